@@ -1,6 +1,7 @@
 //! A domain's folder: the PDDL text, what may be said, the known objects and the scenes.
 
 mod names;
+mod program_texts;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,8 @@ use crate::config::{self, Config};
 use crate::function::Functions;
 use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
+
+pub use program_texts::program_texts;
 
 /// The domains that come with the program.
 static BUILT_IN: [(&str, Dir<'_>); 5] = [

@@ -16,7 +16,7 @@ use crate::plan::{EPSILON_S, Plan};
 use crate::search::classical::plan_classical;
 use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
-use crate::validate::validate;
+use crate::validate::validate_until;
 
 /// Plans.
 ///
@@ -206,8 +206,12 @@ fn search_for(
     // What searches know of preferences may be less than what the validator counts.
     let least = Cell::new(f64::INFINITY);
     let sign = if original.metric.as_ref().is_none_or(|metric| metric.minimise) { 1.0 } else { -1.0 };
+    let unchecked = Cell::new(false);
     let check = |plan| {
-        let plan = checked(original, attachments, plan)?;
+        let Some(plan) = checked(original, attachments, plan, stop)? else {
+            unchecked.set(true);
+            return Ok(None);
+        };
         let cost = sign * plan.cost.unwrap_or(0.0);
         let better = original.preferences.is_empty() || cost < least.get();
         least.set(least.get().min(cost));
@@ -217,11 +221,23 @@ fn search_for(
         // Violations are numbers that the original does not have.
         let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
         let outcome = plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan)?;
-        return Ok((outcome, earns));
+        return Ok((found_at_least(outcome, unchecked.get()), earns));
     }
     let outcome =
         plan_in_time((task, &grounded), attachments, limits(options, memory), stop, &check, on_plan)?;
-    Ok((outcome, earns))
+    Ok((found_at_least(outcome, unchecked.get()), earns))
+}
+
+/// Where a plan was found and there was no time left to validate it, nothing is proven.
+fn found_at_least(outcome: Outcome, unchecked: bool) -> Outcome {
+    match outcome {
+        Outcome::Unsolvable { statistics, .. } if unchecked => Outcome::OutOfTime { best: None, statistics },
+        Outcome::Solved { plan, mut statistics } if unchecked => {
+            statistics.optimal = false;
+            Outcome::OutOfTime { best: Some(plan), statistics }
+        }
+        outcome => outcome,
+    }
 }
 
 /// Plans for a grounded task with times, calls or costs that depend on states.
@@ -365,9 +381,14 @@ fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -
     Plan { steps: steps.collect(), ..Plan::default() }
 }
 
-/// Every plan that leaves this crate has passed the validator. No search looks at constraints that ask for times or attachments:
-/// a plan that breaks nothing else is refused.
-fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Plan, PlanError> {
+/// Every plan that leaves this crate has passed the validator: none where that is stopped. No search looks at constraints that ask for
+/// times or attachments: a plan that breaks nothing else is refused.
+fn checked(
+    task: &Task,
+    attachments: &Attachments,
+    mut plan: Plan,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Option<Plan>, PlanError> {
     plan.steps.retain(|step| !step.action.contains(' '));
     if !task.init.timed.is_empty() && plan.makespan_s().is_none() {
         give_times(task, &mut plan);
@@ -375,19 +396,20 @@ fn checked(task: &Task, attachments: &Attachments, mut plan: Plan) -> Result<Pla
     // What is left of rounding goes, unless the plan rests on it.
     let tidy = plan.tidy();
     if tidy != plan {
-        let verdict = validate(task, attachments, &tidy);
+        let Some(verdict) = validate_until(task, attachments, &tidy, stop) else { return Ok(None) };
         if verdict.valid {
-            return Ok(Plan { cost: verdict.cost, ..tidy });
+            return Ok(Some(Plan { cost: verdict.cost, ..tidy }));
         }
     }
-    let verdict = validate(task, attachments, &plan);
+    let Some(verdict) = validate_until(task, attachments, &plan, stop) else { return Ok(None) };
     if verdict.valid {
-        return Ok(Plan { cost: verdict.cost, ..plan });
+        return Ok(Some(Plan { cost: verdict.cost, ..plan }));
     }
     if task.constraints.iter().any(|constraint| constraint.preference.is_none()) {
         let mut free = task.clone();
         free.constraints.retain(|constraint| constraint.preference.is_some());
-        if validate(&free, attachments, &plan).valid {
+        let Some(freely) = validate_until(&free, attachments, &plan, stop) else { return Ok(None) };
+        if freely.valid {
             let help = "checked, but not planned for: `always-within`, `hold-during` and `hold-after`, `within` where actions take no \
                  time, and what attachments say or changes by itself; ask for the same in conditions and the goal";
             let explained = |finding: Diagnostic| finding.with_help(help);

@@ -84,6 +84,29 @@ fn findings_are_plain_data_too() {
     insta::assert_json_snapshot!("predicate-typo-data", findings);
 }
 
+/// A slip of the pen in the first action of the sound domain, and what helps.
+const PLACES: [(&str, &str, &str); 5] = [
+    ("(on ?d ?p) (hand-free))", "(on d ?p) (hand-free))", "did you mean `?d`?"),
+    ("(on ?d ?p) (hand-free))", "[on ?d ?p] (hand-free))", "is written `(on …)`"),
+    ("(on ?d ?p) (hand-free))", "(at start (on ?d ?p)) (hand-free))", "stands in a `:durative-action` alone"),
+    ("?d - dish", "?d \u{2013} dish", "it is read as `-`; type one here"),
+    ("(and (on ?d ?p)", "(and\u{a0}(on ?d ?p)", "it is read as a plain blank; type one here"),
+];
+
+#[test]
+fn what_is_meant_is_offered() {
+    let text = source("base-domain.pddl").text;
+    let first = text.find("(:action").expect("an action");
+    for (from, to, help) in PLACES {
+        assert!(text[first..].contains(from), "{from}");
+        let faulty = format!("{}{}", &text[..first], text[first..].replacen(from, to, 1));
+        let found = check(&Source::new("domain", faulty), None);
+        // One slip, one finding.
+        let [finding] = &found.list[..] else { panic!("{from} {to}: {}", found.render(false)) };
+        assert!(finding.help.as_deref().is_some_and(|said| said.contains(help)), "{from} {to}: {finding:?}");
+    }
+}
+
 #[test]
 fn a_carriage_return_alone_ends_a_line() {
     let text = source("predicate-typo.pddl").text.replace("(define", "; a comment\n(define");

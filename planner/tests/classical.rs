@@ -204,7 +204,10 @@ fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
     for (body, goal) in [
         // Nothing fits what is asked of the last two.
         (
-            format!(":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h))) :effect (done)"),
+            format!(
+                ":parameters ({variables}) :precondition (and (= ?g ?h) (not (= ?g ?h)))
+                 :effect (and (done) (met {variables}))"
+            ),
             "(done)".to_string(),
         ),
         (
@@ -212,7 +215,14 @@ fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
             "(done)".into(),
         ),
         (simply.clone(), format!("(forall ({variables}) (or (done) (met {variables})))")),
-        (simply, format!("(exists ({variables}) (and (done) (not (= ?a ?b))))")),
+        (simply.clone(), format!("(exists ({variables}) (and (done) (not (= ?a ?b))))")),
+        // What never changes decides, but only once all objects were tried.
+        (
+            format!(
+                ":parameters () :precondition (forall ({variables}) (not (met {variables}))) :effect (done)"
+            ),
+            "(done)".into(),
+        ),
     ] {
         let domain = format!(
             "(define (domain d) (:requirements :adl) (:predicates (done) (met {variables})) (:action meet {body}))"
@@ -227,6 +237,37 @@ fn grounding_hears_the_stop_signal_where_it_finds_nothing() {
             &mut |_| {},
         );
         assert!(matches!(found, Ok(Outcome::OutOfTime { best: None, .. })), "{found:?}");
+    }
+}
+
+#[test]
+fn a_parameter_that_nothing_uses_takes_no_objects_but_one() {
+    let objects: String = (0..60).map(|index| format!(" o{index}")).collect();
+    for (unused, body, actions) in [
+        ("?u ?v ?w", ":precondition (not (met ?a)) :effect (met ?a)", 60),
+        ("", ":precondition (not (met ?a)) :effect (met ?a)", 60),
+        ("?u", ":precondition (not (met ?a)) :effect (and (met ?a) (when (met ?u) (done)))", 60 * 60),
+        (
+            "?u",
+            ":precondition (not (met ?a)) :effect (and (met ?a) (forall (?x) (when (met ?x) (done))))",
+            60,
+        ),
+        ("?u", ":precondition (not (= ?a ?u)) :effect (met ?a)", 60 * 59),
+        ("?u", ":effect (and (met ?a) (increase (total-cost) (price ?u)))", 60 * 60),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl :action-costs) (:predicates (done) (met ?x))
+              (:functions (total-cost) (price ?x)) (:action meet :parameters (?a {unused}) {body}))"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects{objects}) (:init (= (total-cost) 0) (= (price o1) 3) (= (price o2) 1))
+              (:goal (and (met o1) (met o2))) (:metric minimize (total-cost)))"
+        );
+        let (outcome, _) = solve_twice(&domain, &problem, &Options { anytime: true, ..Options::default() });
+        assert_eq!(outcome.plan().map(|plan| plan.steps.len()), Some(2), "{unused} {body}: {outcome:?}");
+        // Without a price there is no such action.
+        let actions = if body.contains("price") { 2 * 60 } else { actions };
+        assert!(outcome.statistics().actions <= actions, "{unused} {body}: {outcome:?}");
     }
 }
 

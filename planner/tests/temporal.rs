@@ -80,6 +80,24 @@ fn what_an_end_builds_on_comes_before_it_though_it_starts_later() {
 }
 
 #[test]
+fn what_is_read_of_an_object_that_a_value_names_is_kept_apart_from_its_change() {
+    // No place that can be come to is ever burnt: which one it is does not matter to resting, but is read.
+    let domain = "(:requirements :adl :object-fluents) (:types place) (:constants a b c - place)
+      (:predicates (burnt ?p - place) (done) (lit ?p - place)) (:functions (spot) - place (beside ?p - place) - place)
+      (:durative-action come :parameters () :duration (= ?duration 1) :effect (at end (assign (spot) c)))
+      (:durative-action rest :parameters () :duration (= ?duration 2)
+        :condition (and (at start (not (burnt (spot)))) (over all (= (spot) c))) :effect (at end (done)))
+      (:durative-action turn :parameters () :duration (= ?duration 1) :effect (at end (assign (beside c) a)))
+      (:durative-action light :parameters () :duration (= ?duration 2)
+        :condition (and (at start (not (burnt (beside (spot))))) (over all (= (beside c) a)) (at end (done)))
+        :effect (at end (lit a)))";
+    check(domain, "(:init (burnt b)) (:goal (done))", Some(3.0));
+    check(domain, "(:init (burnt b)) (:goal (and (done) (lit a)))", Some(3.0));
+    // What is given at a time is such a change, too.
+    check(domain, "(:init (at 1 (= (spot) c))) (:goal (done))", Some(3.0));
+}
+
+#[test]
 fn what_flows_is_read_before_it_begins_to_flow_or_after_it_ends() {
     let domain = "(:requirements :numeric-fluents) (:predicates (ready) (dry) (wet) (known)) (:functions (level) (reading) (rate))
       (:durative-action prepare :parameters () :duration (= ?duration 2) :effect (at end (ready)))

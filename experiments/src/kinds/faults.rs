@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::trial::{self, Measured, Trial};
-use super::{Head, Kind, Summary, parse, refuse};
+use super::{Head, Kind, Summary, inputs_of, parse, refuse};
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::statistics::{self, Observation};
@@ -150,13 +150,7 @@ impl Kind for Faults {
     }
 
     fn inputs(&self) -> Vec<(String, String)> {
-        vec![
-            ("scene".into(), format!("{:?}", self.spec)),
-            (
-                "domain".into(),
-                format!("{}{:?}{:?}", self.domain.pddl.text, self.domain.config, self.domain.objects),
-            ),
-        ]
+        inputs_of(&self.domain, format!("{:?}", self.spec), std::iter::empty())
     }
 
     fn jobs(&self) -> Vec<Job> {

@@ -132,7 +132,10 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
         .flat_map(|(at, set)| (0..set.arrangements).map(move |n| (at, set.first_seed.wrapping_add(n))));
     let head = Head { name: text.name.clone(), kind: text.kind.clone(), about: text.about.clone() };
     let jobs = jobs.collect();
-    let inputs = vec![("scene".into(), format!("{spec:?}")), ("models".into(), format!("{models:?}"))];
+    let bodies = text.sets.iter().filter_map(|set| set.robot.as_ref()).flat_map(OtherBody::texts);
+    let bodies = bodies.map(|(path, text)| (path.display().to_string(), text));
+    let inputs = [("scene".into(), format!("{spec:?}")), ("models".into(), format!("{models:?}"))];
+    let inputs = inputs.into_iter().chain(bodies).collect();
     Ok(Box::new(Figure4 { head, inputs, spec, models, recognisers, jobs, text }))
 }
 

@@ -6,9 +6,11 @@ mod tasks;
 mod trial;
 mod where_to_look;
 
-use descry_agent::stop::Stop;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
+use descry_agent::stop::Stop;
+use descry_domains::load::{Domain, program_texts};
 use descry_robots::input::{self, Objection, Step};
 use serde::Deserialize;
 
@@ -27,7 +29,7 @@ pub trait Kind: Send + Sync {
     /// What every experiment file says.
     fn head(&self) -> &Head;
 
-    /// Other texts that the results depend on, by name: scenes, domain. They count in the experiment's hash.
+    /// Other texts that the results depend on, by name: scenes, domain, programs. They count in the experiment's hash.
     fn inputs(&self) -> Vec<(String, String)>;
 
     /// Every combination, in an order that is always the same.
@@ -56,6 +58,19 @@ pub struct Head {
     pub about: String,
 }
 
+/// What runs in a domain depend on, by name.
+fn inputs_of<'b>(
+    domain: &Domain,
+    scenes: String,
+    bodies: impl Iterator<Item = &'b OtherBody>,
+) -> Vec<(String, String)> {
+    let Domain { pddl, config, objects, shapes, .. } = domain;
+    let read = format!("{}{config:?}{objects:?}{shapes:?}", pddl.text);
+    let programs = domain.program_texts().into_iter().chain(bodies.flat_map(OtherBody::texts));
+    let programs = programs.map(|(path, text)| (path.display().to_string(), text));
+    [("scene".into(), scenes), ("domain".into(), read)].into_iter().chain(programs).collect()
+}
+
 /// A body other than our simulator, as an experiment file names it: `program:COMMAND`. Its runs differ by seed and are held against
 /// the truth, so the command takes both.
 #[derive(Debug, Clone, Deserialize)]
@@ -66,6 +81,11 @@ impl OtherBody {
     /// The program's command line, with places for seed and truth.
     fn command(&self) -> &str {
         &self.0
+    }
+
+    /// What the program is made of.
+    fn texts(&self) -> BTreeMap<PathBuf, String> {
+        program_texts(self.0.split_whitespace(), Path::new("."))
     }
 }
 

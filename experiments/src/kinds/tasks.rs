@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::trial::{self, Trial};
-use super::{Head, Kind, OtherBody, Summary, parse, refuse};
+use super::{Head, Kind, OtherBody, Summary, inputs_of, parse, refuse};
 use crate::{ExperimentError, Job, Numbered, Outcome, Source};
 use descry_agent::body;
 
@@ -278,8 +278,8 @@ impl Kind for Tasks {
     }
 
     fn inputs(&self) -> Vec<(String, String)> {
-        let domain = format!("{}{:?}{:?}", self.domain.pddl.text, self.domain.config, self.domain.objects);
-        vec![("scene".into(), format!("{:?}", self.spec)), ("domain".into(), domain)]
+        let bodies = self.text.cases.iter().filter_map(|case| case.robot.as_ref());
+        inputs_of(&self.domain, format!("{:?}", self.spec), bodies)
     }
 
     fn jobs(&self) -> Vec<Job> {

@@ -43,6 +43,15 @@ fn files_that_name_other_bodies_are_read() {
     }
 }
 
+#[test]
+fn programs_of_a_domain_count_as_inputs() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../domains/multi-object-search");
+    let domain = Domain::load(folder).unwrap_or_else(|e| panic!("{e}"));
+    let inputs = inputs_of(&domain, String::new(), std::iter::empty());
+    let program = inputs.iter().find(|(name, _)| name.ends_with("world.py"));
+    assert!(program.is_some_and(|(_, text)| text.contains("def ")), "{inputs:?}");
+}
+
 /// The template robot, and a file that says how its room is in truth: there is nothing that the camera could not see, or a cup A
 /// that it does not show.
 const TELLING: &str = r#"

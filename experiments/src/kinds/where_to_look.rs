@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::trial::{self, Trial};
-use super::{Head, Kind, Summary, parse, refuse};
+use super::{Head, Kind, Summary, inputs_of, parse, refuse};
 use crate::{ExperimentError, Job, Numbered, Outcome, Source};
 use descry_agent::body;
 use descry_domains::abilities::searching::policies;
@@ -219,13 +219,7 @@ impl Kind for WhereToLook {
     }
 
     fn inputs(&self) -> Vec<(String, String)> {
-        vec![
-            ("scene".into(), format!("{:?}", self.specs)),
-            (
-                "domain".into(),
-                format!("{}{:?}{:?}", self.domain.pddl.text, self.domain.config, self.domain.objects),
-            ),
-        ]
+        inputs_of(&self.domain, format!("{:?}", self.specs), std::iter::empty())
     }
 
     fn jobs(&self) -> Vec<Job> {

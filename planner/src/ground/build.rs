@@ -18,7 +18,7 @@ use super::reach::Reach;
 use super::relaxed;
 use super::relevant::{self, Relevant};
 use super::rules::{self, Rules};
-use super::statics::Statics;
+use super::statics::{Statics, Tries};
 use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
 
 /// Why a task was not grounded.
@@ -63,7 +63,7 @@ pub(crate) fn ground_with(
     let normal = normal::normalise(task);
     let mut atoms = Atoms::new(normal.predicate_count, task.objects.len());
     let rules = rules::make(task, &normal, &mut || atoms.add_predicate());
-    let statics = statics(task, &normal, &rules);
+    let statics = statics(task, &normal, &rules, stop);
     insert_initial(task, &mut atoms);
     let limit = memory_limit_bytes.map_or(usize::MAX / 2, |bytes| bytes / BYTES_AN_INSTANCE);
     let mut reach = Reach {
@@ -84,13 +84,10 @@ pub(crate) fn ground_with(
     }
     drop(span);
     let (atoms, instances) = (reach.atoms, reach.instances);
-    let mut make = Instantiate::new(&statics, atoms, stop);
+    let mut make = Instantiate::new(&statics, atoms);
     let _span = debug_span!("instantiate").entered();
     mark_always(task, &normal, &instances, &mut make, stop)?;
     let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make, stop)?;
-    if make.stopped {
-        return Err(GroundError::Stopped);
-    }
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
@@ -155,7 +152,12 @@ fn widths(task: &Task) -> Result<(), GroundError> {
     }
 }
 
-fn statics<'a>(task: &'a Task, normal: &Normal, rules: &Rules) -> Statics<'a> {
+fn statics<'a>(
+    task: &'a Task,
+    normal: &Normal,
+    rules: &Rules,
+    stop: &'a (dyn Fn() -> bool + Sync),
+) -> Statics<'a> {
     let mut written = vec![false; task.functions.len()];
     for action in &normal.actions {
         for effect in action.start_effects.iter().chain(&action.end_effects) {
@@ -188,7 +190,8 @@ fn statics<'a>(task: &'a Task, normal: &Normal, rules: &Rules) -> Statics<'a> {
     let number = |(fluent, value): &(crate::task::GroundFluent, f64)| {
         ((fluent.function.0, fluent.arguments.iter().map(|o| o.0).collect()), *value)
     };
-    Statics { task, fluent, written, numbers: task.init.numbers.iter().map(number).collect() }
+    let numbers = task.init.numbers.iter().map(number).collect();
+    Statics { task, fluent, written, numbers, tries: Tries::new(stop) }
 }
 
 /// Predicate and arguments of an object function with a value.
@@ -321,7 +324,8 @@ fn instantiate(
     stop: &dyn Fn() -> bool,
 ) -> Result<(RawTask, bool), GroundError> {
     let top = normal.rules.iter().map(|r| r.stratum + 1).max().unwrap_or(0);
-    let mut resolve = Resolve::new(make.atoms.len() as u32);
+    let statics = make.statics;
+    let mut resolve = Resolve::new(make.atoms.len() as u32, &statics.tries);
     let mut axioms = Vec::new();
     for (i, alternative) in rules.alternatives.iter().enumerate() {
         let list = std::mem::take(&mut instances[normal.actions.len() + i]);
@@ -341,10 +345,10 @@ fn instantiate(
     let mut goal = Clauses::default();
     let mut binding = vec![NONE; normal.goal_domains.len()];
     let possible = make.conjoin(&normal.goal, &mut binding, &normal.goal_domains, &mut goal);
-    if make.stopped {
+    let goal = resolve.flat(goal, top);
+    if statics.tries.are_stopped() {
         return Err(GroundError::Stopped);
     }
-    let goal = resolve.flat(goal, top);
     axioms.append(&mut resolve.axioms);
     axioms.sort_by_key(|a: &RawAxiom| a.stratum);
     let timed = timed(task, make);
@@ -364,7 +368,7 @@ fn axioms_of(
     alternative: &rules::Alternative,
     list: &[u32],
     make: &mut Instantiate<'_>,
-    resolve: &mut Resolve,
+    resolve: &mut Resolve<'_>,
     axioms: &mut Vec<RawAxiom>,
 ) {
     let rule = &normal.rules[alternative.rule];
@@ -391,7 +395,7 @@ fn raw_actions(
     action: &Action_,
     binding: &mut Vec<u32>,
     make: &mut Instantiate<'_>,
-    resolve: &mut Resolve,
+    resolve: &mut Resolve<'_>,
     top: u32,
     out: &mut Vec<RawAction>,
 ) {
@@ -430,7 +434,7 @@ fn later(
     bounds: &[(bool, crate::task::Comparison, Number)],
     binding: &mut Vec<u32>,
     make: &mut Instantiate<'_>,
-    resolve: &mut Resolve,
+    resolve: &mut Resolve<'_>,
     top: u32,
 ) -> Option<Later> {
     let (mut over_all, mut end) = (Clauses::default(), Clauses::default());
@@ -473,7 +477,7 @@ fn never(effects: &[GroundEffect]) -> bool {
     effects.iter().any(|effect| effect.when.is_none() && fails(effect))
 }
 
-fn flatten(effects: &mut [GroundEffect], resolve: &mut Resolve, top: u32) {
+fn flatten(effects: &mut [GroundEffect], resolve: &mut Resolve<'_>, top: u32) {
     for effect in effects {
         for clauses in effect.when.iter_mut().flat_map(|w| w.iter_mut()) {
             if !clauses.ors.is_empty() {

@@ -116,18 +116,10 @@ pub(super) struct Instantiate<'a> {
     comparison_ids: FxHashMap<Vec<u64>, u32>,
     /// Numbers of calls, as atoms of their module.
     call_ids: Atoms,
-    stop: &'a dyn Fn() -> bool,
-    /// Objects that were tried for quantified variables.
-    tried: u32,
-    /// Whether it was asked to stop: then what was made since is not whole.
-    pub stopped: bool,
 }
 
-/// Objects that are tried before it is asked again whether to stop.
-const TRIED_AT_ONCE: u32 = 4096;
-
 impl<'a> Instantiate<'a> {
-    pub(super) fn new(statics: &'a Statics<'a>, atoms: Atoms, stop: &'a dyn Fn() -> bool) -> Self {
+    pub(super) fn new(statics: &'a Statics<'a>, atoms: Atoms) -> Self {
         let always = vec![false; atoms.len()];
         Instantiate {
             statics,
@@ -139,19 +131,7 @@ impl<'a> Instantiate<'a> {
             numeric_ids: FxHashMap::default(),
             comparison_ids: FxHashMap::default(),
             call_ids: Atoms::new(statics.task.modules.len(), statics.task.objects.len()),
-            stop,
-            tried: 0,
-            stopped: false,
         }
-    }
-
-    /// Counts one more binding that is tried; `false` once nothing more is to be tried.
-    fn goes_on(&mut self) -> bool {
-        self.tried = self.tried.wrapping_add(1);
-        if self.tried.is_multiple_of(TRIED_AT_ONCE) {
-            self.stopped |= (self.stop)();
-        }
-        !self.stopped
     }
 
     /// Adds the formula to a condition; `false` where it can never hold.
@@ -177,7 +157,7 @@ impl<'a> Instantiate<'a> {
                 true
             }
             Formula::Forall(slots, body) => each(slots, binding, domains, &mut |binding| {
-                self.goes_on() && self.conjoin(body, binding, domains, into)
+                self.statics.tries.go_on() && self.conjoin(body, binding, domains, into)
             }),
             Formula::Or(parts) => {
                 let mut branches = Vec::new();
@@ -463,7 +443,7 @@ impl<'a> Instantiate<'a> {
         domains: &[Arc<[ObjectId]>],
         body: &mut dyn FnMut(&mut Self, &mut Vec<u32>),
     ) {
-        if !self.goes_on() {
+        if !self.statics.tries.go_on() {
             return;
         }
         let mut best: Option<(u32, usize)> = None;

@@ -3,6 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use super::instantiate::{Clauses, Deed, GroundEffect};
+use super::statics::Tries;
 use super::task::{DurationBound, Expression};
 
 /// A disjunctive condition gives at most this many copies of its action; beyond, it becomes a derived variable.
@@ -51,16 +52,17 @@ pub(super) struct RawTask {
 }
 
 /// Replaces disjunctions by derived atoms.
-pub(super) struct Resolve {
+pub(super) struct Resolve<'a> {
     next: u32,
+    tries: &'a Tries<'a>,
     known: FxHashMap<Vec<Clauses>, u32>,
     pub axioms: Vec<RawAxiom>,
 }
 
-impl Resolve {
-    /// Numbers new atoms from `next` on.
-    pub(super) fn new(next: u32) -> Self {
-        Resolve { next, known: FxHashMap::default(), axioms: Vec::new() }
+impl<'a> Resolve<'a> {
+    /// Numbers new atoms from `next` on. Once nothing more is to be tried, what it makes is not whole.
+    pub(super) fn new(next: u32, tries: &'a Tries<'a>) -> Self {
+        Resolve { next, tries, known: FxHashMap::default(), axioms: Vec::new() }
     }
 
     /// How many atoms there are now.
@@ -71,6 +73,9 @@ impl Resolve {
     /// The condition with every disjunction as one derived atom.
     pub(super) fn flat(&mut self, mut clauses: Clauses, stratum: u32) -> Clauses {
         for or in std::mem::take(&mut clauses.ors) {
+            if !self.tries.go_on() {
+                break;
+            }
             clauses.literals.push(self.derived(or, stratum) << 1);
         }
         clauses.tidy();
@@ -81,7 +86,13 @@ impl Resolve {
         if let Some(&atom) = self.known.get(&branches) {
             return atom;
         }
-        let bodies: Vec<Clauses> = branches.iter().map(|b| self.flat(b.clone(), stratum)).collect();
+        let mut bodies = Vec::with_capacity(branches.len());
+        for branch in &branches {
+            if !self.tries.go_on() {
+                break;
+            }
+            bodies.push(self.flat(branch.clone(), stratum));
+        }
         let head = self.next;
         self.next += 1;
         self.axioms.extend(bodies.into_iter().map(|body| RawAxiom { head, body, stratum }));

@@ -44,6 +44,9 @@ pub(super) trait Possible {
         binding: &mut Vec<u32>,
         domains: &[Arc<[ObjectId]>],
     ) -> bool;
+
+    /// Whether it was asked to stop: then what was said since means nothing.
+    fn is_stopped(&self) -> bool;
 }
 
 /// Who ended the work before it was done.
@@ -222,7 +225,11 @@ impl<P: Possible> Reach<'_, P> {
     fn fire(&mut self, join: &mut Join<'_>) -> Result<(), Stopped> {
         let rule = join.rule;
         for filter in &rule.filters {
-            if !self.possible.possible(&self.atoms, filter, &mut join.binding, join.domains) {
+            let possible = self.possible.possible(&self.atoms, filter, &mut join.binding, join.domains);
+            if self.possible.is_stopped() {
+                return Err(Stopped);
+            }
+            if !possible {
                 return Ok(());
             }
         }

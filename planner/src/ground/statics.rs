@@ -1,5 +1,6 @@
 //! What no action changes: evaluated away while grounding.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -20,6 +21,38 @@ pub(super) struct Statics<'a> {
     pub written: Vec<bool>,
     /// The initial numbers.
     pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
+    /// Who is asked now and then whether to stop.
+    pub tries: Tries<'a>,
+}
+
+/// Objects that are tried for quantified variables, until it is asked to stop.
+pub(super) struct Tries<'a> {
+    stop: &'a dyn Fn() -> bool,
+    tried: Cell<u32>,
+    stopped: Cell<bool>,
+}
+
+/// Objects that are tried before it is asked again whether to stop.
+const TRIED_AT_ONCE: u32 = 4096;
+
+impl<'a> Tries<'a> {
+    pub(super) fn new(stop: &'a dyn Fn() -> bool) -> Self {
+        Tries { stop, tried: Cell::new(0), stopped: Cell::new(false) }
+    }
+
+    /// Counts one more object that is tried; `false` once nothing more is to be tried.
+    pub(super) fn go_on(&self) -> bool {
+        self.tried.set(self.tried.get().wrapping_add(1));
+        if self.tried.get().is_multiple_of(TRIED_AT_ONCE) && (self.stop)() {
+            self.stopped.set(true);
+        }
+        !self.stopped.get()
+    }
+
+    /// Whether it was asked to stop: then what was made since is not whole.
+    pub(super) fn are_stopped(&self) -> bool {
+        self.stopped.get()
+    }
 }
 
 impl Statics<'_> {
@@ -74,13 +107,17 @@ impl Possible for &Statics<'_> {
                 }
             }
             Formula::Call(..) => true,
-            Formula::Forall(slots, body) => {
-                each(slots, binding, domains, &mut |binding| self.possible(atoms, body, binding, domains))
-            }
-            Formula::Exists(slots, body) => {
-                !each(slots, binding, domains, &mut |binding| !self.possible(atoms, body, binding, domains))
-            }
+            Formula::Forall(slots, body) => each(slots, binding, domains, &mut |binding| {
+                self.tries.go_on() && self.possible(atoms, body, binding, domains)
+            }),
+            Formula::Exists(slots, body) => !each(slots, binding, domains, &mut |binding| {
+                self.tries.go_on() && !self.possible(atoms, body, binding, domains)
+            }),
         }
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.tries.are_stopped()
     }
 }
 

@@ -189,6 +189,7 @@ pub fn read(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<D
         line_start: 0,
         fresh_line: true,
         too_deep: false,
+        odd: [false; 2],
         findings,
     };
     builder.tree.nodes.reserve(text.len() / 6);
@@ -214,7 +215,20 @@ struct Builder<'a> {
     line_start: usize,
     fresh_line: bool,
     too_deep: bool,
+    /// Whether it was said that blanks, and that hyphens, are not those of PDDL.
+    odd: [bool; 2],
     findings: &'a mut Vec<Diagnostic>,
+}
+
+/// What texts that were copied from elsewhere have for a blank or for nothing: no-break, thin and ideographic ones, and what has no width.
+fn is_odd_blank(sign: char) -> bool {
+    !sign.is_ascii() && sign.is_whitespace()
+        || matches!(sign, '\u{200b}'..='\u{200d}' | '\u{2060}' | '\u{feff}')
+}
+
+/// Whether a word is what word processors make of a hyphen: a dash or a minus sign.
+fn is_odd_hyphen(word: &str) -> bool {
+    matches!(word, "\u{2010}" | "\u{2011}" | "\u{2012}" | "\u{2013}" | "\u{2014}" | "\u{2212}")
 }
 
 impl Builder<'_> {
@@ -242,14 +256,37 @@ impl Builder<'_> {
                     self.close_list(at);
                     at += 1;
                 }
-                _ => {
-                    let end = self.word_end(at);
-                    self.word(at, end, symbols);
-                    at = end;
-                }
+                _ => at = self.word_or_blank(at, symbols),
             }
         }
         self.finish();
+    }
+
+    /// Reads a word, or skips what stands for a blank; gives where it ends.
+    fn word_or_blank(&mut self, at: usize, symbols: &mut Symbols) -> usize {
+        let end = self.word_end(at);
+        let word = &self.text[at..end];
+        let blank =
+            (!word.is_ascii()).then(|| word.char_indices().find(|(_, sign)| is_odd_blank(*sign))).flatten();
+        match blank {
+            Some((0, sign)) => {
+                let end = at + sign.len_utf8();
+                let message = format!("this blank is not a plain one, but U+{:04X}", u32::from(sign));
+                self.odd(0, message, self.span(at, end), "it is read as a plain blank; type one here");
+                return end;
+            }
+            Some((before, _)) => self.word(at, at + before, symbols),
+            None => self.word(at, end, symbols),
+        }
+        blank.map_or(end, |(before, _)| at + before)
+    }
+
+    /// Says once of each kind that a sign is not the one of PDDL for which it is read.
+    fn odd(&mut self, kind: usize, message: String, span: Span, help: &str) {
+        if !std::mem::replace(&mut self.odd[kind], true) {
+            let finding = Diagnostic::warning("odd-sign", message, span, "other planners do not read this");
+            self.findings.push(finding.with_help(help));
+        }
     }
 
     /// A word ends at a delimiter; a question mark begins the next one, so that `at?x` is read as two.
@@ -351,6 +388,13 @@ impl Builder<'_> {
         if text.starts_with(':') && ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(text)) {
             self.expect_action_part(start, end);
         }
+        let text = if is_odd_hyphen(text) {
+            let message = format!("`{text}` is not the hyphen `-` of PDDL");
+            self.odd(1, message, self.span(start, end), "it is read as `-`; type one here");
+            "-"
+        } else {
+            text
+        };
         let next = self.tree.nodes.len() as u32 + 1;
         if text.len() > 1 && text.starts_with('-') {
             // `?x -block` with its space missing names a type.

@@ -86,6 +86,9 @@ impl Semantics<'_> {
     ) -> Result<bool, CallFailure> {
         let Some((first, rest)) = variables.split_first() else { return test(binding) };
         for &object in first.parameter.objects.iter() {
+            if !self.go_on() {
+                break;
+            }
             binding.set(first.slot, object);
             if self.some_binding(rest, binding, test)? {
                 return Ok(true);

@@ -12,6 +12,7 @@ pub(crate) mod effects;
 pub(crate) mod reads;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use crate::attachment::{AttachmentError, Attachments};
 use crate::diagnostic::{Diagnostic, Findings, Span};
@@ -95,11 +96,28 @@ pub struct Semantics<'a> {
     module_names: Vec<Arc<str>>,
     /// By predicate, whether something may change it.
     changing: Vec<bool>,
+    stop: &'a (dyn Fn() -> bool + Sync),
+    /// Objects that were tried for quantified variables.
+    tried: AtomicU32,
+    stopped: AtomicBool,
 }
+
+/// Objects that are tried before it is asked again whether to stop.
+const TRIED_AT_ONCE: u32 = 4096;
 
 impl<'a> Semantics<'a> {
     /// A task with its attachments. A module without one fails when it is called.
     pub fn new(task: &'a Task, attachments: &'a Attachments) -> Semantics<'a> {
+        Self::until(task, attachments, &|| false)
+    }
+
+    /// The same; once `stop` says true, no further objects are tried, and nothing that is said means anything
+    /// ([`Semantics::is_stopped`]).
+    pub(crate) fn until(
+        task: &'a Task,
+        attachments: &'a Attachments,
+        stop: &'a (dyn Fn() -> bool + Sync),
+    ) -> Semantics<'a> {
         let bound = task.modules.iter().map(|module| {
             attachments.resolve(&module.function, &module.name).unwrap_or(&module.function).to_string()
         });
@@ -110,7 +128,24 @@ impl<'a> Semantics<'a> {
             object_names: task.objects.iter().map(|object| object.name.as_str().into()).collect(),
             module_names: task.modules.iter().map(|module| module.name.as_str().into()).collect(),
             changing: reads::changing(task),
+            stop,
+            tried: AtomicU32::new(0),
+            stopped: AtomicBool::new(false),
         }
+    }
+
+    /// Whether it was asked to stop, and something may have been left out.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Counts one more object that is tried; `false` once nothing more is to be tried.
+    fn go_on(&self) -> bool {
+        let tried = self.tried.fetch_add(1, Ordering::Relaxed);
+        if tried % TRIED_AT_ONCE == TRIED_AT_ONCE - 1 && (self.stop)() {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        !self.is_stopped()
     }
 
     /// The initial state with its derived facts.

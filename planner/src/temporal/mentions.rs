@@ -12,8 +12,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::plan::EPSILON_S;
 use crate::semantics::reads::depends_on;
 use crate::task::{
-    Assignment, Atom, Change, Condition, Expression, Fluent, GroundChange, ObjectId, PredicateId, Quantified,
-    Task, Term,
+    Assignment, Change, Condition, Expression, GroundChange, PredicateId, Quantified, Task, Term,
 };
 
 use super::advance::Step;
@@ -26,11 +25,15 @@ const MOST_ROUNDS: usize = 100;
 /// After so many happenings that were compared with their neighbours, it asks whether to stop.
 const TOUCHES_A_LOOK: usize = 1024;
 
-/// A ground atom or number by its name: whether it is a number, predicate or function, arguments.
+/// A predicate or a function: whether it is a function, its number.
+type Place = (bool, u32);
+/// A ground atom, or a function's ground instance, by its name: whether it is a function, predicate or function, arguments.
 type Name = (bool, u32, Vec<u32>);
 
-/// In place of arguments: all instances of a predicate.
+/// In place of arguments: all instances of a predicate or function.
 const ALL: u32 = u32::MAX;
+/// In place of arguments: one instance, which one a state decides.
+const SOME: u32 = u32::MAX - 1;
 /// In place of a step: a timed literal.
 const GIVEN: usize = usize::MAX;
 
@@ -126,15 +129,16 @@ fn touches(
     for timed in &space.world.task.init.timed {
         let mut uses = Uses::default();
         match &timed.change {
-            GroundChange::Add(fact) => named.changed(fact.predicate, &fact.arguments, Use::Adds, &mut uses),
-            GroundChange::Delete(fact) => {
-                named.changed(fact.predicate, &fact.arguments, Use::Deletes, &mut uses);
+            GroundChange::Add(fact) | GroundChange::Delete(fact) => {
+                let adds = matches!(timed.change, GroundChange::Add(_));
+                let arguments = fact.arguments.iter().map(|object| object.0).collect();
+                let does = if adds { Use::Adds } else { Use::Deletes };
+                named.written((false, fact.predicate.0), arguments, does, &mut uses);
             }
-            GroundChange::Number(fluent, _) => {
+            GroundChange::Number(fluent, _) | GroundChange::Object(fluent, _) => {
                 let arguments = fluent.arguments.iter().map(|object| object.0).collect();
-                uses.insert(((true, fluent.function.0, arguments), Use::Writes));
+                named.written((true, fluent.function.0), arguments, Use::Writes, &mut uses);
             }
-            GroundChange::Object(..) => {}
         }
         let happening = track.order.push_fixed(&Access::default(), timed.time_s)?;
         note(happening, GIVEN, uses);
@@ -149,6 +153,8 @@ fn touches(
 struct Named {
     /// By derived predicate, the predicates that it depends on; by any other, none.
     roots: Vec<Vec<u32>>,
+    /// Whether objects may be named by what is their function's value: which, a state decides.
+    is_loose: bool,
 }
 
 impl Named {
@@ -163,7 +169,8 @@ impl Named {
             roots.sort_unstable();
             roots
         };
-        Named { roots: (0..task.predicates.len()).map(roots).collect() }
+        let is_loose = task.functions.iter().any(|function| function.result.is_some());
+        Named { roots: (0..task.predicates.len()).map(roots).collect(), is_loose }
     }
 
     /// What the start and the end of an action mention and change.
@@ -189,29 +196,59 @@ impl Named {
     }
 
     fn change(&self, change: &Change, binding: &[u32], into: &mut Uses) {
-        let (atom, does) = match change {
-            Change::Add(atom) => (atom, Use::Adds),
-            Change::Delete(atom) => (atom, Use::Deletes),
+        let (place, terms, does) = match change {
+            Change::Add(atom) => ((false, atom.predicate.0), &atom.arguments, Use::Adds),
+            Change::Delete(atom) => ((false, atom.predicate.0), &atom.arguments, Use::Deletes),
             Change::Number(how, fluent, amount) => {
-                read(amount, binding, into);
+                self.read(amount, binding, into);
                 let adds = matches!(how, Assignment::Increase | Assignment::Decrease);
                 let does = if adds { Use::Adds } else { Use::Writes };
-                into.extend(number(fluent, binding).map(|name| (name, does)));
-                return;
+                ((true, fluent.function.0), &fluent.arguments, does)
             }
-            Change::Object(..) | Change::Call(_) => return,
+            Change::Object(fluent, value) => {
+                self.terms(value.as_slice(), binding, into);
+                ((true, fluent.function.0), &fluent.arguments, Use::Writes)
+            }
+            Change::Call(_) => return,
         };
-        if let Some(arguments) = objects(&atom.arguments, binding) {
-            let arguments: Vec<ObjectId> = arguments.into_iter().map(ObjectId).collect();
-            self.changed(atom.predicate, &arguments, does, into);
+        self.terms(terms, binding, into);
+        match objects(terms, binding) {
+            Some(arguments) => self.written(place, arguments, does, into),
+            None => {
+                into.insert(((place.0, place.1, vec![ALL]), Use::Changes));
+                into.insert(((place.0, place.1, vec![SOME]), Use::Writes));
+            }
         }
     }
 
-    /// Notes a change of a fact, and of all instances of its predicate where they are read as one.
-    fn changed(&self, predicate: PredicateId, arguments: &[ObjectId], does: Use, into: &mut Uses) {
-        let arguments = arguments.iter().map(|object| object.0).collect();
-        into.insert(((false, predicate.0, arguments), does));
-        into.insert(((false, predicate.0, vec![ALL]), Use::Changes));
+    /// Notes a change of an instance, and of all instances of its predicate or function where they are read as one.
+    fn written(&self, (is_function, place): Place, arguments: Vec<u32>, does: Use, into: &mut Uses) {
+        into.insert(((is_function, place, arguments), does));
+        if self.is_loose || !is_function {
+            into.insert(((is_function, place, vec![ALL]), Use::Changes));
+        }
+        if self.is_loose {
+            into.insert(((is_function, place, vec![SOME]), Use::Mentions));
+        }
+    }
+
+    /// Notes that an instance is read, and what says which one.
+    fn mentioned(&self, (is_function, place): Place, terms: &[Term], binding: &[u32], into: &mut Uses) {
+        self.terms(terms, binding, into);
+        let arguments = objects(terms, binding).unwrap_or_else(|| vec![ALL]);
+        into.insert(((is_function, place, arguments), Use::Mentions));
+        if self.is_loose {
+            into.insert(((is_function, place, vec![SOME]), Use::Mentions));
+        }
+    }
+
+    /// Notes the functions whose values terms stand for.
+    fn terms(&self, terms: &[Term], binding: &[u32], into: &mut Uses) {
+        for term in terms {
+            if let Term::Function(fluent) = term {
+                self.mentioned((true, fluent.function.0), &fluent.arguments, binding, into);
+            }
+        }
     }
 
     fn walk(&self, condition: &Condition, binding: &mut [u32], into: &mut Uses) {
@@ -224,22 +261,36 @@ impl Named {
                 every(variables, binding, &mut |binding| self.walk(inner, binding, into));
             }
             Condition::Atom(atom) => {
-                into.extend(name(atom, binding).map(|name| (name, Use::Mentions)));
+                self.mentioned((false, atom.predicate.0), &atom.arguments, binding, into);
                 let roots = self.roots[atom.predicate.index()].iter();
                 into.extend(roots.map(|&root| ((false, root, vec![ALL]), Use::Mentions)));
             }
-            Condition::Compare(_, sides, _) => sides.iter().for_each(|side| read(side, binding, into)),
-            Condition::Same(..) | Condition::Call(_) => {}
+            Condition::Compare(_, sides, _) => sides.iter().for_each(|side| self.read(side, binding, into)),
+            Condition::Same(terms, _) => self.terms(&**terms, binding, into),
+            Condition::Call(call) => self.terms(&call.arguments, binding, into),
         }
     }
-}
 
-fn name(atom: &Atom, binding: &[u32]) -> Option<Name> {
-    Some((false, atom.predicate.0, objects(&atom.arguments, binding)?))
-}
-
-fn number(fluent: &Fluent, binding: &[u32]) -> Option<Name> {
-    Some((true, fluent.function.0, objects(&fluent.arguments, binding)?))
+    /// Notes the numbers that an expression reads.
+    fn read(&self, expression: &Expression, binding: &[u32], into: &mut Uses) {
+        match expression {
+            Expression::Fluent(fluent) => {
+                self.mentioned((true, fluent.function.0), &fluent.arguments, binding, into);
+            }
+            Expression::Add(parts) | Expression::Multiply(parts) => {
+                parts.iter().for_each(|part| self.read(part, binding, into));
+            }
+            Expression::Subtract(sides) | Expression::Divide(sides) => {
+                sides.iter().for_each(|side| self.read(side, binding, into));
+            }
+            Expression::Negative(inner) => self.read(inner, binding, into),
+            Expression::Call(call) => self.terms(&call.arguments, binding, into),
+            Expression::Number(_)
+            | Expression::Duration
+            | Expression::TotalTime
+            | Expression::Violated(_) => {}
+        }
+    }
 }
 
 fn objects(terms: &[Term], binding: &[u32]) -> Option<Vec<u32>> {
@@ -249,25 +300,6 @@ fn objects(terms: &[Term], binding: &[u32]) -> Option<Vec<u32>> {
         Term::Function(_) => None,
     };
     terms.iter().map(object).collect()
-}
-
-/// Notes the numbers that an expression reads.
-fn read(expression: &Expression, binding: &[u32], into: &mut Uses) {
-    match expression {
-        Expression::Fluent(fluent) => into.extend(number(fluent, binding).map(|name| (name, Use::Mentions))),
-        Expression::Add(parts) | Expression::Multiply(parts) => {
-            parts.iter().for_each(|part| read(part, binding, into));
-        }
-        Expression::Subtract(sides) | Expression::Divide(sides) => {
-            sides.iter().for_each(|side| read(side, binding, into));
-        }
-        Expression::Negative(inner) => read(inner, binding, into),
-        Expression::Number(_)
-        | Expression::Duration
-        | Expression::TotalTime
-        | Expression::Violated(_)
-        | Expression::Call(_) => {}
-    }
 }
 
 fn every(variables: &[Quantified], binding: &mut [u32], visit: &mut dyn FnMut(&mut [u32])) {

@@ -71,8 +71,24 @@ pub(crate) struct Replayed {
 ///
 /// A failing attachment makes the verdict invalid, with the failure as its reason.
 pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict {
+    said(&Semantics::new(task, attachments), plan)
+}
+
+/// The same; none once `stop` has said true.
+pub(crate) fn validate_until(
+    task: &Task,
+    attachments: &Attachments,
+    plan: &Plan,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Option<Verdict> {
+    let semantics = Semantics::until(task, attachments, stop);
+    let verdict = said(&semantics, plan);
+    (!semantics.is_stopped()).then_some(verdict)
+}
+
+fn said(semantics: &Semantics<'_>, plan: &Plan) -> Verdict {
     let _span = tracing::debug_span!("validate", steps = plan.steps.len()).entered();
-    let semantics = Semantics::new(task, attachments);
+    let task = semantics.task;
     let takes_time = |step: &Step| {
         let mut named = task.actions.iter().filter(|action| action.name.eq_ignore_ascii_case(&step.action));
         named.next().is_none_or(Action::is_durative)
@@ -93,10 +109,10 @@ pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict 
         let finding = failure.findings(task).list.into_iter().next();
         invalid(failure.to_string(), None, finding)
     };
-    match whole(&semantics, plan) {
+    match whole(semantics, plan) {
         Err(failure) => failed(failure),
         Ok(Err(fault)) => invalid(fault.reason, fault.step, Some(fault.finding)),
-        Ok(Ok(replayed)) => match metric(&semantics, &replayed) {
+        Ok(Ok(replayed)) => match metric(semantics, &replayed) {
             Err(failure) => failed(failure),
             Ok(metric) => Verdict {
                 valid: true,
@@ -135,4 +151,26 @@ fn metric(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Option<f64>,
     }
     let violations = trajectory::violations(semantics, replayed)?;
     semantics.measured(&replayed.state, replayed.end, &violations)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::Source;
+
+    #[test]
+    fn once_asked_to_stop_nothing_is_said() {
+        let variables = "?a ?b ?c ?d ?e ?f ?g ?h";
+        let objects: String = (0..40).map(|index| format!(" o{index}")).collect();
+        let domain = "(define (domain d) (:requirements :adl) (:predicates (met ?x)) (:action meet :parameters (?x) :effect (met ?x)))";
+        for goal in ["(forall (VARIABLES) (not (met ?h)))", "(exists (VARIABLES) (met ?h))"] {
+            let goal = goal.replace("VARIABLES", variables);
+            let problem =
+                format!("(define (problem p) (:domain d) (:objects{objects}) (:init) (:goal {goal}))");
+            let task = Task::read(&Source::new("domain", domain), &Source::new("problem", problem));
+            let task = task.unwrap_or_else(|findings| panic!("{findings}"));
+            let verdict = validate_until(&task, &Attachments::new(), &Plan::default(), &|| true);
+            assert_eq!(verdict, None, "{goal}");
+        }
+    }
 }

@@ -58,6 +58,9 @@ impl Checker<'_> {
                 {
                     return self.object_function(*name, &[], name.span, scope);
                 }
+                if let Some(variable) = self.without_question_mark(*name, scope) {
+                    return Some(variable);
+                }
                 let id = self.find_object(*name)?;
                 Some((Term::Object(id), self.task.object(id).types.clone()))
             }

@@ -6,7 +6,7 @@ use super::{Checker, Scope};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{Name, Symbol};
 use crate::pddl::nearest;
-use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, Task, TypeId};
+use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, Task, Term, TypeId};
 
 /// More uses of one undeclared name that are shown.
 const MORE_USES: usize = 2;
@@ -79,6 +79,38 @@ impl Checker<'_> {
         self.push(finding);
     }
 
+    /// The variable that is meant where no object has this name and a variable has it behind its question mark; says so.
+    pub(super) fn without_question_mark(&mut self, name: Name, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
+        if self.objects[name.symbol.0 as usize].is_some() {
+            return None;
+        }
+        let written = self.name(name.symbol);
+        let variable = scope.find(self.symbols.find(&format!("?{written}"))?)?;
+        let meant = (Term::Variable(variable.slot), variable.types.clone());
+        let message = format!("object `{written}` is not declared");
+        let finding = Diagnostic::error("undeclared-object", message, name.span, "unknown object");
+        let help = format!("did you mean `?{written}`?");
+        self.push(finding.with_help(help));
+        Some(meant)
+    }
+
+    /// What helps where nothing that is declared has nearly this name.
+    fn help_for(&self, kind: &str, section: &str, name: Name) -> String {
+        let written = self.name(name.symbol);
+        match kind {
+            "module" if self.predicates.contains_key(&name.symbol) => {
+                format!("a predicate has this name, and is written `({written} …)`")
+            }
+            "module" if self.functions.contains_key(&name.symbol) => {
+                format!("a function has this name, and is written `({written} …)`")
+            }
+            "predicate" if ["at", "over"].contains(&written) => format!(
+                "declare it in `({section} …)`; `({written} …)` as a time stands in a `:durative-action` alone"
+            ),
+            _ => format!("declare it in `({section} …)`"),
+        }
+    }
+
     /// Reports a name that is not declared. Gives the declared name that is surely meant, to go on with.
     fn undeclared(
         &mut self,
@@ -110,7 +142,7 @@ impl Checker<'_> {
                     None => finding,
                 }
             }
-            None => finding.with_help(format!("declare it in `({section} …)`")),
+            None => finding.with_help(self.help_for(kind, section, name)),
         };
         self.reported.insert((code, name.symbol), (self.findings.len(), near.clone()));
         self.push(finding);

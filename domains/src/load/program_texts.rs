@@ -1,0 +1,62 @@
+//! What programs are made of, as far as their command lines say.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::Domain;
+
+impl Domain {
+    /// The texts of its programs ([`program_texts`]).
+    pub fn program_texts(&self) -> BTreeMap<PathBuf, String> {
+        let folder = self.folder.as_deref().unwrap_or(Path::new("."));
+        let commands = self.programs().into_iter().map(|(_, command)| command);
+        commands.flat_map(|command| program_texts(command.iter().map(String::as_str), folder)).collect()
+    }
+}
+
+/// The files that a command names, from a folder, and those beside each that end the same way, since a program may use them: what they
+/// hold, by their paths. What else a program reads, its command does not say.
+pub fn program_texts<'c>(command: impl Iterator<Item = &'c str>, folder: &Path) -> BTreeMap<PathBuf, String> {
+    let mut texts = BTreeMap::new();
+    for named in command.map(|word| folder.join(word)) {
+        // An interpreter that is named by its path has no ending, and is not the program.
+        let Some(ending) = named.extension().filter(|_| named.is_file()) else { continue };
+        let beside = named.parent().and_then(|folder| std::fs::read_dir(folder).ok());
+        let beside = beside.into_iter().flatten().flatten().map(|entry| entry.path());
+        let alike = beside.filter(|path| path.extension() == Some(ending) && path.is_file());
+        for path in alike.chain([named.clone()]) {
+            if let Ok(bytes) = std::fs::read(&path) {
+                texts.insert(path, String::from_utf8_lossy(&bytes).into_owned());
+            }
+        }
+    }
+    texts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_the_files_that_its_command_names_and_what_it_may_use() {
+        let folder = std::env::temp_dir().join(format!("descry-program-texts-{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("calls")).expect("a folder");
+        for (name, text) in
+            [("act.py", "a"), ("common.py", "c"), ("notes.txt", "n"), ("calls/cost.py", "k"), ("run", "r")]
+        {
+            std::fs::write(folder.join(name), text).expect("written");
+        }
+        let cases: [(&[&str], &[&str]); 5] = [
+            (&["python3", "act.py", "once"], &["a", "c"]),
+            (&["python3", "calls/cost.py"], &["k"]),
+            (&["python3", "absent.py"], &[]),
+            (&["run"], &[]),
+            (&["python3", "act.py", "notes.txt"], &["a", "c", "n"]),
+        ];
+        for (command, expected) in cases {
+            let texts = program_texts(command.iter().copied(), &folder);
+            assert_eq!(texts.values().collect::<Vec<_>>(), expected, "{command:?}");
+        }
+        std::fs::remove_dir_all(&folder).expect("removed");
+    }
+}

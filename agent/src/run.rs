@@ -110,6 +110,9 @@ pub async fn pursue(
     watcher: Watcher<'_>,
 ) -> Result<Report, CommandError> {
     let Task { domain, goal, past } = task;
+    if let Some(store) = &settings.remember {
+        remembering::check(store, folder.path())?;
+    }
     let header = Header {
         version: env!("CARGO_PKG_VERSION").into(),
         goal: goal.said.clone(),
@@ -128,7 +131,7 @@ pub async fn pursue(
     let task = Task { domain: &kept.domain, ..task };
     let (mut report, remembered) =
         live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
-    remember(settings, remembered.as_ref())?;
+    remember(settings, past, remembered, folder.path())?;
     show_true_position(&mut report, body);
     Ok(report)
 }
@@ -159,12 +162,22 @@ fn now_unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
 }
 
-/// Keeps what is to be remembered of a run, if its settings say where.
-fn remember(settings: &Settings, remembered: Option<&Remembered>) -> Result<(), CommandError> {
-    match (&settings.remember, remembered) {
-        (Some(store), Some(remembered)) => remembering::keep(store, remembered, now_unix_s()),
-        _ => Ok(()),
-    }
+/// Keeps what is to be remembered of a run that has ended, if its settings say where.
+fn remember(
+    settings: &Settings,
+    past: Option<&Past>,
+    left: Option<Remembered>,
+    folder: &Path,
+) -> Result<(), CommandError> {
+    let (Some(store), Some(past), Some(left)) = (&settings.remember, past, left) else { return Ok(()) };
+    remembering::keep(store, past, left, now_unix_s()).map_err(|why| {
+        let folder = folder.display().to_string();
+        let word = shell::word(&folder);
+        CommandError::broken(format!(
+            "{why}\n  the run has ended, and its record in {folder} is whole; what it has seen is not remembered in {store} yet\n  \
+             once that can be written: descry do --resume {word}"
+        ))
+    })
 }
 
 /// Goes on with a run that was cut off: its agent lives through what the record holds once more, and then goes on with the body.
@@ -188,7 +201,10 @@ pub async fn go_on(
     let task = Task { domain: &kept.domain, ..task };
     let (mut report, remembered) =
         live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
-    remember(settings, remembered.as_ref())?;
+    // What a run leaves that had ended is kept, and others may have gone on from there.
+    if !files::has_ended(folder.path()) {
+        remember(settings, task.past, remembered, folder.path())?;
+    }
     show_true_position(&mut report, body);
     Ok(report)
 }

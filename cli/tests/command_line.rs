@@ -373,7 +373,18 @@ fn a_cloud_that_is_none_points_at_the_place() {
     )
     .expect("writable");
     check(&["recognise", &path.display().to_string()], 2, &["cut.pcd", "byte 87", "9 points"]);
-    check(&["recognise", "nowhere.pcd"], 2, &["nowhere.pcd"]);
+}
+
+#[test]
+fn what_is_not_there_is_named_with_what_was_expected() {
+    for (arguments, words) in [
+        (&["recognise", "nowhere.pcd"][..], &["nowhere.pcd", "expected a point cloud"][..]),
+        (&["experiment", "nowhere.toml", "--out", "results"], &["nowhere.toml", "expected an experiment"]),
+        (&["find", "cup A", "--run", "/dev/null/run"], &["/dev/null/run", "expected a folder"]),
+        (&["name", "nowhere"], &["nowhere", "name the folder"]),
+    ] {
+        check(arguments, 2, words);
+    }
 }
 
 #[test]

@@ -31,7 +31,7 @@ fn a_page_stands_alone_and_tells_the_run() {
     let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "3", "--run", "run"]);
     assert!(run.status.success());
     let nowhere = ["show", "run", "--html", "nowhere/page.html"];
-    binary::check_refused(folder.path(), &nowhere, 2, &["nowhere/page.html: "]);
+    binary::check_refused(folder.path(), &nowhere, 2, &["nowhere/page.html: ", "expected a file"]);
     let page = page(folder.path());
     for outside in ["http://", "https://", "src=", "@import", "{{"] {
         let used = page.replace("http://www.w3.org/2000/svg", "");

@@ -143,6 +143,13 @@ fn a_record_is_queried_verified_and_exported() {
     let eye = place(&clouds["records"][0]["seen_from_m"]);
     let cup = place(&report["position_m"]);
     check_query(folder, &["--kind", "cloud"], views..=views);
+    let clouds = ["memory", "query", "run", "--kind", "clouds"];
+    check_refused(
+        folder,
+        &clouds,
+        1,
+        &["nothing of the kind \"clouds\"", "there are: ", "belief, body, cloud, "],
+    );
     check_query(folder, &["--kind", "cloud", "--frame", "camera"], views..=views);
     check_query(folder, &["--kind", "cloud", "--frame", "elsewhere"], 0..=0);
     check_query(folder, &["--kind", "cloud", "--nearest", "1", "--tolerance", "1000"], 1..=1);

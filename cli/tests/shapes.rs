@@ -87,3 +87,56 @@ fn what_was_learned_is_known_after_a_restart() {
         ("achieved", Some("stool")),
     );
 }
+
+/// The names of the shapes that a store holds.
+fn learned(folder: &Path, store: &Path) -> Vec<String> {
+    let asked = ["memory", "query", &store.display().to_string(), "--newest", "--limit", "1", "--json"];
+    let found: Value = crate::binary::check(folder, &asked, 0);
+    let shapes = found["records"][0]["body"]["shapes"].as_array().cloned().unwrap_or_default();
+    shapes.iter().filter_map(|shape| shape["name"].as_str().map(str::to_owned)).collect()
+}
+
+#[test]
+fn what_others_have_learned_since_stays_where_a_run_is_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let store = folder.join("seen");
+    let learn = |name: &str, seed: u64| {
+        check(&format!("learn {name}"), "stool", seed, folder, Some(&store), ("achieved", Some(name)));
+    };
+    learn("armchair", 5);
+    learn("coffee table", 6);
+    let first = folder.join("stool-5-learn-armchair");
+    let resume = ["do", "--resume", &first.display().to_string(), "--json"];
+    let _: Value = crate::binary::check(folder, &resume, 0);
+    assert_eq!(learned(folder, &store), ["armchair", "coffee table"], "of a run that had ended");
+    // As if it had been cut off before it had kept what it saw.
+    std::fs::remove_file(first.join("report.json")).unwrap();
+    let _: Value = crate::binary::check(folder, &resume, 0);
+    assert_eq!(learned(folder, &store), ["armchair", "coffee table"], "of a run that was cut off");
+    // As if it had been cut off before anything was recorded.
+    std::fs::create_dir(folder.join("cut")).unwrap();
+    std::fs::copy(first.join("run.json"), folder.join("cut/run.json")).unwrap();
+    let _: Value = crate::binary::check(folder, &["do", "--resume", "cut", "--json"], 0);
+    let begun: Value =
+        crate::binary::check(folder, &["memory", "query", "cut", "--kind", "run", "--json"], 0);
+    assert!(begun["records"][0]["body"]["past"].is_object(), "it begins with what is remembered");
+}
+
+#[test]
+fn a_run_begins_only_where_what_it_sees_can_be_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("file"), "").unwrap();
+    std::fs::create_dir_all(folder.join("run/record")).unwrap();
+    for (store, why) in [
+        ("file", "it is a file"),
+        ("file/seen", "Not a directory"),
+        ("run", "it is the folder of a run"),
+        ("new", "it is the folder of this run"),
+    ] {
+        let asked = ["find", "cup A", "--remember", store, "--run", "new"];
+        crate::binary::check_refused(folder, &asked, 2, &[store, why, "--remember", "expected a folder"]);
+        assert!(!folder.join("new/run.json").exists(), "{store}: nothing was begun");
+    }
+}

@@ -1,5 +1,7 @@
 //! What outlasts a run: where things were seen last, and when. A later run begins with it, as far as time has not worn it.
 
+mod joined;
+
 use descry_perception::laser::KnownShape;
 use descry_perception::mapping::{Level, Survey};
 use descry_perception::nalgebra::{Isometry2, Point2};
@@ -127,9 +129,14 @@ impl Remembered {
 
     /// Gives a thing that was learned another name, wherever it was seen.
     pub fn rename(&mut self, old: &str, new: &str) {
+        self.call(|name| (name == old).then(|| new.to_owned()));
+    }
+
+    /// Gives things other names, those that there are for them.
+    fn call(&mut self, other: impl Fn(&str) -> Option<String>) {
         let rename = |name: &mut String| {
-            if name == old {
-                new.clone_into(name);
+            if let Some(new) = other(name) {
+                *name = new;
             }
         };
         self.things.iter_mut().for_each(|thing| rename(&mut thing.name));

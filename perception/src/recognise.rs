@@ -3,6 +3,7 @@
 mod asker;
 mod body;
 mod descry;
+mod ends;
 mod evidence;
 mod likelihood;
 mod model;

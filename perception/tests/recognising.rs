@@ -252,6 +252,23 @@ fn a_low_box_far_off_is_in_one_piece() {
     assert!(broken.is_empty(), "height, seed, pieces: {broken:?}");
 }
 
+/// From far off the camera passes closely over the top of a tall box and may see its front alone, or in pieces: it may be the known one.
+#[test]
+fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
+    let size_m = [0.20, 0.15, 0.25];
+    for turn_rad in [0.1, 0.5, 0.9, 1.3] {
+        for away_m in [1.6, 2.0, 2.3] {
+            let half = [0.5 * size_m[0], 0.5 * size_m[1]];
+            let thing = Thing::Block { x: 0.05, y: 0.02, half, height: size_m[2], turn_rad };
+            let (cloud, seen) = seen_from(&[thing], 0.3, away_m);
+            let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+            let found = Descry::default().recognise(&scene, &seen, &[known_box(size_m)]);
+            let p = found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max);
+            assert!(p > 0.1, "turned by {turn_rad} from {away_m} m, {} pieces: {p}", found.len());
+        }
+    }
+}
+
 /// From far off sides are measured to centimetres: a box that is a little shorter may be another, and is not sure to be the known one.
 #[test]
 fn a_box_of_nearly_the_size_is_not_surely_the_known_one() {

@@ -45,6 +45,11 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
     })
 }
 
+/// Whether a folder is that of a run.
+pub(super) fn is_run(folder: &Path) -> bool {
+    [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
+}
+
 /// What is lost with what a folder says a run was started with, if that is missing or damaged: its record says all else.
 pub fn lost_of_header(folder: &Path) -> Option<String> {
     let why = read_json::<Header>(&folder.join(HEADER)).err()?;

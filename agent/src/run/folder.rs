@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 use descry_domains::goal::Goal;
 use descry_domains::lexicon::symbol;
 
-use super::files::HEADER;
+use super::files::is_run;
 use crate::exit::CommandError;
-use crate::keeping::RECORD;
 
 /// The folder of a run that this process writes, and no other.
 pub struct Folder {
@@ -37,12 +36,17 @@ impl Folder {
     /// # Errors
     /// As [`Folder::of_new_run`].
     pub fn made(folder: &Path) -> Result<Self, CommandError> {
-        let refuse_a_run = || match holds_a_run(folder) {
+        let refuse_a_run = || match is_run(folder) {
             true => Err(refused(folder, "it holds a run already\n  name another folder")),
             false => Ok(()),
         };
         refuse_a_run()?;
-        create_dir_all(folder).map_err(|e| refused(folder, e))?;
+        create_dir_all(folder).map_err(|e| {
+            refused(
+                folder,
+                format!("{e}\n  expected a folder that is new or empty, where files can be written"),
+            )
+        })?;
         let claimed = Self::locked(folder)?;
         // Another process may have been quicker, and be done.
         refuse_a_run()?;
@@ -84,10 +88,6 @@ impl Folder {
     pub fn path(&self) -> &Path {
         &self.path
     }
-}
-
-fn holds_a_run(folder: &Path) -> bool {
-    [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
 }
 
 fn refused(folder: &Path, why: impl std::fmt::Display) -> CommandError {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use descry_domains::situation::Past;
 use descry_memory::remember::Remembered;
@@ -9,11 +10,17 @@ use descry_memory::{Error, Options, Record};
 
 use crate::exit::CommandError;
 use crate::keeping::{Address, is_address};
+use crate::run::files::is_run;
+
+/// So long it is waited for another process that is keeping something in the same store.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
+/// So often it is looked whether that one is done.
+const WAIT: Duration = Duration::from_millis(50);
 
 /// What a store remembers of earlier runs; nothing if it is new.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if there is a store and it cannot be read.
+/// [`CommandError::BadInput`] if it is no store; [`CommandError::Broken`] if it cannot be read.
 pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
     let is_new = !is_address(Path::new(store)) && !Path::new(store).exists();
     let remembered = if is_new { Ok(Remembered::default()) } else { Remembered::recall(&open(store)?) };
@@ -21,15 +28,30 @@ pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
     Ok(Past { remembered: Arc::new(remembered), now_unix_s })
 }
 
-/// Keeps in a store what is to be remembered.
+/// Makes sure, before a run begins in a folder, that what it sees can be kept.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it cannot be kept.
-pub fn keep(store: &str, remembered: &Remembered, now_unix_s: f64) -> Result<(), CommandError> {
-    remembered.keep(&open(store)?, now_unix_s).map_err(CommandError::broken)
+/// [`CommandError::BadInput`] if that is no place for a store, or none that can be written; else as [`recall`].
+pub fn check(store: &str, run: &Path) -> Result<(), CommandError> {
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    if !is_address(Path::new(store)) && whole(Path::new(store)) == whole(run) {
+        return Err(no_store(store, "it is the folder of this run"));
+    }
+    open(store).map(|_| ())
 }
 
-/// The store in a folder or at an address, made if it is not there.
+/// Keeps in a store what a run leaves that began with what there was in the store at that time.
+///
+/// # Errors
+/// As [`recall`].
+pub fn keep(store: &str, began: &Past, left: Remembered, now_unix_s: f64) -> Result<(), CommandError> {
+    let store = open(store)?;
+    let there = Remembered::recall(&store).map_err(CommandError::broken)?;
+    let joined = there.joined(&began.remembered, left, began.now_unix_s);
+    joined.keep(&store, now_unix_s).map_err(CommandError::broken)
+}
+
+/// The store in a folder or at an address, made if it is not there. Another process that keeps something there is waited for.
 fn open(store: &str) -> Result<Record, CommandError> {
     let folder = Path::new(store);
     if is_address(folder) {
@@ -37,10 +59,32 @@ fn open(store: &str) -> Result<Record, CommandError> {
         let address = if address.run.is_some() { address } else { address.of_run(Path::new("remembered")) };
         return address.write(Options::default());
     }
-    match Record::open(folder, Options::default()) {
-        Err(Error::NoRecord { .. }) => {
-            Record::create(folder, Options::default()).map_err(CommandError::broken)
-        }
-        opened => opened.map_err(CommandError::broken),
+    if folder.is_file() {
+        return Err(no_store(store, "it is a file"));
     }
+    if is_run(folder) {
+        return Err(no_store(store, "it is the folder of a run, whose record is that run's alone"));
+    }
+    let began = Instant::now();
+    loop {
+        let opened = match Record::open(folder, Options::default()) {
+            Err(Error::NoRecord { .. }) => match Record::create(folder, Options::default()) {
+                Err(Error::File { because, .. }) => return Err(no_store(store, &because.to_string())),
+                made => made,
+            },
+            opened => opened,
+        };
+        match opened {
+            Err(Error::InUse { .. }) if began.elapsed() < LONGEST_WAIT => std::thread::sleep(WAIT),
+            // Another was quicker to make it.
+            Err(Error::Exists { .. }) if began.elapsed() < LONGEST_WAIT => std::thread::sleep(WAIT),
+            opened => return opened.map_err(CommandError::broken),
+        }
+    }
+}
+
+fn no_store(store: &str, why: &str) -> CommandError {
+    CommandError::BadInput(format!(
+        "--remember {store}: {why}\n  expected a folder for what is remembered from run to run: a new one, or that of earlier runs"
+    ))
 }

@@ -8,7 +8,9 @@ use descry_domains::load::Domain;
 use descry_memory::Record;
 use serde::{Deserialize, Serialize};
 
-use super::{Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs, understood};
+use super::{
+    Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs, recall, understood,
+};
 use crate::body;
 use crate::exit::CommandError;
 use crate::report::Report;
@@ -76,13 +78,20 @@ pub async fn resume(
     let recorded = if asked.robot.is_some() { "" } else { robot };
     programs::check_allowed(&domain, recorded, &folder.display().to_string(), asked.allow_programs)?;
     let body = body::open(robot, settings.scene.as_deref(), settings.seed, &domain)?;
-    let past = beginning.as_ref().and_then(|b| b.past.as_ref());
+    // Of a run that begins now nothing else says what was remembered before.
+    let past = match &beginning {
+        Some(beginning) => beginning.past.clone(),
+        None => recall(settings.remember.as_deref())?,
+    };
+    let past = past.as_ref();
     let goal = understood(&header.goal, &domain, &*body.robot, past)?;
     let chooser = policies::named(&settings.policy, settings.seed, None).map_err(CommandError::bad_input)?;
     keep(folder, &header, &record)?;
     if beginning.is_none() {
         let header = Header { resumed: Vec::new(), ..header.clone() };
-        Beginning::new(header, &domain, body.scene.clone()).put(&record, body.robot.now_ns())?;
+        let beginning =
+            Beginning { past: past.cloned(), ..Beginning::new(header, &domain, body.scene.clone()) };
+        beginning.put(&record, body.robot.now_ns())?;
     }
     let task = Task { domain: &domain, goal: &goal, past };
     let mut report = go_on(task, &body, &claimed, record, settings, chooser, watcher).await?;

@@ -167,7 +167,17 @@ fn query(arguments: &QueryArguments) -> Result<Exit, CommandError> {
         found.iter().try_for_each(|document| input::print_text(&line(document)))?;
     }
     let exit = input::lost(&lost);
-    Ok(if found.is_empty() { Exit::No } else { exit })
+    if !found.is_empty() {
+        return Ok(exit);
+    }
+    let kinds: Vec<String> = record.stats().map_err(CommandError::broken)?.kinds.into_keys().collect();
+    if let Some(kind) = arguments.filter.kind.as_ref().filter(|kind| !kinds.contains(kind)) {
+        input::narrate(&format!(
+            "descry: nothing of the kind \"{kind}\" is recorded\n  there are: {}",
+            kinds.join(", ")
+        ));
+    }
+    Ok(Exit::No)
 }
 
 /// A query that finds one record of those that another finds.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use descry_domains::abilities::learning::news::called;
 use descry_memory::learned::LearnedThing;
 use descry_memory::remember::Remembered;
-use descry_memory::{Options, Record};
+use descry_memory::{Error, Options, Record};
 use descry_perception::files::ply;
 use serde_json::{Value, json};
 
@@ -71,7 +71,10 @@ fn open(store: &Path) -> Result<Record, CommandError> {
         let address = if address.run.is_some() { address } else { address.of_run(Path::new("remembered")) };
         return address.write(Options::default());
     }
-    Record::open(store, Options::default()).map_err(CommandError::bad_input)
+    Record::open(store, Options::default()).map_err(|e| match e {
+        Error::NoRecord { .. } => CommandError::bad_input(e),
+        other => CommandError::broken(other),
+    })
 }
 
 fn find<'a>(remembered: &'a Remembered, old: &str) -> Result<&'a LearnedThing, CommandError> {

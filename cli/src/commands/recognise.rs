@@ -88,7 +88,12 @@ fn look(
     objects: &[ObjectModel],
 ) -> Result<Seen, CommandError> {
     let shown = path.display().to_string();
-    let bytes = input::read(path, MOST_CLOUD_BYTES)?;
+    let bytes = input::read(path, MOST_CLOUD_BYTES).map_err(|e| match e {
+        CommandError::BadInput(why) if !why.contains("expected") => {
+            CommandError::BadInput(format!("{why}\n  expected a point cloud: a PCD or PLY file"))
+        }
+        other => other,
+    })?;
     let loaded = read_cloud(&bytes).map_err(|e| CommandError::BadInput(format!("{shown}, {e}")))?;
     let (cloud, mut notes) = (loaded.cloud, loaded.notes);
     let points = cloud.points.len();

@@ -36,7 +36,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if let Some(page) = &arguments.html {
         let text = descry_pages::page::of_run(&record, report.as_ref())?;
         let at = |e: std::io::Error| format!("{}: {e}", page.display());
-        let mut file = File::create(page).map_err(|e| CommandError::bad_input(at(e)))?;
+        let mut file = File::create(page).map_err(|e| {
+            CommandError::BadInput(format!("--html {}\n  expected a file that can be written", at(e)))
+        })?;
         file.write_all(text.as_bytes()).map_err(|e| CommandError::broken(at(e)))?;
         input::print_text(&page.display().to_string())?;
     } else if arguments.json {

@@ -2,6 +2,7 @@
 
 use super::asker::{Asker, IN_VIEW_M};
 use super::body::Frustum;
+use super::ends::{open_sides, top_hidden};
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, Rays};
 use super::settle::settle;
@@ -93,6 +94,8 @@ pub(super) struct Measured {
     pub top_hidden: bool,
     /// What bounds it seen from above, surface frame.
     pub footprint: Rectangle,
+    /// Whether the longer and the shorter side of that may go on where no camera could tell.
+    pub open_sides: [bool; 2],
     /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
     pub looked_through: f64,
     /// Points that tell the side's form, counted once for each group that shares its error.
@@ -229,6 +232,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
             .hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M))
             .hypot(this.base_sigma_m),
         top_hidden: top_hidden(&asker, &footprint, top),
+        open_sides: open_sides(&asker, &footprint, top),
         footprint,
         looked_through: 0.0,
         independent: (side.len() as f64 / SHARING).clamp(1.0, MOST_GROUPS),
@@ -306,23 +310,6 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
 /// Number of looks with the place (surface frame) inside the image and not behind something else.
 fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
     asker.views.iter().filter(|view| !matches!(view.look(place, IN_VIEW_M), Seen::Never)).count()
-}
-
-/// True if most places just above the object are hidden by something nearer to the cameras.
-fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool {
-    /// Places above are asked about so far from the middle, as a share of the shorter side, and so high over the top, metres; so many of
-    /// the five must be hidden. From: chosen.
-    const REACH: f64 = 0.25;
-    const ABOVE_M: f64 = 0.02;
-    const MOST: usize = 3;
-    let reach = REACH * footprint.sides_m[1];
-    let places = [(0.0, 0.0), (reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)];
-    let above = top + ABOVE_M;
-    let hidden = places
-        .iter()
-        .filter(|(dx, dy)| asker.look(footprint.x + dx, footprint.y + dy, above) < Seen::Surface)
-        .count();
-    !asker.views.is_empty() && hidden >= MOST
 }
 
 fn measure_round(

@@ -122,13 +122,29 @@ fn side_sigma_m(m: &Measured) -> f64 {
     LEAST_M.hypot(2.0 * m.sigma_m)
 }
 
+/// Log density of a side that may go on where no camera could tell, if a thing is at least so long by this chance: any of at least that
+/// length looks so.
+fn open_side_log(value: f64, at_least: f64) -> f64 {
+    ((1.0 - ASTRAY) * at_least + ASTRAY).ln() + everyday_density(value, WIDTHS).max(LEAST_DENSITY).ln()
+}
+
 /// A footprint is measured only as far as it was seen: a side may be longer than it looks.
 pub(super) fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
+    /// What is only known to be long enough is so often just the known thing. From: chosen.
+    const LONG_ENOUGH: f64 = 0.25;
     let sigma = side_sigma_m(m);
+    let side = |n: usize, range: Range| {
+        let value = m.footprint.sides_m[n];
+        match m.open_sides[n] {
+            false => measure_log(value, sigma, Some(range), WIDTHS),
+            true => LONG_ENOUGH.ln() + open_side_log(value, 1.0 - normal_cdf((value - range.high) / sigma)),
+        }
+    };
     match ranges {
+        Some((width, depth)) if m.open_sides == [false; 2] => side(0, width) + side(1, depth),
+        // The side that is longer as far as it was seen may be the shorter one.
         Some((width, depth)) => {
-            measure_log(m.footprint.sides_m[0], sigma, Some(width), WIDTHS)
-                + measure_log(m.footprint.sides_m[1], sigma, Some(depth), WIDTHS)
+            0.5_f64.ln() + log_sum(&[side(0, width) + side(1, depth), side(0, depth) + side(1, width)])
         }
         // One side only, as for a round body: densities of as many measures must be compared.
         None => {
@@ -140,12 +156,19 @@ pub(super) fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
 
 /// The same for the sides of things alike: median and log-normal spread of the longer and of the shorter, blurred by the measurement.
 pub(super) fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
-    let sides = m.footprint.sides_m.iter().zip(near);
-    sides
-        .map(|(side, (median, spread))| {
-            measure_log(*side, side_sigma_m(m), None, (median, spread.hypot(side_sigma_m(m) / median)))
-        })
-        .sum()
+    let side = |n: usize, (median, spread): (f64, f64)| {
+        let value = m.footprint.sides_m[n];
+        let spread = spread.hypot(side_sigma_m(m) / median);
+        match m.open_sides[n] {
+            false => measure_log(value, side_sigma_m(m), None, (median, spread)),
+            true => open_side_log(value, 1.0 - normal_cdf((value / median).ln() / spread)),
+        }
+    };
+    let [width, depth] = near;
+    match m.open_sides {
+        [false, false] => side(0, width) + side(1, depth),
+        _ => 0.5_f64.ln() + log_sum(&[side(0, width) + side(1, depth), side(0, depth) + side(1, width)]),
+    }
 }
 
 /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell. From: chosen.

@@ -1,0 +1,308 @@
+//! What a run leaves, joined with what others have kept in the same store since it began.
+
+use std::collections::BTreeMap;
+
+use descry_perception::laser::KnownShape;
+
+use super::{MOST_GONE, Recollection, Remembered, SAME_M};
+use crate::learned::{LearnedThing, Visited};
+
+/// Who has changed something since a run began.
+enum Changed {
+    /// Nobody, or the run alone.
+    Here,
+    /// Others alone.
+    Elsewhere,
+    /// Others and the run.
+    Both,
+}
+
+fn changed<T: PartialEq>(before: &T, others: &T, after: &T) -> Changed {
+    match (others == before, after == before) {
+        (true, _) => Changed::Here,
+        (false, true) => Changed::Elsewhere,
+        (false, false) => Changed::Both,
+    }
+}
+
+impl Remembered {
+    /// What is to be kept in a store that holds this, where a run began with `before` at a time and leaves `after`: what other
+    /// runs have kept there meanwhile stays, and so do the names that were given; what the run has learned and seen is added. A
+    /// surface is remembered as it was looked at last. Of two maps made meanwhile that of more looks stays, with what was seen on it.
+    pub fn joined(&self, before: &Self, mut after: Self, began_unix_s: f64) -> Self {
+        self.give_names(&mut after);
+        let looks = |of: &Self| of.surveyed.as_ref().map_or(0, |map| map.stood.len());
+        let with_places = match changed(&before.surveyed, &self.surveyed, &after.surveyed) {
+            Changed::Both if looks(&after) > looks(self) => after.clone(),
+            Changed::Both => self.clone(),
+            Changed::Here => {
+                Self { surveyed: after.surveyed.clone(), ..self.places(before, &after, began_unix_s) }
+            }
+            Changed::Elsewhere => self.places(before, &after, began_unix_s),
+        };
+        let is_new = |shape: &&KnownShape| ![&before.shapes, &self.shapes].iter().any(|s| s.contains(shape));
+        Self {
+            shapes: self.shapes.iter().chain(after.shapes.iter().filter(is_new)).cloned().collect(),
+            visited: self.visits(before, &after),
+            things: self.learned(before, &after),
+            ..with_places
+        }
+    }
+
+    /// Calls the things of a run as they are called here, and those that only the run has learned so that each has a name of its own.
+    fn give_names(&self, after: &mut Self) {
+        let here = marked(&self.things);
+        let mut names: BTreeMap<String, String> = BTreeMap::new();
+        let mut taken: Vec<String> =
+            self.things.iter().chain(&after.things).map(|t| t.name.clone()).collect();
+        for (mark, thing) in marked(&after.things) {
+            let name = match here.get(&mark) {
+                Some(same) => same.name.clone(),
+                None if self.things.iter().all(|other| other.name != thing.name) => continue,
+                None => {
+                    (1..).map(|n| format!("thing {n}")).find(|name| !taken.contains(name)).unwrap_or_default()
+                }
+            };
+            taken.push(name.clone());
+            names.insert(thing.name.clone(), name);
+        }
+        after.call(|name| names.get(name).cloned());
+    }
+
+    /// What was learned here and there. What was learned of one thing here and there is that of the later meeting.
+    fn learned(&self, before: &Self, after: &Self) -> Vec<LearnedThing> {
+        let (earlier, ours) = (marked(&before.things), marked(&after.things));
+        let here = marked(&self.things);
+        let kept = here.iter().map(|(mark, thing)| match (earlier.get(mark), ours.get(mark)) {
+            (Some(earlier), Some(our)) => {
+                let earlier = LearnedThing { name: thing.name.clone(), ..LearnedThing::clone(earlier) };
+                match changed(&&earlier, thing, our) {
+                    Changed::Here => LearnedThing::clone(our),
+                    Changed::Both if our.seen.unix_s > thing.seen.unix_s => LearnedThing::clone(our),
+                    Changed::Both | Changed::Elsewhere => LearnedThing::clone(thing),
+                }
+            }
+            _ => LearnedThing::clone(thing),
+        });
+        let mut all: BTreeMap<_, _> = here.keys().copied().zip(kept).collect();
+        for (mark, our) in &ours {
+            all.entry(*mark).or_insert_with(|| LearnedThing::clone(our));
+        }
+        // In the order in which they were kept: those of the store, then those that are new to it.
+        let order = marks(&self.things).into_iter().chain(marks(&after.things));
+        order.filter_map(|mark| all.remove(&mark)).collect()
+    }
+
+    /// How places looked, each as it was visited last.
+    fn visits(&self, before: &Self, after: &Self) -> Vec<Visited> {
+        let of = |all: &Self, waypoint: &str| all.visited.iter().find(|v| v.waypoint == waypoint).cloned();
+        let is_ours = |waypoint: &str| {
+            let (theirs, ours) = (of(self, waypoint), of(after, waypoint));
+            let last = |visit: &Option<Visited>| visit.as_ref().map_or(0.0, |v| v.last_unix_s);
+            match changed(&of(before, waypoint), &theirs, &ours) {
+                Changed::Here => true,
+                Changed::Both => last(&ours) > last(&theirs),
+                Changed::Elsewhere => false,
+            }
+        };
+        let theirs = self.visited.iter().filter(|v| !is_ours(&v.waypoint));
+        theirs.chain(after.visited.iter().filter(|v| is_ours(&v.waypoint))).cloned().collect()
+    }
+
+    /// What stands where, each surface as it was looked at last, and what is gone; all else as it is here.
+    fn places(&self, before: &Self, after: &Self, began_unix_s: f64) -> Self {
+        let on = |all: &Self, surface: &str| -> Vec<Recollection> {
+            all.present.iter().filter(|r| r.track.on == surface).cloned().collect()
+        };
+        let is_ours = |r: &Recollection| {
+            let surface = r.track.on.as_str();
+            let theirs = on(self, surface);
+            match changed(&on(before, surface), &theirs, &on(after, surface)) {
+                Changed::Here => true,
+                Changed::Both => theirs.iter().all(|r| r.seen_unix_s <= began_unix_s),
+                Changed::Elsewhere => false,
+            }
+        };
+        let theirs = self.present.iter().filter(|r| !is_ours(r));
+        let present: Vec<Recollection> =
+            theirs.chain(after.present.iter().filter(|r| is_ours(r))).cloned().collect();
+        let still = |r: &Recollection| {
+            let near = |p: &Recollection| (p.track.position_m - r.track.position_m).norm() < SAME_M;
+            present.iter().any(|p| p.track.on == r.track.on && near(p))
+        };
+        // What one of both has seen meanwhile and the other no more.
+        let only_one = [self, after].into_iter().flat_map(|all| &all.present);
+        let only_one = only_one.filter(|r| !before.present.contains(r) && !still(r));
+        let theirs = self.gone.iter().chain(after.gone.iter().filter(|r| !before.gone.contains(r)));
+        let mut gone: Vec<Recollection> = Vec::new();
+        for r in theirs.chain(only_one) {
+            if !gone.contains(r) {
+                gone.push(r.clone());
+            }
+        }
+        gone.drain(..gone.len().saturating_sub(MOST_GONE));
+        let mut looked_at = [self.looked_at.as_slice(), &after.looked_at].concat();
+        looked_at.sort_unstable();
+        looked_at.dedup();
+        Self { present, gone, looked_at, ..self.clone() }
+    }
+}
+
+/// By what a thing is known whatever it is called: when it was learned, and which of those learned then it is.
+type Mark = (u64, usize);
+
+fn marks(things: &[LearnedThing]) -> Vec<Mark> {
+    let mut of_time: BTreeMap<u64, usize> = BTreeMap::new();
+    let mark = |thing: &LearnedThing| {
+        let time = thing.learned_unix_s.to_bits();
+        let nth = of_time.entry(time).or_default();
+        *nth += 1;
+        (time, *nth)
+    };
+    things.iter().map(mark).collect()
+}
+
+fn marked(things: &[LearnedThing]) -> BTreeMap<Mark, &LearnedThing> {
+    marks(things).into_iter().zip(things).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::belief::{Belief, Sighted};
+    use crate::learned::Place;
+    use descry_perception::Cloud;
+    use descry_perception::nalgebra::Point3;
+    use descry_perception::recognise::{Evidence, Percept};
+
+    fn named(name: &str, learned_unix_s: f64, seen_unix_s: f64) -> LearnedThing {
+        LearnedThing {
+            name: name.into(),
+            learned_unix_s,
+            cloud: Cloud::from_points(vec![Point3::new(0.0, 0.0, 0.1)]),
+            sides: 0.5,
+            directions: 1,
+            meetings: 1,
+            seen: Place { unix_s: seen_unix_s, at_m: Point3::origin(), on: "desk".into() },
+        }
+    }
+
+    /// What a run remembers that began at a time with `before` and has seen one thing, of which it says this name, at these places.
+    fn looked(
+        before: &Remembered,
+        unix_s: f64,
+        looked_at: &[&str],
+        things: &[(&str, f64, &str)],
+    ) -> Remembered {
+        let mut belief = Belief::default();
+        for surface in looked_at {
+            let there = things.iter().filter(|(on, ..)| on == surface);
+            let percepts: Vec<Percept> = there.map(|(_, x, name)| percept(*x, name)).collect();
+            let sighted: Vec<Sighted<'_>> = percepts
+                .iter()
+                .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
+                .collect();
+            belief.update(surface, &sighted, 1, &[]);
+        }
+        let looked_at: Vec<String> = looked_at.iter().map(|s| s.to_string()).collect();
+        before.clone().after(&belief, &looked_at, unix_s)
+    }
+
+    fn percept(x: f64, name: &str) -> Percept {
+        Percept {
+            label: None,
+            kind: None,
+            probabilities: vec![(name.into(), 0.9)],
+            kinds: vec![(name.into(), 0.9)],
+            unknown: 0.1,
+            position_m: Point3::new(x, 0.0, 0.0),
+            position_sigma_m: 0.002,
+            size_m: [0.07, 0.07, 0.1],
+            stance: Default::default(),
+            points: 100,
+            seen_fraction: 0.5,
+            evidence: Evidence::default(),
+            indices: vec![],
+        }
+    }
+
+    fn places(all: &[Recollection]) -> Vec<(&str, f64, &str, f64)> {
+        let of = |r: &'_ Recollection| (r.track.position_m.x, r.seen_unix_s);
+        all.iter()
+            .map(|r| (r.track.on.as_str(), of(r).0, r.track.probabilities[0].0.as_str(), of(r).1))
+            .collect()
+    }
+
+    #[test]
+    fn where_nobody_else_has_kept_anything_it_is_what_the_run_leaves() {
+        let mut before = looked(
+            &Remembered::default(),
+            1.0,
+            &["desk", "shelf"],
+            &[("desk", 0.0, "cup"), ("shelf", 1.0, "mug")],
+        );
+        before.things = vec![named("thing 1", 1.0, 1.0)];
+        let mut after = looked(&before, 5.0, &["desk"], &[("desk", 2.0, "cup")]);
+        after.things = vec![named("thing 1", 1.0, 5.0), named("thing 2", 5.0, 5.0)];
+        assert_eq!(before.joined(&before, after.clone(), 5.0), after);
+        // A run that was cut off while it kept this does so again.
+        assert_eq!(after.joined(&before, after.clone(), 5.0), after);
+    }
+
+    #[test]
+    fn a_surface_is_remembered_as_it_was_looked_at_last() {
+        let before = looked(
+            &Remembered::default(),
+            1.0,
+            &["desk", "shelf"],
+            &[("desk", 0.0, "cup"), ("shelf", 1.0, "mug")],
+        );
+        let check = |others: (f64, &[&str], &[(&str, f64, &str)]),
+                     present: &[(&str, f64, &str, f64)],
+                     gone: &[(&str, f64, &str, f64)]| {
+            let here = looked(&before, others.0, others.1, others.2);
+            let after = looked(&before, 5.0, &["desk"], &[("desk", 2.0, "cup")]);
+            let joined = here.joined(&before, after, 5.0);
+            assert_eq!(
+                (places(&joined.present), places(&joined.gone)),
+                (present.to_vec(), gone.to_vec()),
+                "{others:?}"
+            );
+        };
+        // Others looked elsewhere.
+        check(
+            (9.0, &["shelf"], &[("shelf", 3.0, "mug")]),
+            &[("shelf", 3.0, "mug", 9.0), ("desk", 2.0, "cup", 5.0)],
+            &[("shelf", 1.0, "mug", 1.0), ("desk", 0.0, "cup", 1.0)],
+        );
+        // Others looked there later, and earlier.
+        check(
+            (9.0, &["desk"], &[("desk", 4.0, "cup")]),
+            &[("desk", 4.0, "cup", 9.0), ("shelf", 1.0, "mug", 1.0)],
+            &[("desk", 0.0, "cup", 1.0), ("desk", 2.0, "cup", 5.0)],
+        );
+        check(
+            (3.0, &["desk"], &[("desk", 4.0, "cup")]),
+            &[("shelf", 1.0, "mug", 1.0), ("desk", 2.0, "cup", 5.0)],
+            &[("desk", 0.0, "cup", 1.0), ("desk", 4.0, "cup", 3.0)],
+        );
+    }
+
+    #[test]
+    fn nothing_that_was_learned_is_lost_and_each_thing_has_a_name_of_its_own() {
+        let before = Remembered { things: vec![named("thing 1", 1.0, 1.0)], ..Remembered::default() };
+        let mut here = Remembered {
+            things: vec![named("thing 1", 1.0, 1.0), named("thing 2", 3.0, 3.0)],
+            ..before.clone()
+        };
+        here.rename("thing 1", "kettle");
+        let mut after =
+            looked(&before, 5.0, &["desk"], &[("desk", 0.0, "thing 1"), ("desk", 1.0, "thing 2")]);
+        after.things = vec![named("thing 1", 1.0, 5.0), named("thing 2", 5.0, 5.0)];
+        let joined = here.joined(&before, after, 5.0);
+        let known: Vec<(&str, f64, f64)> =
+            joined.things.iter().map(|t| (t.name.as_str(), t.learned_unix_s, t.seen.unix_s)).collect();
+        assert_eq!(known, [("kettle", 1.0, 5.0), ("thing 2", 3.0, 3.0), ("thing 3", 5.0, 5.0)]);
+        assert_eq!(places(&joined.present), [("desk", 0.0, "kettle", 5.0), ("desk", 1.0, "thing 3", 5.0)]);
+    }
+}

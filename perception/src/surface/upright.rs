@@ -37,8 +37,10 @@ const LEVEL: f64 = 4.0;
 const UPRIGHT: f64 = 4.0;
 const UNDERSIDE: f64 = 3.0;
 const OBLIQUE: f64 = 0.05;
-/// Chance that a view that is asked for a surface shows none, and that planes tell no direction at all. From: chosen.
+/// Chance that a view that is asked for a surface shows none, against one that shows so much of it, a share of the returns, or more; and that
+/// planes tell no direction at all. From: chosen.
 const NO_LEVEL: f64 = 0.1;
+const SHOWN: f64 = 0.2;
 const SHAPELESS: f64 = 0.2;
 /// Share of what lies in no plane that stands on what is level if up is right, and if nothing is known. From: chosen.
 const STANDS: f64 = 0.8;
@@ -240,7 +242,8 @@ impl Hypothesis {
         let share = standing as f64 / all.max(1) as f64;
         let each = share * (STANDS / ANYHOW).ln() + (1.0 - share) * ((1.0 - STANDS) / (1.0 - ANYHOW)).ln();
         let stand = THINGS * (things.share / MANY).min(1.0) * each;
-        let bare = if carriers.is_empty() { NO_LEVEL.ln() } else { 0.0 };
+        let level: f64 = faces.iter().filter(|face| is_level(face, &up)).map(|face| face.share).sum();
+        let bare = (NO_LEVEL + (1.0 - NO_LEVEL) * (level / SHOWN).min(1.0)).ln();
         Hypothesis { up, log: planes + stand + bare + held_log(&up, seen), is_level: !carriers.is_empty() }
     }
 }

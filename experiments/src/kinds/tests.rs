@@ -245,3 +245,26 @@ fn a_policy_gets_through_a_shut_door_and_the_planner_does_the_rest() {
         "{row:?}"
     );
 }
+
+#[test]
+fn a_program_is_the_files_that_its_command_names_and_what_it_may_use() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::create_dir_all(folder.join("calls")).expect("a folder");
+    for (name, text) in
+        [("act.py", "a"), ("common.py", "c"), ("notes.txt", "n"), ("calls/cost.py", "k"), ("run", "r")]
+    {
+        std::fs::write(folder.join(name), text).expect("written");
+    }
+    let cases: [(&[&str], &[&str]); 5] = [
+        (&["python3", "act.py", "once"], &["a", "c"]),
+        (&["python3", "calls/cost.py"], &["k"]),
+        (&["python3", "absent.py"], &[]),
+        (&["run"], &[]),
+        (&["python3", "act.py", "notes.txt"], &["a", "c", "n"]),
+    ];
+    for (command, expected) in cases {
+        let texts = program_texts(command.iter().copied(), folder);
+        assert_eq!(texts.values().collect::<Vec<_>>(), expected, "{command:?}");
+    }
+}

@@ -257,9 +257,9 @@ mod tests {
             &["desk", "shelf"],
             &[("desk", 0.0, "cup"), ("shelf", 1.0, "mug")],
         );
-        let check = |others: (f64, &[&str], &[(&str, f64, &str)]),
-                     present: &[(&str, f64, &str, f64)],
-                     gone: &[(&str, f64, &str, f64)]| {
+        /// When others looked at which surfaces, and the things that they saw there.
+        type Looks<'a> = (f64, &'a [&'a str], &'a [(&'a str, f64, &'a str)]);
+        let check = |others: Looks, present: &[(&str, f64, &str, f64)], gone: &[(&str, f64, &str, f64)]| {
             let here = looked(&before, others.0, others.1, others.2);
             let after = looked(&before, 5.0, &["desk"], &[("desk", 2.0, "cup")]);
             let joined = here.joined(&before, after, 5.0);

@@ -226,10 +226,11 @@ fn seen(on: &str, sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> T
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn percept(x: f64, cup: f64) -> Percept {
+    /// What is cup A with this chance, so far along x, metres.
+    pub(crate) fn percept(x: f64, cup: f64) -> Percept {
         Percept {
             label: None,
             kind: None,

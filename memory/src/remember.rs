@@ -189,32 +189,15 @@ const SAME_M: f64 = 0.10;
 mod tests {
     use super::*;
     use crate::belief::Sighted;
+    use crate::belief::tests::percept;
     use descry_perception::nalgebra::Point3;
-    use descry_perception::recognise::{Evidence, Percept};
-
-    fn cup(x: f64, p: f64) -> Percept {
-        Percept {
-            label: None,
-            kind: None,
-            probabilities: vec![("cup A".into(), p)],
-            kinds: vec![("cup".into(), p)],
-            unknown: 1.0 - p,
-            position_m: Point3::new(x, 0.0, 0.0),
-            position_sigma_m: 0.002,
-            size_m: [0.07, 0.07, 0.1],
-            stance: Default::default(),
-            points: 100,
-            seen_fraction: 0.5,
-            evidence: Evidence::default(),
-            indices: vec![],
-        }
-    }
+    use descry_perception::recognise::Percept;
 
     fn believed(places: &[(&str, f64, f64)]) -> Belief {
         let mut belief = Belief::default();
         for surface in ["desk", "shelf"] {
             let percepts: Vec<Percept> =
-                places.iter().filter(|(on, ..)| *on == surface).map(|&(_, x, p)| cup(x, p)).collect();
+                places.iter().filter(|(on, ..)| *on == surface).map(|&(_, x, p)| percept(x, p)).collect();
             let sighted: Vec<Sighted<'_>> = percepts
                 .iter()
                 .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })

@@ -150,7 +150,7 @@ pub struct Surface {
     pub because: Sign,
     /// Height above the floor, metres, where the floor is in view.
     pub above_floor_m: Option<f64>,
-    /// How likely up is what it was taken to be when the surface was found: one where it was said.
+    /// How likely up is what it was taken to be when the surface was found: one where it was said, or no camera is known.
     #[serde(default = "said")]
     pub up_chance: f64,
     /// Outlines of the other surfaces to stand things on that lie above this one, metres in the world.

@@ -9,6 +9,7 @@ mod formatting;
 mod layers;
 mod modules;
 mod numeric;
+mod objects;
 mod preferences;
 mod reading;
 mod solving;

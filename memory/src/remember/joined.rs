@@ -169,11 +169,12 @@ fn marked(things: &[LearnedThing]) -> BTreeMap<Mark, &LearnedThing> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::belief::tests::percept;
     use crate::belief::{Belief, Sighted};
     use crate::learned::Place;
     use descry_perception::Cloud;
     use descry_perception::nalgebra::Point3;
-    use descry_perception::recognise::{Evidence, Percept};
+    use descry_perception::recognise::Percept;
 
     fn named(name: &str, learned_unix_s: f64, seen_unix_s: f64) -> LearnedThing {
         LearnedThing {
@@ -197,7 +198,7 @@ mod tests {
         let mut belief = Belief::default();
         for surface in looked_at {
             let there = things.iter().filter(|(on, ..)| on == surface);
-            let percepts: Vec<Percept> = there.map(|(_, x, name)| percept(*x, name)).collect();
+            let percepts: Vec<Percept> = there.map(|(_, x, name)| called(*x, name)).collect();
             let sighted: Vec<Sighted<'_>> = percepts
                 .iter()
                 .map(|percept| Sighted { percept, viewpoints_m: &[], footprint_m: &[] })
@@ -208,22 +209,10 @@ mod tests {
         before.clone().after(&belief, &looked_at, unix_s)
     }
 
-    fn percept(x: f64, name: &str) -> Percept {
-        Percept {
-            label: None,
-            kind: None,
-            probabilities: vec![(name.into(), 0.9)],
-            kinds: vec![(name.into(), 0.9)],
-            unknown: 0.1,
-            position_m: Point3::new(x, 0.0, 0.0),
-            position_sigma_m: 0.002,
-            size_m: [0.07, 0.07, 0.1],
-            stance: Default::default(),
-            points: 100,
-            seen_fraction: 0.5,
-            evidence: Evidence::default(),
-            indices: vec![],
-        }
+    /// What is of this name, most likely.
+    fn called(x: f64, name: &str) -> Percept {
+        let likely = vec![(name.into(), 0.9)];
+        Percept { probabilities: likely.clone(), kinds: likely, ..percept(x, 0.9) }
     }
 
     fn places(all: &[Recollection]) -> Vec<(&str, f64, &str, f64)> {

@@ -190,7 +190,6 @@ mod tests {
     use super::*;
     use crate::belief::Sighted;
     use crate::belief::tests::percept;
-    use descry_perception::nalgebra::Point3;
     use descry_perception::recognise::Percept;
 
     fn believed(places: &[(&str, f64, f64)]) -> Belief {

@@ -324,7 +324,7 @@ pub fn find_surfaces(
         let (teller, told) = mpsc::channel();
         let mut tried = 0;
         // The faces of one are found while the next planes are sought.
-        rayon::in_place_scope(|scope| {
+        let planes = || rayon::in_place_scope(|scope| {
             let found = |plane: Plane| {
                 // What a plane was proposed as, its points may not bear out.
                 if is_level(&plane) {
@@ -335,6 +335,7 @@ pub fn find_surfaces(
             };
             large_planes(&samples, (options.seed, ROUNDS), is_level, found);
         });
+        let ((), rays) = rayon::join(planes, || role::rays(&samples, seen));
         drop(teller);
         let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();
         faces.sort_unstable_by_key(|(n, _)| *n);
@@ -344,7 +345,7 @@ pub fn find_surfaces(
         }
         let mut surfaces = distinct(surfaces, &samples);
         surfaces.iter_mut().for_each(|surface| surface.up_chance = way_up.map_or(1.0, |(_, chance)| chance));
-        role::tell(&mut surfaces, &samples, seen, up.as_ref(), options);
+        role::tell(&mut surfaces, &samples, &rays, seen, up.as_ref(), options);
         surfaces.sort_by_key(|surface| (!options.wants(surface), surface.role));
         let whole = |surface: Surface| match surface.role {
             Role::Support | Role::Untold => surface.with_hidden(&samples, seen),

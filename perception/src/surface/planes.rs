@@ -2,6 +2,7 @@
 
 use crate::draw::Draws;
 use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Points looked at when a plane is sought; more do not change it. From: chosen.
@@ -18,6 +19,8 @@ const REACH_M: f64 = 0.3;
 const JUDGES: usize = 2400;
 /// Judges after which a proposal may be left. From: work.
 const BLOCK: usize = 128;
+/// Points that one thread takes in a row. From: work.
+const SOME: usize = 2048;
 
 /// A measurement of a plane lies within this many spreads of its own and this distance of it, metres. From: chosen.
 pub(crate) const BAND: (f64, f64) = (3.0, 0.004);
@@ -89,15 +92,14 @@ pub(super) fn large_planes(
         }
         let Some(plane) = propose(&left, &cubes, &mut rng, &plausible) else { break };
         let Some(plane) = refine(plane, &left) else { break };
-        let before = left.len();
-        let kept: Vec<bool> = left.iter().map(|s| !plane.holds(s)).collect();
-        cubes.keep(kept.iter().copied());
-        let mut kept = kept.into_iter();
-        left.retain(|_| kept.next().unwrap_or(false));
-        if before - left.len() < FEWEST {
+        let kept: Vec<bool> = left.par_iter().with_min_len(SOME).map(|s| !plane.holds(s)).collect();
+        if kept.iter().filter(|kept| !**kept).count() < FEWEST {
             break;
         }
         found(plane);
+        cubes.keep(kept.iter().copied());
+        let mut kept = kept.into_iter();
+        left.retain(|_| kept.next().unwrap_or(false));
     }
 }
 
@@ -113,17 +115,19 @@ struct Cubes {
 
 impl Cubes {
     fn of(samples: &[Sample]) -> Cubes {
+        const PER_M: f64 = 1.0 / REACH_M;
+        let key = |sample: &Sample| [0, 1, 2].map(|k| super::floor(sample.point[k] * PER_M));
+        let keys: Vec<[i32; 3]> = samples.par_iter().with_min_len(SOME).map(key).collect();
         let mut numbers: FxHashMap<[i32; 3], u32> = FxHashMap::default();
         let mut last = ([i32::MIN; 3], 0);
-        let mut number = |sample: &Sample| {
-            let key = [0, 1, 2].map(|k| super::floor(sample.point[k] / REACH_M));
+        let number = |key: [i32; 3]| {
             if key != last.0 {
                 let next = numbers.len() as u32;
                 last = (key, *numbers.entry(key).or_insert(next));
             }
             last.1
         };
-        let of: Vec<u32> = samples.iter().map(&mut number).collect();
+        let of: Vec<u32> = keys.into_iter().map(number).collect();
         let mut cubes = Cubes { of, starts: vec![0; numbers.len() + 1], members: Vec::new() };
         cubes.sort();
         cubes
@@ -227,23 +231,34 @@ fn propose(
     /// Points tell no plane if twice the area between them is less, square metres. From: chosen.
     const FLAT_M2: f64 = 1e-4;
     let judges = Judges::of(left);
-    let mut best: Option<(f64, Plane)> = None;
-    for _ in 0..PROPOSALS {
+    let drawn = (0..PROPOSALS).filter_map(|_| {
         let first = rng.below(left.len());
         let near = cubes.around(first);
         let mut pick = || left[near[rng.below(near.len())] as usize].point;
         let (a, b, c) = (left[first].point, pick(), pick());
-        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(FLAT_M2) else { continue };
+        let normal = (b - a).cross(&(c - a)).try_normalize(FLAT_M2)?;
         let plane = Plane { normal, offset: normal.dot(&a.coords) };
-        if !plausible(&plane) {
-            continue;
+        plausible(&plane).then_some(plane)
+    });
+    let drawn: Vec<Plane> = drawn.collect();
+    let best_of = |planes: &[Plane]| {
+        let mut best: Option<(f64, Plane)> = None;
+        for plane in planes {
+            let count = match best {
+                Some((beaten, _)) => judges.near(plane, beaten),
+                None => judges.near(plane, 0.0).or(Some(0.0)),
+            };
+            best = count.map(|count| (count, *plane)).or(best);
         }
-        let count = match best {
-            Some((beaten, _)) => judges.near(&plane, beaten),
-            None => judges.near(&plane, 0.0).or(Some(0.0)),
-        };
-        best = count.map(|count| (count, plane)).or(best);
-    }
+        best
+    };
+    let (first, second) = drawn.split_at(drawn.len() / 2);
+    let both: (Option<(f64, Plane)>, Option<(f64, Plane)>) = rayon::join(|| best_of(first), || best_of(second));
+    // Of equals the first.
+    let best = match both {
+        (Some(one), Some(other)) if other.0 > one.0 => Some(other),
+        (one, other) => one.or(other),
+    };
     best.map(|(_, plane)| plane)
 }
 
@@ -257,10 +272,14 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     let is_near = |plane: &Plane, s: &Sample, band: f64, times: f64| {
         plane.distance(&s.point).abs() < times * (band * s.sigma_m + BESIDE_M)
     };
-    let around: Vec<Sample> =
-        samples.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect();
+    let some_around = |some: &[Sample]| -> Vec<Sample> {
+        some.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect()
+    };
+    let around: Vec<Vec<Sample>> = samples.par_chunks(SOME).map(some_around).collect();
     for band in BANDS {
-        plane = least_squares(around.iter().filter(|s| is_near(&plane, s, band, 1.0)), &plane.normal)?;
+        let sums_of = |some: &Vec<Sample>| Sums::of(some.iter().filter(|s| is_near(&plane, s, band, 1.0)));
+        let sums: Vec<Sums> = around.par_iter().map(sums_of).collect();
+        plane = sums.into_iter().fold(Sums::default(), Sums::with).plane(&plane.normal)?;
     }
     Some(plane)
 }
@@ -270,27 +289,50 @@ pub(super) fn least_squares<'a>(
     samples: impl Iterator<Item = &'a Sample>,
     side: &Vector3<f64>,
 ) -> Option<Plane> {
-    let (mut weight, mut sum) = (0.0, [0.0; 3]);
-    // xx xy xz yy yz zz.
-    let mut products = [0.0; 6];
-    for Sample { point: p, sigma_m } in samples {
-        let w = 1.0 / (sigma_m * sigma_m);
-        weight += w;
-        let [x, y, z] = [w * p.x, w * p.y, w * p.z];
-        sum.iter_mut().zip([x, y, z]).for_each(|(sum, term)| *sum += term);
-        let terms = [x * p.x, y * p.x, z * p.x, y * p.y, z * p.y, z * p.z];
-        products.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+    Sums::of(samples).plane(side)
+}
+
+/// Sums over samples, each weighed by its spread.
+#[derive(Default)]
+struct Sums {
+    weight: f64,
+    sum: [f64; 3],
+    /// xx xy xz yy yz zz.
+    products: [f64; 6],
+}
+
+impl Sums {
+    fn of<'a>(samples: impl Iterator<Item = &'a Sample>) -> Sums {
+        let mut all = Sums::default();
+        for Sample { point: p, sigma_m } in samples {
+            let w = 1.0 / (sigma_m * sigma_m);
+            let [x, y, z] = [w * p.x, w * p.y, w * p.z];
+            let products = [x * p.x, y * p.x, z * p.x, y * p.y, z * p.y, z * p.z];
+            all = all.with(Sums { weight: w, sum: [x, y, z], products });
+        }
+        all
     }
-    if weight <= 0.0 {
-        return None;
+
+    fn with(mut self, other: Sums) -> Sums {
+        self.weight += other.weight;
+        self.sum.iter_mut().zip(other.sum).for_each(|(sum, term)| *sum += term);
+        self.products.iter_mut().zip(other.products).for_each(|(sum, term)| *sum += term);
+        self
     }
-    let mean = Vector3::from(sum) / weight;
-    let [xx, xy, xz, yy, yz, zz] = products;
-    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    let eigen = (moments / weight - mean * mean.transpose()).symmetric_eigen();
-    let least = eigen.eigenvalues.imin();
-    let normal: Vector3<f64> = eigen.eigenvectors.column(least).into_owned();
-    let normal = if normal.dot(side) < 0.0 { -normal } else { normal };
-    let offset = normal.dot(&mean);
-    normal.iter().all(|c| c.is_finite()).then_some(Plane { normal, offset })
+
+    /// The plane of least squares; its normal on a side.
+    fn plane(&self, side: &Vector3<f64>) -> Option<Plane> {
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let mean = Vector3::from(self.sum) / self.weight;
+        let [xx, xy, xz, yy, yz, zz] = self.products;
+        let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let eigen = (moments / self.weight - mean * mean.transpose()).symmetric_eigen();
+        let least = eigen.eigenvalues.imin();
+        let normal: Vector3<f64> = eigen.eigenvectors.column(least).into_owned();
+        let normal = if normal.dot(side) < 0.0 { -normal } else { normal };
+        let offset = normal.dot(&mean);
+        normal.iter().all(|c| c.is_finite()).then_some(Plane { normal, offset })
+    }
 }

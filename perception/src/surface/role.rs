@@ -132,7 +132,7 @@ const WIDE_M2: f64 = 2.5;
 const TELLING_M: f64 = 1.0;
 
 /// Where a return was seen from, if that is known, and where it lies.
-struct Ray {
+pub(super) struct Ray {
     eye: Option<Point3<f64>>,
     end: Point3<f64>,
 }
@@ -141,14 +141,15 @@ struct Ray {
 pub(super) fn tell(
     surfaces: &mut [Surface],
     samples: &[Sample],
+    rays: &[Ray],
     seen: &Visibility,
     up: Option<&Unit<Vector3<f64>>>,
     options: &SurfaceOptions,
 ) {
     let level = level(surfaces, up);
-    let rays = rays(samples, seen);
-    let past: Vec<Option<f64>> = surfaces.par_iter().map(|s| past(s, &rays)).collect();
-    let supports = |n| supports(n, surfaces, &level, &past, samples, &rays);
+    let told_by = |s: &Surface| (past(s, rays), s.is_open_beneath(samples));
+    let (past, open): (Vec<Option<f64>>, Vec<bool>) = surfaces.par_iter().map(told_by).unzip();
+    let supports = |n| supports(n, surfaces, &level, (&past, &open), rays);
     let told: Vec<(Role, Sign)> = (0..surfaces.len()).into_par_iter().map(supports).collect();
     assign(surfaces, told);
     let eyes = seen.viewpoints();
@@ -161,10 +162,9 @@ pub(super) fn tell(
     let told: Vec<(Role, Sign)> = surfaces.iter().map(|s| level_with_floor(s, surfaces)).collect();
     assign(surfaces, told);
     let ground = surfaces.iter().filter(|s| s.role == Role::Floor).max_by_key(|s| s.points).cloned();
-    let boards: Vec<&Surface> = surfaces
-        .iter()
-        .filter(|s| s.role == Role::Support && s.residual_m < BOARD_RESIDUAL_M && s.is_open_beneath(samples))
-        .collect();
+    let is_board =
+        |(s, open): &(&Surface, &bool)| s.role == Role::Support && s.residual_m < BOARD_RESIDUAL_M && **open;
+    let boards: Vec<&Surface> = surfaces.iter().zip(&open).filter(is_board).map(|(s, _)| s).collect();
     let over: Vec<Vec<Level>> = surfaces.iter().map(|s| over(s, &boards)).collect();
     for (surface, over) in surfaces.iter_mut().zip(over) {
         surface.above_floor_m = ground.as_ref().map(|floor| floor.height_m(&surface.middle()));
@@ -195,7 +195,7 @@ fn level(surfaces: &[Surface], hint: Option<&Unit<Vector3<f64>>>) -> Unit<Vector
 }
 
 /// Some returns of each camera; without cameras the points themselves.
-fn rays(samples: &[Sample], seen: &Visibility) -> Vec<Ray> {
+pub(super) fn rays(samples: &[Sample], seen: &Visibility) -> Vec<Ray> {
     let mut rays = Vec::new();
     for map in &seen.maps {
         let (camera, eye) = (map.intrinsics, map.viewpoint());
@@ -243,8 +243,7 @@ fn supports(
     n: usize,
     surfaces: &[Surface],
     level: &Unit<Vector3<f64>>,
-    past: &[Option<f64>],
-    samples: &[Sample],
+    (past, open): (&[Option<f64>], &[bool]),
     rays: &[Ray],
 ) -> (Role, Sign) {
     let surface = &surfaces[n];
@@ -252,10 +251,9 @@ fn supports(
     if by_rad.cos() < PARALLEL {
         return (Role::Other, Sign::Slanted { by_rad });
     }
-    let is_solid = !surface.is_open_beneath(samples);
     let lies_on = |other: &Surface| {
         // What is no taller than things are, on a table, is one unless something was seen beneath it.
-        let tall_m = if past[n].is_some() && is_solid { TALLEST_M } else { THING_M.1 };
+        let tall_m = if past[n].is_some() && !open[n] { TALLEST_M } else { THING_M.1 };
         let by_m = other.height_m(&surface.middle());
         (by_m > THING_M.0 && by_m < tall_m && surface.stands_on(other, rays)).then_some(by_m)
     };

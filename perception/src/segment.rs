@@ -95,8 +95,8 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     pool::within(tracing::debug_span!("segment", points = cloud.len()), || {
         let (indices, points) = above(cloud, &surface, options);
         let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
-        let voxels = patches::voxels(&points, options.voxel_m, &viewpoints);
-        let mut part_of_voxel = join::parts(&voxels, options);
+        let (voxels, sets) = patches::voxels(&points, options.voxel_m, &viewpoints, join::sets);
+        let mut part_of_voxel = join::parts(&voxels, &sets, options);
         if options.part_touching {
             rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);
             hidden::join(&voxels, &mut part_of_voxel, seen, &surface);
@@ -193,6 +193,20 @@ fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, optio
 pub(crate) fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
     end(&heights, POINT_ENDS.1)
+}
+
+/// The voxels of each part, ascending, by its name, which is that of a voxel.
+fn members(part_of_voxel: &[u32]) -> Vec<(u32, Vec<usize>)> {
+    let mut counts = vec![0; part_of_voxel.len()];
+    part_of_voxel.iter().for_each(|part| counts[*part as usize] += 1);
+    let named = (0..).zip(&counts).filter(|(_, count)| **count > 0);
+    let mut members: Vec<(u32, Vec<usize>)> =
+        named.map(|(name, count)| (name, Vec::with_capacity(*count))).collect();
+    let mut places = counts;
+    members.iter().enumerate().for_each(|(place, (name, _))| places[*name as usize] = place);
+    let all = part_of_voxel.iter().enumerate();
+    all.for_each(|(voxel, part)| members[places[*part as usize]].1.push(voxel));
+    members
 }
 
 /// True of the normal of something upright.

@@ -324,17 +324,19 @@ pub fn find_surfaces(
         let (teller, told) = mpsc::channel();
         let mut tried = 0;
         // The faces of one are found while the next planes are sought.
-        let planes = || rayon::in_place_scope(|scope| {
-            let found = |plane: Plane| {
-                // What a plane was proposed as, its points may not bear out.
-                if is_level(&plane) {
-                    let (n, teller, faces_of) = (tried, teller.clone(), &faces_of);
-                    scope.spawn(move |_| drop(teller.send((n, faces_of(&plane)))));
-                    tried += 1;
-                }
-            };
-            large_planes(&samples, (options.seed, ROUNDS), is_level, found);
-        });
+        let planes = || {
+            rayon::in_place_scope(|scope| {
+                let found = |plane: Plane| {
+                    // What a plane was proposed as, its points may not bear out.
+                    if is_level(&plane) {
+                        let (n, teller, faces_of) = (tried, teller.clone(), &faces_of);
+                        scope.spawn(move |_| drop(teller.send((n, faces_of(&plane)))));
+                        tried += 1;
+                    }
+                };
+                large_planes(&samples, (options.seed, ROUNDS), is_level, found);
+            })
+        };
         let ((), rays) = rayon::join(planes, || role::rays(&samples, seen));
         drop(teller);
         let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();

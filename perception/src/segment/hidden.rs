@@ -1,11 +1,11 @@
 //! Bodies that something before them parts: two ends of one face, and what lies between them hidden from all views.
 
 use super::patches::Voxels;
-use super::{VOXEL_ENDS, is_upright, quantile};
+use super::{VOXEL_ENDS, is_upright, members, quantile};
+use crate::pool;
 use crate::surface::Surface;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Point3, Vector2, Vector3};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Fewest voxels of a face that tell where it lies. From: chosen.
@@ -45,14 +45,9 @@ struct Body {
 
 /// Gives the ends of one body that a thing before it parts the same name, the lower one.
 pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility, surface: &Surface) {
-    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (voxel, part) in part_of_voxel.iter().enumerate() {
-        members.entry(*part).or_default().push(voxel);
-    }
-    let all: Vec<(&u32, &Vec<usize>)> = members.iter().collect();
-    let body = |(name, of): (&u32, &Vec<usize>)| Body::of(*name, voxels, of);
-    let bodies: Vec<Body> = all.into_par_iter().with_max_len(1).map(body).collect();
-    let mut names: BTreeMap<u32, u32> = members.keys().map(|name| (*name, *name)).collect();
+    let body = |(name, of): &(u32, Vec<usize>)| Body::of(*name, voxels, of);
+    let bodies = pool::heaviest_first(&members(part_of_voxel), |(_, of)| of.len(), body);
+    let mut names: BTreeMap<u32, u32> = bodies.iter().map(|body| (body.name, body.name)).collect();
     for (i, one) in bodies.iter().enumerate() {
         for other in &bodies[i + 1..] {
             if one.goes_on_in(other, seen, surface) {

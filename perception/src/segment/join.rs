@@ -3,6 +3,7 @@
 use super::SceneOptions;
 use super::mend::mend;
 use super::patches::{SOME, Voxels};
+use crate::pool;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -16,22 +17,30 @@ const PATCH_COS: f64 = 0.906;
 /// From: chosen, .25 was tried on piles of things and not kept.
 const SMOOTH_RAD: f64 = 0.35;
 
-/// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
-pub(super) fn parts(voxels: &Voxels, options: &SceneOptions) -> Vec<u32> {
+/// Which voxels are thin, and what hangs together of the others.
+pub(super) type Sets = (Vec<bool>, Vec<Vec<usize>>);
+
+/// Sets of voxels within which parts are sought.
+pub(super) fn sets(voxels: &Voxels) -> Sets {
     let thin = thin(voxels);
     let full: Vec<usize> = (0..voxels.len()).filter(|&i| !thin[i]).collect();
     let sets = voxels.together(&full);
+    (thin, sets)
+}
+
+/// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
+pub(super) fn parts(voxels: &Voxels, (thin, sets): &Sets, options: &SceneOptions) -> Vec<u32> {
     let mut place = vec![None; voxels.len()];
     sets.iter().for_each(|set| (0..).zip(set).for_each(|(local, &voxel)| place[voxel] = Some(local)));
     let name = |set: &Vec<usize>| match options.part_touching {
         true => Piece::of(voxels, set, &place).parts(),
         false => vec![set[0] as u32; set.len()],
     };
-    let names: Vec<Vec<u32>> = sets.par_iter().with_max_len(1).map(name).collect();
+    let names: Vec<Vec<u32>> = pool::heaviest_first(sets, Vec::len, name);
     let mut parts: Vec<u32> = (0..voxels.len() as u32).collect();
     let named = sets.iter().flatten().zip(names.iter().flatten());
     named.for_each(|(&voxel, &name)| parts[voxel] = name);
-    adopt(voxels, &thin, &mut parts);
+    adopt(voxels, thin, &mut parts);
     parts
 }
 
@@ -101,11 +110,9 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
         let near = voxels.neighbours(i).iter().map(|&j| j as usize).filter(|&j| !thin[j]);
         near.max_by_key(|&j| (voxels.counts[j], usize::MAX - j))
     };
-    for i in (0..voxels.len()).filter(|&i| thin[i]) {
-        if let Some(j) = full(i) {
-            parts[i] = parts[j];
-        }
-    }
+    let thin_ones = (0..voxels.len()).into_par_iter().with_min_len(SOME).filter(|&i| thin[i]);
+    let adopted: Vec<(usize, usize)> = thin_ones.filter_map(|i| full(i).map(|j| (i, j))).collect();
+    adopted.into_iter().for_each(|(i, j)| parts[i] = parts[j]);
 }
 
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.

@@ -110,33 +110,41 @@ impl Moments {
 /// Voxels that one thread takes in a row. From: work.
 pub(super) const SOME: usize = 256;
 
-/// Gathers points into voxels of a side and estimates a normal for each from its surroundings.
-pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f64>]) -> Voxels {
+/// Gathers points into voxels of a side and estimates a normal for each from its surroundings. Meanwhile something else is told of them that
+/// needs no normals.
+pub(super) fn voxels<T: Send>(
+    points: &[Point3<f64>],
+    side_m: f64,
+    viewpoints: &[Point3<f64>],
+    meanwhile: impl FnOnce(&Voxels) -> T + Send,
+) -> (Voxels, T) {
     let (low, high) = bounds(points);
     let lattice = Lattice::over(&low, &high, side_m);
     let (mut entries, run_starts) = runs(&lattice, points);
     lattice.sort(&mut entries, &mut Vec::new());
     let range = |run: usize| (run_starts[run], run_starts[run + 1]);
-    let runs: Vec<(u32, u32)> = entries.iter().map(|(_, run)| range(*run as usize)).collect();
-    let (mut keys, mut run_ends) = (Vec::new(), Vec::new());
-    let mut of_run = vec![0; entries.len()];
-    for same in entries.chunk_by(|a, b| a.0 == b.0) {
-        same.iter().for_each(|(_, run)| of_run[*run as usize] = keys.len() as u32);
-        keys.push(same[0].0);
-        run_ends.push(run_ends.last().copied().unwrap_or(0) + same.len() as u32);
-    }
-    let moments_of = |voxel: usize| {
-        let mut own = Moments::NONE;
-        let first = if voxel == 0 { 0 } else { run_ends[voxel - 1] };
-        for &(from, to) in &runs[first as usize..run_ends[voxel] as usize] {
-            points[from as usize..to as usize].iter().for_each(|p| own.add(p));
+    let voxels = || entries.chunk_by(|a, b| a.0 == b.0);
+    let keys: Vec<u64> = voxels().map(|same| same[0].0).collect();
+    let gathered = || {
+        let runs: Vec<(u32, u32)> = entries.iter().map(|(_, run)| range(*run as usize)).collect();
+        let (mut of_run, mut run_ends) = (vec![0; entries.len()], Vec::with_capacity(keys.len()));
+        for (voxel, same) in (0..).zip(voxels()) {
+            same.iter().for_each(|(_, run)| of_run[*run as usize] = voxel);
+            run_ends.push(run_ends.last().copied().unwrap_or(0) + same.len() as u32);
         }
-        own
+        let moments_of = |voxel: usize| {
+            let mut own = Moments::NONE;
+            let first = if voxel == 0 { 0 } else { run_ends[voxel - 1] };
+            for &(from, to) in &runs[first as usize..run_ends[voxel] as usize] {
+                points[from as usize..to as usize].iter().for_each(|p| own.add(p));
+            }
+            own
+        };
+        let moments = (0..keys.len()).into_par_iter().with_min_len(SOME).map(moments_of);
+        (moments.collect::<Vec<Moments>>(), runs, of_run, run_ends)
     };
-    let (moments, (starts, near)) = rayon::join(
-        || (0..keys.len()).into_par_iter().with_min_len(SOME).map(moments_of).collect::<Vec<Moments>>(),
-        || neighbours(&lattice, &keys),
-    );
+    let ((moments, runs, of_run, run_ends), (starts, near)) =
+        rayon::join(gathered, || neighbours(&lattice, &keys));
     let mut voxels = Voxels {
         centres: moments.iter().map(|m| Point3::from(m.sum / m.count)).collect(),
         normals: Vec::new(),
@@ -149,10 +157,13 @@ pub(super) fn voxels(points: &[Point3<f64>], side_m: f64, viewpoints: &[Point3<f
         runs,
         run_ends,
     };
-    let facing =
-        (0..keys.len()).into_par_iter().with_min_len(SOME).map(|i| surface(&voxels, &moments, i, viewpoints));
-    (voxels.normals, voxels.curvatures) = facing.unzip();
-    voxels
+    let facing = || {
+        let all = (0..keys.len()).into_par_iter().with_min_len(SOME);
+        all.map(|i| surface(&voxels, &moments, i, viewpoints)).unzip()
+    };
+    let (told, (normals, curvatures)) = rayon::join(|| meanwhile(&voxels), facing);
+    (voxels.normals, voxels.curvatures) = (normals, curvatures);
+    (voxels, told)
 }
 
 /// Points that follow each other in one voxel, as neighbours in an image do: the voxel and the number of each run, and where the runs begin
@@ -178,6 +189,8 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
 
 /// For each voxel where its neighbours begin, and all of them in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
+    /// In how many shares they are found, at the most. From: work.
+    const SHARES: usize = 8;
     let of = |range: Range<usize>| {
         let (mut starts, mut near) = (Vec::with_capacity(range.len() + 1), Vec::new());
         let mut around = Around::from(lattice, keys, range.start);
@@ -191,10 +204,15 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
         }
         (starts, near)
     };
-    let half = keys.len() / 2;
-    let ((mut starts, mut near), more) = rayon::join(|| of(0..half), || of(half..keys.len()));
-    starts.extend(more.0.iter().map(|start| start + near.len() as u32));
-    near.extend(more.1);
+    let some = keys.len().div_ceil(SHARES).max(SOME);
+    let from: Vec<usize> = (0..keys.len()).step_by(some).collect();
+    let shares: Vec<(Vec<u32>, Vec<u32>)> =
+        from.into_par_iter().with_max_len(1).map(|from| of(from..(from + some).min(keys.len()))).collect();
+    let (mut starts, mut near) = (Vec::with_capacity(keys.len() + 1), Vec::new());
+    for (more_starts, more) in shares {
+        starts.extend(more_starts.into_iter().map(|start| start + near.len() as u32));
+        near.extend(more);
+    }
     starts.push(near.len() as u32);
     (starts, near)
 }

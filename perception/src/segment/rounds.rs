@@ -6,8 +6,9 @@
 use super::patches::Voxels;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
-use super::{VOXEL_ENDS, is_upright, quantile};
+use super::{VOXEL_ENDS, is_upright, members, quantile};
 use crate::outline;
+use crate::pool;
 use crate::round::{SECTORS, distance, sector};
 use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
@@ -44,25 +45,28 @@ pub(super) fn part(
     part_of_voxel: &mut [u32],
     viewpoints: &[Point3<f64>],
 ) {
-    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for (voxel, part) in part_of_voxel.iter().enumerate() {
-        members.entry(*part).or_default().push(voxel);
-    }
-    let is_one = |of: &Vec<usize>| is_box(voxels, of, points) || is_round(voxels, of, points, viewpoints);
-    let all: Vec<&Vec<usize>> = members.values().collect();
-    let mut is_one = all.into_par_iter().with_max_len(1).map(is_one).collect::<Vec<_>>().into_iter();
-    members.retain(|_, _| !is_one.next().unwrap_or(false));
+    let all = members(part_of_voxel);
+    let is_one = |of: &[usize]| is_box(voxels, of, points) || is_round(voxels, of, points, viewpoints);
+    let one = pool::heaviest_first(&all, |(_, of)| of.len(), |(_, of)| is_one(of));
+    let more = all.into_iter().zip(one).filter(|(_, is_one)| !is_one);
+    let mut members: BTreeMap<u32, Vec<usize>> = more.map(|(part, _)| part).collect();
     let all: Vec<usize> = members.values().flatten().copied().collect();
-    for mut pool in voxels.together(&all) {
-        while let Some(cut) = Axis::sought(voxels, &pool).par_iter().with_max_len(1).find_map_first(|axis| {
-            let body = axis.body(voxels, &pool)?;
-            let is_round = is_round(voxels, &body, points, viewpoints);
-            is_round.then(|| Cut::around(voxels, body, axis, part_of_voxel, &members))?
+    for mut together in voxels.together(&all) {
+        let mut votes = votes_of(voxels, &together);
+        while let Some(cut) = Axis::sought(&votes).par_iter().with_max_len(1).find_map_first(|axis| {
+            let body = axis.body(voxels, &together)?;
+            // Most are round.
+            let (is_round, cut) = rayon::join(
+                || is_round(voxels, &body, points, viewpoints),
+                || Cut::around(voxels, &body, axis, part_of_voxel, &members),
+            );
+            cut.filter(|_| is_round)
         }) {
             cut.body.iter().for_each(|v| {
                 members.remove(&part_of_voxel[*v]);
             });
-            pool.retain(|v| cut.body.binary_search(v).is_err());
+            together.retain(|v| cut.body.binary_search(v).is_err());
+            cut.body.iter().filter_map(|&v| voted_for(voxels, v)).for_each(|cells| votes.take_back(&cells));
             cut.body.iter().for_each(|&v| part_of_voxel[v] = cut.body[0] as u32);
             for left in cut.left {
                 left.iter().for_each(|&v| part_of_voxel[v] = left[0] as u32);
@@ -97,7 +101,7 @@ impl Cut {
     /// None if the body is just one of the parts, or no body.
     fn around(
         voxels: &Voxels,
-        body: Vec<usize>,
+        body: &[usize],
         axis: &Axis,
         part_of_voxel: &[u32],
         members: &BTreeMap<u32, Vec<usize>>,
@@ -106,7 +110,7 @@ impl Cut {
         let rest = touched.iter().filter_map(|part| members.get(part)).flatten().copied();
         let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
         let (left, own): (Vec<_>, Vec<_>) =
-            voxels.together(&rest).into_iter().partition(|piece| is_apart(voxels, piece, &body, axis));
+            voxels.together(&rest).into_iter().partition(|piece| is_apart(voxels, piece, body, axis));
         // What two parts leave stays two.
         let left: Vec<Vec<usize>> = left
             .iter()
@@ -119,7 +123,7 @@ impl Cut {
         if touched.len() == 1 && left.is_empty() {
             return None;
         }
-        let mut body = body;
+        let mut body = body.to_vec();
         body.extend(own.into_iter().flatten());
         body.sort_unstable();
         (!axis.parts_a_top(voxels, &body, &left)).then_some(Cut { body, left })
@@ -152,6 +156,38 @@ fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints:
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
 }
 
+/// The votes of the side of what hangs together.
+fn votes_of(voxels: &Voxels, of: &[usize]) -> Votes {
+    let (low, high) = bounds(of.iter().map(|&v| voxels.centres[v].xy()));
+    let low = [low.x, low.y].map(|c| cell_of(c - RADII_M.1) - 1);
+    let high = [high.x, high.y].map(|c| cell_of(c + RADII_M.1) + 1);
+    let some = |of: &[usize]| {
+        let mut votes = Votes::over(low, high);
+        of.iter().filter_map(|&v| voted_for(voxels, v)).for_each(|cells| votes.add(&cells));
+        votes
+    };
+    let (first, second) = of.split_at(of.len() / 2);
+    let (mut votes, more) = rayon::join(|| some(first), || some(second));
+    votes.join(&more);
+    votes
+}
+
+/// The cells of the axes that a voxel may belong to, radius by radius, if it is one of a side.
+fn voted_for(voxels: &Voxels, voxel: usize) -> Option<[[i32; 2]; RADII]> {
+    let (place, normal) = (&voxels.centres[voxel], &voxels.normals[voxel]);
+    is_upright(normal).then(|| {
+        let across = normal.xy().normalize();
+        std::array::from_fn(|k| {
+            let r = RADII_M.0 + k as f64 * STEP_M;
+            [place.x - across.x * r, place.y - across.y * r].map(cell_of)
+        })
+    })
+}
+
+fn cell_of(m: f64) -> i32 {
+    floor(m * (1.0 / STEP_M) + 0.5)
+}
+
 /// An upright axis that the side of a body may have.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
@@ -161,28 +197,14 @@ struct Axis {
 }
 
 impl Axis {
-    /// The axes on which most normals of a part agree, best first.
-    fn sought(voxels: &Voxels, of: &[usize]) -> Vec<Axis> {
+    /// The axes that most votes are for, best first.
+    fn sought(votes: &Votes) -> Vec<Axis> {
         /// Axes that are tried. From: chosen.
         const MOST: usize = 8;
         /// A place and radius has more votes of its own than this. From: chosen.
         const FEW: u16 = 3;
         /// Axes are apart by more than so many steps. From: chosen.
         const APART: f64 = 3.0;
-        let cell = |m: f64| floor(m * (1.0 / STEP_M) + 0.5);
-        let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
-        let (low, high) = bounds(side.iter().map(|&v| voxels.centres[v].xy()));
-        let mut votes = Votes::over(
-            [low.x, low.y].map(|c| cell(c - RADII_M.1) - 1),
-            [high.x, high.y].map(|c| cell(c + RADII_M.1) + 1),
-        );
-        for &v in &side {
-            let (place, across) = (&voxels.centres[v], voxels.normals[v].xy().normalize());
-            for k in 0..RADII {
-                let r = RADII_M.0 + k as f64 * STEP_M;
-                votes.add(cell(place.x - across.x * r), cell(place.y - across.y * r), k);
-            }
-        }
         let mut cells = votes.peaks(FEW, FEWEST as u32);
         cells.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut axes: Vec<Axis> = Vec::new();

@@ -23,28 +23,56 @@ impl Votes {
         Votes { low, deep: tiles(1), tiles: vec![0; tiles(0) * tiles(1)], counts: Vec::new() }
     }
 
-    /// Tile and place in it.
+    /// Tile and place in it; none beyond the cells that were named.
     fn locate(&self, x: i32, y: i32) -> Option<(usize, usize)> {
-        let (i, j) = (usize::try_from(x - self.low[0]).ok()?, usize::try_from(y - self.low[1]).ok()?);
-        (j / TILE < self.deep).then_some((i / TILE * self.deep + j / TILE, i % TILE * TILE + j % TILE))
+        // What is lower than the lowest is far beyond the highest.
+        let [i, j] = [x.wrapping_sub(self.low[0]), y.wrapping_sub(self.low[1])].map(|at| at as u32 as usize);
+        let tile = i / TILE * self.deep + j / TILE;
+        (j / TILE < self.deep && tile < self.tiles.len()).then_some((tile, i % TILE * TILE + j % TILE))
     }
 
-    /// One vote more. Beyond the cells that were named, votes are lost.
-    pub fn add(&mut self, x: i32, y: i32, radius: usize) {
-        let Some((tile, place)) = self.locate(x, y).filter(|(tile, _)| *tile < self.tiles.len()) else {
-            return;
-        };
+    /// One vote more for each radius, in the cell that goes with it. Beyond the cells that were named, votes are lost.
+    pub fn add(&mut self, cells: &[[i32; 2]; RADII]) {
+        self.change(cells, |count| count.saturating_add(1));
+    }
+
+    /// Votes that were given are none.
+    pub fn take_back(&mut self, cells: &[[i32; 2]; RADII]) {
+        self.change(cells, |count| count.saturating_sub(1));
+    }
+
+    fn change(&mut self, cells: &[[i32; 2]; RADII], to: impl Fn(u16) -> u16) {
+        for (radius, [x, y]) in cells.iter().enumerate() {
+            if let Some((tile, place)) = self.locate(*x, *y) {
+                let count = &mut self.lay(tile)[place][radius];
+                *count = to(*count);
+            }
+        }
+    }
+
+    /// Those of another over the same cells are added.
+    pub fn join(&mut self, other: &Votes) {
+        for (tile, laid) in other.tiles.iter().enumerate().filter(|(_, laid)| **laid > 0) {
+            let more = &other.counts[(*laid as usize - 1) * TILE * TILE..*laid as usize * TILE * TILE];
+            for (own, more) in self.lay(tile).iter_mut().flatten().zip(more.iter().flatten()) {
+                *own = own.saturating_add(*more);
+            }
+        }
+    }
+
+    /// The counts of a tile, which is laid if it was not.
+    fn lay(&mut self, tile: usize) -> &mut [[u16; RADII]] {
         if self.tiles[tile] == 0 {
             self.counts.resize(self.counts.len() + TILE * TILE, [0; RADII]);
             self.tiles[tile] = (self.counts.len() / (TILE * TILE)) as u32;
         }
-        let count = &mut self.counts[(self.tiles[tile] as usize - 1) * TILE * TILE + place][radius];
-        *count = count.saturating_add(1);
+        let end = self.tiles[tile] as usize * TILE * TILE;
+        &mut self.counts[end - TILE * TILE..end]
     }
 
     fn at(&self, x: i32, y: i32) -> Option<&[u16; RADII]> {
         let (tile, place) = self.locate(x, y)?;
-        let laid = (*self.tiles.get(tile)? as usize).checked_sub(1)?;
+        let laid = (self.tiles[tile] as usize).checked_sub(1)?;
         self.counts.get(laid * TILE * TILE + place)
     }
 
@@ -85,12 +113,25 @@ mod tests {
 
     proptest! {
         #[test]
-        fn peaks_are_those_of_a_map(votes in prop::collection::vec((-3..30_i32, 40..60_i32, 0..RADII), 1..300)) {
+        fn peaks_are_those_of_a_map(
+            votes in prop::collection::vec((-3..30_i32, 40..60_i32, -2..3_i32, -2..3_i32), 1..100)
+        ) {
             let mut map: BTreeMap<[i32; 3], u32> = BTreeMap::new();
-            let mut counted = Votes::over([-3, 40], [29, 59]);
-            for &(x, y, k) in &votes {
-                *map.entry([x, y, k as i32]).or_default() += 1;
-                counted.add(x, y, k);
+            let none = || Votes::over([-3, 40], [29, 59]);
+            let (mut counted, mut others) = (none(), none());
+            // Each a line of cells; what would leave those that are named stays at their edge.
+            let line = |&(x, y, i, j): &(i32, i32, i32, i32)| -> [[i32; 2]; RADII] {
+                std::array::from_fn(|k| [(x + i * k as i32).clamp(-3, 29), (y + j * k as i32).clamp(40, 59)])
+            };
+            for (n, cells) in votes.iter().map(line).enumerate() {
+                (0..).zip(cells).for_each(|(k, [x, y])| *map.entry([x, y, k]).or_default() += 1);
+                let some = if n % 2 == 0 { &mut counted } else { &mut others };
+                some.add(&cells);
+            }
+            counted.join(&others);
+            for cells in votes.iter().step_by(3).map(line) {
+                (0..).zip(cells).for_each(|(k, [x, y])| *map.entry([x, y, k]).or_default() -= 1);
+                counted.take_back(&cells);
             }
             let near = |a: &[i32; 3], b: &[i32; 3]| (0..3).all(|i| (a[i] - b[i]).abs() <= 1);
             let around = |cell| map.iter().filter(|(other, _)| near(cell, other)).map(|(_, n)| *n).sum::<u32>();

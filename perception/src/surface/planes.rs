@@ -115,20 +115,19 @@ struct Cubes {
 
 impl Cubes {
     fn of(samples: &[Sample]) -> Cubes {
-        const PER_M: f64 = 1.0 / REACH_M;
-        let key = |sample: &Sample| [0, 1, 2].map(|k| super::floor(sample.point[k] * PER_M));
-        let keys: Vec<[i32; 3]> = samples.par_iter().with_min_len(SOME).map(key).collect();
-        let mut numbers: FxHashMap<[i32; 3], u32> = FxHashMap::default();
-        let mut last = ([i32::MIN; 3], 0);
-        let number = |key: [i32; 3]| {
-            if key != last.0 {
-                let next = numbers.len() as u32;
-                last = (key, *numbers.entry(key).or_insert(next));
-            }
-            last.1
+        let (first, second) = samples.split_at(samples.len() / 2);
+        let ((mut of, mut keys), (others, more)) = rayon::join(|| numbered(first), || numbered(second));
+        // What both have has one number.
+        let numbers: FxHashMap<[i32; 3], u32> = keys.iter().copied().zip(0..).collect();
+        let renumber = |key| {
+            numbers.get(&key).copied().unwrap_or_else(|| {
+                keys.push(key);
+                keys.len() as u32 - 1
+            })
         };
-        let of: Vec<u32> = keys.into_iter().map(number).collect();
-        let mut cubes = Cubes { of, starts: vec![0; numbers.len() + 1], members: Vec::new() };
+        let new: Vec<u32> = more.into_iter().map(renumber).collect();
+        of.extend(others.into_iter().map(|cube| new[cube as usize]));
+        let mut cubes = Cubes { of, starts: vec![0; keys.len() + 1], members: Vec::new() };
         cubes.sort();
         cubes
     }
@@ -161,6 +160,25 @@ impl Cubes {
         let cube = self.of[point] as usize;
         &self.members[self.starts[cube] as usize..self.starts[cube + 1] as usize]
     }
+}
+
+/// The number of each point's cube, and which cubes these are, as they come.
+fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
+    const PER_M: f64 = 1.0 / REACH_M;
+    let (mut numbers, mut keys): (FxHashMap<[i32; 3], u32>, Vec<[i32; 3]>) = Default::default();
+    let mut last = ([i32::MIN; 3], 0);
+    let number = |sample: &Sample| {
+        let key = [0, 1, 2].map(|k| super::floor(sample.point[k] * PER_M));
+        if key != last.0 {
+            let number = *numbers.entry(key).or_insert_with(|| {
+                keys.push(key);
+                keys.len() as u32 - 1
+            });
+            last = (key, number);
+        }
+        last.1
+    };
+    (samples.iter().map(number).collect(), keys)
 }
 
 /// The points that proposals are judged by, each coordinate by itself, from the first of them: a micrometre is more than they know. Filled
@@ -253,9 +271,9 @@ fn propose(
         best
     };
     let (first, second) = drawn.split_at(drawn.len() / 2);
-    let both: (Option<(f64, Plane)>, Option<(f64, Plane)>) = rayon::join(|| best_of(first), || best_of(second));
+    let (one, other) = rayon::join(|| best_of(first), || best_of(second));
     // Of equals the first.
-    let best = match both {
+    let best = match (one, other) {
         (Some(one), Some(other)) if other.0 > one.0 => Some(other),
         (one, other) => one.or(other),
     };

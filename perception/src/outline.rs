@@ -214,13 +214,15 @@ impl Side {
         {
             // Neighbours in an image are near each other: most blocks have none so far out.
             if reach <= limit {
-                let (mut some, mut count) = ([0; BLOCK], 0);
+                let (before, mut count) = (self.found.len(), 0);
+                self.found.resize(before + BLOCK, 0);
+                let some = &mut self.found[before..];
                 for (place, number) in block.iter().map(|place| way(*place)).zip(first..) {
                     // Written over by the next if it is not so far out.
                     some[count % BLOCK] = ranked(place, number);
                     count += usize::from(place <= limit);
                 }
-                self.found.extend_from_slice(&some[..count]);
+                self.found.truncate(before + count);
             }
         }
         let last = self.outermost.len() - 1;

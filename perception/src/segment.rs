@@ -135,8 +135,11 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
             parts.push(Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 });
             parts.len() - 1
         });
-        parts[slot].indices.extend_from_slice(&indices[range.clone()]);
-        parts[slot].points.extend_from_slice(&points[range]);
+        // One or two most often: to copy them as a slice takes longer.
+        for at in range {
+            parts[slot].indices.push(indices[at]);
+            parts[slot].points.push(points[at]);
+        }
     }
     parts
 }
@@ -167,7 +170,7 @@ fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, optio
     let offset = surface.offset_m as f32;
     let band = clearance_m as f32..options.tallest_m as f32;
     let is_over = surface.overhung();
-    let (mut indices, mut points) = (Vec::with_capacity(of.len()), Vec::with_capacity(of.len()));
+    let (mut indices, mut points) = (Vec::new(), Vec::new());
     for (block, first) in of.chunks(BLOCK).zip((from..).step_by(BLOCK)) {
         // What is not finite is in no band.
         let mut heights = [f32::NAN; BLOCK];
@@ -218,6 +221,15 @@ fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     let n = points.len().max(1) as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
     [x / n, y / n]
+}
+
+/// Drops from ascending numbers what is among others that ascend.
+fn take_away(from: &mut Vec<usize>, others: &[usize]) {
+    let mut others = others.iter().peekable();
+    from.retain(|own| {
+        while others.next_if(|other| *other < own).is_some() {}
+        others.peek() != Some(&own)
+    });
 }
 
 /// Lowest and highest corner of the box around points.

@@ -66,6 +66,8 @@ const COLLINEAR: f64 = 1e-9;
 
 /// Newton's steps towards the least eigenvalue; from a few on they change nothing, but where two of them are nearly the same.
 const MOST_STEPS: usize = 40;
+/// What is left after so small a step is its square: nothing.
+const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
 ///
@@ -89,10 +91,10 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
     for _ in 0..MOST_STEPS {
         let value = ((trace - smallest) * smallest - pairs) * smallest + determinant;
         let step = value / (pairs - (2.0 * trace - 3.0 * smallest) * smallest);
-        if step.is_nan() || step <= 1e-15 {
+        smallest += if step > 0.0 { step } else { 0.0 };
+        if step.is_nan() || step <= LAST_STEP {
             break;
         }
-        smallest += step;
     }
     let rows = [[xx - smallest, xy, xz], [xy, yy - smallest, yz], [xz, yz, zz - smallest]];
     let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];

@@ -6,7 +6,7 @@
 use super::patches::Voxels;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
-use super::{VOXEL_ENDS, is_upright, members, quantile};
+use super::{VOXEL_ENDS, is_upright, members, quantile, take_away};
 use crate::outline;
 use crate::pool;
 use crate::round::{SECTORS, distance, sector};
@@ -65,7 +65,7 @@ pub(super) fn part(
             cut.body.iter().for_each(|v| {
                 members.remove(&part_of_voxel[*v]);
             });
-            together.retain(|v| cut.body.binary_search(v).is_err());
+            take_away(&mut together, &cut.body);
             cut.body.iter().filter_map(|&v| voted_for(voxels, v)).for_each(|cells| votes.take_back(&cells));
             cut.body.iter().for_each(|&v| part_of_voxel[v] = cut.body[0] as u32);
             for left in cut.left {
@@ -107,8 +107,10 @@ impl Cut {
         members: &BTreeMap<u32, Vec<usize>>,
     ) -> Option<Cut> {
         let touched: BTreeSet<u32> = body.iter().map(|&v| part_of_voxel[v]).collect();
-        let rest = touched.iter().filter_map(|part| members.get(part)).flatten().copied();
-        let rest: Vec<usize> = rest.filter(|v| body.binary_search(v).is_err()).collect();
+        let mut rest: Vec<usize> =
+            touched.iter().filter_map(|part| members.get(part)).flatten().copied().collect();
+        rest.sort_unstable();
+        take_away(&mut rest, body);
         let (left, own): (Vec<_>, Vec<_>) =
             voxels.together(&rest).into_iter().partition(|piece| is_apart(voxels, piece, body, axis));
         // What two parts leave stays two.

@@ -192,7 +192,8 @@ impl Grid {
 
     /// The cell that a place lies in.
     pub fn cell_of(&self, p: &Point3<f64>) -> [i32; 2] {
-        self.axes.each_ref().map(|axis| floor(axis.dot(&p.coords) / self.side_m))
+        let per_m = 1.0 / self.side_m;
+        self.axes.each_ref().map(|axis| floor(axis.dot(&p.coords) * per_m))
     }
 }
 

@@ -6,7 +6,6 @@ use crate::draw::Draws;
 use crate::surface::range_sigma_m;
 use nalgebra::{Point3, Vector4};
 use side::{Side, Sums};
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Radii that are tried, metres. From: chosen.
@@ -101,10 +100,29 @@ impl Round {
     }
 }
 
-/// In which of so many directions around an axis a place lies that is `x` and `y` from it.
-pub(crate) fn sector(x: f64, y: f64, sectors: usize) -> usize {
-    let turn = y.atan2(x).rem_euclid(TAU) / TAU;
-    ((turn * sectors as f64) as usize).min(sectors - 1)
+/// In which of the [`SECTORS`] directions around an axis a place lies that is `x` and `y` from it.
+#[inline]
+pub(crate) fn sector(x: f64, y: f64) -> usize {
+    /// Where the sectors of a quarter end but for the last, as tangents. From: derived, every ten degrees.
+    const ENDS: [f64; SECTORS / 4 - 1] = [
+        0.176_326_980_708_464_98,
+        0.363_970_234_266_202_36,
+        0.577_350_269_189_625_8,
+        0.839_099_631_177_280_1,
+        1.191_753_592_594_21,
+        1.732_050_807_568_877,
+        2.747_477_419_454_622,
+        5.671_281_819_617_709,
+    ];
+    let (quarter, along, across) = match () {
+        () if y > 0.0 && x <= 0.0 => (1, y, -x),
+        () if y <= 0.0 && x < 0.0 => (2, -x, -y),
+        () if y < 0.0 && x >= 0.0 => (3, -y, x),
+        () => (0, x, y),
+    };
+    let beyond: usize = ENDS.iter().map(|end| usize::from(across >= end * along)).sum();
+    // Of what lies on the axis itself none is beyond.
+    quarter * (SECTORS / 4) + if along > 0.0 { beyond } else { 0 }
 }
 
 /// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.
@@ -305,6 +323,7 @@ fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     /// Points on the side of a cup, over an arc, with a ripple in place of noise.
     fn cup(x: f64, y: f64, base: f64, top: f64, arc_rad: f64) -> Vec<Point3<f64>> {
@@ -321,7 +340,7 @@ mod tests {
     #[test]
     fn radius_place_and_taper_come_back() {
         let cases = [
-            ("all around", 0.0, 0.0, 0.035, 0.035, std::f64::consts::TAU),
+            ("all around", 0.0, 0.0, 0.035, 0.035, TAU),
             ("half", 0.4, -0.2, 0.035, 0.035, 2.6),
             ("a tapered cup", -0.3, 0.1, 0.025, 0.04, 3.0),
         ];
@@ -335,6 +354,16 @@ mod tests {
             });
             assert!(close, "{name}: {found:?}");
         }
+    }
+
+    #[test]
+    fn directions_around_an_axis_are_those_of_the_angle() {
+        for k in 0..7200 {
+            let angle = TAU * (f64::from(k) + 0.5) / 7200.0;
+            assert_eq!(sector(0.3 * angle.cos(), 0.3 * angle.sin()), k as usize / 200, "{angle} rad");
+        }
+        let axes = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0)];
+        assert_eq!(axes.map(|(x, y)| sector(x, y)), [0, 9, 18, 27, 0]);
     }
 
     #[test]

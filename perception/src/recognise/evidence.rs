@@ -445,28 +445,8 @@ pub(super) fn measured_sectors(
     let (low, high) = (base_m + ENDS.0 * height, base_m + (1.0 - ENDS.1) * height);
     let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < NEAR_M;
     let mut counts = [0_u32; SECTORS];
-    // What follows lies in the same direction, most often: this much of the circle needs no angle to be told.
-    let mut settled: Option<[[f64; 2]; 2]> = None;
-    for p in points.iter().filter(on_side) {
-        let (x, y) = (p.x - round.x, p.y - round.y);
-        if settled.is_some_and(|[from, to]| from[0] * y - from[1] * x > 0.0 && to[0] * y - to[1] * x < 0.0) {
-            continue;
-        }
-        let sector = round::sector(x, y, SECTORS);
-        counts[sector] += 1;
-        settled = (counts[sector] >= 2).then(|| within_sector(sector));
-    }
+    points.iter().filter(on_side).for_each(|p| counts[sector_of(round, p)] += 1);
     counts.map(|c| c >= 2)
-}
-
-/// Directions just inside both ends of a sector.
-fn within_sector(sector: usize) -> [[f64; 2]; 2] {
-    /// Of a sector's width, so near to an end a direction may be of the next. From: rounding.
-    const ROUNDING: f64 = 1e-9;
-    [ROUNDING, 1.0 - ROUNDING].map(|share| {
-        let (sin, cos) = (std::f64::consts::TAU * (sector as f64 + share) / SECTORS as f64).sin_cos();
-        [cos, sin]
-    })
 }
 
 fn share(flags: &[bool; SECTORS]) -> f64 {
@@ -474,7 +454,7 @@ fn share(flags: &[bool; SECTORS]) -> f64 {
 }
 
 fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
-    round::sector(p.x - round.x, p.y - round.y, SECTORS)
+    round::sector(p.x - round.x, p.y - round.y)
 }
 
 /// The largest thing that sticks out of the body in one direction.

@@ -249,7 +249,7 @@ impl Axis {
         let mut tops = [f64::NEG_INFINITY; SECTORS];
         for &v in &side {
             let place = &voxels.centres[v];
-            let top = &mut tops[sector(place.x - self.x, place.y - self.y, SECTORS)];
+            let top = &mut tops[sector(place.x - self.x, place.y - self.y)];
             *top = top.max(place.z);
         }
         let mut seen: Vec<f64> = tops.into_iter().filter(|top| top.is_finite()).collect();
@@ -276,8 +276,7 @@ impl Axis {
             beside.any(|n| is_top(n) && body.binary_search(&n).is_ok())
         };
         let outline = left.iter().flatten().copied().filter(|&v| is_top(v) && runs_on(v));
-        let direction =
-            |v: usize| sector(voxels.centres[v].x - self.x, voxels.centres[v].y - self.y, SECTORS);
+        let direction = |v: usize| sector(voxels.centres[v].x - self.x, voxels.centres[v].y - self.y);
         let sectors: BTreeSet<usize> = outline.map(direction).collect();
         sectors.len() >= LEAST_SECTORS
     }

@@ -1,7 +1,7 @@
 //! What each thing stands on: the surface, another thing, or the bottom of one that it stands in.
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
-use crate::round::sector;
+use crate::round::{SECTORS, sector};
 use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -12,8 +12,7 @@ const BOTTOM_M: (f64, f64) = (0.005, 0.006);
 
 /// How far from its lower edge the top of what a thing stands on may be measured, metres. From: chosen.
 const MEETS_M: f64 = 0.03;
-/// Directions from a place that are looked at one by one, how many of them what is around shows at least, and what bears. From: chosen.
-const DIRECTIONS: usize = 36;
+/// Of the directions from a place, how many what is around shows at least, and what bears. From: chosen.
 const AROUND: usize = 27;
 const BEARS: usize = 15;
 
@@ -102,8 +101,8 @@ fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>,
 
 /// In how many directions from a place points lie.
 fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
-    let mut seen = [false; DIRECTIONS];
-    points.for_each(|p| seen[sector(p.x - x, p.y - y, DIRECTIONS)] = true);
+    let mut seen = [false; SECTORS];
+    points.for_each(|p| seen[sector(p.x - x, p.y - y)] = true);
     seen.iter().filter(|seen| **seen).count()
 }
 

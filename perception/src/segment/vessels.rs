@@ -161,7 +161,7 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < ON_SIDE_M;
     let on = |of: &[Point3<f64>]| of.iter().filter(is_on).count() as f64 / of.len().max(1) as f64;
     let mut seen = [false; SECTORS];
-    both.iter().filter(is_on).for_each(|p| seen[sector(p.x - body.x, p.y - body.y, SECTORS)] = true);
+    both.iter().filter(is_on).for_each(|p| seen[sector(p.x - body.x, p.y - body.y)] = true);
     let is_within =
         |p: &&Point3<f64>| distance(p.x - body.x, p.y - body.y) < body.radius_at(top_m) + TOUCHES_M;
     let holds = |part: &Candidate| {

@@ -1,6 +1,6 @@
 //! Sets of cells and of points in a plane: what hangs together, and the hull.
 
-/// The largest set of cells that hang together over gaps of up to two cells (shadows of objects); ties go to the first in order. Each cell
+/// The largest set of cells that hang together, up to two cells apart (shadows of objects); ties go to the first in order. Each cell
 /// is named once.
 pub(crate) fn largest_part(cells: Vec<([i32; 2], u32)>) -> Vec<[i32; 2]> {
     parts(cells).into_iter().next().unwrap_or_default()
@@ -62,21 +62,41 @@ pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<
     })
 }
 
+/// Cells of one column that hang together.
+struct Run {
+    x: i32,
+    /// The first and the last.
+    ends: [i32; 2],
+    /// Where the first lies among all cells in order, and how many they are.
+    at: usize,
+    len: usize,
+}
+
 /// For each of some cells in order the first that it hangs together with.
 fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
-    /// Over so many empty cells two hang together: shadows of objects. From: chosen.
+    /// Cells so far apart hang together: shadows of objects. From: chosen.
     const GAP: i32 = 2;
-    let mut first: Vec<usize> = (0..order.len()).collect();
-    // The cells that follow within reach: in the same column, and in the next ones.
-    let mut ahead = [0; GAP as usize + 1];
-    for (i, ([x, y], _)) in order.iter().enumerate() {
+    let mut at = 0;
+    let in_column = order.chunk_by(|([x, y], _), ([next, on], _)| x == next && on.saturating_sub(*y) <= GAP);
+    let run = |cells: &[([i32; 2], u32)]| {
+        let (([x, first], _), ([_, last], _)) = (cells[0], cells[cells.len() - 1]);
+        at += cells.len();
+        Run { x, ends: [first, last], at: at - cells.len(), len: cells.len() }
+    };
+    let runs: Vec<Run> = in_column.map(run).collect();
+    let mut first: Vec<usize> = (0..runs.len()).collect();
+    // The runs that follow within reach, in the next columns. No gap in a run is wider than that reach.
+    let mut ahead = [0; GAP as usize];
+    for (i, Run { x, ends: [low, high], .. }) in runs.iter().enumerate() {
         let mut own = root(&mut first, i);
-        for (dx, start) in (0..).zip(&mut ahead) {
-            let from = [x + dx, if dx == 0 { y + 1 } else { y - GAP }];
-            while order.get(*start).is_some_and(|(cell, _)| *cell < from) {
+        for (dx, start) in (1..).zip(&mut ahead) {
+            let column = x.saturating_add(dx);
+            let from = [column, low.saturating_sub(GAP)];
+            while runs.get(*start).is_some_and(|run| [run.x, run.ends[1]] < from) {
                 *start += 1;
             }
-            let near = order[*start..].iter().take_while(|(cell, _)| *cell <= [x + dx, y + GAP]);
+            let to = [column, high.saturating_add(GAP)];
+            let near = runs[*start..].iter().take_while(|run| [run.x, run.ends[0]] <= to);
             for j in (*start..).take(near.count()) {
                 let other = root(&mut first, j);
                 first[own.max(other)] = own.min(other);
@@ -84,7 +104,8 @@ fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
             }
         }
     }
-    (0..order.len()).map(|i| root(&mut first, i)).collect()
+    let of_cells = |(i, run): (usize, &Run)| std::iter::repeat_n(runs[root(&mut first, i)].at, run.len);
+    runs.iter().enumerate().flat_map(of_cells).collect()
 }
 
 fn root(first: &mut [usize], mut i: usize) -> usize {
@@ -182,6 +203,34 @@ mod tests {
             let left = |p: &[f64; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
             assert!(points.iter().all(|p| left(p) >= -1e-9), "{a:?} to {b:?}");
         }
+    }
+
+    #[test]
+    fn cells_up_to_two_apart_hang_together() {
+        // Each cell and whether it is of the first part, in a plan of rows: a letter for each part, dots for none.
+        let check = |plan: &[&str]| {
+            let all =
+                plan.iter().zip(0..).flat_map(|(row, y)| row.chars().zip(0..).map(move |(c, x)| (c, [x, y])));
+            let named: Vec<(char, [i32; 2])> = all.filter(|(c, _)| *c != '.').collect();
+            let mut found = parts(named.iter().map(|(_, cell)| (*cell, 1)).collect());
+            let mut names: Vec<char> = named.iter().map(|(c, _)| *c).collect();
+            names.sort_unstable();
+            names.dedup();
+            let of = |name: &char| {
+                named.iter().filter(|(c, _)| c == name).map(|(_, cell)| *cell).collect::<Vec<_>>()
+            };
+            let mut expected: Vec<Vec<[i32; 2]>> = names.iter().map(of).collect();
+            expected.iter_mut().chain(&mut found).for_each(|part| part.sort_unstable());
+            expected.sort_unstable();
+            found.sort_unstable();
+            assert_eq!(found, expected, "{plan:#?}");
+        };
+        check(&["aa.a..bb", "a......b", "..a...b."]);
+        check(&["a..b", "....", "...b", "c..b", "c..."]);
+        check(&["a.a.a.a", ".......", ".......", ".b.b.b."]);
+        check(&[
+            "aaaaaaa", "......a", "......a", "bbb...a", "..b...a", "bbb...a", "......a", "......a", "aaaaaaa",
+        ]);
     }
 
     #[test]

@@ -27,8 +27,9 @@ impl Rectangle {
 /// Orientations over a quarter turn, and one in so many that is tried before those beside the best.
 const TURNS: usize = 30;
 const APART: usize = 3;
-/// Points that are looked at, at the most.
+/// Points that are looked at, at the most, and those by which the turn is sought.
 const MOST: usize = 1200;
+const SCOUTS: usize = 400;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
@@ -38,11 +39,12 @@ pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
     }
-    let mut turner = Turner::of(points);
-    let (_, turn) = best_turn(|turn, bound| {
+    let squares = |turner: &mut Turner, turn, bound| {
         let turned = turner.turned(turn);
         turner.squares_within(&turned, bound)
-    })?;
+    };
+    let mut turner = Turner::of(points, MOST);
+    let (_, turn) = best_turn(&mut Turner::of(points, SCOUTS), &mut turner, squares)?;
     let turned = turner.turned(turn);
     let turned = turner.settled(turned);
     let squares = turner.squares_within(&turned, f64::INFINITY)?;
@@ -54,14 +56,18 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     if points.len() < 8 {
         return false;
     }
-    let mut turner = Turner::of(points);
-    let bound = residual_m * residual_m * turner.len as f64;
-    let best = best_turn(|turn, best| {
-        let turned = turner.turned(turn);
+    let bound_of = |turner: &Turner| residual_m * residual_m * turner.len as f64;
+    let squares = |turner: &mut Turner, turn, best| {
         // What fits is good enough.
-        if best <= bound { None } else { turner.squares_within(&turned, best) }
-    });
-    best.is_some_and(|(squares, _)| squares <= bound)
+        if best <= bound_of(turner) {
+            return None;
+        }
+        let turned = turner.turned(turn);
+        turner.squares_within(&turned, best)
+    };
+    let mut turner = Turner::of(points, MOST);
+    let best = best_turn(&mut Turner::of(points, SCOUTS), &mut turner, squares);
+    best.is_some_and(|(squares, _)| squares <= bound_of(&turner))
 }
 
 /// The rectangle of least area around nearly all points; it has no residual.
@@ -69,33 +75,35 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.is_empty() {
         return None;
     }
-    let mut turner = Turner::of(points);
-    let (_, turn) = best_turn(|turn, _| {
+    let area = |turner: &mut Turner, turn, _| {
         let [a, b] = turner.turned(turn).along_m();
         Some(a * b)
-    })?;
+    };
+    let mut turner = Turner::of(points, MOST);
+    let (_, turn) = best_turn(&mut Turner::of(points, SCOUTS), &mut turner, area)?;
     Some(turner.turned(turn).rectangle(turner.origin, 0.0))
 }
 
-/// The turn that costs least, and what it costs: the best of a few, or one beside it. `cost` is told the least so far, and may give none
-/// for more.
-fn best_turn(mut cost: impl FnMut(usize, f64) -> Option<f64>) -> Option<(f64, usize)> {
-    let mut best: Option<(f64, usize)> = None;
-    let mut ask = |best: &mut Option<(f64, usize)>, turn: usize| {
-        let least = best.map_or(f64::INFINITY, |(least, _)| least);
-        if let Some(cost) = cost(turn, least).filter(|cost| *cost < least) {
-            *best = Some((cost, turn));
+/// The turn that costs least, and what it costs: the best of a few by some of the points, or one beside it. `cost` is told the least so far,
+/// and may give none for more.
+fn best_turn(
+    scouts: &mut Turner,
+    all: &mut Turner,
+    cost: impl Fn(&mut Turner, usize, f64) -> Option<f64>,
+) -> Option<(f64, usize)> {
+    let best_of = |turner: &mut Turner, turns: &mut dyn Iterator<Item = usize>| {
+        let mut best: Option<(f64, usize)> = None;
+        for turn in turns {
+            let least = best.map_or(f64::INFINITY, |(least, _)| least);
+            if let Some(cost) = cost(turner, turn, least).filter(|cost| *cost < least) {
+                best = Some((cost, turn));
+            }
         }
+        best
     };
-    for turn in (0..TURNS).step_by(APART) {
-        ask(&mut best, turn);
-    }
-    let (_, among) = best?;
-    for aside in 1..=APART / 2 {
-        ask(&mut best, (among + aside) % TURNS);
-        ask(&mut best, (among + TURNS - aside) % TURNS);
-    }
-    best
+    let (_, among) = best_of(scouts, &mut (0..TURNS).step_by(APART))?;
+    let aside = (1..=APART / 2).flat_map(|aside| [aside, TURNS - aside]);
+    best_of(all, &mut std::iter::once(0).chain(aside).map(|aside| (among + aside) % TURNS))
 }
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
@@ -115,8 +123,9 @@ struct Turner {
 }
 
 impl Turner {
-    fn of(points: &[Point3<f64>]) -> Turner {
-        let stride = points.len().div_ceil(MOST).max(1);
+    /// So many of the points at the most.
+    fn of(points: &[Point3<f64>], most: usize) -> Turner {
+        let stride = points.len().div_ceil(most).max(1);
         let origin = points.first().map_or([0.0; 2], |p| [p.x, p.y]);
         let from_there = |p: &Point3<f64>| ((p.x - origin[0]) as f32, (p.y - origin[1]) as f32);
         let (mut xs, mut ys): (Vec<f32>, Vec<f32>) = points.iter().step_by(stride).map(from_there).unzip();

@@ -22,6 +22,7 @@ use nalgebra::{Point3, Vector3};
 use patches::Voxels;
 pub(crate) use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// How to part a scene into objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -126,22 +127,38 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
     for (&part, &count) in part_of_voxel.iter().zip(&voxels.counts) {
         counts[part as usize] += count as usize;
     }
-    let mut parts: Vec<Segment> = Vec::new();
-    let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
-    for (range, voxel) in voxels.runs() {
-        let part = part_of_voxel[voxel] as usize;
-        let slot = *slots[part].get_or_insert_with(|| {
-            let (indices, points) = (Vec::with_capacity(counts[part]), Vec::with_capacity(counts[part]));
-            parts.push(Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 });
-            parts.len() - 1
-        });
-        // One or two most often: to copy them as a slice takes longer.
-        for at in range {
-            parts[slot].indices.push(indices[at]);
-            parts[slot].points.push(points[at]);
+    // Where each part is, by the voxel that names it, in each half of the points.
+    let of = |runs: Range<usize>| {
+        let mut parts: Vec<(u32, Segment)> = Vec::new();
+        let mut slots: Vec<Option<usize>> = vec![None; voxels.len()];
+        for (range, voxel) in voxels.runs(runs) {
+            let part = part_of_voxel[voxel];
+            let slot = *slots[part as usize].get_or_insert_with(|| {
+                let count = counts[part as usize];
+                let (indices, points) = (Vec::with_capacity(count), Vec::with_capacity(count));
+                parts.push((part, Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 }));
+                parts.len() - 1
+            });
+            // One or two most often: to copy them as a slice takes longer.
+            for at in range {
+                parts[slot].1.indices.push(indices[at]);
+                parts[slot].1.points.push(points[at]);
+            }
+        }
+        (parts, slots)
+    };
+    let half = voxels.count_runs() / 2;
+    let ((mut parts, slots), (others, _)) = rayon::join(|| of(0..half), || of(half..voxels.count_runs()));
+    for (part, other) in others {
+        match slots[part as usize] {
+            Some(slot) => {
+                parts[slot].1.indices.extend(other.indices);
+                parts[slot].1.points.extend(other.points);
+            }
+            None => parts.push((part, other)),
         }
     }
-    parts
+    parts.into_iter().map(|(_, segment)| segment).collect()
 }
 
 /// Indices and positions (surface frame) of points.

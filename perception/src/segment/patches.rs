@@ -60,10 +60,16 @@ impl Voxels {
         sets
     }
 
-    /// Ranges of points that follow each other in one voxel, and this voxel, in the order of the points.
-    pub fn runs(&self) -> impl Iterator<Item = (Range<usize>, usize)> {
-        let ends = self.run_starts.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
-        ends.zip(self.of_run.iter().map(|&voxel| voxel as usize))
+    /// How many runs there are of points that follow each other in one voxel.
+    pub fn count_runs(&self) -> usize {
+        self.of_run.len()
+    }
+
+    /// Ranges of points that follow each other in one voxel, and this voxel, in the order of the points: some of these runs.
+    pub fn runs(&self, of: Range<usize>) -> impl Iterator<Item = (Range<usize>, usize)> {
+        let ends =
+            self.run_starts[of.start..=of.end].windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
+        ends.zip(self.of_run[of].iter().map(|&voxel| voxel as usize))
     }
 
     /// The points of some voxels, voxel by voxel, from those that the voxels were made of.

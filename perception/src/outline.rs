@@ -28,8 +28,8 @@ impl Rectangle {
 const TURNS: usize = 30;
 const APART: usize = 3;
 /// Points that are looked at, at the most, and those by which the turn is sought.
-const MOST: usize = 1200;
-const SCOUTS: usize = 400;
+const MOST: usize = 800;
+const SCOUTS: usize = 300;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
@@ -164,13 +164,10 @@ impl Turner {
         const LEAST_SHARE: f64 = 0.03;
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
+            let edges = [u0, u1, v0, v1].map(|edge| edge as f32);
             let mut sums = [(0.0, 0.0); 4];
-            let places = self.us.iter().zip(&self.vs).take(self.len);
-            for (u, v) in places.map(|(u, v)| (f64::from(*u), f64::from(*v))) {
-                let away = [u - u0, u - u1, v - v0, v - v1].map(f64::abs);
-                let nearest = (0..4).min_by(|&a, &b| away[a].total_cmp(&away[b])).unwrap_or(0);
-                sums[nearest].0 += if nearest < 2 { u } else { v };
-                sums[nearest].1 += 1.0;
+            for (us, vs) in self.us.as_chunks::<BLOCK>().0.iter().zip(self.vs.as_chunks::<BLOCK>().0) {
+                sums = add_nearest(sums, [us, vs], edges);
             }
             let least = LEAST_SHARE * self.len as f64;
             let amid = |n: usize, edge: f64| if sums[n].1 > least { sums[n].0 / sums[n].1 } else { edge };
@@ -201,6 +198,29 @@ impl Turner {
         sum += last_us.iter().zip(last_vs).map(|(u, v)| f64::from(square(*u, *v))).sum::<f64>();
         (sum <= bound).then_some(sum)
     }
+}
+
+/// Adds the points of a block to the sums of the edges that are nearest to them: where they lie across it, and how many they are.
+#[inline(always)]
+fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32; 4]) -> [(f64, f64); 4] {
+    let mut own = [([0.0; BLOCK], [0.0; BLOCK]); 4];
+    for i in 0..BLOCK {
+        let places = [us[i], us[i], vs[i], vs[i]];
+        let [a, b, c, d] = [0, 1, 2, 3].map(|n| (places[n] - edges[n]).abs());
+        // The first of equals; what is no number is near none.
+        let nearest = [
+            (a <= b) & (a <= c) & (a <= d),
+            (b < a) & (b <= c) & (b <= d),
+            (c < a) & (c < b) & (c <= d),
+            (d < a) & (d < b) & (d < c),
+        ];
+        for n in 0..4 {
+            own[n].0[i] = if nearest[n] { places[n] } else { 0.0 };
+            own[n].1[i] = if nearest[n] { 1.0 } else { 0.0 };
+        }
+    }
+    let sum = |of: &[f32; BLOCK]| f64::from(of.iter().sum::<f32>());
+    std::array::from_fn(|n| (sums[n].0 + sum(&own[n].0), sums[n].1 + sum(&own[n].1)))
 }
 
 /// A side of the rectangle, and the points that it leaves outside.

@@ -96,7 +96,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     pool::within(tracing::debug_span!("segment", points = cloud.len()), || {
         let (indices, points) = above(cloud, &surface, options);
         let viewpoints: Vec<_> = seen.viewpoints().iter().map(|v| surface.surface_from_world * v).collect();
-        let (voxels, sets) = patches::voxels(&points, options.voxel_m, &viewpoints, join::sets);
+        let (voxels, sets) = patches::voxels(&points, options.voxel_m, &viewpoints, join::Sets::of);
         let mut part_of_voxel = join::parts(&voxels, &sets, options);
         if options.part_touching {
             rounds::part(&voxels, &points, &mut part_of_voxel, &viewpoints);

@@ -17,23 +17,33 @@ const PATCH_COS: f64 = 0.906;
 /// From: chosen, .25 was tried on piles of things and not kept.
 const SMOOTH_RAD: f64 = 0.35;
 
-/// Which voxels are thin, and what hangs together of the others.
-pub(super) type Sets = (Vec<bool>, Vec<Vec<usize>>);
-
 /// Sets of voxels within which parts are sought.
-pub(super) fn sets(voxels: &Voxels) -> Sets {
-    let thin = thin(voxels);
-    let full: Vec<usize> = (0..voxels.len()).filter(|&i| !thin[i]).collect();
-    let sets = voxels.together(&full);
-    (thin, sets)
+pub(super) struct Sets {
+    thin: Vec<bool>,
+    /// What hangs together of those that are not thin.
+    sets: Vec<Vec<usize>>,
+    /// The number of each voxel in its set; [`NONE`] of what is thin.
+    place: Vec<u32>,
+}
+
+/// No set, or no patch. From: mark.
+const NONE: u32 = u32::MAX;
+
+impl Sets {
+    pub fn of(voxels: &Voxels) -> Sets {
+        let thin = thin(voxels);
+        let full: Vec<usize> = (0..voxels.len()).filter(|&i| !thin[i]).collect();
+        let sets = voxels.together(&full);
+        let mut place = vec![NONE; voxels.len()];
+        sets.iter().for_each(|set| (0..).zip(set).for_each(|(local, &voxel)| place[voxel] = local));
+        Sets { thin, sets, place }
+    }
 }
 
 /// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
-pub(super) fn parts(voxels: &Voxels, (thin, sets): &Sets, options: &SceneOptions) -> Vec<u32> {
-    let mut place = vec![None; voxels.len()];
-    sets.iter().for_each(|set| (0..).zip(set).for_each(|(local, &voxel)| place[voxel] = Some(local)));
+pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options: &SceneOptions) -> Vec<u32> {
     let name = |set: &Vec<usize>| match options.part_touching {
-        true => Piece::of(voxels, set, &place).parts(),
+        true => Piece::of(voxels, set, place).parts(),
         false => vec![set[0] as u32; set.len()],
     };
     let names: Vec<Vec<u32>> = pool::heaviest_first(sets, Vec::len, name);
@@ -55,12 +65,17 @@ pub(super) struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// `place` is the number here of each of all voxels that is in some piece.
-    fn of(voxels: &'a Voxels, of: &'a [usize], place: &[Option<u32>]) -> Piece<'a> {
-        let (mut starts, mut near) = (Vec::with_capacity(of.len() + 1), Vec::new());
+    /// `place` is the number here of each of all voxels, [`NONE`] of what is in no piece.
+    fn of(voxels: &'a Voxels, of: &'a [usize], place: &[u32]) -> Piece<'a> {
+        let count = of.iter().map(|&voxel| voxels.neighbours(voxel).len()).sum();
+        let (mut starts, mut near) = (Vec::with_capacity(of.len() + 1), Vec::with_capacity(count));
         for &voxel in of {
             starts.push(near.len() as u32);
-            near.extend(voxels.neighbours(voxel).iter().filter_map(|&j| place[j as usize]));
+            for place in voxels.neighbours(voxel).iter().map(|&n| place[n as usize]) {
+                if place != NONE {
+                    near.push(place);
+                }
+            }
         }
         starts.push(near.len() as u32);
         Piece { voxels, of, starts, near }
@@ -117,8 +132,6 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
 
 /// Patches: voxels around a flat seed with like normals. Flattest seeds first.
 fn grow_patches(piece: &Piece) -> Vec<u32> {
-    /// No patch. From: mark.
-    const NONE: u32 = u32::MAX;
     let Piece { voxels, of, .. } = *piece;
     // Curvatures are not negative: their bits are in the order of their values.
     let key = |(&voxel, local): (&usize, u32)| {
@@ -195,13 +208,23 @@ pub(super) struct Border {
 fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
     let of = |range: Range<usize>| {
         let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+        // Pairs that follow each other are of one border, most often.
+        let (mut last, mut length) = ((NONE, NONE), 0);
         for i in range {
             for j in piece.near(i).map(|j| j as usize).filter(|&j| j > i) {
                 let (a, b) = (patch_of[i], patch_of[j]);
-                if a != b {
-                    *lengths.entry((a.min(b), a.max(b))).or_default() += 1;
+                if a == b {
+                    continue;
                 }
+                let patches = (a.min(b), a.max(b));
+                if patches != last && length > 0 {
+                    *lengths.entry(last).or_default() += std::mem::take(&mut length);
+                }
+                (last, length) = (patches, length + 1);
             }
+        }
+        if length > 0 {
+            *lengths.entry(last).or_default() += length;
         }
         lengths
     };

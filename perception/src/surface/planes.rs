@@ -290,12 +290,16 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     let is_near = |plane: &Plane, s: &Sample, band: f64, times: f64| {
         plane.distance(&s.point).abs() < times * (band * s.sigma_m + BESIDE_M)
     };
-    let some_around = |some: &[Sample]| -> Vec<Sample> {
-        some.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER)).copied().collect()
+    let some_around = |some: &[Sample]| -> Vec<(Sample, f64)> {
+        let around = some.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER));
+        around.map(|s| (*s, weight(s))).collect()
     };
-    let around: Vec<Vec<Sample>> = samples.par_chunks(SOME).map(some_around).collect();
+    let around: Vec<Vec<(Sample, f64)>> = samples.par_chunks(SOME).map(some_around).collect();
     for band in BANDS {
-        let sums_of = |some: &Vec<Sample>| Sums::of(some.iter().filter(|s| is_near(&plane, s, band, 1.0)));
+        let sums_of = |some: &Vec<(Sample, f64)>| {
+            let near = some.iter().filter(|(s, _)| is_near(&plane, s, band, 1.0));
+            Sums::of(near.map(|(s, weight)| (&s.point, *weight)))
+        };
         let sums: Vec<Sums> = around.par_iter().map(sums_of).collect();
         plane = sums.into_iter().fold(Sums::default(), Sums::with).plane(&plane.normal)?;
     }
@@ -307,7 +311,11 @@ pub(super) fn least_squares<'a>(
     samples: impl Iterator<Item = &'a Sample>,
     side: &Vector3<f64>,
 ) -> Option<Plane> {
-    Sums::of(samples).plane(side)
+    Sums::of(samples.map(|s| (&s.point, weight(s)))).plane(side)
+}
+
+fn weight(sample: &Sample) -> f64 {
+    1.0 / (sample.sigma_m * sample.sigma_m)
 }
 
 /// Sums over samples, each weighed by its spread.
@@ -320,10 +328,9 @@ struct Sums {
 }
 
 impl Sums {
-    fn of<'a>(samples: impl Iterator<Item = &'a Sample>) -> Sums {
+    fn of<'a>(weighed: impl Iterator<Item = (&'a Point3<f64>, f64)>) -> Sums {
         let mut all = Sums::default();
-        for Sample { point: p, sigma_m } in samples {
-            let w = 1.0 / (sigma_m * sigma_m);
+        for (p, w) in weighed {
             let [x, y, z] = [w * p.x, w * p.y, w * p.z];
             let products = [x * p.x, y * p.x, z * p.x, y * p.y, z * p.y, z * p.z];
             all = all.with(Sums { weight: w, sum: [x, y, z], products });

@@ -168,7 +168,7 @@ impl Descry {
                 let [foot, rim] = lies.unwrap_or_default();
                 [own.log_against(m, *stance), foot, rim].map(|log| self.verified * log)
             };
-            let each = models.iter().zip(&weighed.stances).zip(doubted);
+            let each = models.par_iter().zip(&weighed.stances).zip(doubted).with_max_len(1);
             let against: Vec<[f64; 3]> =
                 each.map(|(asked, doubted)| if doubted { against(asked) } else { [0.0; 3] }).collect();
             weighed = self.weigh(models, &looked.measured, toppled.as_ref(), &against);

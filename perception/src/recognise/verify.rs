@@ -5,6 +5,7 @@ use super::evidence::Measured;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
+use rayon::prelude::*;
 
 /// Thickness of the walls of vessels, metres. From: chosen.
 pub(super) const WALL_M: f64 = 0.003;
@@ -39,7 +40,7 @@ impl<'a> Own<'a> {
         let frustum = measured.round.map(|round| {
             let body = Frustum::around(&round, base_m, base_m + measured.height_m);
             let body = Frustum { wall_m: wall_m(measured), ..body };
-            rays.views.iter().map(|view| placed(view, &body, [0.0; 2])).collect::<Vec<_>>()
+            rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2])).collect::<Vec<_>>()
         });
         let cuboid = measured.rectangle.map(|rectangle| {
             let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
@@ -92,8 +93,9 @@ impl<'a> Own<'a> {
                 rim_m: widest_m / taper.max(1.0),
                 wall_m: wall_m(m),
             };
-            let views = self.rays.views.iter().zip(&self.placed).zip(&self.logs);
-            views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log)).sum::<f64>()
+            let views = self.rays.views.par_iter().zip(&self.placed).zip(&self.logs);
+            let each = views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log));
+            total(&each.collect::<Vec<f64>>())
         };
         let (middle, own) =
             (tapers.middle(), within(m.evidence.taper, tapers, apart_m / widest_m.max(LEAST_M)));

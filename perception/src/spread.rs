@@ -70,40 +70,63 @@ const MOST_STEPS: usize = 40;
 const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
+#[inline(always)]
+pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
+    let [least] = least_of(&c.map(|value| [value]));
+    least
+}
+
+/// The same of several covariances side by side.
 ///
 /// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
 #[inline(always)]
-pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
-    let scale = c[0].max(c[3]).max(c[5]);
-    if !(scale > 0.0 && scale.is_finite()) {
-        return None;
-    }
-    let per = 1.0 / scale;
-    let [xx, xy, xz, yy, yz, zz] = [c[0] * per, c[1] * per, c[2] * per, c[3] * per, c[4] * per, c[5] * per];
-    let trace = xx + yy + zz;
+pub(crate) fn least_of<const N: usize>(c: &[[f64; N]; 6]) -> [Option<Least>; N] {
+    let scale = lanes::<N>(|i| c[0][i].max(c[3][i]).max(c[5][i]));
+    let per = lanes::<N>(|i| 1.0 / scale[i]);
+    let [xx, xy, xz, yy, yz, zz] = c.each_ref().map(|c| lanes::<N>(|i| c[i] * per[i]));
+    let trace = lanes::<N>(|i| xx[i] + yy[i] + zz[i]);
     // The sum of products of two eigenvalues each: next to nothing if only one differs from zero.
-    let pairs = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz;
-    if pairs.is_nan() || pairs <= COLLINEAR / 9.0 * trace * trace {
-        return None;
-    }
-    let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let mut smallest = 0.0;
+    let pairs = lanes::<N>(|i| {
+        xx[i] * yy[i] + xx[i] * zz[i] + yy[i] * zz[i] - xy[i] * xy[i] - xz[i] * xz[i] - yz[i] * yz[i]
+    });
+    let determinant = lanes::<N>(|i| {
+        xx[i] * (yy[i] * zz[i] - yz[i] * yz[i]) - xy[i] * (xy[i] * zz[i] - yz[i] * xz[i])
+            + xz[i] * (xy[i] * yz[i] - yy[i] * xz[i])
+    });
+    let (mut smallest, mut is_open) = ([0.0; N], [true; N]);
     for _ in 0..MOST_STEPS {
-        let value = ((trace - smallest) * smallest - pairs) * smallest + determinant;
-        let step = value / (pairs - (2.0 * trace - 3.0 * smallest) * smallest);
-        smallest += if step > 0.0 { step } else { 0.0 };
-        if step.is_nan() || step <= LAST_STEP {
+        let step = lanes::<N>(|i| {
+            let value = ((trace[i] - smallest[i]) * smallest[i] - pairs[i]) * smallest[i] + determinant[i];
+            value / (pairs[i] - (2.0 * trace[i] - 3.0 * smallest[i]) * smallest[i])
+        });
+        for i in 0..N {
+            smallest[i] += if is_open[i] & (step[i] > 0.0) { step[i] } else { 0.0 };
+            is_open[i] &= step[i] > LAST_STEP;
+        }
+        if !is_open.iter().fold(false, |any, open| any | open) {
             break;
         }
     }
-    let rows = [[xx - smallest, xy, xz], [xy, yy - smallest, yz], [xz, yz, zz - smallest]];
-    let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let longer = |a: [f64; 3], b: [f64; 3]| if square(b) > square(a) { b } else { a };
-    let best = longer(longer(cross(rows[0], rows[1]), cross(rows[0], rows[2])), cross(rows[1], rows[2]));
-    let length = square(best).sqrt();
-    let per = 1.0 / length;
-    let normal = [best[0] * per, best[1] * per, best[2] * per];
-    (length > 0.0).then_some(Least { normal, share: smallest / trace })
+    std::array::from_fn(|i| {
+        let (x, y, z) = (xx[i] - smallest[i], yy[i] - smallest[i], zz[i] - smallest[i]);
+        let rows = [[x, xy[i], xz[i]], [xy[i], y, yz[i]], [xz[i], yz[i], z]];
+        let square = |v: [f64; 3]| v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+        let longer = |a: [f64; 3], b: [f64; 3]| if square(b) > square(a) { b } else { a };
+        let best = longer(longer(cross(rows[0], rows[1]), cross(rows[0], rows[2])), cross(rows[1], rows[2]));
+        let length = square(best).sqrt();
+        let per = 1.0 / length;
+        let is_told = scale[i] > 0.0
+            && scale[i].is_finite()
+            && pairs[i] > COLLINEAR / 9.0 * trace[i] * trace[i]
+            && length > 0.0;
+        let normal = [best[0] * per, best[1] * per, best[2] * per];
+        is_told.then_some(Least { normal, share: smallest[i] / trace[i] })
+    })
+}
+
+#[inline(always)]
+fn lanes<const N: usize>(of: impl Fn(usize) -> f64) -> [f64; N] {
+    std::array::from_fn(of)
 }
 
 #[inline(always)]

@@ -24,7 +24,7 @@ const LENGTH_ENDS: (f64, f64) = (0.01, 0.99);
 /// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
 /// Points by which the direction of its axis is sought, at the most. From: chosen.
-const SCOUTS: usize = 500;
+const SCOUTS: usize = 300;
 /// How far from its radius its axis lies above what it rests on, metres. From: chosen.
 const RESTS_M: f64 = 0.01;
 /// Spread of how long it is however good the camera, metres. From: chosen, twice that of a height: both ends are edges.

@@ -84,7 +84,7 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
         .map(|&v| (voxels.centres[v], voxels.normals[v].xy().normalize()))
         .collect();
     /// Directions that are tried. From: work.
-    const TRIED: usize = 40;
+    const TRIED: usize = 25;
     let mut faces = Vec::new();
     while side.len() >= FEWEST && faces.len() < FACES {
         let like = |to: &Vector2<f64>| side.iter().filter(|(_, n)| n.dot(to) > FLAT).count();

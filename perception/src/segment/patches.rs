@@ -114,6 +114,8 @@ impl Moments {
     }
 }
 
+/// Voxels whose normals are told side by side. From: work.
+const LANES: usize = 4;
 /// Voxels that one thread takes in a row. From: work.
 pub(super) const SOME: usize = 256;
 
@@ -165,8 +167,16 @@ pub(super) fn voxels<T: Send>(
         run_ends,
     };
     let facing = || {
-        let all = (0..keys.len()).into_par_iter().with_min_len(SOME);
-        all.map(|i| surface(&voxels, &moments, i, viewpoints)).unzip()
+        let (mut normals, mut curvatures) = (vec![Vector3::zeros(); keys.len()], vec![1.0; keys.len()]);
+        let some = normals.par_chunks_mut(LANES).zip(curvatures.par_chunks_mut(LANES)).enumerate();
+        some.with_min_len(SOME / LANES).for_each(|(k, (normals, curvatures))| {
+            let found = surfaces(&voxels, &moments, k * LANES, viewpoints);
+            let told = normals.iter_mut().zip(curvatures).zip(found);
+            told.for_each(|((normal, curvature), found)| {
+                (*normal, *curvature) = found.unwrap_or((Vector3::zeros(), 1.0));
+            });
+        });
+        (normals, curvatures)
     };
     let (told, (normals, curvatures)) = rayon::join(|| meanwhile(&voxels), facing);
     (voxels.normals, voxels.curvatures) = (normals, curvatures);
@@ -224,26 +234,33 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     (starts, near)
 }
 
-/// Normal and curvature of a voxel, from its own and its neighbours' points.
-fn surface(
+/// Normals and curvatures of the voxels from one on, from their own and their neighbours' points.
+fn surfaces(
     voxels: &Voxels,
     moments: &[Moments],
-    voxel: usize,
+    first: usize,
     viewpoints: &[Point3<f64>],
-) -> (Vector3<f64>, f64) {
+) -> [Option<(Vector3<f64>, f64)>; LANES] {
     /// Fewest points that tell a normal. From: chosen.
     const FEWEST: f64 = 5.0;
-    let mut total = moments[voxel];
-    voxels.neighbours(voxel).iter().for_each(|&n| total.join(&moments[n as usize]));
-    let covariance = spread::covariance(total.count, total.sum.into(), total.products);
-    let Some(least) = spread::least(&covariance).filter(|_| total.count >= FEWEST) else {
-        return (Vector3::zeros(), 1.0);
-    };
-    let nearest = viewpoints
-        .iter()
-        .map(|v| v - voxels.centres[voxel])
-        .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
-        .unwrap_or_else(Vector3::z);
-    let normal = Vector3::from(least.normal);
-    (if normal.dot(&nearest) < 0.0 { -normal } else { normal }, least.share)
+    let mut covariances = [[0.0; LANES]; 6];
+    for (lane, voxel) in (first..voxels.len()).take(LANES).enumerate() {
+        let mut total = moments[voxel];
+        voxels.neighbours(voxel).iter().for_each(|&n| total.join(&moments[n as usize]));
+        if total.count >= FEWEST {
+            let covariance = spread::covariance(total.count, total.sum.into(), total.products);
+            covariances.iter_mut().zip(covariance).for_each(|(lanes, value)| lanes[lane] = value);
+        }
+    }
+    let found = spread::least_of(&covariances);
+    std::array::from_fn(|lane| {
+        let least = found[lane]?;
+        let nearest = viewpoints
+            .iter()
+            .map(|v| v - voxels.centres[first + lane])
+            .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+            .unwrap_or_else(Vector3::z);
+        let normal = Vector3::from(least.normal);
+        Some((if normal.dot(&nearest) < 0.0 { -normal } else { normal }, least.share))
+    })
 }

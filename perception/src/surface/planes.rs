@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Points looked at when a plane is sought; more do not change it. From: chosen.
-pub(super) const SAMPLE: usize = 16_000;
+pub(super) const SAMPLE: usize = 12_000;
 /// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.

@@ -117,9 +117,8 @@ impl Recogniser for Descry {
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         pool::within(tracing::debug_span!("recognise", segments = scene.segments.len()), || {
             let setting = Setting::of(scene, fitted(scene, seen));
-            let judge = |segment| self.judge(&setting, segment, seen, models);
-            // Some take far longer than others.
-            scene.segments.par_iter().with_max_len(1).map(judge).collect()
+            let judge = |segment: &Segment| self.judge(&setting, segment, seen, models);
+            pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge)
         })
     }
 }

@@ -38,6 +38,7 @@
 //! ```
 
 pub mod agent;
+pub mod basis;
 pub mod body;
 mod compared;
 pub mod exit;

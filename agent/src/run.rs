@@ -129,8 +129,8 @@ pub async fn pursue(
     let robot = Arc::new(TapedRobot::begin(Arc::clone(&body.robot), tape));
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) =
-        live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
+    let lived = live_through(task, &robot, &record, chooser, folder.path(), watcher).await;
+    let (mut report, remembered) = lived.map_err(|error| how_to_go_on(error, folder.path()))?;
     remember(settings, past, remembered, folder.path())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -199,8 +199,8 @@ pub async fn go_on(
     let robot = Arc::new(TapedRobot::go_on(Arc::clone(&body.robot), tape, entries));
     let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
-    let (mut report, remembered) =
-        live_through(task, &robot, &record, chooser, folder.path(), watcher).await?;
+    let lived = live_through(task, &robot, &record, chooser, folder.path(), watcher).await;
+    let (mut report, remembered) = lived.map_err(|error| how_to_go_on(error, folder.path()))?;
     // What a run leaves that had ended is kept, and others may have gone on from there.
     if !files::has_ended(folder.path()) {
         remember(settings, task.past, remembered, folder.path())?;
@@ -229,7 +229,7 @@ pub async fn live_through(
     let eyes = Arc::clone(&body);
     let setting = Setting { domain, goal, robot: eyes, record, recogniser: &recogniser, past: past.cloned() };
     let lived = Agent::new(body, record, watcher.stop.clone(), watcher.tell).pursue(setting, chooser).await;
-    let (conclusion, totals) = lived.map_err(|error| how_to_go_on(error, folder))?;
+    let (conclusion, totals) = lived?;
     robot.finish().map_err(CommandError::broken)?;
     let mut report = Report::begin(goal, folder.display().to_string());
     report.answer = goal.question.then(|| answer(conclusion.verdict).to_string());
@@ -240,14 +240,21 @@ pub async fn live_through(
     Ok((report, remembered))
 }
 
-/// Says of a run that was stopped how it goes on.
+/// Says of a run that was stopped, or that the body or the record has failed, how it goes on.
 fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
-    let CommandError::Stopped { signal, .. } = error else { return error };
     let folder = folder.display().to_string();
-    let word = shell::word(&folder);
-    let said =
-        format!("stopped; everything until here is in {folder}\n  go on with: descry do --resume {word}");
-    CommandError::Stopped { said, signal }
+    let resume = format!("descry do --resume {}", shell::word(&folder));
+    match error {
+        CommandError::Stopped { signal, .. } => {
+            let said = format!("stopped; everything until here is in {folder}\n  go on with: {resume}");
+            CommandError::Stopped { said, signal }
+        }
+        // The bound of a record stays what the run was started with.
+        CommandError::Broken(why) if !why.contains("--max-bytes") => {
+            CommandError::Broken(format!("{why}\n  once that is mended, go on with: {resume}"))
+        }
+        other => other,
+    }
 }
 
 /// Where the thing is; simulation only.
@@ -300,13 +307,25 @@ pub fn events(record: &Record) -> Result<(Vec<Value>, Vec<Fault>), CommandError>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exit::Exit;
 
     #[test]
-    fn a_run_that_was_stopped_says_how_it_goes_on() {
+    fn a_run_that_did_not_end_says_how_it_goes_on() {
         let check = |folder: &str, expected: &str| {
             let stopped = CommandError::Stopped { said: "stopped".into(), signal: 2 };
-            let said = how_to_go_on(stopped, Path::new(folder)).to_string();
-            assert!(said.ends_with(&format!("go on with: descry do --resume {expected}")), "{said}");
+            let full = CommandError::Broken("no room left".into());
+            for (error, exit) in [(stopped, Exit::Interrupted), (full, Exit::Broken)] {
+                let error = how_to_go_on(error, Path::new(folder));
+                let said = error.to_string();
+                assert_eq!(error.exit(), exit, "{said}");
+                assert!(said.ends_with(&format!("go on with: descry do --resume {expected}")), "{said}");
+            }
+            for other in
+                [CommandError::BadInput("no such word".into()), CommandError::Broken("--max-bytes".into())]
+            {
+                let said = other.to_string();
+                assert_eq!(how_to_go_on(other, Path::new(folder)).to_string(), said);
+            }
         };
         check("runs/mug", "runs/mug");
         check("my runs/mug", "'my runs/mug'");

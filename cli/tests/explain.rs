@@ -204,6 +204,30 @@ fn what_is_lost_with_a_damaged_header_is_said() {
     let told = binary::check(folder.path(), &["explain", "run", "--json"], 1);
     assert_eq!(told["lost"].as_array().map(Vec::len), Some(2), "{told}");
     assert!(told["verdict"].to_string().contains("achieved: cup A stands on the table"), "{told}");
+    let shown = binary::outcome(folder.path(), &["show", "run"]);
+    let (text, lost) = (String::from_utf8_lossy(&shown.stdout), String::from_utf8_lossy(&shown.stderr));
+    assert_eq!(shown.status.code(), Some(1), "{lost}");
+    assert!(lost.contains("what the end of the run rests on is not in the record"), "{lost}");
+    assert!(text.contains("rests on  belief "), "{text}");
+}
+
+#[test]
+fn what_is_shown_of_a_run_says_what_its_verdict_rests_on() {
+    let folder = tempfile::tempdir().expect("a folder");
+    binary::check(folder.path(), &["find", "cup A", "--seed", "10", "--run", "run", "--json"], 0);
+    let shown = binary::outcome(folder.path(), &["show", "run"]);
+    let text = String::from_utf8_lossy(&shown.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(shown.status.success(), "{text}");
+    for part in ["rests on end ", " (the goal held), belief ", "cup A: sure with 0.89 (0.80 is wanted), "] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    let told = binary::check(folder.path(), &["show", "run", "--json"], 0);
+    let looks = told["rests_on"]["surfaces"][0]["looks"].as_array().expect("looks").clone();
+    let clouds = binary::check(folder.path(), &["memory", "query", "run", "--kind", "cloud", "--json"], 0);
+    let clouds: Vec<_> =
+        clouds["records"].as_array().expect("clouds").iter().map(|c| c["id"].clone()).collect();
+    assert_eq!(looks, clouds, "{told}");
+    assert_eq!(told["rests_on"]["lost"], serde_json::json!([]), "{told}");
 }
 
 /// What only the document holds that says what the verdict rests on.

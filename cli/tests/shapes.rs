@@ -102,8 +102,8 @@ fn what_others_have_learned_since_stays_where_a_run_is_gone_on_with() {
     let folder = folder.path();
     let store = folder.join("seen");
     let learn = |name: &str, seed: u64| {
-        let report = run(&format!("learn {name}"), "stool", seed, folder, Some(&store));
-        assert_eq!(report["verdict"], "achieved", "{name}: {}", report["why"]);
+        let said = ("achieved", Some(name));
+        check(&format!("learn {name}"), "stool", seed, folder, Some(&store), said);
     };
     learn("armchair", 5);
     learn("coffee table", 6);

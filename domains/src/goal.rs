@@ -88,6 +88,14 @@ pub enum GoalError {
         /// What followed "within".
         found: String,
     },
+    /// The deadline that was asked for is a number of nothing.
+    #[error(
+        "\"within {found}\" does not say of what\n  seconds or minutes were expected, as in \"within {found} seconds\" or \"within {found} minutes\""
+    )]
+    NoUnit {
+        /// What followed "within".
+        found: String,
+    },
     /// How sure, or how soon, is said more than once.
     #[error("\"{condition}\" is said twice\n  expected it once, as in \"find cup A {condition} {example}\"")]
     SaidTwice {
@@ -251,8 +259,7 @@ fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
             }
             (_, Some(at)) => {
                 let found = words.split_off(at)[1..].join(" ");
-                let other =
-                    wanted.deadline_s.replace(seconds(&found).ok_or(GoalError::BadDeadline { found })?);
+                let other = wanted.deadline_s.replace(seconds(found)?);
                 once(other, "within", "60 seconds")?;
             }
             _ => return Ok((words, wanted)),
@@ -279,15 +286,18 @@ pub(crate) fn bare(word: &str) -> &str {
     word.trim_matches(|c: char| "\"'.,!?".contains(c))
 }
 
-/// "60", "60 s", "60 seconds", "1.5 minutes".
-fn seconds(said: &str) -> Option<f64> {
-    let (number, unit) = said.split_once(' ').unwrap_or((said, "s"));
+/// "60 s", "60s", "60 seconds", "1.5 minutes"; a number alone may be meant as either.
+fn seconds(found: String) -> Result<f64, GoalError> {
+    let end = found.find(|c: char| c.is_alphabetic()).unwrap_or(found.len());
+    let (number, unit) = (found[..end].trim().parse::<f64>().ok(), &found[end..]);
     let factor = match unit {
         "s" | "second" | "seconds" => 1.0,
         "min" | "minute" | "minutes" => 60.0,
-        _ => return None,
+        "" if number.is_some_and(|n| n > 0.0) => return Err(GoalError::NoUnit { found }),
+        _ => return Err(GoalError::BadDeadline { found }),
     };
-    number.parse::<f64>().ok().map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite())
+    let wanted_s = number.map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite());
+    wanted_s.ok_or(GoalError::BadDeadline { found })
 }
 
 /// The ways in which words fit a phrase with slots, each slot with what it holds; a slot takes one word or more.
@@ -462,6 +472,14 @@ mod tests {
             }
         };
         check("within 60 seconds with confidence 0.9", Ok((0.9, Some(60.0))));
+        for (time, expected_s) in [("90 s", 90.0), ("90s", 90.0), ("5 minutes", 300.0), ("1.5 min", 90.0)] {
+            check(&format!("within {time}"), Ok((0.8, Some(expected_s))));
+        }
+        check("within 5", Err("\"within 5\" does not say of what"));
+        check("within 5 with confidence 0.9", Err("\"within 5 seconds\" or \"within 5 minutes\""));
+        for none in ["0 s", "-5", "nan", "inf s", "1e9e s", "5 days", "s", "five minutes", ""] {
+            check(&format!("within {none}"), Err("asks for no time"));
+        }
         check("with confidence 0.9 within 60 seconds", Ok((0.9, Some(60.0))));
         check("with confidence 0.9 with confidence 0.6", Err("\"with confidence\" is said twice"));
         check("within 9 seconds with confidence 0.9 within 1 minute", Err("\"within\" is said twice"));

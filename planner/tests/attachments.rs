@@ -122,6 +122,41 @@ fn an_infinite_cost_means_that_the_way_is_closed() {
     assert_eq!(names(&plan), ["move start p4", "observe p4 table cup"]);
 }
 
+/// Seconds to a pose on a line; nothing leads into the pit, as far as the gate that is read tells.
+struct PastTheGate;
+
+impl Attachment for PastTheGate {
+    fn reads(&self) -> Vec<Read> {
+        vec![Read::At("shut".to_string(), Vec::new())]
+    }
+
+    fn evaluate(&self, call: &Call) -> Result<Answer, CallError> {
+        let at = |n: usize| call.arguments[n].trim_start_matches('p').parse::<f64>().unwrap_or(12.0);
+        let leads = &*call.arguments[1] != "pit";
+        Ok(Answer::Number(if leads { 3.0 + 2.0 * (at(0) - at(1)).abs() } else { f64::INFINITY }))
+    }
+}
+
+#[test]
+fn a_way_that_is_closed_now_is_no_short_cut_for_the_heuristic() {
+    let poses: Vec<String> = (0..24).map(|n| format!("p{n}")).collect();
+    let problem = format!(
+        "(define (problem three) (:domain carry) (:objects {} pit - pose a b c - thing)
+           (:init (at p0) (free) (shut) (on a p5) (on b p17) (on c p20))
+           (:goal (and (on a p11) (on b p11) (on c p11))) (:metric minimize (total-time)))",
+        poses.join(" ")
+    );
+    let domain = Source::new("carry.pddl", include_str!("data/carry.pddl"));
+    let task = Task::read(&domain, &Source::new("problem.pddl", problem)).expect("the task can be read");
+    let mut attachments = Attachments::new();
+    attachments.insert("path_cost", PastTheGate);
+    let options = Options { evaluation_limit: Some(2_500), ..Options::default() };
+    let outcome = plan(&task, &attachments, &options, &|| false, &mut |_| {}).expect("it is planned");
+    let found = outcome.plan().unwrap_or_else(|| panic!("no plan: {:?}", outcome.statistics()));
+    assert_eq!(found.steps.len(), 12, "{:?}", names(found));
+    assert!(end_s(found) < 160.0, "{:?} ends at {}", names(found), end_s(found));
+}
+
 #[test]
 fn missing_and_failing_attachments_are_errors_at_their_place() {
     let task = look(3, 0.5);

@@ -1,5 +1,6 @@
 //! `descry show RUN`: what happened in a run, from its record.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;
@@ -7,6 +8,7 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::commands::input;
+use descry_agent::basis;
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::report::Event;
 
@@ -33,6 +35,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),
     };
+    let basis = report.as_ref().map(|report| basis::of(&record, report)).transpose()?;
     if let Some(page) = &arguments.html {
         let text = descry_pages::page::of_run(&record, report.as_ref())?;
         let at = |e: std::io::Error| format!("{}: {e}", page.display());
@@ -43,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         input::print_text(&page.display().to_string())?;
     } else if arguments.json {
         input::print_json(&json!({
-            "run": folder.display().to_string(), "events": events, "report": report, "lost": lost,
+            "run": folder.display().to_string(), "events": events, "report": report, "rests_on": basis, "lost": lost,
         }))?;
     } else {
         for event in &events {
@@ -53,7 +56,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
             }
         }
         match (report, &damaged) {
-            (Some(report), _) => input::print_fitted(&report.to_string())?,
+            (Some(report), _) => {
+                input::print_fitted(&report.to_string())?;
+                let basis = basis.as_ref().map(ToString::to_string).filter(|said| !said.is_empty());
+                basis.map_or(Ok(()), |said| input::print_fitted(&said))?;
+            }
             (None, None) => input::print_text("\nthe run has not finished")?,
             (None, Some(_)) => (),
         }
@@ -61,8 +68,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if let Some(damaged) = &damaged {
         input::narrate(&format!("descry: lost: {damaged}"));
     }
+    let told: BTreeSet<String> = lost.iter().map(ToString::to_string).collect();
+    let more: Vec<String> = basis.map_or_else(Vec::new, |basis| basis.lost);
+    let more: Vec<&String> = more.iter().filter(|lost| !told.contains(*lost)).collect();
+    more.iter().for_each(|lost| input::narrate(&format!("descry: lost: {lost}")));
     let exit = input::lost(&lost);
-    Ok(if damaged.is_some() { Exit::No } else { exit })
+    Ok(if damaged.is_some() || !more.is_empty() { Exit::No } else { exit })
 }
 
 /// An event of another version, as it stands in the record.

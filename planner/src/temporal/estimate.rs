@@ -58,6 +58,8 @@ pub(super) struct Work {
     nearer: bool,
     /// By proposition, what is left at least to the goal: in costs, and in time; empty until it is asked for.
     remaining: [Vec<f64>; 2],
+    /// The most seconds that any operator was found to take.
+    dearest_s: f64,
     /// Propositions and operators looked at since the beginning: a measure of work that no clock is part of.
     pub(super) spent: u64,
 }
@@ -85,6 +87,7 @@ impl Work {
             latest: f64::INFINITY,
             nearer: false,
             remaining: [Vec::new(), Vec::new()],
+            dearest_s: 0.0,
             spent: 0,
         }
     }
@@ -254,19 +257,19 @@ impl Relaxed {
         if !self.given[hot.gives as usize..hot.end as usize].iter().any(helps) {
             return Ok(());
         }
-        let mut seconds = hot.seconds;
+        let (mut least_s, mut likely_s) = (hot.seconds, hot.seconds);
         if !hot.is_known() {
             let proposal = suiting(world, from.state, &self.operators[index as usize])?;
             let Some(proposal) = proposal else { return Ok(()) };
             let asked = self.seconds(world, from.state, index, proposal.as_ref())?;
-            seconds = asked.unwrap_or(f64::INFINITY);
+            (least_s, likely_s) = asked.unwrap_or((f64::INFINITY, f64::INFINITY));
         }
-        if seconds.is_infinite() {
+        if least_s.is_infinite() {
             return Ok(());
         }
-        let cost = seconds + hot.step + self.counted_s(world, from.state, index)?;
+        let cost = likely_s + hot.step + self.counted_s(world, from.state, index)?;
         self.work.fired[index as usize] = (base, cost);
-        let label = base + if timed { seconds } else { cost };
+        let label = base + if timed { least_s } else { cost };
         for &proposition in &self.given[hot.gives as usize..hot.moves as usize] {
             self.work.reach(proposition, label, index, 1.0);
         }
@@ -291,19 +294,20 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Seconds that the operator takes at least; `None` if it can never be applied.
+    /// Seconds that the operator takes at least, and is likely to take; `None` if it can never be applied.
     fn seconds(
         &mut self,
         world: &World,
         state: &Values,
         index: u32,
         proposal: Option<&Arc<str>>,
-    ) -> Result<Option<f64>, Failure> {
+    ) -> Result<Option<(f64, f64)>, Failure> {
         let operator = &self.operators[index as usize];
         let known = self.hot[index as usize].seconds;
         if !known.is_nan() {
-            return Ok(Some(known));
+            return Ok(Some((known, known)));
         }
+        let is_settled = operator.seconds == Seconds::Settled;
         let act = &world.acts[operator.act as usize];
         let moment = Moment { state, duration_s: 0.0, proposal, level: Level::Relaxed };
         let share = match operator.part {
@@ -311,12 +315,14 @@ impl Relaxed {
             _ => 1.0,
         };
         let seconds = world.span(act, &moment)?.map(|span| span.least_s * share);
-        if operator.seconds == Seconds::Settled {
+        if is_settled {
             self.hot[index as usize].seconds = seconds.unwrap_or(f64::INFINITY);
-            return Ok(seconds);
+            return Ok(seconds.map(|seconds| (seconds, seconds)));
         }
-        // No duration now does not mean that there will be none once other numbers have changed.
-        Ok(seconds.or(Some(0.0)))
+        // No duration now does not mean that there will be none once other things have changed; until then other ways are likelier.
+        self.work.dearest_s = self.work.dearest_s.max(seconds.unwrap_or(0.0));
+        let later_s = share * UNSURE * self.work.dearest_s.max(self.unit);
+        Ok(Some(seconds.map_or((0.0, later_s), |seconds| (seconds, seconds))))
     }
 
     /// What an operator adds to the measure of plans beside time, in seconds that count as much.

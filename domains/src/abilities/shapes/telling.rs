@@ -26,12 +26,15 @@ pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> 
     let believed: Vec<Believed> = s.floor.things.iter().map(|t| teller.believed(t)).collect();
     let found = thing.and_then(|t| s.floor.things.iter().position(|o| o.symbol == t.symbol));
     let found = found.map(|n| believed[n].clone());
+    // What is learned may have another name already.
+    let is_learned = is_to_learn && verdict == Verdict::Achieved;
+    let learned = s.floor.learned.last().filter(|_| is_learned).map(|shape| shape.name.clone());
     Some(Conclusion {
         verdict,
         why,
         confidence: thing.map_or(0.0, |t| t.sureness(s.floor.known.len())),
         remaining: None,
-        object: found.as_ref().and_then(|b| b.label.clone()),
+        object: learned.or_else(|| found.as_ref().and_then(|b| b.label.clone())),
         found,
         objects: believed,
         remembered: None,

@@ -15,7 +15,7 @@ use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
 use crate::search::classical::plan_classical;
 use crate::task::Task;
-use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
+use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans, to_plan};
 use crate::validate::validate_until;
 
 /// Plans.
@@ -260,7 +260,7 @@ fn plan_in_time(
     let mut best: Option<Plan> = None;
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
-        let plan = to_plan(task, grounded, &world, timed);
+        let plan = to_plan(&world, timed);
         match check(plan) {
             Ok(Some(plan)) => {
                 on_plan(&plan);
@@ -364,21 +364,6 @@ fn measure(grounded: &GroundTask) -> Measure {
         Some(metric) if metric.minimise => Measure::Expression(metric.expression.clone()),
         Some(metric) => Measure::Expression(Expression::Negative(Box::new(metric.expression.clone()))),
     }
-}
-
-fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -> Plan {
-    let classical = grounded.durative.is_empty() && grounded.timed.is_empty();
-    let steps = timed.iter().map(|timed| {
-        let origin = &world.acts[timed.step.act as usize].origin;
-        let names = origin.arguments.iter().map(|&object| task.objects[object as usize].name.clone());
-        crate::plan::Step {
-            start_s: (!classical).then_some(timed.start_s),
-            action: task.actions[origin.schema as usize].name.clone(),
-            arguments: names.chain(timed.step.proposal.iter().map(|name| name.to_string())).collect(),
-            duration_s: timed.duration_s,
-        }
-    });
-    Plan { steps: steps.collect(), ..Plan::default() }
 }
 
 /// Every plan that leaves this crate has passed the validator: none where that is stopped. No search looks at constraints that ask for

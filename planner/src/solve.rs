@@ -8,8 +8,8 @@ use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{Explanation, constrained, explain, is_open, narrowed};
-use crate::ground::{Earns, Expression, GroundError, GroundTask, compile, ground_with};
+use crate::explain::{Explanation, constrained, explain, is_open, narrowed, too_slow};
+use crate::ground::{Earliest, Earns, Expression, GroundError, GroundTask, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
@@ -34,6 +34,10 @@ pub fn plan(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
+    let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
+    if let Some(why) = too_slow(task, freed(task), memory.counted(), stop) {
+        return Ok(Outcome::Unsolvable { why, statistics: Statistics::default() });
+    }
     let outcome = search(task, attachments, options, stop, on_plan)?;
     let mut outcome = on_the_way(task, attachments, options, stop, outcome);
     if let Outcome::Unsolvable { why, statistics } = &mut outcome
@@ -271,7 +275,8 @@ fn plan_in_time(
         }
         Ok(())
     };
-    let found = match grounded.goal_reachable {
+    let in_time = grounded.timed.is_empty() || Earliest::new(grounded).of(&grounded.goal).is_finite();
+    let found = match grounded.goal_reachable && in_time {
         true => search_plans(&world, &measure(grounded), limits, stop, &mut hear),
         false => Ok(Progress {
             reason: Reason::Exhausted,

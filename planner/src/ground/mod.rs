@@ -19,6 +19,7 @@ mod relevant;
 mod rules;
 mod statics;
 mod task;
+mod unused;
 mod variables;
 
 pub(crate) use build::ground_with;

@@ -128,6 +128,11 @@ impl<'a> Calls<'a> {
         Ok(calls)
     }
 
+    /// Those that are asked.
+    pub fn attachments(&self) -> &'a Attachments {
+        self.attachments
+    }
+
     fn asked(&self, declared: &Module) -> Asked<'a> {
         let attachment =
             self.attachments.resolve(&declared.function, &declared.name).unwrap_or_default().to_string();

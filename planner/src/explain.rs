@@ -3,6 +3,7 @@
 mod core;
 mod relaxed;
 mod sites;
+mod within;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -21,6 +22,7 @@ use crate::task::{
 pub(crate) use self::core::{is_open, narrowed};
 use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
+pub(crate) use self::within::too_slow;
 
 /// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

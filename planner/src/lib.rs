@@ -59,4 +59,4 @@ pub use semantics::Semantics;
 pub use solve::plan;
 pub use state::State;
 pub use task::Task;
-pub use validate::{Broken, SEPARATION_S, Verdict, after, monitor, validate};
+pub use validate::{Broken, SEPARATION_S, Verdict, after, endless, monitor, validate};

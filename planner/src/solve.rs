@@ -8,14 +8,14 @@ use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{Explanation, constrained, explain, is_open, narrowed};
-use crate::ground::{Earns, Expression, GroundError, GroundTask, compile, ground_with};
+use crate::explain::{Explanation, constrained, explain, is_open, narrowed, too_slow};
+use crate::ground::{Earliest, Earns, Expression, GroundError, GroundTask, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
 use crate::search::classical::plan_classical;
 use crate::task::Task;
-use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans};
+use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans, to_plan};
 use crate::validate::validate_until;
 
 /// Plans.
@@ -34,6 +34,10 @@ pub fn plan(
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
+    let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
+    if let Some(why) = too_slow(task, freed(task), memory.counted(), stop) {
+        return Ok(Outcome::Unsolvable { why, statistics: Statistics::default() });
+    }
     let outcome = search(task, attachments, options, stop, on_plan)?;
     let mut outcome = on_the_way(task, attachments, options, stop, outcome);
     if let Outcome::Unsolvable { why, statistics } = &mut outcome
@@ -260,7 +264,7 @@ fn plan_in_time(
     let mut best: Option<Plan> = None;
     let mut invalid: Option<PlanError> = None;
     let mut hear = |timed: &[Timed]| {
-        let plan = to_plan(task, grounded, &world, timed);
+        let plan = to_plan(&world, timed);
         match check(plan) {
             Ok(Some(plan)) => {
                 on_plan(&plan);
@@ -271,7 +275,8 @@ fn plan_in_time(
         }
         Ok(())
     };
-    let found = match grounded.goal_reachable {
+    let in_time = grounded.timed.is_empty() || Earliest::new(grounded).of(&grounded.goal).is_finite();
+    let found = match grounded.goal_reachable && in_time {
         true => search_plans(&world, &measure(grounded), limits, stop, &mut hear),
         false => Ok(Progress {
             reason: Reason::Exhausted,
@@ -364,21 +369,6 @@ fn measure(grounded: &GroundTask) -> Measure {
         Some(metric) if metric.minimise => Measure::Expression(metric.expression.clone()),
         Some(metric) => Measure::Expression(Expression::Negative(Box::new(metric.expression.clone()))),
     }
-}
-
-fn to_plan(task: &Task, grounded: &GroundTask, world: &World, timed: &[Timed]) -> Plan {
-    let classical = grounded.durative.is_empty() && grounded.timed.is_empty();
-    let steps = timed.iter().map(|timed| {
-        let origin = &world.acts[timed.step.act as usize].origin;
-        let names = origin.arguments.iter().map(|&object| task.objects[object as usize].name.clone());
-        crate::plan::Step {
-            start_s: (!classical).then_some(timed.start_s),
-            action: task.actions[origin.schema as usize].name.clone(),
-            arguments: names.chain(timed.step.proposal.iter().map(|name| name.to_string())).collect(),
-            duration_s: timed.duration_s,
-        }
-    });
-    Plan { steps: steps.collect(), ..Plan::default() }
 }
 
 /// Every plan that leaves this crate has passed the validator: none where that is stopped. No search looks at constraints that ask for

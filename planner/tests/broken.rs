@@ -108,6 +108,40 @@ fn what_is_meant_is_offered() {
 }
 
 #[test]
+fn one_misspelt_keyword_is_one_finding() {
+    let [domain, problem] = ["base-domain.pddl", "base-problem.pddl"].map(|name| source(name).text);
+    for (from, to) in [
+        ("(define", "(defin"),
+        ("define", "to-define"),
+        ("(domain ", "(domian "),
+        ("(problem ", "(probelm "),
+        ("(:types", "(:tpyes"),
+        ("(:types", "(:kinds"),
+        ("(:predicates", "(:predicate"),
+        ("(:predicates", "(predicates"),
+        ("(:predicates", "(:facts"),
+        ("(:action", "(:acton"),
+        ("(:objects", "(:object"),
+        ("(:objects", "(:things"),
+        ("(:init", "(:int"),
+        ("(:goal", "(:gaol"),
+        ("(:goal", "(goal"),
+        ("(:goal", "(:wanted"),
+        ("(:domain", "(:doman"),
+    ] {
+        let faulty = |text: &str| text.replacen(from, to, 1);
+        for (faulty_domain, faulty_problem) in
+            [(faulty(&domain), problem.clone()), (domain.clone(), faulty(&problem))]
+        {
+            let expected = usize::from(faulty_domain != domain || faulty_problem != problem);
+            let (one, other) = (Source::new("domain", faulty_domain), Source::new("problem", faulty_problem));
+            let found = check(&one, Some(&other));
+            assert_eq!(found.list.len(), expected, "{to}: {}", found.render(false));
+        }
+    }
+}
+
+#[test]
 fn a_carriage_return_alone_ends_a_line() {
     let text = source("predicate-typo.pddl").text.replace("(define", "; a comment\n(define");
     for line_end in ["\r", "\r\n"] {

@@ -88,3 +88,28 @@ fn what_is_made_better_by_going_on_is_gone_on_with() {
     let problem = "(:objects a) (:init (= (spent) 0)) (:goal (done)) (:metric minimize (spent))";
     check(domain, problem, true, Expect::Plan(1.0, false));
 }
+
+#[test]
+fn what_only_looks_like_a_plan_without_its_times_is_none() {
+    // The rate is another one on the way; what must stand apart makes an action longer than it may be; a number has no value yet.
+    let rated = "(:requirements :continuous-effects) (:predicates (idle) (full)) (:functions (level) (rate))
+      (:durative-action fill :parameters () :duration (>= ?duration 1) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (full)) (increase (level) (* #t (rate))) (at end (decrease (level) (* 2 ?duration)))))";
+    let rate = "(:init (idle) (= (level) 0) (= (rate) 1) (at 5 (not (idle))) (at 12 (= (rate) 3)))";
+    let stretched = "(:requirements :adl) (:predicates (lit) (wet) (dry)) (:functions (level))
+      (:durative-action fill :parameters () :duration (and (>= ?duration 2) (<= ?duration 7)) :condition (at start (dry))
+        :effect (and (at start (not (dry))) (at end (assign (level) ?duration)) (when (at end (not (lit))) (at end (wet)))))";
+    let unknown = "(:requirements :continuous-effects) (:predicates (full)) (:functions (level))
+      (:durative-action fill :parameters () :duration (= ?duration 2) :effect (and (at end (full)) (increase (level) (* #t 1))))";
+    for (domain, problem, expect) in [
+        (rated, format!("{rate} (:goal (and (full) (>= (level) 1) (>= (rate) 3)))"), Expect::Open),
+        (
+            stretched,
+            "(:init (dry) (lit) (= (level) 0) (at 2 (lit))) (:goal (= (level) 2))".into(),
+            Expect::Open,
+        ),
+        (unknown, "(:init) (:goal (full))".into(), Expect::Open),
+    ] {
+        check(domain, &problem, false, expect);
+    }
+}

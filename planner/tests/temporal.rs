@@ -131,6 +131,17 @@ fn timed_literals_open_and_close() {
     check(SHOP, "(:init (home) (at 6 (open)) (at 12 (not (open)))) (:goal (bought))", Some(9.0));
     check(SHOP, "(:init (home) (open) (at 9 (not (open)))) (:goal (bought))", Some(7.0));
     check(SHOP, "(:init (home) (open) (at 6 (not (open)))) (:goal (bought))", None);
+    // Of two facts that exclude each other, time takes one away.
+    let seat = "(:requirements :numeric-fluents) (:predicates (free) (taken)) (:functions (warmth))
+      (:durative-action sit :parameters () :duration (= ?duration 1) :condition (and (at start (free)) (at start (>= (warmth) 3)))
+        :effect (and (at start (not (free))) (at end (taken))))";
+    let warm = |gone_s: f64| {
+        format!(
+            "(:init (free) (= (warmth) 1) (at {gone_s} (not (free))) (at 12 (= (warmth) 3))) (:goal (taken))"
+        )
+    };
+    check(seat, &warm(5.0), None);
+    check(seat, &warm(15.0), Some(13.0));
 }
 
 #[test]
@@ -266,6 +277,12 @@ fn durations_may_be_nothing_at_first_or_at_all() {
       (:durative-action flash :parameters () :duration (= ?duration 0) :condition (at start (idle))
         :effect (and (at start (not (idle))) (at end (idle)) (at end (lit))))";
     check(flash, "(:init (idle)) (:goal (lit))", None);
+    // Nor one that changes what its start asks for, though nobody else does.
+    let count = "(:requirements :adl :numeric-fluents) (:predicates (lit)) (:functions (long))
+      (:durative-action count :parameters () :duration (= ?duration (long))
+        :effect (and (when (at start (>= (long) 0)) (at start (lit))) (at end (increase (long) 2))))";
+    check(count, "(:init (= (long) 0)) (:goal (lit))", None);
+    check(count, "(:init (= (long) 1)) (:goal (lit))", Some(1.0));
 }
 
 #[test]
@@ -550,4 +567,42 @@ fn a_plan_that_is_written_and_read_again_is_valid() {
     let again = descry_planner::Plan::read(&Source::new("plan", written.as_str())).expect("it is a plan");
     let verdict = descry_planner::validate(&task, &Attachments::new(), &again);
     assert!(verdict.valid, "{written}{verdict:?}");
+}
+
+#[test]
+fn a_parameter_that_nothing_uses_stands_for_one_object_where_no_two_runs_help() {
+    let objects: String = (0..12).map(|index| format!(" o{index}")).collect();
+    let alone = "(at start (free)) (at start (not (met ?a)))";
+    for (condition, effect, more, actions) in [
+        // The one that ends first is enough; or it goes on alone.
+        ("", "(at end (met ?a))", "", 12),
+        (
+            alone,
+            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
+            "",
+            12,
+        ),
+        (alone, "(and (at start (not (free))) (at end (met ?a)) (at end (increase (count) 1)))", "", 12),
+        // Two runs may help, or are possible.
+        ("", "(and (at end (met ?a)) (at end (increase (count) 1)))", "", 12 * 12),
+        ("", "(and (at start (met ?a)) (at end (not (met ?a))))", "", 12 * 12),
+        (
+            alone,
+            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
+            "(:action free :parameters () :effect (free))",
+            12 * 12 + 1,
+        ),
+        // It is used.
+        ("(at start (not (met ?u)))", "(at end (met ?a))", "", 12 * 12),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:predicates (free) (met ?x)) (:functions (count))
+              (:durative-action meet :parameters (?a ?u) :duration (= ?duration 3) :condition (and {condition}) :effect {effect}) {more})"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects{objects}) (:init (free) (= (count) 0)) (:goal (and (forall (?x) (met ?x)) (>= (count) 0))))"
+        );
+        let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+        assert_eq!(found.statistics().actions, actions, "{condition} {effect} {more}");
+    }
 }

@@ -187,6 +187,54 @@ fn deadlines_are_met_where_they_can_be_and_else_proven_too_early() {
     }
 }
 
+const ROUND: &str = "  (:requirements :typing :durative-actions :constraints :timed-initial-literals)
+  (:types place pack)
+  (:predicates (at ?p - place) (road ?a ?b - place) (in ?x - pack) (lies ?x - pack ?p - place) (lit) (told))
+  (:durative-action go :parameters (?a ?b - place) :duration (= ?duration 4)
+    :condition (and (at start (at ?a)) (at start (road ?a ?b))) :effect (and (at start (not (at ?a))) (at end (at ?b))))
+  (:durative-action load :parameters (?x - pack ?p - place) :duration (= ?duration 1)
+    :condition (and (at start (lies ?x ?p)) (over all (at ?p))) :effect (and (at start (not (lies ?x ?p))) (at end (in ?x))))
+  (:durative-action drop :parameters (?x - pack ?p - place) :duration (= ?duration 1)
+    :condition (and (at start (in ?x)) (over all (at ?p))) :effect (and (at start (not (in ?x))) (at end (lies ?x ?p))))
+  (:durative-action tell :parameters () :duration (= ?duration 1) :condition (at start (lit)) :effect (at end (told)))
+";
+
+#[test]
+fn what_comes_too_late_whatever_is_done_is_proven_at_once() {
+    // Many packs leave much to look at; a place is twenty seconds away, and to put a pack there takes one more.
+    let places: String = (0..6).map(|at| format!(" p{at}")).collect();
+    let packs: String = (0..6).map(|pack| format!(" x{pack}")).collect();
+    let lie: String = (0..6).map(|pack| format!(" (lies x{pack} p0)")).collect();
+    let roads: String =
+        (0..5).map(|at| format!(" (road p{at} p{}) (road p{} p{at})", at + 1, at + 1)).collect();
+    for (more, goal, expected) in [
+        ("", "(and)) (:constraints (within 20 (lies x0 p5)))", Some("within 20 s: it takes 21 s at least")),
+        ("", "(and)) (:constraints (within 23 (lies x0 p5)))", None),
+        ("", "(and)) (:constraints (forall (?p - place) (within 19.5 (at ?p))))", Some("within 19.5 s")),
+        (
+            "",
+            "(and)) (:constraints (and (within 30 (at p5)) (within 3 (or (at p1) (at p2)))))",
+            Some("within 3 s"),
+        ),
+        // It is light at first and again later: not for ever too late.
+        ("(lit) (at 9 (not (lit)))", "(and (lies x0 p5) (told)))", None),
+        ("(at 3 (lit)) (at 9 (not (lit))) (at 40 (lit))", "(told))", None),
+    ] {
+        let problem = format!(
+            "(:objects{places} - place{packs} - pack) (:init (at p0){lie}{roads} {more}) (:goal {goal}"
+        );
+        let outcome = solve(ROUND, &problem).expect("no attachment");
+        match (&outcome, expected) {
+            (Outcome::Unsolvable { why, statistics }, Some(said)) => {
+                assert!(why.to_string().contains(said), "{goal}: {why}");
+                assert_eq!(statistics.evaluated, 0, "{goal}");
+            }
+            (Outcome::Solved { .. }, None) => {}
+            _ => panic!("{more} {goal}: {outcome:?}"),
+        }
+    }
+}
+
 #[test]
 fn what_only_chosen_durations_could_reach_is_not_called_impossible() {
     // The level rises with the duration chosen; the search takes the shortest, so it finds no plan, and proves nothing.

@@ -2,7 +2,7 @@
 
 use descry_planner::{
     Answer, Attachments, Call, CallError, FactValue, Plan, Read, Semantics, Source, State, Task, Verdict,
-    monitor, validate,
+    endless, monitor, validate,
 };
 
 const KITCHEN: &str = include_str!("data/kitchen-domain.pddl");
@@ -374,4 +374,61 @@ fn the_monitor_says_what_broke() {
 fn an_invalid_step_is_drawn_in_the_domain() {
     let verdict = verdict(WORKSHOP, WORKSHOP_PROBLEM, "0: (light) [5]\n4: (join a) [2]");
     insta::assert_snapshot!("invalid-step", verdict.findings.render(false));
+}
+
+#[test]
+fn what_takes_no_time_starts_and_ends_at_once() {
+    let domain = "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:predicates (dry) (wet) (known) (odd))
+      (:functions (level) (long))
+      (:durative-action look :parameters () :duration (= ?duration (long)) :condition (over all (< (level) 5))
+        :effect (and (at end (known)) (when (at start (dry)) (at end (odd)))))
+      (:durative-action flash :parameters () :duration (= ?duration (long)) :effect (and (at start (wet)) (at end (not (wet)))))
+      (:action fill :parameters () :effect (increase (level) 9)))";
+    let problem = "(define (problem p) (:domain d) (:init (dry) (= (level) 0) (= (long) 0)) (:goal (and (known) (odd))))";
+    check(
+        domain,
+        problem,
+        &[
+            ("1: (look) [0]", ""),
+            // Its condition over all is nobody's any more.
+            ("1: (look) [0]\n2: (fill)", ""),
+            ("1: (flash) [0]", "both touch (wet)"),
+        ],
+    );
+}
+
+#[test]
+fn a_metric_that_a_step_makes_ever_better_is_told_from_one_with_an_end() {
+    let (down, up) = ("(decrease (cost) 2)", "(increase (cost) 2)");
+    let domain = |earn: &str| {
+        format!(
+            "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (p) (q)) (:functions (cost) (left))
+              (:action earn :parameters () :precondition (p) :effect {earn})
+              (:durative-action sell :parameters () :duration (= ?duration 2) :condition (at start (p)) :effect (at end {down}))
+              (:action go :parameters () :precondition (p) :effect (and (q) (increase (cost) 5))))"
+        )
+    };
+    for (earn, metric, steps, expected) in [
+        (down, "minimize (cost)", "0: (earn)\n1: (go)", Some(("earn", 2.0))),
+        (down, "minimize (cost)", "0: (sell) [2]\n1: (go)", Some(("sell", 2.0))),
+        (down, "minimize (* 3 (cost))", "(earn)\n(go)", Some(("earn", 6.0))),
+        (down, "minimize (+ (cost) (* 5 (total-time)))", "0: (sell) [2]\n1: (go)", None),
+        (down, "minimize (cost)", "(go)", None),
+        (up, "minimize (- 9 (cost))", "(earn)\n(go)", Some(("earn", 2.0))),
+        (up, "maximize (cost)", "(earn)\n(go)", Some(("earn", 2.0))),
+        (up, "minimize (cost)", "(earn)\n(go)", None),
+        ("(and (decrease (cost) (left)) (decrease (left) 1))", "minimize (cost)", "(earn)\n(go)", None),
+        ("(scale-down (cost) 2)", "minimize (cost)", "(go)\n(earn)", None),
+    ] {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (p) (= (cost) 0) (= (left) 9)) (:goal (q)) (:metric {metric}))"
+        );
+        let domain = Source::new("domain", domain(earn).as_str());
+        let task = Task::read(&domain, &Source::new("problem", problem.as_str()));
+        let task = task.unwrap_or_else(|findings| panic!("{}", findings.render(false)));
+        let plan = Plan::read(&Source::new("plan", steps)).expect("it is read");
+        let found = endless(&task, &Attachments::new(), &plan);
+        let found = found.map(|(step, gain)| (step.action, gain));
+        assert_eq!(found, expected.map(|(name, gain)| (name.to_string(), gain)), "{earn} {metric} {steps}");
+    }
 }

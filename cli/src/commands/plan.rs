@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use descry_planner::{Outcome, Plan, PlanError, Statistics, Task, number_text};
+use descry_planner::{Attachments, Outcome, Plan, PlanError, Statistics, Task, endless, number_text};
 use serde::Serialize;
 use serde_json::json;
 
@@ -80,12 +80,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         ..descry_planner::Options::default()
     };
     let mut unwritten = Ok(());
+    let mut endless = None;
     let mut on_plan = |plan: &Plan| {
         if let Some(path) = &arguments.out {
             unwritten = write_plan(path, plan);
         }
         if arguments.anytime && !arguments.json {
             input::narrate(&format!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan)));
+        }
+        if arguments.anytime && endless.is_none() {
+            endless = ever_better(&task, &attachments, plan);
+            endless.iter().filter(|_| !arguments.json).for_each(|said| input::narrate(said));
         }
     };
     let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
@@ -111,7 +116,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let answer = |asked| why_not::answer(&task, &attachments, outcome.plan(), asked, &options, &stop);
     let answer = asked.map(answer).transpose()?;
     if arguments.json {
-        print_json(status, &outcome, answer.as_ref(), started)?;
+        print_json((status, endless), &outcome, answer.as_ref(), started)?;
     } else {
         show(&status, &outcome, arguments.out.is_some(), started, stop())?;
         if let Some(answer) = answer {
@@ -147,7 +152,7 @@ fn address_space_bytes() -> Option<u64> {
 }
 
 fn print_json(
-    status: Status,
+    (status, endless): (Status, Option<String>),
     outcome: &Outcome,
     answer: Option<&why_not::Answer>,
     started: Instant,
@@ -171,6 +176,7 @@ fn print_json(
         "actions": actions,
         "optimal": optimal,
         "scored_only": scored_only,
+        "endless": endless,
         "attachments": attachments,
         "why": why.map(|why| why.to_string()),
         // A proof holds for plans in which none of these overlaps itself.
@@ -235,6 +241,18 @@ fn show(
         ));
     }
     Ok(())
+}
+
+/// That the metric may have no best value, where a plan shows it.
+fn ever_better(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<String> {
+    let (step, gain) = endless(task, attachments, plan)?;
+    let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();
+    Some(format!(
+        "  the metric seems to have no best value: ({}{arguments}) can be done ever again and makes it better by {} each time; \
+         this goes on until a limit ends it",
+        step.action,
+        number_text(gain)
+    ))
 }
 
 fn summary(plan: &Plan) -> String {

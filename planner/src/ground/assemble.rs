@@ -1,6 +1,6 @@
 //! The last step of grounding: variables, actions and axioms in their final form.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::model::relation::quotient;
 use crate::task::Task;
@@ -44,10 +44,21 @@ pub(super) fn assemble(
             reached.atoms[a] && !always[a] && matters && fluent(a)
         })
         .collect();
+    // What a timed deletion takes away may be gone already: alone, it can be lost whatever else holds.
+    let lost = raw.timed.iter().flat_map(|(_, deeds)| deeds).filter_map(|deed| match deed {
+        Deed::Delete(atom) => Some(*atom),
+        _ => None,
+    });
+    let lost: FxHashSet<u32> = lost.collect();
+    let shared: Vec<Vec<u32>> = groups
+        .found
+        .iter()
+        .map(|group| group.iter().copied().filter(|atom| !lost.contains(atom)).collect())
+        .collect();
     let encoding = encode(Choice {
         carried: &carried,
         always,
-        groups: &groups.found,
+        groups: &shared,
         fixed: &groups.fixed,
         unwanted: &relevant.unwanted,
         derived: &strata,
@@ -223,10 +234,8 @@ fn encode_action(
 fn timed(encoding: &Encoding, time_s: f64, deeds: &[Deed]) -> TimedEffect {
     let effects: Vec<GroundEffect> =
         deeds.iter().map(|deed| GroundEffect { when: None, deed: deed.clone() }).collect();
-    // What a timed deletion takes away may be gone already: only two-valued variables lose it unconditionally.
-    let outcomes = encoding.effects(&effects, &[]).into_iter().map(|e| (e.when, e.outcome));
-    let outcomes = outcomes.map(|(when, outcome)| (when.is_none(), outcome));
-    TimedEffect { time_s, outcomes: outcomes.filter(|(plain, _)| *plain).map(|(_, o)| o).collect() }
+    let outcomes = encoding.effects(&effects, &[]).into_iter().map(|effect| effect.outcome);
+    TimedEffect { time_s, outcomes: outcomes.collect() }
 }
 
 /// The numbers at first; NaN where undefined.

@@ -3,6 +3,7 @@
 mod assemble;
 mod atoms;
 mod build;
+mod earliest;
 mod groups;
 mod instantiate;
 mod invariants;
@@ -18,12 +19,14 @@ mod relevant;
 mod rules;
 mod statics;
 mod task;
+mod unused;
 mod variables;
 
 pub(crate) use build::ground_with;
 pub use build::{GroundError, ground};
+pub(crate) use earliest::Earliest;
 pub(crate) use metric::{added, weights};
 pub use obstacles::{MissingAtom, Obstacle};
 pub(crate) use pairs::exclusive;
-pub(crate) use pddl3::compile;
+pub(crate) use pddl3::{WITNESS, compile};
 pub use task::*;

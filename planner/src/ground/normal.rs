@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::pddl3::conditions::negated;
+use super::unused::leave_out_what_nothing_uses;
 use crate::task::{
     Assignment, Atom, Call, Change, Comparison, Condition, Effect, Expression, Fluent, FunctionId, ObjectId,
     Quantified, Task, Term as LiftedTerm, Timed, Written,
@@ -111,46 +112,16 @@ pub(super) struct Action_ {
     pub flows: Vec<(Named, Number)>,
 }
 
-impl Action_ {
-    /// Of a parameter that nothing of the action mentions any object will do: the first.
-    fn leave_out_what_nothing_uses(&mut self) {
-        let mut used = vec![false; self.domains.len()];
-        let mut note = |term: &Term| {
-            if let Term::Slot(slot) = term {
-                used[*slot as usize] = true;
-            }
-        };
-        for formula in self.condition.all() {
-            formula.terms(&mut note);
-        }
-        for effect in self.start_effects.iter().chain(&self.end_effects) {
-            effect.when.all().into_iter().for_each(|formula| formula.terms(&mut note));
-            match &effect.change {
-                Change_::Add(pattern) | Change_::Delete(pattern) | Change_::Unset(pattern) => {
-                    pattern.terms.iter().for_each(&mut note);
-                }
-                Change_::Number(_, fluent, amount) => {
-                    fluent.terms.iter().for_each(&mut note);
-                    amount.terms(&mut note);
-                }
-                Change_::Call(call) => call.terms.iter().for_each(&mut note),
-            }
-        }
-        for (domain, _) in self.domains[..self.arity].iter_mut().zip(&used).filter(|(_, used)| !**used) {
-            *domain = domain.iter().copied().take(1).collect();
-        }
-    }
-}
-
 impl Timed3<Formula> {
-    fn all(&self) -> [&Formula; 3] {
+    /// All of it.
+    pub fn all(&self) -> [&Formula; 3] {
         [&self.start, &self.over_all, &self.end]
     }
 }
 
 impl Formula {
     /// Visits every term.
-    fn terms(&self, visit: &mut dyn FnMut(&Term)) {
+    pub fn terms(&self, visit: &mut dyn FnMut(&Term)) {
         match self {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| part.terms(visit)),
             Formula::Literal(pattern, _) => pattern.terms.iter().for_each(visit),
@@ -164,7 +135,7 @@ impl Formula {
 
 impl Number {
     /// Visits every term.
-    fn terms(&self, visit: &mut dyn FnMut(&Term)) {
+    pub fn terms(&self, visit: &mut dyn FnMut(&Term)) {
         match self {
             Number::Fluent(named) | Number::Call(named) => named.terms.iter().for_each(visit),
             Number::Sum(parts) | Number::Product(parts) => parts.iter().for_each(|part| part.terms(visit)),
@@ -504,7 +475,7 @@ fn action(task: &Task, schema: usize) -> Action_ {
     };
     let start_effects = effects(&lifted.effects.start, false, &mut condition.start);
     let end_effects = effects(&lifted.effects.end, true, &mut condition.end);
-    let mut action = Action_ {
+    Action_ {
         schema: schema as u32,
         arity: lifted.parameters.len(),
         extra: fresh.slots,
@@ -514,12 +485,7 @@ fn action(task: &Task, schema: usize) -> Action_ {
         end_effects,
         flows,
         domains: scope.domains,
-    };
-    // What takes time may go on twice at once only under two names.
-    if lifted.duration.is_none() && lifted.grounding.is_empty() && lifted.preferences.is_empty() {
-        action.leave_out_what_nothing_uses();
     }
-    action
 }
 
 /// Brings a lifted task into the form for grounding.
@@ -540,8 +506,10 @@ pub(super) fn normalise(task: &Task) -> Normal {
     let goal_domains = scope.domains;
     let mut scope = Scope::new(task, 0);
     let metric = task.metric.as_ref().map(|m| scope.number(&m.value, &mut Fresh::default()));
+    let mut actions: Vec<Action_> = (0..task.actions.len()).map(|schema| action(task, schema)).collect();
+    leave_out_what_nothing_uses(task, &mut actions);
     Normal {
-        actions: (0..task.actions.len()).map(|schema| action(task, schema)).collect(),
+        actions,
         rules: rules.collect(),
         goal,
         goal_domains,

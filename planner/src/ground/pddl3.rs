@@ -26,6 +26,8 @@ use crate::task::{
 use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
 use touch::Mentioned;
 
+/// What an action is called that sees in time what must come about; it stands where the constraint does.
+pub(crate) const WITNESS: &str = "see it";
 /// Preferences of one action that become conditions of its copies, at most.
 const MOST_OF_AN_ACTION: usize = 3;
 
@@ -49,7 +51,7 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
         compiler.action_preferences(action, own);
     }
     for constraint in &task.constraints {
-        let Trajectory { forall, operator, times_s, conditions, slots, preference, .. } = constraint;
+        let Trajectory { operator, times_s, preference, .. } = constraint;
         let asked = match (Automaton::of(*operator), operator, &times_s[..]) {
             (Some(automaton), ..) => Asked::States(automaton),
             (None, Modal::Within, [time_s]) if task.is_temporal() => Asked::Within(*time_s),
@@ -58,12 +60,19 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
                 continue;
             }
         };
-        compiler.instances(asked, forall, *slots, conditions, *preference);
+        let Trajectory { forall, conditions, slots, span, .. } = constraint;
+        compiler.instances(asked, *span, (forall, *slots), conditions, *preference);
     }
     for (preference, own) in (0..).map(PreferenceId).zip(&task.preferences) {
         for PreferredGoal { forall, condition, slots, .. } in &own.goals {
             let conditions = std::slice::from_ref(condition);
-            compiler.instances(Asked::States(&AT_END), forall, *slots, conditions, Some(preference));
+            compiler.instances(
+                Asked::States(&AT_END),
+                Span::default(),
+                (forall, *slots),
+                conditions,
+                Some(preference),
+            );
         }
     }
     Some(compiler.finish())
@@ -81,6 +90,7 @@ enum Asked {
 /// A constraint or preference with objects for its variables, as it is stated.
 struct Stated {
     asked: Asked,
+    span: Span,
     conditions: Vec<Condition>,
     preference: Option<PreferenceId>,
 }
@@ -209,8 +219,8 @@ impl<'t> Compiler<'t> {
     fn instances(
         &mut self,
         asked: Asked,
-        forall: &[Quantified],
-        slots: usize,
+        span: Span,
+        (forall, slots): (&[Quantified], usize),
         conditions: &[Condition],
         preference: Option<PreferenceId>,
     ) {
@@ -225,12 +235,12 @@ impl<'t> Compiler<'t> {
             let number = *self.said.entry(key).or_insert(self.instances.len());
             match self.instances.get_mut(number) {
                 Some((_, times)) => *times += 1.0,
-                None => self.instances.push((Stated { asked, conditions, preference }, 1.0)),
+                None => self.instances.push((Stated { asked, span, conditions, preference }, 1.0)),
             }
         });
     }
 
-    fn instance(&mut self, Stated { asked, conditions, preference }: Stated, times: f64) {
+    fn instance(&mut self, Stated { asked, span, conditions, preference }: Stated, times: f64) {
         let task = self.task;
         // What comes about by itself may still do so after the last action of a plan.
         if preference.is_some() && !task.init.timed.is_empty() {
@@ -239,7 +249,7 @@ impl<'t> Compiler<'t> {
         let automaton = match asked {
             Asked::States(automaton) => automaton,
             Asked::Within(time_s) => {
-                let kept = self.witnessed(time_s, all(conditions));
+                let kept = self.witnessed(time_s, span, all(conditions));
                 return self.ask(kept, preference, times);
             }
         };
@@ -276,7 +286,7 @@ impl<'t> Compiler<'t> {
     }
 
     /// The fact that some action of ours has seen the condition before it was too late.
-    fn witnessed(&mut self, time_s: f64, condition: Condition) -> Condition {
+    fn witnessed(&mut self, time_s: f64, span: Span, condition: Condition) -> Condition {
         let (seen, early) = (self.fact("seen in time"), self.fact("early"));
         let (Condition::Atom(own), Condition::Atom(early_atom)) = (&seen, &early) else { return seen };
         let early_fact = Fact { predicate: early_atom.predicate, arguments: Box::new([]) };
@@ -287,7 +297,8 @@ impl<'t> Compiler<'t> {
         let late = TimedInitial { time_s, change: GroundChange::Delete(early_fact), span: Span::default() };
         init.timed.insert(init.timed.partition_point(|timed| timed.time_s <= time_s), late);
         let effects = vec![effect(Change::Add(own.clone()), Condition::TRUE, false)];
-        self.made.actions.push(bookkeeping("see it", all([early, condition]), effects));
+        let witness = bookkeeping(WITNESS, all([early, condition]), effects);
+        self.made.actions.push(Action { span, ..witness });
         seen
     }
 

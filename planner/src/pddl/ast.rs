@@ -332,6 +332,8 @@ pub struct Derived {
 /// A domain file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Domain {
+    /// Whether a part of it could not be read at all.
+    pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
     /// Declared requirements.
@@ -408,6 +410,8 @@ pub struct Metric {
 /// A problem file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Problem {
+    /// Whether a part of it could not be read at all.
+    pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
     /// The domain that it says it belongs to.

@@ -17,12 +17,12 @@ use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::joined::shortened;
 use super::manner::{Counts, End, Manner};
-use super::mentions::keep_apart;
 use super::overlap::helpful;
 use super::relaxed::{Part, Relaxed};
 use super::schedule::{Replayed, tightened};
 use super::search::Search;
 use super::space::{Base, Measure, Space};
+use super::timed::{Timed, schedule};
 use super::tours::Tours;
 use super::world::World;
 
@@ -39,17 +39,6 @@ pub(crate) struct Limits {
     pub memory: MemoryLimit,
     /// Decides every choice that is left open.
     pub seed: u64,
-}
-
-/// An action of a plan with its times.
-#[derive(Debug, Clone)]
-pub(crate) struct Timed {
-    /// The step of the search.
-    pub step: Step,
-    /// When it starts.
-    pub start_s: f64,
-    /// How long it takes.
-    pub duration_s: f64,
 }
 
 /// How the search for plans ended.
@@ -524,36 +513,4 @@ fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
     }
     timed.sort_by(|one, other| one.0.total_cmp(&other.0));
     timed.into_iter().map(|(_, step)| step.clone()).collect()
-}
-
-/// The earliest schedule of a plan; `None` if it is long and has been asked to stop.
-fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
-    let mut track = space.track(steps).ok()?;
-    let mut apart = track.clone();
-    match keep_apart(space, steps, &mut apart, stop) {
-        Ok(true) => track = apart,
-        Ok(false) => return None,
-        // A schedule that has no room for more distance is as good as the search took it for.
-        Err(_) => {}
-    }
-    let actions =
-        track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
-    let mut plan: Vec<Timed> = actions
-        .map(|((start, end), step)| {
-            let start_s = track.order.earliest_s(start);
-            let duration_s = end.map_or(0.0, |end| {
-                let taken_s = track.order.earliest_s(end) - start_s;
-                // Exact where the duration is fixed: differences of times carry rounding.
-                if step.span.least_s == step.span.most_s {
-                    step.span.least_s
-                } else {
-                    taken_s.max(step.span.least_s)
-                }
-            });
-            Timed { step: step.clone(), start_s, duration_s }
-        })
-        .collect();
-    plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
-    debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
-    Some(plan)
 }

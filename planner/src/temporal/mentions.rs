@@ -18,7 +18,7 @@ use crate::task::{
 use super::advance::Step;
 use super::order::{Access, Inconsistent};
 use super::space::{Space, Track};
-use super::world::World;
+use super::world::{Act, World};
 
 /// Rounds of moving happenings apart, each of which may bring others together.
 const MOST_ROUNDS: usize = 100;
@@ -99,6 +99,14 @@ pub(super) fn keep_apart(
     Ok(true)
 }
 
+/// Whether start and end of an action mention or change what the other changes.
+pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
+    let [at_start, at_end] = Named::new(world.task).uses(world, act);
+    at_start.iter().any(|(name, does)| {
+        at_end.iter().any(|(other, also)| other == name && (also != does || *does == Use::Writes))
+    })
+}
+
 /// Two happenings, the one that shall come first before the other: what is given cannot be moved.
 fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
     let key = |touch: &Touch| (touch.step != GIVEN, touch.happening);
@@ -120,7 +128,7 @@ fn touches(
     let named = Named::new(space.world.task);
     for (step, action) in track.actions.iter().enumerate() {
         let &Some((start, end)) = action else { continue };
-        let [at_start, at_end] = named.uses(space.world, steps[step].act);
+        let [at_start, at_end] = named.uses(space.world, &space.world.acts[steps[step].act as usize]);
         note(start, step, at_start);
         if let Some(end) = end {
             note(end, step, at_end);
@@ -174,8 +182,8 @@ impl Named {
     }
 
     /// What the start and the end of an action mention and change.
-    fn uses(&self, world: &World, act: u32) -> [Uses; 2] {
-        let origin = world.acts[act as usize].origin;
+    fn uses(&self, world: &World, act: &Act) -> [Uses; 2] {
+        let origin = act.origin;
         let action = &world.task.actions[origin.schema as usize];
         let mut binding = vec![0; action.slots];
         binding[..origin.arguments.len()].copy_from_slice(&origin.arguments);

@@ -379,9 +379,9 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
     }
 
-    /// Whether a plan is one still where its actions are stretched. Of what goes on from a base, its beginning is not known here.
+    /// Whether a plan is one still with its times. Of what goes on from a base, its beginning is not known here.
     fn works_out(&self, node: u32) -> Result<bool, Failure> {
-        if !self.space.stretches || !self.base.track.actions.is_empty() {
+        if !self.space.is_open || !self.base.track.actions.is_empty() {
             return Ok(true);
         }
         Ok(self.space.replay_to_goal(&mut self.path(node), &|| false)?.is_some())

@@ -13,6 +13,7 @@ use crate::validate::SEPARATION_S;
 use super::advance::{Accesses, Situation, Step};
 use super::order::{Clock, Inconsistent, Order};
 use super::relaxed::Part;
+use super::timed::is_valid;
 use super::world::{Act, Moment, Span, World};
 
 /// How often a plan is replayed whose actions are stretched in turn by those that were stretched before.
@@ -123,7 +124,9 @@ pub(crate) struct Space<'w, 'a> {
     /// another plan is taken to lead to no better one.
     pub earns: Earns,
     /// Whether effects or costs of some action depend on how long it is stretched.
-    pub stretches: bool,
+    stretches: bool,
+    /// Whether that is so or numbers flow: what a plan does is then known once it has its times.
+    pub is_open: bool,
 }
 
 impl<'w, 'a> Space<'w, 'a> {
@@ -153,7 +156,8 @@ impl<'w, 'a> Space<'w, 'a> {
         let tight = open_act.contains(&true) || !ground.timed.is_empty();
         let earns = measure.earns(world);
         let stretches = world.acts.iter().any(Act::is_read_off);
-        Space { world, open_act, measure, accesses, pivots, everywhere, tight, earns, stretches }
+        let is_open = stretches || world.acts.iter().any(|act| !act.flow_effects.is_empty());
+        Space { world, open_act, measure, accesses, pivots, everywhere, tight, earns, stretches, is_open }
     }
 
     /// Actions whose facts at start hold, in order.
@@ -296,7 +300,8 @@ impl<'w, 'a> Space<'w, 'a> {
         if self.tight && base.track.timed_at_end(self) != (false, false) {
             return Ok(None);
         }
-        Ok(self.world.is_goal(&base.situation)?.then_some((measured, base)))
+        let reached = self.world.is_goal(&base.situation)? && (!self.is_open || is_valid(self, steps, stop));
+        Ok(reached.then_some((measured, base)))
     }
 
     /// Fixes how long those actions take that are stretched on a track, where something depends on it; whether there are any.

@@ -14,6 +14,7 @@ use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
 
+use super::mentions::disturbs_itself;
 use super::together::some_only_together;
 use super::touch::{Touched, expression_touches};
 
@@ -45,6 +46,8 @@ pub(crate) struct Act<'a> {
     pub cost: &'a Expression,
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
+    /// Whether its end may happen together with its start, once it was asked for.
+    pub(super) ends_freely: OnceCell<bool>,
 }
 
 /// Of what bounds on a duration leave, what is tried besides the least where effects depend on it: half of it, and all.
@@ -137,6 +140,7 @@ impl<'a> World<'a> {
             end_effects: &action.end_effects,
             cost: &action.cost,
             grounding: grounding(task, &action.origin),
+            ends_freely: OnceCell::new(),
         });
         let instantaneous = ground.actions.iter().map(|action| Act {
             origin: &action.origin,
@@ -151,6 +155,7 @@ impl<'a> World<'a> {
             end_effects: &[],
             cost: &action.cost,
             grounding: grounding(task, &action.origin),
+            ends_freely: OnceCell::new(),
         });
         let mut acts: Vec<Act> = durative.chain(instantaneous).collect();
         let longer = |act: &&Act| chooses_effects(act);
@@ -282,7 +287,7 @@ impl<'a> World<'a> {
             }
         }
         span = span.strictly_inside(strict);
-        if span.most_s < EPSILON_S && !self.ends_freely(act) {
+        if span.most_s < EPSILON_S && !*act.ends_freely.get_or_init(|| self.ends_freely(act)) {
             return Ok(None);
         }
         span.least_s = span.least_s.max(EPSILON_S.min(span.most_s));
@@ -305,6 +310,9 @@ impl<'a> World<'a> {
     fn ends_freely(&self, act: &Act) -> bool {
         let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());
         read.condition(self, act.at_start);
+        for bound in act.bounds {
+            expression_touches(self, &bound.seconds, if bound.at_end { &mut end_read } else { &mut read });
+        }
         act.start_effects.iter().for_each(|effect| written.outcome(self, &effect.outcome));
         [act.over_all, act.at_end].into_iter().for_each(|condition| end_read.condition(self, condition));
         for effect in act.end_effects {
@@ -317,6 +325,7 @@ impl<'a> World<'a> {
             && !written.meets(&end_read)
             && !written.meets(&end_written)
             && !read.meets(&end_written)
+            && !disturbs_itself(self, act)
     }
 
     /// Whether the bounds that are evaluated at the end allow this duration.
@@ -372,6 +381,9 @@ impl<'a> World<'a> {
                 Outcome::Flow { fluent, rate } => {
                     let change = self.evaluate(rate, moment)? * moment.duration_s;
                     into.numbers[*fluent as usize] += change;
+                    if !into.numbers[*fluent as usize].is_finite() {
+                        return Ok(false);
+                    }
                 }
                 Outcome::Call(call) => {
                     self.calls.write(*call, moment.proposal, moment.state, moment.level, into)?;

@@ -5,6 +5,7 @@
 //! meet their bounds, timed literals happen by themselves.
 
 mod after;
+mod endless;
 mod monitor;
 mod replay;
 mod timeline;
@@ -20,6 +21,7 @@ use crate::state::State;
 use crate::task::{Action, Task};
 
 pub use after::after;
+pub use endless::endless;
 pub use monitor::{Broken, monitor};
 
 /// Happenings closer than this are at the same time, in seconds. Plans are printed with few digits, and peers keep

@@ -215,7 +215,12 @@ impl Replay<'_, '_> {
         }
         self.preferences(step, event, &mut binding)?;
         let running = self.running.iter().find(|running| running.step == step);
-        let pending = at_end.then(|| running.map(|running| running.pending.clone()).unwrap_or_default());
+        let pending = match (at_end, running) {
+            (false, _) => None,
+            (true, Some(running)) => Some(running.pending.clone()),
+            // What takes no time ends where it starts.
+            (true, None) => Some(self.remembered(step)?),
+        };
         let changes = self.semantics.changes(
             &self.state,
             effects,
@@ -364,20 +369,23 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
+    /// What a step that starts in the present state knows of it at its end.
+    fn remembered(&self, step: usize) -> Result<Pending, CallFailure> {
+        let (action, mut binding) = self.bound[step].clone();
+        let effects = &self.semantics.task.action(action).effects.end;
+        self.semantics.remember(&self.state, effects, &mut binding)
+    }
+
     fn start_and_end(&mut self, events: &[Event]) -> Result<(), CallFailure> {
         for event in events {
-            match *event {
-                Event::Start(step) => {
-                    let (action, mut binding) = self.bound[step].clone();
-                    let effects = &self.semantics.task.action(action).effects.end;
-                    let pending = self.semantics.remember(&self.state, effects, &mut binding)?;
-                    let since_s = self.now_s;
-                    self.running.push(Running { step, action, binding, pending, since_s });
-                }
-                Event::End(step) => self.running.retain(|running| running.step != step),
-                _ => {}
+            if let Event::Start(step) = *event {
+                let (action, binding) = self.bound[step].clone();
+                let pending = self.remembered(step)?;
+                let since_s = self.now_s;
+                self.running.push(Running { step, action, binding, pending, since_s });
             }
         }
+        self.running.retain(|running| !events.contains(&Event::End(running.step)));
         Ok(())
     }
 

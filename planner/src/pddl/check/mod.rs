@@ -63,6 +63,9 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
         }
     }
     let Checker { task, mut findings, .. } = checker;
+    if domain_tree.unread || problem_tree.as_ref().is_some_and(|problem| problem.unread) {
+        findings.retain(|finding| !is_missed(finding));
+    }
     // What follows from a missing parenthesis, or from what is not read, is no finding of its own; a misspelt name is.
     findings.retain(|finding| {
         let place = finding.labels.first().map_or(Span::default(), |label| label.span);
@@ -78,6 +81,13 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
 /// Whether a text could not be read as the lists that were meant.
 fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
+}
+
+/// Whether something was not found that may stand in what was not read.
+fn is_missed(finding: &Diagnostic) -> bool {
+    let names = ["undeclared-type", "undeclared-predicate", "undeclared-function", "undeclared-object"];
+    let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
+    matches!(finding.code, "no-goal" | "no-domain") || names.contains(&finding.code) && !is_near
 }
 
 /// Whether a name is meant to be another that is declared.

@@ -17,9 +17,12 @@ pub fn domain(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec
     symbols.declare_predicates(&tree);
     let mut parser = Parser { tree: &tree, text, source, symbols, findings };
     let mut domain = Domain::default();
-    if let Some(sections) = parser.definition("domain", &mut domain.name) {
-        for section in sections {
-            parser.domain_section(section, &mut domain);
+    let sections = parser.definition("domain", &mut domain.name);
+    domain.unread = sections.is_none();
+    for section in sections.into_iter().flatten() {
+        match parser.section_keyword(section, DOMAIN_SECTIONS) {
+            Some(keyword) => parser.domain_section(section, keyword, &mut domain),
+            None => domain.unread = true,
         }
     }
     domain
@@ -30,9 +33,12 @@ pub fn problem(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Ve
     let tree = lex::read(text, source, symbols, findings);
     let mut parser = Parser { tree: &tree, text, source, symbols, findings };
     let mut problem = Problem::default();
-    if let Some(sections) = parser.definition("problem", &mut problem.name) {
-        for section in sections {
-            parser.problem_section(section, &mut problem);
+    let sections = parser.definition("problem", &mut problem.name);
+    problem.unread = sections.is_none();
+    for section in sections.into_iter().flatten() {
+        match parser.section_keyword(section, PROBLEM_SECTIONS) {
+            Some(keyword) => parser.problem_section(section, keyword, &mut problem),
+            None => problem.unread = true,
         }
     }
     problem
@@ -191,11 +197,16 @@ impl<'a> Parser<'a> {
                 self.expected("`(define …)`", root, "a file holds one `(define …)` and comments");
             }
         }
-        let found = defines.iter().copied().find(|&root| is_kind(self, root, kind));
-        let Some(define) = found else {
+        let mut found = defines.iter().copied().find(|&root| is_kind(self, root, kind));
+        // One of its first words is misspelt: the rest is read as what is meant.
+        found = found.or_else(|| roots.iter().copied().find(|&root| is_kind(self, root, kind)));
+        if found.is_none() {
             self.no_definition(kind, other, defines.first().copied(), roots.is_empty());
-            return None;
-        };
+            let header = |root: usize| self.children(root).nth(1).and_then(|header| self.head(header));
+            let meant = |&root: &usize| header(root).is_some_and(|head| nearest(head, [kind]).is_some());
+            found = defines.iter().copied().find(meant);
+        }
+        let define = found?;
         let header = self.children(define).nth(1)?;
         match self.children(header).nth(1) {
             Some(node) => {
@@ -238,18 +249,17 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The keyword of a section, or a finding.
-    fn section_keyword(&mut self, section: usize) -> Option<&'a str> {
+    /// The keyword of a section; or a finding, and the keyword that is meant if one is near enough.
+    fn section_keyword(&mut self, section: usize, known: &[&'static str]) -> Option<&'a str> {
         let keyword = self.head(section).filter(|_| self.is_list(section));
         if keyword.is_none_or(|keyword| !keyword.starts_with(':')) {
             self.expected("a section", section, "sections look like `(:keyword …)`");
-            return None;
+            return nearest(&format!(":{}", keyword?), known.iter().copied());
         }
         keyword
     }
 
-    fn domain_section(&mut self, section: usize, domain: &mut Domain) {
-        let Some(keyword) = self.section_keyword(section) else { return };
+    fn domain_section(&mut self, section: usize, keyword: &str, domain: &mut Domain) {
         match keyword {
             ":requirements" => self.requirements(section, &mut domain.requirements),
             ":types" => domain.types.extend(self.typed_list(section, 1, false)),
@@ -261,12 +271,14 @@ impl<'a> Parser<'a> {
             ":constraints" => domain.constraints.extend(self.constraints(section)),
             ":derived" => domain.derived.extend(self.derived(section)),
             ":action" | ":durative-action" => domain.actions.extend(self.action(section, keyword)),
-            _ => self.unknown_section(section, keyword, "domain", DOMAIN_SECTIONS, PROBLEM_SECTIONS),
+            _ => match self.unknown_section(section, keyword, "domain", DOMAIN_SECTIONS, PROBLEM_SECTIONS) {
+                Some(meant) => self.domain_section(section, meant, domain),
+                None => domain.unread |= self.leaves_unread(),
+            },
         }
     }
 
-    fn problem_section(&mut self, section: usize, problem: &mut Problem) {
-        let Some(keyword) = self.section_keyword(section) else { return };
+    fn problem_section(&mut self, section: usize, keyword: &str, problem: &mut Problem) {
         match keyword {
             ":domain" if problem.domain.is_some() => self.second(section, keyword),
             ":domain" => match self.children(section).nth(1) {
@@ -292,19 +304,29 @@ impl<'a> Parser<'a> {
             ":moduleexitoptions" => self.module_options(section, &mut problem.module_exit_options),
             // Hints on the length of plans in files of the year 2000; they never bound a plan.
             ":length" => {}
-            _ => self.unknown_section(section, keyword, "problem", PROBLEM_SECTIONS, DOMAIN_SECTIONS),
+            _ => match self.unknown_section(section, keyword, "problem", PROBLEM_SECTIONS, DOMAIN_SECTIONS) {
+                Some(meant) => self.problem_section(section, meant, problem),
+                None => problem.unread |= self.leaves_unread(),
+            },
         }
     }
 
+    /// Whether it was said just now that something may have been meant that is not known: of what is known, nobody asks for more.
+    fn leaves_unread(&self) -> bool {
+        self.findings.last().is_some_and(|finding| finding.code == "unknown-section")
+    }
+
+    /// Says that nobody knows a section; gives the keyword that is meant if one is near enough.
     fn unknown_section(
         &mut self,
         section: usize,
         keyword: &str,
         here: &str,
-        known: &[&str],
+        known: &[&'static str],
         elsewhere: &[&str],
-    ) {
+    ) -> Option<&'static str> {
         let span = self.head_span(section);
+        let mut meant = None;
         let diagnostic = match keyword {
             ":process" | ":event" => refused(keyword, "PDDL+ processes and events", span),
             ":method" | ":methods" | ":task" | ":tasks" | ":htn" | ":ordered-subtasks" | ":expansion" => {
@@ -326,13 +348,15 @@ impl<'a> Parser<'a> {
             _ => {
                 let message = format!("no section `{keyword}` is known in a {here}");
                 let diagnostic = Diagnostic::error("unknown-section", message, span, "unknown section");
-                match nearest(keyword, known.iter().copied()) {
+                meant = nearest(keyword, known.iter().copied());
+                match meant {
                     Some(near) => diagnostic.with_help(format!("did you mean `{near}`?")),
                     None => diagnostic.with_help(format!("sections of a {here}: {}", known.join(" "))),
                 }
             }
         };
         self.findings.push(diagnostic);
+        meant
     }
 
     /// A section that a problem has once.

@@ -1,0 +1,248 @@
+//! When facts can hold at the earliest, where nothing is ever taken away but what is given until some time alone.
+//!
+//! Labels are times and spread from what holds at first (Dijkstra 1959): what an operator gives comes no earlier than all that
+//! it needs, and never where something that it needs is over by then.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use crate::grouped::Grouped;
+
+use super::task::{
+    Conjunction, DurationBound, Effect, Expression, Fact, GroundTask, Outcome, Place, Relation,
+};
+
+/// Times this near to each other are the same.
+const ROUNDING_S: f64 = 1e-6;
+
+/// An operator of the relaxed task.
+struct Operator {
+    missing: u32,
+    /// The latest label of what it needs, so far.
+    base_s: f64,
+    /// When something that it needs is over, for good.
+    until_s: f64,
+    gives: Vec<u32>,
+}
+
+/// Earliest times, in seconds from the start of the plan.
+pub(crate) struct Earliest<'g> {
+    ground: &'g GroundTask,
+    /// By variable, the proposition of its value 0; those of actions that have started follow after all.
+    offsets: Vec<u32>,
+    /// By proposition, when it is over for good.
+    until_s: Vec<f64>,
+    operators: Vec<Operator>,
+    /// What operators need, with what lies between that and what they give.
+    waits: Vec<(u32, (u32, f64))>,
+    labels_s: Vec<f64>,
+}
+
+impl<'g> Earliest<'g> {
+    /// Of a grounded task.
+    pub(crate) fn new(ground: &'g GroundTask) -> Earliest<'g> {
+        let mut offsets = Vec::with_capacity(ground.variables.len());
+        let mut facts = 0;
+        for variable in &ground.variables {
+            offsets.push(facts);
+            facts += variable.domain_size();
+        }
+        let mut earliest = Earliest {
+            ground,
+            offsets,
+            until_s: vec![f64::INFINITY; facts as usize],
+            operators: Vec::new(),
+            waits: Vec::new(),
+            labels_s: vec![f64::INFINITY; facts as usize + ground.durative.len()],
+        };
+        earliest.operators(facts);
+        earliest.endings();
+        earliest.spread();
+        earliest
+    }
+
+    /// When all of a condition's facts can hold at the earliest, each by itself; infinite for never.
+    pub(crate) fn of(&self, condition: &Conjunction) -> f64 {
+        let labels = condition.facts.iter().map(|&fact| self.labels_s[self.place(fact) as usize]);
+        labels.fold(0.0, f64::max)
+    }
+
+    fn place(&self, fact: Fact) -> u32 {
+        self.offsets[fact.variable as usize] + fact.value
+    }
+
+    fn operators(&mut self, facts: u32) {
+        let ground = self.ground;
+        for (action, started) in ground.durative.iter().zip(facts..) {
+            // What its start may change need not hold before it.
+            let kept = |fact: &&Fact| {
+                let derived = ground.variables[fact.variable as usize].stratum.is_some();
+                !derived && action.start_effects.iter().all(|effect| !writes(ground, effect, fact.variable))
+            };
+            let inside: Vec<Fact> = action.over_all.facts.iter().filter(kept).copied().collect();
+            let at_start: Vec<&[Fact]> = vec![&action.at_start.facts, &inside];
+            self.operator(&at_start, None, vec![started]);
+            let takes_s = |bound: &&DurationBound| {
+                !bound.at_end
+                    && matches!(bound.relation, Relation::Equal | Relation::AtLeast | Relation::Greater)
+            };
+            let bounds = action.duration.iter().filter(takes_s).filter_map(|bound| match bound.seconds {
+                Expression::Constant(seconds) => Some(seconds),
+                _ => None,
+            });
+            let least_s = bounds.fold(0.0, f64::max);
+            let at_end: [&[Fact]; 2] = [&action.over_all.facts, &action.at_end.facts];
+            self.effects(&at_start, None, &action.start_effects);
+            self.effects(&at_end, Some((started, least_s)), &action.end_effects);
+        }
+        for action in &ground.actions {
+            self.effects(&[&action.condition.facts], None, &action.effects);
+        }
+        for axiom in &ground.axioms {
+            self.operator(&[&axiom.body.facts], None, vec![self.place(axiom.head)]);
+        }
+        // Anything derived may be absent, and what is given from outside comes by itself.
+        for (&first, variable) in self.offsets.iter().zip(&ground.variables) {
+            if variable.stratum.is_some() {
+                self.labels_s[first as usize + 1] = 0.0;
+            }
+        }
+        for (variable, &value) in (0..).zip(&ground.initial.values) {
+            let place = self.place(Fact { variable, value });
+            self.labels_s[place as usize] = 0.0;
+        }
+        for timed in &ground.timed {
+            let given: Vec<u32> = timed.outcomes.iter().flat_map(|outcome| self.given(outcome)).collect();
+            for place in given {
+                let label_s = &mut self.labels_s[place as usize];
+                *label_s = label_s.min(timed.time_s.max(0.0));
+            }
+        }
+    }
+
+    /// What effects give that happen where some facts hold, and so long after an action has started.
+    fn effects(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, effects: &[Effect]) {
+        let plain = effects.iter().filter(|effect| effect.when.is_none());
+        let gives: Vec<u32> = plain.flat_map(|effect| self.given(&effect.outcome)).collect();
+        self.operator(needs, started, gives);
+        for effect in effects {
+            let Some(when) = &effect.when else { continue };
+            // What held at the start may be over by the end.
+            let more: [&[Fact]; 2] = [&when.here.facts, &when.over_all.facts];
+            let needs: Vec<&[Fact]> = needs.iter().copied().chain(more).collect();
+            self.operator(&needs, started, self.given(&effect.outcome));
+        }
+    }
+
+    fn operator(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, gives: Vec<u32>) {
+        if gives.is_empty() {
+            return;
+        }
+        let own = self.operators.len() as u32;
+        let mut places: Vec<u32> =
+            needs.iter().flat_map(|facts| facts.iter()).map(|&fact| self.place(fact)).collect();
+        places.sort_unstable();
+        places.dedup();
+        let missing = (places.len() + usize::from(started.is_some())) as u32;
+        self.waits.extend(places.into_iter().map(|place| (place, (own, 0.0))));
+        self.waits.extend(started.map(|(started, after_s)| (started, (own, after_s))));
+        self.operators.push(Operator { missing, base_s: 0.0, until_s: f64::INFINITY, gives });
+    }
+
+    fn given(&self, outcome: &Outcome) -> Vec<u32> {
+        match outcome {
+            Outcome::Set(fact) => vec![self.place(*fact)],
+            Outcome::Call(call) => {
+                let written = self.ground.calls[*call as usize].writes.iter().filter_map(set_by_a_call);
+                let values = |variable: u32| self.ground.variables[variable as usize].domain_size();
+                let all = |variable: u32| (0..values(variable)).map(move |value| Fact { variable, value });
+                written.flat_map(all).map(|fact| self.place(fact)).collect()
+            }
+            Outcome::Change { .. } | Outcome::Flow { .. } => Vec::new(),
+        }
+    }
+
+    /// Notes until when that holds which nothing but time gives.
+    fn endings(&mut self) {
+        let mut made = vec![false; self.until_s.len()];
+        let facts = made.len();
+        let gives = self.operators.iter().flat_map(|operator| &operator.gives);
+        gives.filter(|&&place| (place as usize) < facts).for_each(|&place| made[place as usize] = true);
+        let mut now = self.ground.initial.values.clone();
+        for timed in &self.ground.timed {
+            for outcome in &timed.outcomes {
+                let Outcome::Set(fact) = *outcome else { continue };
+                let before = std::mem::replace(&mut now[fact.variable as usize], fact.value);
+                let before = self.place(Fact { variable: fact.variable, value: before }) as usize;
+                self.until_s[before] = timed.time_s;
+                let after = self.place(fact) as usize;
+                self.until_s[after] = f64::INFINITY;
+            }
+        }
+        let derived = |variable: usize| self.ground.variables[variable].stratum.is_some();
+        for (variable, &first) in self.offsets.iter().enumerate().filter(|&(variable, _)| derived(variable)) {
+            let values = self.ground.variables[variable].domain_size() as usize;
+            made[first as usize..first as usize + values].fill(true);
+        }
+        for (until_s, _) in self.until_s.iter_mut().zip(made).filter(|&(_, made)| made) {
+            *until_s = f64::INFINITY;
+        }
+        for &(place, (operator, _)) in &self.waits {
+            let Some(&until_s) = self.until_s.get(place as usize) else { continue };
+            let own = &mut self.operators[operator as usize].until_s;
+            *own = own.min(until_s);
+        }
+    }
+
+    fn spread(&mut self) {
+        let waits = Grouped::new(self.labels_s.len(), self.waits.iter().copied());
+        // Times are never negative: their bits are in the same order as they are.
+        let key = |label_s: f64, place: u32| Reverse((label_s.to_bits(), place));
+        let known = (0..).zip(&self.labels_s).filter(|(_, label_s)| label_s.is_finite());
+        let mut queue: BinaryHeap<_> = known.map(|(place, &label_s)| key(label_s, place)).collect();
+        let free = self.operators.iter().filter(|operator| operator.missing == 0);
+        for place in free.flat_map(|operator| &operator.gives) {
+            queue.push(key(0.0, *place));
+            self.labels_s[*place as usize] = 0.0;
+        }
+        let mut done = vec![false; self.labels_s.len()];
+        while let Some(Reverse((_, place))) = queue.pop() {
+            if std::mem::replace(&mut done[place as usize], true) {
+                continue;
+            }
+            let label_s = self.labels_s[place as usize];
+            for &(own, after_s) in waits.of(place) {
+                let operator = &mut self.operators[own as usize];
+                operator.base_s = operator.base_s.max(label_s + after_s);
+                operator.missing -= 1;
+                if operator.missing > 0 || operator.base_s > operator.until_s + ROUNDING_S {
+                    continue;
+                }
+                for &given in &operator.gives {
+                    if operator.base_s < self.labels_s[given as usize] {
+                        self.labels_s[given as usize] = operator.base_s;
+                        queue.push(key(operator.base_s, given));
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn set_by_a_call(place: &Place) -> Option<u32> {
+    match place {
+        Place::Truth(variable) | Place::Object(variable) => Some(*variable),
+        Place::Number(_) | Place::Nowhere => None,
+    }
+}
+
+/// Whether an effect may change a variable.
+fn writes(ground: &GroundTask, effect: &Effect, variable: u32) -> bool {
+    match &effect.outcome {
+        Outcome::Set(fact) => fact.variable == variable,
+        Outcome::Call(call) => {
+            ground.calls[*call as usize].writes.iter().filter_map(set_by_a_call).any(|own| own == variable)
+        }
+        Outcome::Change { .. } | Outcome::Flow { .. } => false,
+    }
+}

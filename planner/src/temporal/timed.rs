@@ -1,0 +1,77 @@
+//! A finished plan with its times, and whether it is one.
+
+use crate::plan::Plan;
+use crate::validate::validate;
+
+use super::advance::Step;
+use super::mentions::keep_apart;
+use super::relaxed::Part;
+use super::space::Space;
+use super::world::World;
+
+/// An action of a plan with its times.
+#[derive(Debug, Clone)]
+pub(crate) struct Timed {
+    /// The step of the search.
+    pub step: Step,
+    /// When it starts.
+    pub start_s: f64,
+    /// How long it takes.
+    pub duration_s: f64,
+}
+
+/// The earliest schedule of a plan; `None` if it is long and has been asked to stop.
+pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
+    let mut track = space.track(steps).ok()?;
+    let mut apart = track.clone();
+    match keep_apart(space, steps, &mut apart, stop) {
+        Ok(true) => track = apart,
+        Ok(false) => return None,
+        // A schedule that has no room for more distance is as good as the search took it for.
+        Err(_) => {}
+    }
+    let actions =
+        track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
+    let mut plan: Vec<Timed> = actions
+        .map(|((start, end), step)| {
+            let start_s = track.order.earliest_s(start);
+            let duration_s = end.map_or(0.0, |end| {
+                let taken_s = track.order.earliest_s(end) - start_s;
+                // Exact where the duration is fixed: differences of times carry rounding.
+                if step.span.least_s == step.span.most_s {
+                    step.span.least_s
+                } else {
+                    taken_s.max(step.span.least_s)
+                }
+            });
+            Timed { step: step.clone(), start_s, duration_s }
+        })
+        .collect();
+    plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
+    Some(plan)
+}
+
+/// Whether a plan is one in time: where numbers flow, or effects depend on how long an action is stretched, the search knows too
+/// little of what happens when.
+pub(super) fn is_valid(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> bool {
+    let Some(timed) = schedule(space, steps, stop) else { return false };
+    let world = space.world;
+    validate(world.task, world.calls.attachments(), &to_plan(world, &timed)).valid
+}
+
+/// A plan in the words of its task.
+pub(crate) fn to_plan(world: &World, timed: &[Timed]) -> Plan {
+    let classical = world.ground.durative.is_empty() && world.ground.timed.is_empty();
+    let steps = timed.iter().map(|timed| {
+        let origin = &world.acts[timed.step.act as usize].origin;
+        let names = origin.arguments.iter().map(|&object| world.task.objects[object as usize].name.clone());
+        crate::plan::Step {
+            start_s: (!classical).then_some(timed.start_s),
+            action: world.task.actions[origin.schema as usize].name.clone(),
+            arguments: names.chain(timed.step.proposal.iter().map(|name| name.to_string())).collect(),
+            duration_s: timed.duration_s,
+        }
+    });
+    Plan { steps: steps.collect(), ..Plan::default() }
+}

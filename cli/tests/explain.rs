@@ -112,7 +112,7 @@ fn all_on_a_surface_is_no_thing_that_may_be_somewhere() {
             "the certainty of what stands on the table is ",
             "something stands there unseen",
             "of what kind the least sure one is, and that there are no more",
-            "in all, this was seen: 100 % of the table",
+            "in all, this was seen: 99 % of the table",
         ],
     );
     assert!(!told.to_string().contains("where table may be"), "{told}");
@@ -266,7 +266,7 @@ fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
         &["find", "cup A", "--seed", "17", "--scene", "ring-of-boxes"],
         0,
         &[
-            "pushing object 0 aside from table-3 failed: slipped",
+            "pushing object 1 aside from table-3 failed: slipped",
             "From then on: the robot stands at here-9; no longer: the robot stands at table-3",
         ],
     );
@@ -275,7 +275,7 @@ fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
 #[test]
 fn a_recorded_body_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
-    binary::check(folder.path(), &["find", "cup A", "--seed", "5", "--run", "first", "--json"], 0);
+    binary::check(folder.path(), &["find", "cup A", "--seed", "8", "--run", "first", "--json"], 0);
     let again = ["find", "cup A", "--robot", "recorded:first", "--run", "run", "--json"];
     binary::check(folder.path(), &again, 0);
     let words = [
@@ -323,7 +323,7 @@ fn what_is_left_of_a_plan_has_the_time_that_is_left_now() {
 #[test]
 fn a_look_that_would_come_too_late_is_not_gone_for() {
     let folder = tempfile::tempdir().expect("a folder");
-    let run = ["do", "find cup A within 45 seconds", "--domain", "home", "--seed", "99623", "--run", "run"];
+    let run = ["do", "find cup A within 45 seconds", "--domain", "home", "--seed", "99601", "--run", "run"];
     let run = binary::outcome(folder.path(), &run);
     assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
     // What ends in time is done, though no plan would do; what does not is not begun.

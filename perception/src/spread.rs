@@ -164,6 +164,10 @@ mod tests {
             let found = least(&c).unwrap();
             let n = Vector3::from(found.normal);
             prop_assert!((m * n - n * sorted[0]).norm() < 1e-6);
+            // Whatever lies beside it.
+            let [same, none] = least_of(&c.map(|value| [value, 0.0]));
+            prop_assert_eq!(same.map(|same| same.normal), Some(found.normal));
+            prop_assert!(none.is_none());
         }
     }
 

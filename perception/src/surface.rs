@@ -23,7 +23,7 @@ pub(crate) use hull::{convex_hull, largest_part};
 pub use outline::Outline;
 pub(crate) use outline::Rows;
 pub(crate) use planes::{BAND, dominant_planes};
-use planes::{FEWEST, Plane, ROUNDS, SAMPLE, Sample, large_planes};
+use planes::{FEWEST, Plane, ROUNDS, SAMPLE, SAMPLE_OF_ONE, Sample, large_planes};
 pub use role::{Role, Sign};
 use upright::Doubt;
 
@@ -454,7 +454,8 @@ pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
 fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
     /// However far off a point is measured, metres. From: chosen.
     const WORST_SIGMA_M: f64 = 0.02;
-    let stride = (cloud.len() / SAMPLE).max(1);
+    let wanted = if viewpoints.len() > 1 { SAMPLE } else { SAMPLE_OF_ONE };
+    let stride = (cloud.len() / wanted).max(1);
     // A stride that shares a factor with the rows would sample columns only.
     let stride = match cloud.grid {
         Some(grid) if stride > 1 && grid.width % stride == 0 => stride + 1,

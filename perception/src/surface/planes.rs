@@ -6,7 +6,9 @@ use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Points looked at when a plane is sought; more do not change it. From: chosen.
-pub(super) const SAMPLE: usize = 12_000;
+pub(super) const SAMPLE: usize = 16_000;
+/// Of one view, which shows less, fewer do. From: chosen, on piles of things and on recordings.
+pub(super) const SAMPLE_OF_ONE: usize = 12_000;
 /// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.
@@ -164,6 +166,7 @@ impl Cubes {
 
 /// The number of each point's cube, and which cubes these are, as they come.
 fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
+    /// Cubes a metre. From: derived, their side.
     const PER_M: f64 = 1.0 / REACH_M;
     let (mut numbers, mut keys): (FxHashMap<[i32; 3], u32>, Vec<[i32; 3]>) = Default::default();
     let mut last = ([i32::MIN; 3], 0);

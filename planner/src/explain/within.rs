@@ -28,7 +28,8 @@ pub(crate) fn too_slow(
     let finding = |constraint: &Trajectory| {
         let &[given_s] = &constraint.times_s[..] else { return None };
         let mut seen_s = witnesses(&compiled, constraint).map(|schema| seen_s(&grounded, &earliest, schema));
-        let late_s = seen_s.find(|seen_s| *seen_s > given_s + 3.0 * EPSILON_S)?;
+        // What is over before it can be seen is told by others.
+        let late_s = seen_s.find(|seen_s| *seen_s > given_s + 3.0 * EPSILON_S && seen_s.is_finite())?;
         let [late, given] = [late_s, given_s].map(number_text);
         let message = format!("this cannot come about within {given} s: it takes {late} s at least");
         Some(Diagnostic::error("unsolvable", message, constraint.span, format!("not before {late} s")))

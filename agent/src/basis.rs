@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use crate::exit::CommandError;
 use crate::explain::wording::{count, share};
-use crate::report::Report;
 use crate::standing::{self, InDoubt, Of, Rests};
 
 /// See the module.
@@ -41,7 +40,7 @@ pub struct Perceived {
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
-pub fn of(record: &Record, report: &Report) -> Result<Basis, CommandError> {
+pub fn of(record: &Record) -> Result<Basis, CommandError> {
     let mut lost = Vec::new();
     let mut whole = |kind: &str| -> Result<Vec<Document>, CommandError> {
         let (found, faults) = record.find_whole(&Query::of_kind(kind)).map_err(CommandError::broken)?;
@@ -67,7 +66,8 @@ pub fn of(record: &Record, report: &Report) -> Result<Basis, CommandError> {
             lost.push(format!("what is believed of {on} rests on views that are not in the record: {gone}"));
         }
     }
-    if beliefs.is_empty() && !report.objects.is_empty() {
+    // Where surfaces are not looked at, nothing is believed of what stands on them.
+    if beliefs.is_empty() && !surfaces.is_empty() {
         lost.push("what was believed of the objects is not in the record".into());
     }
     let (ended, in_doubt) = match end {

@@ -9,11 +9,13 @@ fn run(goal: &str, scene: &str, seed: u64, folder: &Path, remember: Option<&Path
     let mut command = Command::cargo_bin("descry").unwrap();
     let run = folder.join(format!("{scene}-{seed}-{}", goal.replace(' ', "-")));
     command.args(["do", goal, "--domain", "shapes", "--scene", scene, "--json", "--seed"]);
-    command.arg(seed.to_string()).arg("--run").arg(run);
+    command.arg(seed.to_string()).arg("--run").arg(&run);
     if let Some(store) = remember {
         command.arg("--remember").arg(store);
     }
     let output = command.output().unwrap();
+    // Nothing of what the verdict rests on is missed.
+    Command::cargo_bin("descry").unwrap().arg("show").arg(&run).assert().success();
     serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|e| panic!("{goal}: {e}\n{}", String::from_utf8_lossy(&output.stderr)))
 }

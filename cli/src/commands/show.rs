@@ -35,7 +35,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),
     };
-    let basis = report.as_ref().map(|report| basis::of(&record, report)).transpose()?;
+    let basis = report.as_ref().map(|_| basis::of(&record)).transpose()?;
     if let Some(page) = &arguments.html {
         let text = descry_pages::page::of_run(&record, report.as_ref())?;
         let at = |e: std::io::Error| format!("{}: {e}", page.display());

@@ -1,6 +1,8 @@
-//! Values that are objects, in plans that take time.
+//! Values that are objects, and objects that nothing uses, in plans that take time.
 
-use crate::temporal::check;
+use descry_planner::Source;
+
+use crate::temporal::{check, outcome};
 
 #[test]
 fn what_is_read_of_an_object_that_a_value_names_is_kept_apart_from_its_change() {
@@ -54,4 +56,42 @@ fn an_object_gets_one_value_at_a_time() {
     check(domain, "(:init (p) (q) (= (held) x)) (:goal (= (held) y))", None);
     // What holds again at the end is restored while it goes on.
     check(domain, "(:init (p) (q) (= (held) y)) (:goal (= (held) x))", Some(2.0));
+}
+
+#[test]
+fn a_parameter_that_nothing_uses_stands_for_one_object_where_no_two_runs_help() {
+    let objects: String = (0..12).map(|index| format!(" o{index}")).collect();
+    let alone = "(at start (free)) (at start (not (met ?a)))";
+    for (condition, effect, more, actions) in [
+        // The one that ends first is enough; or it goes on alone.
+        ("", "(at end (met ?a))", "", 12),
+        (
+            alone,
+            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
+            "",
+            12,
+        ),
+        (alone, "(and (at start (not (free))) (at end (met ?a)) (at end (increase (count) 1)))", "", 12),
+        // Two runs may help, or are possible.
+        ("", "(and (at end (met ?a)) (at end (increase (count) 1)))", "", 12 * 12),
+        ("", "(and (at start (met ?a)) (at end (not (met ?a))))", "", 12 * 12),
+        (
+            alone,
+            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
+            "(:action free :parameters () :effect (free))",
+            12 * 12 + 1,
+        ),
+        // It is used.
+        ("(at start (not (met ?u)))", "(at end (met ?a))", "", 12 * 12),
+    ] {
+        let domain = format!(
+            "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:predicates (free) (met ?x)) (:functions (count))
+              (:durative-action meet :parameters (?a ?u) :duration (= ?duration 3) :condition (and {condition}) :effect {effect}) {more})"
+        );
+        let problem = format!(
+            "(define (problem p) (:domain d) (:objects{objects}) (:init (free) (= (count) 0)) (:goal (and (forall (?x) (met ?x)) (>= (count) 0))))"
+        );
+        let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
+        assert_eq!(found.statistics().actions, actions, "{condition} {effect} {more}");
+    }
 }

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use descry_planner::{Attachments, Options, Outcome, PlanError, Source, Task, plan};
 
-fn outcome(domain: Source, problem: Source) -> Outcome {
+/// What comes of a task; it must be read.
+pub(crate) fn outcome(domain: Source, problem: Source) -> Outcome {
     let task = match Task::read(&domain, &problem) {
         Ok(task) => task,
         Err(findings) => panic!("{}", findings.render(false)),
@@ -567,42 +568,4 @@ fn a_plan_that_is_written_and_read_again_is_valid() {
     let again = descry_planner::Plan::read(&Source::new("plan", written.as_str())).expect("it is a plan");
     let verdict = descry_planner::validate(&task, &Attachments::new(), &again);
     assert!(verdict.valid, "{written}{verdict:?}");
-}
-
-#[test]
-fn a_parameter_that_nothing_uses_stands_for_one_object_where_no_two_runs_help() {
-    let objects: String = (0..12).map(|index| format!(" o{index}")).collect();
-    let alone = "(at start (free)) (at start (not (met ?a)))";
-    for (condition, effect, more, actions) in [
-        // The one that ends first is enough; or it goes on alone.
-        ("", "(at end (met ?a))", "", 12),
-        (
-            alone,
-            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
-            "",
-            12,
-        ),
-        (alone, "(and (at start (not (free))) (at end (met ?a)) (at end (increase (count) 1)))", "", 12),
-        // Two runs may help, or are possible.
-        ("", "(and (at end (met ?a)) (at end (increase (count) 1)))", "", 12 * 12),
-        ("", "(and (at start (met ?a)) (at end (not (met ?a))))", "", 12 * 12),
-        (
-            alone,
-            "(and (at start (not (free))) (at end (free)) (at end (met ?a)) (at end (increase (count) 1)))",
-            "(:action free :parameters () :effect (free))",
-            12 * 12 + 1,
-        ),
-        // It is used.
-        ("(at start (not (met ?u)))", "(at end (met ?a))", "", 12 * 12),
-    ] {
-        let domain = format!(
-            "(define (domain d) (:requirements :adl :durative-actions :numeric-fluents) (:predicates (free) (met ?x)) (:functions (count))
-              (:durative-action meet :parameters (?a ?u) :duration (= ?duration 3) :condition (and {condition}) :effect {effect}) {more})"
-        );
-        let problem = format!(
-            "(define (problem p) (:domain d) (:objects{objects}) (:init (free) (= (count) 0)) (:goal (and (forall (?x) (met ?x)) (>= (count) 0))))"
-        );
-        let found = outcome(Source::new("domain.pddl", domain), Source::new("problem.pddl", problem));
-        assert_eq!(found.statistics().actions, actions, "{condition} {effect} {more}");
-    }
 }

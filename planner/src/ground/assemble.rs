@@ -44,21 +44,10 @@ pub(super) fn assemble(
             reached.atoms[a] && !always[a] && matters && fluent(a)
         })
         .collect();
-    // What a timed deletion takes away may be gone already: alone, it can be lost whatever else holds.
-    let lost = raw.timed.iter().flat_map(|(_, deeds)| deeds).filter_map(|deed| match deed {
-        Deed::Delete(atom) => Some(*atom),
-        _ => None,
-    });
-    let lost: FxHashSet<u32> = lost.collect();
-    let shared: Vec<Vec<u32>> = groups
-        .found
-        .iter()
-        .map(|group| group.iter().copied().filter(|atom| !lost.contains(atom)).collect())
-        .collect();
     let encoding = encode(Choice {
         carried: &carried,
         always,
-        groups: &shared,
+        groups: &shared(&raw, &groups),
         fixed: &groups.fixed,
         unwanted: &relevant.unwanted,
         derived: &strata,
@@ -112,6 +101,17 @@ pub(super) fn assemble(
     compact(&mut ground, !task.modules.is_empty());
     derive_initial(&mut ground);
     ground
+}
+
+/// The groups that may share a variable. What a timed deletion takes away may be gone already: alone, it can be lost whatever else holds.
+fn shared(raw: &RawTask, groups: &Groups) -> Vec<Vec<u32>> {
+    let lost = raw.timed.iter().flat_map(|(_, deeds)| deeds).filter_map(|deed| match deed {
+        Deed::Delete(atom) => Some(*atom),
+        _ => None,
+    });
+    let lost: FxHashSet<u32> = lost.collect();
+    let kept = |group: &Vec<u32>| group.iter().copied().filter(|atom| !lost.contains(atom)).collect();
+    groups.found.iter().map(kept).collect()
 }
 
 /// Drops actions that always give an object fluent several values at once.

@@ -350,7 +350,7 @@ fn align_everything(
     steps: &mut Vec<Step>,
 ) {
     let all: Vec<Vec<Part>> = prepared.iter().map(|p| vec![Part::Standing; p.points.len()]).collect();
-    let found = joint::align(prepared, used, used, &all, poses, first);
+    let found = joint::align(prepared, used, &as_stated(prepared), &all, poses, first);
     steps.push(aligned("first alignment", &found));
 }
 
@@ -363,6 +363,11 @@ fn aligned(name: &str, found: &[Found]) -> Step {
         points: matched,
         result: format!("matched within {:.1} mm of each other's planes", 1e3 * residual_m),
     }
+}
+
+/// Localisation errs by as much as it states.
+fn as_stated(prepared: &[Prepared]) -> Vec<f64> {
+    vec![1.0; prepared.len()]
 }
 
 /// Step 4, second half: the objects decide; views that contradict the others are left out one by one.
@@ -381,10 +386,11 @@ fn align_objects(
         .map(|i| up.map_or(poses[i], |up| only_levelled(&prepared[i], &poses[i], &up)))
         .collect();
     let mut retried = vec![false; prepared.len()];
+    let loose = as_stated(prepared);
     if let Some(up) = up {
         place_objects(prepared, used, parts, &up, &levelled, poses);
     }
-    let mut found = joint::align(prepared, used, used, parts, poses, &SECOND);
+    let mut found = joint::align(prepared, used, &loose, parts, poses, &SECOND);
     while let Some((worst, why)) = check::misfit(prepared, used, parts, poses, maps, &found) {
         if let Some(up) = up.filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
@@ -392,14 +398,20 @@ fn align_objects(
             let others = (0..prepared.len()).filter(|&i| used[i] && i != worst);
             let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
             poses[worst] = levelled[worst];
-            place_on(prepared, parts, &up, &placed, &levelled, poses, worst);
-            found = joint::align(prepared, used, used, parts, poses, &SECOND);
+            place_on(
+                (&prepared[worst], &parts[worst], 1.0),
+                &up,
+                &placed,
+                &levelled[worst],
+                &mut poses[worst],
+            );
+            found = joint::align(prepared, used, &loose, parts, poses, &SECOND);
             continue;
         }
         used[worst] = false;
         whys[worst] = Some(why);
         poses[worst] = prepared[worst].prior;
-        let settled = joint::align(prepared, used, used, parts, poses, &SETTLE);
+        let settled = joint::align(prepared, used, &loose, parts, poses, &SETTLE);
         found.iter_mut().zip(settled).zip(used.iter()).for_each(|((f, s), u)| {
             if *u {
                 *f = s;
@@ -456,31 +468,29 @@ fn place_objects(
             return;
         };
         left.retain(|&i| i != next);
-        place_on(prepared, parts, up, &placed, levelled, poses, next);
+        place_on((&prepared[next], &parts[next], 1.0), up, &placed, &levelled[next], &mut poses[next]);
         placed.extend(objects(&prepared[next], &parts[next], &poses[next]));
         done.push(next);
     }
 }
 
-/// Puts the objects of one view onto placed ones: by search from its levelled pose, unless the pose it has fits them better already.
+/// Puts the objects of one view, so loose, onto placed ones: by search from its levelled pose, unless the pose it has fits them better already.
 fn place_on(
-    prepared: &[Prepared],
-    parts: &[Vec<Part>],
+    (view, parts, loose): (&Prepared, &[Part], f64),
     up: &Unit<Vector3<f64>>,
     placed: &[Oriented],
-    levelled: &[Isometry3<f64>],
-    poses: &mut [Isometry3<f64>],
-    view: usize,
+    levelled: &Isometry3<f64>,
+    pose: &mut Isometry3<f64>,
 ) {
     /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
     const STAYS: f64 = 0.05;
-    let from = |pose: &Isometry3<f64>| objects(&prepared[view], &parts[view], pose);
-    let own = from(&levelled[view]);
-    let window = window(&prepared[view], &own, &levelled[view]);
+    let from = |pose: &Isometry3<f64>| objects(view, parts, pose);
+    let own = from(levelled);
+    let window = window(view, loose, &own, levelled);
     let Some(found) = search::place(&own, placed, up, window) else { return };
-    let stays = search::fits(&from(&poses[view]), placed, up) > found.share + STAYS;
+    let stays = search::fits(&from(pose), placed, up) > found.share + STAYS;
     if !stays {
-        poses[view] = found.correction * levelled[view];
+        *pose = found.correction * levelled;
     }
 }
 
@@ -491,7 +501,7 @@ fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Orient
 }
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
-fn window(view: &Prepared, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
+fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
     /// Spreads of localisation. From: chosen.
     const SPREADS: f64 = 3.0;
     /// Least and greatest turn, radians, and shift, metres; the greatest shift with what a turn adds. From: chosen, 6° to 8°.
@@ -504,8 +514,8 @@ fn window(view: &Prepared, objects: &[Oriented], pose: &Isometry3<f64>) -> searc
     const WIDER: f64 = 1.2;
     let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
     let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(FARTHEST_M);
-    let turn_rad = (SPREADS * view.sigma_rad).clamp(TURNS_RAD.0, TURNS_RAD.1);
-    let shift_m = (SPREADS * view.sigma_m).clamp(SHIFTS_M.0, SHIFTS_M.1) + distance * turn_rad;
+    let turn_rad = loose * (SPREADS * view.sigma_rad).clamp(TURNS_RAD.0, TURNS_RAD.1);
+    let shift_m = loose * (SPREADS * view.sigma_m).clamp(SHIFTS_M.0, SHIFTS_M.1) + distance * turn_rad;
     search::Window { shift_m: shift_m.min(WIDEST_M), turn_rad: WIDER * turn_rad }
 }
 

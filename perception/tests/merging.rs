@@ -195,7 +195,12 @@ fn what_was_kept_of_other_views_changes_nothing() {
     let mut merger = Merger::default();
     let mut check = |what: &str, views: &[View]| {
         let kept = merger.merge(views, &options()).expect("the views are sound");
-        assert!(same(&kept, &merge(views, &options()).expect("the views are sound")), "{what}");
+        let fresh = Merger::default().merge(views, &options()).expect("the views are sound");
+        assert!(same(&kept, &fresh), "{what}");
+        // Half of them find what was done ahead.
+        if views.len() % 2 == 0 {
+            merger.go_ahead(views.to_vec());
+        }
     };
     for n in 1..=4 {
         check(&format!("{n} views"), &views[..n]);
@@ -209,13 +214,14 @@ fn what_was_kept_of_other_views_changes_nothing() {
     check("in another order", &views[..4]);
     let of_half = MergeOptions { align_voxel_m: 0.012, ..options() };
     let kept = merger.merge(&views[..4], &of_half).expect("the views are sound");
-    assert!(same(&kept, &merge(&views[..4], &of_half).expect("the views are sound")), "other options");
+    let fresh = Merger::default().merge(&views[..4], &of_half).expect("the views are sound");
+    assert!(same(&kept, &fresh), "other options");
 }
 
 #[test]
 fn a_further_view_is_laid_on_those_before_it() {
-    /// Before and after all are merged anew, and once more.
-    const AT_ONCE: [usize; 3] = [8, 10, 11];
+    /// Few; and before, as and after all are merged together anew.
+    const AT_ONCE: [usize; 5] = [2, 5, 9, 10, 11];
     let angles: Vec<f64> = (0..11).map(|i| 2.4 * f64::from(i)).collect();
     for (seed, sigma_m, sigma_rad) in [(1, 0.03, 0.035), (7, 0.03, 0.035), (4, 0.045, 0.04)] {
         let (mut views, mut truths) = views(&angles, sigma_m, sigma_rad, seed);
@@ -223,6 +229,9 @@ fn a_further_view_is_laid_on_those_before_it() {
         let mut laid = 0;
         for n in 1..=views.len() {
             let merged = merger.merge(&views[..n], &options()).expect("the views are sound");
+            if n % 3 > 0 {
+                merger.go_ahead(views[..n].to_vec());
+            }
             laid += usize::from(merged.steps.iter().any(|step| step.name == "further look"));
             assert_eq!(merged.visibility.maps.len(), n, "seed {seed}: {:?}", merged.fits);
             let (apart, off) = (disagreement_m(&merged, &truths[..n]), offset_m(&merged, &truths[..n]));
@@ -233,7 +242,7 @@ fn a_further_view_is_laid_on_those_before_it() {
                 assert!(same(&merged, &at_once), "seed {seed}: {n} views at once give something else");
             }
         }
-        assert!(laid >= 4, "seed {seed}: only {laid} views were laid on those before");
+        assert!(laid >= 8, "seed {seed}: only {laid} views were laid on those before");
         // A view that cannot be placed is left out as it is by merging anew.
         let lost = Isometry3::translation(0.0, 0.0, 0.4) * views[0].world_from_camera;
         views.push(View { world_from_camera: lost, stamp_ns: 1, ..views[0].clone() });

@@ -1,5 +1,5 @@
-//! What one more look at a table costs: time of merging as views become more, anew and with what was kept of the look before, and
-//! CPU time of all its threads.
+//! What one more look at a table costs: time of merging as views become more, anew, with what was kept of the look before, and of what is
+//! done ahead of the next look; and CPU time of all threads.
 
 use super::table::{arrangement, judge, options};
 use super::tabletop::{Draws, Thing, disturbed, look, on_ring};
@@ -50,8 +50,8 @@ impl Least {
 /// Merges up to `count` views of some arrangements, look by look.
 pub fn run(count: usize, mode: &str) -> Result<(), String> {
     println!(
-        "{:>5} {:>10} {:>10}   ms (of CPU), least of {REPETITIONS}; {:>9} {:>9}  cups right, wrong",
-        "views", "anew", "kept", "anew", "kept"
+        "{:>5} {:>10} {:>10} {:>10}   ms (of CPU), least of {REPETITIONS}; {:>9} {:>9}  cups right, wrong",
+        "views", "anew", "kept", "ahead", "anew", "kept"
     );
     for seed in 1..=2 {
         let mut draws = Draws(seed);
@@ -65,7 +65,7 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
                 look(&bare, &truth, &stated, &mut draws)
             })
             .collect();
-        let mut looks = vec![[Least::NONE; 2]; count];
+        let mut looks = vec![[Least::NONE; 3]; count];
         let mut scores = vec![["-".to_owned(), "-".to_owned()]; count];
         for repetition in 0..REPETITIONS {
             let mut merger = Merger::default();
@@ -75,6 +75,13 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
                     (mode != "kept").then(|| look[0].time(|| merge(views, &options()))),
                     (mode != "anew").then(|| look[1].time(|| merger.merge(views, &options()))),
                 ];
+                if mode != "anew" {
+                    let views = views.to_vec();
+                    look[2].time(|| {
+                        merger.go_ahead(views);
+                        merger.wait();
+                    });
+                }
                 for (merged, score) in merged.into_iter().zip(score).filter(|_| repetition == 0) {
                     if let Some(merged) = merged {
                         *score = of_cups(&merged.map_err(|e| e.to_string())?, &things)?;
@@ -83,8 +90,11 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
             }
         }
         for (n, (look, score)) in (1..).zip(looks.iter().zip(&scores)) {
-            let [anew, kept] = look.map(|least| least.words());
-            println!("{n:5} {anew:>10} {kept:>10}                 {:>9} {:>9}", score[0], score[1]);
+            let [anew, kept, ahead] = look.map(|least| least.words());
+            println!(
+                "{n:5} {anew:>10} {kept:>10} {ahead:>10}                 {:>9} {:>9}",
+                score[0], score[1]
+            );
         }
     }
     Ok(())

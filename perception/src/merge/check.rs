@@ -34,7 +34,7 @@ pub(super) fn misfit(
     if let Some(i) = lonely.min_by_key(|&i| (views[i].points.len(), usize::MAX - i)) {
         return Some((i, format!("it shares only {} points with the other views", found[i].matched)));
     }
-    let far = active.iter().copied().filter_map(|i| too_far(&views[i], &poses[i]).map(|why| (i, why)));
+    let far = active.iter().copied().filter_map(|i| too_far(&views[i], &poses[i], 1.0).map(|why| (i, why)));
     if let Some(worst) = far.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
         return Some((worst.0, worst.1.1));
     }
@@ -50,19 +50,18 @@ pub(super) fn misfit(
     })
 }
 
-/// Whether a further view belongs with the others as they lie.
+/// Whether a further view, so loose, belongs with the others as they lie: `all` with it.
 pub(super) fn belongs(
-    view: usize,
+    (view, loose, all): (usize, f64, &[usize]),
     views: &[Prepared],
     parts: &[Vec<Part>],
     poses: &[Isometry3<f64>],
     maps: &[Option<DepthMap>],
     found: &Found,
 ) -> bool {
-    let all: Vec<usize> = (0..views.len()).collect();
     found.matched >= FEWEST_MATCHED
-        && too_far(&views[view], &poses[view]).is_none()
-        && contradicted(view, &all, views, parts, poses, maps) <= MOST_CONTRADICTED
+        && too_far(&views[view], &poses[view], loose).is_none()
+        && contradicted(view, all, views, parts, poses, maps) <= MOST_CONTRADICTED
 }
 
 /// Share of what a view shows, and of what others show, that contradicts the other: the mean over the others. With one other view there
@@ -86,14 +85,15 @@ fn contradicted(
 }
 
 /// How far beyond belief the camera was moved, with words.
-fn too_far(view: &Prepared, pose: &Isometry3<f64>) -> Option<(f64, String)> {
+fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, String)> {
     /// Localisation errs by more than it states now and then, and 10 cm and 6° must be mended: so many spreads are believed, and so much,
     /// metres and radians, in any case. From: chosen.
     const SPREADS: f64 = 5.0;
     const MENDED: (f64, f64) = (0.2, 0.2);
-    let most = ((SPREADS * view.sigma_m).max(MENDED.0), (SPREADS * view.sigma_rad).max(MENDED.1));
+    let most = [(view.sigma_m, MENDED.0), (view.sigma_rad, MENDED.1)];
+    let most = most.map(|(sigma, mended)| loose * (SPREADS * sigma).max(mended));
     let (turn, shift) = super::joint::departure(pose, &view.prior);
-    let excess = (shift.norm() / most.0).max(turn.norm() / most.1);
+    let excess = (shift.norm() / most[0]).max(turn.norm() / most[1]);
     (excess > 1.0).then(|| {
         let words = format!(
             "it would have to move {:.2} m and turn {:.1}°, more than localisation errs",

@@ -1,19 +1,19 @@
 //! A further look at the same place: what was found of the earlier ones is kept.
 //!
-//! What is known of a view by itself is kept as long as the view is the same. Where the earlier views lie, what was gathered of them and what
-//! that was settled to is kept while it is a further view that comes: it alone is aligned, to the views beside it, and gathered, and what it
-//! touches is settled. Errors of one look by one do not add up: whenever there are half as many views more, and whenever a view does not fit
-//! in, all are merged anew. Which views are merged together follows from the views alone, not from what was merged before: the same views
-//! give the same bytes, whatever was kept.
+//! What is known of a view by itself is kept as long as the view is the same. A further view alone is aligned, to the views beside it as they
+//! lie, and gathered; what it touches is settled, and the frame stays the average of what localisation said. A real camera bends what it sees,
+//! and errors of one look by one add up: few views, and whenever there are half as many more, are merged together. That need not wait for the
+//! next look, nor the next look for that: it is done ahead, while the body drives. Which views are merged together follows from the views
+//! alone, not from what was merged before: the same views give the same bytes, whatever was kept.
 
 use super::check::belongs;
 use super::fuse::{gather, gather_further};
-use super::joint::Found;
+use super::joint::{Found, Round};
 use super::parts::Part;
 use super::prepare::Prepared;
 use super::settle::settle;
 use super::{
-    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, check,
+    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, WIDE, check,
     filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on, visibility,
 };
 use crate::cloud::Cloud;
@@ -24,21 +24,31 @@ use nalgebra::Isometry3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::fmt;
+use std::thread::{self, JoinHandle};
 
-/// Up to so many views all are merged together. From: chosen.
+/// Up to so many earlier views all are merged together. From: chosen.
 const FEW: usize = 6;
 
 /// Merges the views of one place again and again, as they become more.
 #[derive(Default)]
 pub struct Merger {
+    kept: Kept,
+    /// What is done ahead of the next look.
+    ahead: Option<JoinHandle<Kept>>,
+}
+
+/// What is known of the views that were merged last.
+#[derive(Default)]
+struct Kept {
     options: Option<MergeOptions>,
     digests: Vec<u64>,
     prepared: Vec<Prepared>,
     maps: Vec<Option<DepthMap>>,
+    /// What a further view is laid on; none if the views are to be merged together for that.
     base: Option<Base>,
 }
 
-/// The views that were merged last.
+/// Views that were merged.
 struct Base {
     digests: Vec<u64>,
     aligned: Aligned,
@@ -51,42 +61,83 @@ struct Base {
 
 impl fmt::Debug for Merger {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Merger").field("views", &self.digests.len()).finish_non_exhaustive()
+        f.debug_struct("Merger").field("views", &self.kept.digests.len()).finish_non_exhaustive()
     }
 }
 
 impl Merger {
-    /// As [`merge`](super::merge), quicker if all views but the last were merged last time. Up to six views are merged as there; of more,
-    /// the later are laid on the earlier.
+    /// As [`merge`](super::merge), but the last view is laid on what the others are merged to: quicker if they were merged last time.
     ///
     /// # Errors
     /// As [`merge`](super::merge).
     pub fn merge(&mut self, views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
+        let kept = self.kept();
         pool::within(tracing::debug_span!("merge further", views = views.len()), || {
-            check(views, options)?;
-            if self.options.as_ref() != Some(options) {
-                *self = Merger { options: Some(options.clone()), ..Merger::default() };
-            }
-            self.prepare(views, options);
-            let anew = together(views.len());
-            let is_begun =
-                |base: &Base| base.digests.len() >= anew && self.digests.starts_with(&base.digests);
-            let kept = self.base.take().filter(is_begun);
-            let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
-            let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
-            for n in begun + 1..=views.len() {
-                let settled = base.ok().map(|base| self.settled(base));
-                let further = settled.and_then(|base| self.further(base, &views[..n], options));
-                base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
-            }
-            let mut base = base?;
-            let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-            let merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
-            base.settled = views.len();
-            // If with one more all are merged anew, nothing of this is wanted.
-            self.base = (together(views.len() + 1) <= views.len()).then_some(base);
-            Ok(merged)
+            kept.merge(views, options)
         })
+    }
+
+    /// In a thread of its own, does with the views that were merged last what merging them with a further one would have to do first. What is
+    /// merged is the same without it, but later.
+    pub fn go_ahead(&mut self, views: Vec<View>) {
+        let kept = self.kept();
+        if kept.base.is_none() && kept.digests.len() == views.len() {
+            let mut kept = std::mem::take(kept);
+            // Without a thread it is known less, and merged later.
+            let ahead = thread::Builder::new().name("merge ahead".to_owned()).spawn(move || {
+                pool::within(tracing::debug_span!("merge ahead", views = views.len()), || {
+                    kept.go_ahead(&views)
+                });
+                kept
+            });
+            self.ahead = ahead.ok();
+        }
+    }
+
+    /// Waits until what is done ahead is done.
+    pub fn wait(&mut self) {
+        self.kept();
+    }
+
+    /// What is known, once all of it is.
+    fn kept(&mut self) -> &mut Kept {
+        if let Some(ahead) = self.ahead.take() {
+            self.kept = ahead.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        }
+        &mut self.kept
+    }
+}
+
+impl Kept {
+    fn merge(&mut self, views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
+        check(views, options)?;
+        if self.options.as_ref() != Some(options) {
+            *self = Kept { options: Some(options.clone()), ..Kept::default() };
+        }
+        self.prepare(views, options);
+        let earlier = &views[..views.len() - 1];
+        let before = if earlier.is_empty() { None } else { self.base_of(earlier, options).ok() };
+        let are_all_used = before.as_ref().is_none_or(Base::are_all_used);
+        let laid = before.and_then(|before| self.further(before, views, options));
+        let is_laid = laid.is_some();
+        let mut base = laid.map_or_else(|| self.anew(views, options), Ok)?;
+        let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
+        let mut merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
+        base.settled = views.len();
+        if is_laid {
+            merged = self.onto_priors(merged, &base.aligned);
+        }
+        let stays = !is_laid || are_all_used && together(views.len()) < views.len();
+        self.base = stays.then_some(base);
+        Ok(merged)
+    }
+
+    fn go_ahead(&mut self, views: &[View]) {
+        let options = self.options.clone().unwrap_or_default();
+        let are_known = views.par_iter().map(digest).eq(self.digests.par_iter().copied());
+        if are_known {
+            self.base = self.base_of(views, &options).ok();
+        }
     }
 
     /// What is known of each view by itself: of those that were here before it is kept.
@@ -100,6 +151,23 @@ impl Merger {
         };
         (self.prepared, self.maps) = views.par_iter().zip(kept).map(ready).unzip();
         self.digests = digests;
+    }
+
+    /// What a view after the first ones, which were prepared, is laid on, from what is kept.
+    fn base_of(&mut self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
+        let anew = together(views.len());
+        let is_begun = |base: &Base| {
+            (anew..=views.len()).contains(&base.digests.len()) && self.digests.starts_with(&base.digests)
+        };
+        let kept = self.base.take().filter(is_begun);
+        let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
+        let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
+        for n in begun + 1..=views.len() {
+            let before = base.ok().filter(Base::are_all_used).map(|base| self.settled(base));
+            let further = before.and_then(|base| self.further(base, &views[..n], options));
+            base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
+        }
+        base.map(|base| self.settled(base))
     }
 
     /// The first views, together.
@@ -123,14 +191,15 @@ impl Merger {
         base
     }
 
-    /// The last of the first views with the others as they lie; `None` if it does not fit in, or another did not.
+    /// The last of the first views with the others as they lie; `None` if it does not fit in.
     fn further(&self, mut base: Base, views: &[View], options: &MergeOptions) -> Option<Base> {
         let last = views.len() - 1;
         let (prepared, maps) = (&self.prepared[..=last], &self.maps[..=last]);
-        if prepared[last].points.is_empty() || !base.aligned.used.iter().all(|used| *used) {
+        if prepared[last].points.is_empty() {
             return None;
         }
-        let (pose, found, parts) = base.aligned.lay_further(prepared, maps)?;
+        let lay = |first: &Round| base.aligned.lay_further(prepared, maps, first);
+        let (pose, found, parts) = lay(&FIRST).or_else(|| lay(&WIDE))?;
         let of_view = (&views[last], &prepared[last]);
         if !gather_further(&mut base.gathered, last, of_view, &pose, &base.aligned.planes, options) {
             return None;
@@ -142,6 +211,25 @@ impl Merger {
         base.steps.push(Step { name: "further look".to_owned(), points: found.matched, result });
         Some(base)
     }
+
+    /// Moved onto the average of what localisation said of all used views.
+    fn onto_priors(&self, merged: Merged, Aligned { used, poses, .. }: &Aligned) -> Merged {
+        let mut merged = merged.moved(&joint::onto_priors(&self.prepared, used, poses));
+        for (fit, Prepared { prior, .. }) in merged.fits.iter_mut().zip(&self.prepared) {
+            if !fit.used {
+                fit.world_from_camera = *prior;
+            }
+            let (turn, shift) = joint::departure(&fit.world_from_camera, prior);
+            (fit.moved_m, fit.moved_rad) = (shift.norm(), turn.norm());
+        }
+        merged
+    }
+}
+
+impl Base {
+    fn are_all_used(&self) -> bool {
+        self.aligned.used.iter().all(|used| *used)
+    }
 }
 
 /// How many of the first views of so many are merged together: few, or with half as many more each time.
@@ -151,34 +239,38 @@ fn together(views: usize) -> usize {
 }
 
 impl Aligned {
-    /// Where the last of the views belongs if the others stay; `None` if that contradicts them. With what the alignment found of it and what its
-    /// points belong to.
+    /// Where the last of the views belongs if the others stay, its first alignment as asked; `None` if that contradicts them. With what the
+    /// alignment found of it and what its points belong to.
     fn lay_further(
         &self,
         prepared: &[Prepared],
         maps: &[Option<DepthMap>],
+        first: &Round,
     ) -> Option<(Isometry3<f64>, Found, Vec<Part>)> {
         let last = prepared.len() - 1;
         let view = &prepared[last];
         let mut poses: Vec<Isometry3<f64>> = self.poses.iter().copied().chain([view.prior]).collect();
-        let used = beside(&poses);
-        let moves: Vec<bool> = (0..=last).map(|i| i == last).collect();
+        let used = beside(&self.used, &poses);
+        // Where localisation has the others on the average errs as well.
+        let others = self.used.iter().filter(|used| **used).count();
+        let looser = (1.0 + 1.0 / others.max(1) as f64).sqrt();
+        let loose: Vec<f64> = (0..=last).map(|i| if i == last { looser } else { 0.0 }).collect();
         let of_used = |(view, used): (&Prepared, &bool)| {
             vec![Part::Standing; if *used { view.points.len() } else { 0 }]
         };
         let all: Vec<Vec<Part>> = prepared.iter().zip(&used).map(of_used).collect();
-        joint::align(prepared, &used, &moves, &all, &mut poses, &FIRST);
+        joint::align(prepared, &used, &loose, &all, &mut poses, first);
         let mut parts = self.parts.of.clone();
         parts.push(self.parts.of_view(view, &poses[last]));
         if let Some(up) = self.parts.up {
-            let mut levelled = poses.clone();
-            levelled[last] = only_levelled(view, &poses[last], &up);
+            let levelled = only_levelled(view, &poses[last], &up);
             let others = (0..last).filter(|&i| used[i]);
             let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
-            place_on(prepared, &parts, &up, &placed, &levelled, &mut poses, last);
+            place_on((view, &parts[last], looser), &up, &placed, &levelled, &mut poses[last]);
         }
-        let found = *joint::align(prepared, &used, &moves, &parts, &mut poses, &SECOND).last()?;
-        let fits = belongs(last, prepared, &parts, &poses, maps, &found);
+        let found = *joint::align(prepared, &used, &loose, &parts, &mut poses, &SECOND).last()?;
+        let all: Vec<usize> = (0..last).filter(|&i| self.used[i]).chain([last]).collect();
+        let fits = belongs((last, looser, &all), prepared, &parts, &poses, maps, &found);
         fits.then_some((poses[last], found, parts.pop()?))
     }
 
@@ -191,14 +283,14 @@ impl Aligned {
     }
 }
 
-/// The last view and those whose cameras are nearest to its.
-fn beside(poses: &[Isometry3<f64>]) -> Vec<bool> {
+/// The last view and, of those before it that are used, those whose cameras are nearest to its.
+fn beside(used: &[bool], poses: &[Isometry3<f64>]) -> Vec<bool> {
     let last = poses.len() - 1;
     let apart = |i: usize| {
         let turn = poses[i].rotation.angle_to(&poses[last].rotation);
         (poses[i].translation.vector - poses[last].translation.vector).norm() + turn
     };
-    let mut others: Vec<usize> = (0..last).collect();
+    let mut others: Vec<usize> = (0..last).filter(|&i| used[i]).collect();
     others.sort_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)));
     let mut beside = vec![false; poses.len()];
     others.iter().take(joint::PARTNERS).chain([&last]).for_each(|&i| beside[i] = true);

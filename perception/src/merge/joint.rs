@@ -7,7 +7,8 @@ use super::parts::Part;
 use super::prepare::{Prepared, Surfel};
 use crate::register::{Partner, Sums};
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
+    DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector3,
+    Vector6,
 };
 use rayon::prelude::*;
 
@@ -59,12 +60,12 @@ const NEARLY: f64 = 5.0;
 /// A round ends early once partners lie within so many times what they do at its last pass. From: chosen.
 const LATE: f64 = 1.5;
 
-/// Aligns the views that are `used` among each other; those of them that do not `move` stay where they are. `parts` tells for each view
-/// what its points belong to.
+/// Aligns the views that are `used` among each other. Where localisation has a view errs by so many times what it states as `loose` tells; what is
+/// not loose at all stays where it is. `parts` tells for each view what its points belong to.
 pub(super) fn align(
     views: &[Prepared],
     used: &[bool],
-    moves: &[bool],
+    loose: &[f64],
     parts: &[Vec<Part>],
     poses: &mut [Isometry3<f64>],
     round: &Round,
@@ -77,14 +78,14 @@ pub(super) fn align(
     let ask = |&(i, j): &(usize, usize)| {
         Asked::of(&views[i].points, &askers[i], (i, j), round.asked / of_view(i), round)
     };
-    let of_moving = pairs.iter().filter(|&&(i, j)| moves[i] || moves[j]);
+    let of_moving = pairs.iter().filter(|&&(i, j)| loose[i].max(loose[j]) > 0.0);
     let mut asked: Vec<Asked> = of_moving.map(ask).collect();
     let mut found = vec![Found::default(); views.len()];
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
         let radius = round.from_m * (round.to_m / round.from_m).powf(share);
         let links: Vec<Link> = asked.par_iter_mut().map(|asked| link(views, asked, poses, radius)).collect();
-        let moved = step(views, used, moves, poses, &links);
+        let moved = step(views, used, loose, poses, &links);
         for (i, f) in found.iter_mut().enumerate() {
             let own = links.iter().filter(|l| l.from == i || l.to == i);
             let (n, squares) = own.fold((0, 0.0), |(n, s), l| (n + l.matched, s + l.squares));
@@ -238,14 +239,14 @@ impl Link {
 fn step(
     views: &[Prepared],
     used: &[bool],
-    moves: &[bool],
+    loose: &[f64],
     poses: &mut [Isometry3<f64>],
     links: &[Link],
 ) -> (f64, f64) {
     /// Neighbouring points share their errors: the matched surface counts for no more than so many independent looks. From: chosen.
     const INDEPENDENT: f64 = 150.0;
     let mut slots = vec![None; views.len()];
-    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && moves[i]).collect();
+    let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && loose[i] > 0.0).collect();
     active.iter().enumerate().for_each(|(slot, &i)| slots[i] = Some(6 * slot));
     let n = 6 * active.len();
     let mut normal = DMatrix::<f64>::zeros(n, n);
@@ -276,6 +277,7 @@ fn step(
         for (k, (off, sigma)) in
             [(turn, views[i].sigma_rad), (shift, views[i].sigma_m)].into_iter().enumerate()
         {
+            let sigma = loose[i] * sigma;
             let weight = prior_weight(off.norm() / sigma) / (sigma * sigma);
             for axis in 0..3 {
                 let at = 6 * slot + 3 * k + axis;
@@ -299,6 +301,40 @@ fn step(
         most = (most.0.max(shift.norm()), most.1.max(turn.norm()));
     }
     most
+}
+
+/// What moves views that lie as they do among each other onto the robust average of where localisation had them.
+pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Isometry3<f64> {
+    /// Gauss-Newton steps: the first all but ends it. From: chosen.
+    const PASSES: usize = 4;
+    let active: Vec<usize> = (0..poses.len()).filter(|&i| used[i]).collect();
+    let sum: Vector3<f64> = active.iter().map(|&i| poses[i].translation.vector).sum();
+    let middle = Translation3::from(sum / active.len().max(1) as f64);
+    let mut about = Isometry3::identity();
+    for _ in 0..PASSES {
+        let moved = middle * about * middle.inverse();
+        let (mut normal, mut right) = (Matrix6::<f64>::zeros(), Vector6::<f64>::zeros());
+        for &i in &active {
+            let pose = moved * poses[i];
+            let (turn, shift) = departure(&pose, &views[i].prior);
+            let weigh = |off: &Vector3<f64>, sigma: f64| prior_weight(off.norm() / sigma) / (sigma * sigma);
+            let weights = [weigh(&turn, views[i].sigma_rad), weigh(&shift, views[i].sigma_m)];
+            let arm = pose.translation.vector - middle.vector;
+            let mut shifted = Matrix3x6::zeros();
+            shifted.fixed_view_mut::<3, 3>(0, 0).copy_from(&-arm.cross_matrix());
+            shifted.fixed_view_mut::<3, 3>(0, 3).copy_from(&Matrix3::identity());
+            normal += shifted.transpose() * shifted * weights[1];
+            right -= shifted.transpose() * shift * weights[1];
+            for axis in 0..3 {
+                normal[(axis, axis)] += weights[0];
+                right[axis] -= weights[0] * turn[axis];
+            }
+        }
+        let Some(solved) = normal.cholesky().map(|of| of.solve(&right)) else { break };
+        let turn = UnitQuaternion::from_scaled_axis(solved.fixed_rows::<3>(0).into_owned());
+        about = Isometry3::from_parts(solved.fixed_rows::<3>(3).into_owned().into(), turn) * about;
+    }
+    middle * about * middle.inverse()
 }
 
 /// A camera far from where localisation had it loses its say on the common frame: one lost view must not drag the others.

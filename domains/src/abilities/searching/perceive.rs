@@ -191,7 +191,11 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
             begin_again(mind, on);
             perceive(mind, eyes, on, notes)
         }
-        None => Ok(()),
+        None => {
+            // Beside planning and driving.
+            mind.regions[on].merger.go_ahead(views);
+            Ok(())
+        }
     }
 }
 

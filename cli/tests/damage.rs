@@ -169,6 +169,38 @@ fn a_damaged_record_is_used_as_far_as_it_is_whole() {
     check_damage(&ended(folder.path()), 0..6);
 }
 
+/// What stands beside a record and is whole, but of another run, is not taken for its own.
+#[test]
+fn files_of_another_run_are_told_from_its_own() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    check(folder, &["find", "cup A", "--seed", "10", "--run", "run", "--json"], 0);
+    check(folder, &["find", "cup A", "--seed", "3", "--run", "same", "--json"], 0);
+    check(folder, &["find", "cup B", "--seed", "3", "--run", "other", "--json"], 0);
+    let commands = [["show", "run", "--json"], ["explain", "run", "--json"], ["runs", ".", "--json"]];
+    let whole = commands.map(|command| ask(folder, &command));
+    for name in ["report.json", "run.json"] {
+        let own = std::fs::read(folder.join("run").join(name)).expect("it can be read");
+        for other in ["same", "other"] {
+            let put = std::fs::copy(folder.join(other).join(name), folder.join("run").join(name));
+            put.expect("it can be copied");
+            for (command, whole) in commands.iter().zip(&whole) {
+                let got = ask(folder, command);
+                let about = format!("{name} of {other}: descry {}: {}", command.join(" "), got.said);
+                let mut shown = got.shown;
+                // That it is so is said by explain.
+                let keys = ["lost", "missing"];
+                forget(&mut shown, &keys);
+                let mut expected = whole.shown.clone();
+                forget(&mut expected, &keys);
+                assert_eq!(shown, expected, "{about}");
+                assert!(got.said.contains("is that of another run"), "{about}");
+            }
+        }
+        std::fs::write(folder.join("run").join(name), own).expect("it can be written");
+    }
+}
+
 #[test]
 #[ignore = "spoils 100 records and asks nine commands of each: some minutes"]
 fn a_hundred_damaged_records_are_used_as_far_as_they_are_whole() {

@@ -56,9 +56,15 @@ fn begun(record: &Record) -> Option<Header> {
 fn own_header(folder: &Path, begun: Option<&Header>) -> Result<Header, String> {
     let path = folder.join(HEADER);
     let header: Header = read_json(&path)?;
-    // That it was cut off stands in the folder alone.
-    let is_own =
-        begun.is_none_or(|begun| Header { resumed: begun.resumed.clone(), ..header.clone() } == *begun);
+    let is_own = begun.is_none_or(|begun| {
+        let mut recorded = begun.clone();
+        // That it was cut off stands in the folder alone, and which scene is the domain's own in the record.
+        recorded.resumed.clone_from(&header.resumed);
+        if header.settings.scene.is_none() {
+            recorded.settings.scene = None;
+        }
+        recorded == header
+    });
     if is_own { Ok(header) } else { Err(of_another(&path)) }
 }
 

@@ -201,7 +201,9 @@ fn files_of_another_run_are_told_from_its_own() {
                 let about = format!("{name} of {other:?}: descry {}: {}", command.join(" "), got.said);
                 let [mut shown, mut expected] = [got.shown, whole.shown.clone()];
                 // What only the file says is told to be lost.
-                [&mut shown, &mut expected].map(|told| forget(told, &["lost"]));
+                for told in [&mut shown, &mut expected] {
+                    forget(told, &["lost"]);
+                }
                 assert_eq!(shown, expected, "{about}");
                 assert!(got.said.contains(said), "{about}");
             }

@@ -128,10 +128,15 @@ fn chances(doubt: &InDoubt) -> String {
     });
     let seen: Vec<String> = seen.collect();
     let seen = if seen.is_empty() { "nothing of where it may be".into() } else { seen.join(", ") };
-    format!(
-        "{about}: {sure} ({} is wanted), {} is left, {} of it where nothing was seen; seen: {seen}",
-        share(doubt.wanted),
-        share(doubt.left),
-        share(doubt.hidden)
-    )
+    let (wanted, hidden) = (share(doubt.wanted), share(doubt.hidden));
+    // What hangs on the sides of what is known well enough is no doubt about it.
+    let open = match doubt.sure.is_some_and(|sure| sure >= doubt.wanted) {
+        true if doubt.of == Of::Thing => format!("{hidden} that it is where nothing was seen"),
+        true => format!("{hidden} that there is more where nothing was seen"),
+        false => format!(
+            "{} hangs on what no look has shown, {hidden} of it on places where nothing was seen",
+            share(doubt.left)
+        ),
+    };
+    format!("{about}: {sure} ({wanted} is wanted); {open}; seen: {seen}")
 }

@@ -118,6 +118,9 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             };
             Ok(Body::new(Arc::new(robot)))
         }
+        Some((kind @ ("program" | "socket"), "")) => Err(CommandError::BadInput(format!(
+            "--robot {kind}: names nothing behind the colon\n  expected: program:COMMAND, or socket:HOST:PORT or socket:PATH"
+        ))),
         Some((kind @ ("program" | "socket"), at)) => {
             if let Some(scene) = scene {
                 let text = format!(

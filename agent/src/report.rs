@@ -101,7 +101,7 @@ impl fmt::Display for Event {
 }
 
 /// The result of a run: what `--json` prints.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// The words as they were given.
     pub goal: String,
@@ -161,6 +161,20 @@ pub struct Report {
 }
 
 impl Report {
+    /// It without what differs however often the run is lived through, and without what only a simulation knows.
+    pub(crate) fn as_recorded(&self) -> Self {
+        Self {
+            true_position_m: None,
+            true_on: None,
+            true_room: None,
+            wall_s: 0.0,
+            planning_s: 0.0,
+            geometry_s: 0.0,
+            run: String::new(),
+            ..self.clone()
+        }
+    }
+
     /// A report of a run that has only begun.
     pub fn begin(goal: &Goal, run: String) -> Self {
         Self {

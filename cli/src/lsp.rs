@@ -46,7 +46,10 @@ pub fn serve() -> Result<(), CommandError> {
 /// [`CommandError::Broken`] if the editor does not speak the protocol, or goes without a word.
 pub fn serve_over(connection: &Connection) -> Result<(), CommandError> {
     let capabilities = serde_json::to_value(capabilities()).map_err(|e| CommandError::Bug(e.to_string()))?;
-    let (id, _) = connection.initialize_start().map_err(CommandError::broken)?;
+    let (id, _) = connection.initialize_start().map_err(|e| {
+        let means = "expected an editor on standard input: one that starts `descry lsp` by itself";
+        CommandError::broken(format!("{e}\n  {means}"))
+    })?;
     let server = json!({ "name": "descry", "version": env!("CARGO_PKG_VERSION") });
     let said = json!({ "capabilities": capabilities, "serverInfo": server });
     connection.initialize_finish(id, said).map_err(CommandError::broken)?;

@@ -183,6 +183,10 @@ fn a_goal_that_is_not_understood_names_what_could_be_said() {
         2,
         &["expected: sim, recorded:DIR, program:COMMAND, or socket:"],
     );
+    check(&["find", "cup A", "--robot", "program:"], 2, &["nothing behind the colon", "program:COMMAND"]);
+    for seed in ["-1", "two", "1.5"] {
+        check(&["find", "cup A", "--seed", seed], 2, &["--seed", seed, "a whole number from 0"]);
+    }
     check(&["find", "cup A", "--domain", "attic"], 2, &["attic", "tabletop"]);
 }
 

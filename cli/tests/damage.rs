@@ -169,6 +169,49 @@ fn a_damaged_record_is_used_as_far_as_it_is_whole() {
     check_damage(&ended(folder.path()), 0..6);
 }
 
+/// What stands beside a record and is whole, but of another run, is not taken for its own; nor is anything missed without it.
+#[test]
+fn files_of_another_run_are_told_from_its_own() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let folder = folder.path();
+    let scene = ["--scene", "no-cup-a", "--json"];
+    check(folder, &[&["find", "mug", "--seed", "4", "--run", "run"], &scene[..]].concat(), 0);
+    check(folder, &[&["find", "mug", "--seed", "3", "--run", "same"], &scene[..]].concat(), 0);
+    check(folder, &["find", "cup B", "--seed", "3", "--run", "other", "--json"], 0);
+    let commands = [["show", "run", "--json"], ["explain", "run", "--json"], ["runs", ".", "--json"]];
+    let whole = commands.map(|command| ask(folder, &command));
+    for (command, whole) in commands.iter().zip(&whole) {
+        assert_eq!(whole.said, "", "descry {}", command.join(" "));
+    }
+    for name in ["report.json", "run.json"] {
+        let path = folder.join("run").join(name);
+        let own = std::fs::read(&path).expect("it can be read");
+        for (other, said) in [
+            (Some("same"), "is that of another run"),
+            (Some("other"), "is that of another run"),
+            (None, "No such file"),
+        ] {
+            match other {
+                Some(other) => std::fs::copy(folder.join(other).join(name), &path).map(drop),
+                None => std::fs::remove_file(&path),
+            }
+            .expect("it can be put there");
+            for (command, whole) in commands.iter().zip(&whole) {
+                let got = ask(folder, command);
+                let about = format!("{name} of {other:?}: descry {}: {}", command.join(" "), got.said);
+                let [mut shown, mut expected] = [got.shown, whole.shown.clone()];
+                // What only the file says is told to be lost.
+                for told in [&mut shown, &mut expected] {
+                    forget(told, &["lost"]);
+                }
+                assert_eq!(shown, expected, "{about}");
+                assert!(got.said.contains(said), "{about}");
+            }
+        }
+        std::fs::write(&path, own).expect("it can be written");
+    }
+}
+
 #[test]
 #[ignore = "spoils 100 records and asks nine commands of each: some minutes"]
 fn a_hundred_damaged_records_are_used_as_far_as_they_are_whole() {

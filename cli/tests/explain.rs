@@ -218,9 +218,14 @@ fn what_is_shown_of_a_run_says_what_its_verdict_rests_on() {
     let shown = binary::outcome(folder.path(), &["show", "run"]);
     let text = String::from_utf8_lossy(&shown.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(shown.status.success(), "{text}");
-    for part in ["rests on end ", " (the goal held), belief ", "cup A: sure with 0.89 (0.80 is wanted), "] {
+    for part in ["rests on end ", " (the goal held), belief ", "cup A: sure with 0.89 (0.80 is wanted); "] {
         assert!(text.contains(part), "{part}: {text}");
     }
+    // What hangs on sides of the cup that no look showed is not said to be left of a goal that holds.
+    assert!(
+        text.contains(" that it is where nothing was seen; seen: ") && !text.contains("is left"),
+        "{text}"
+    );
     let told = binary::check(folder.path(), &["show", "run", "--json"], 0);
     let looks = told["rests_on"]["surfaces"][0]["looks"].as_array().expect("looks").clone();
     let clouds = binary::check(folder.path(), &["memory", "query", "run", "--kind", "cloud", "--json"], 0);

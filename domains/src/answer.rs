@@ -285,8 +285,8 @@ impl Asker<'_> {
             || s.asked.iter().any(|&on| s.clarity(on) < s.threshold);
         if unclear {
             let left = match reasons::left_in_all(s) {
-                Some(doubt) => format!(", {doubt}; {}", self.looks()),
-                None => format!("; {}{says}", self.looks()),
+                Some(doubt) => format!(", {doubt}{}; {}", self.known_members(), self.looks()),
+                None => format!("{}; {}{says}", self.known_members(), self.looks()),
             };
             return (Verdict::CannotTell, format!("not everything could be identified{left}"));
         }
@@ -405,6 +405,24 @@ impl Asker<'_> {
         let is = |t: &&Track| kind.probability(t, &self.s.surfaces) > 0.5;
         let named = |t: &Track| format!("{} {}", t.label().unwrap_or(&kind.name), self.standing(t));
         self.s.belief.tracks.iter().filter(is).map(named).collect()
+    }
+
+    /// What is surely of the kinds of which not all are known; empty if nothing is.
+    fn known_members(&self) -> String {
+        let s = self.s;
+        let is_open = |&n: &usize| s.completeness(n) < s.wanted_of(n);
+        let named = |kind: &Thing, t: &Track| {
+            let label = t.label().filter(|label| t.probability_of(label) >= s.thresholds.confidence);
+            format!("{} {}", label.unwrap_or(&kind.name), self.standing(t))
+        };
+        let of_kind = |n: usize| {
+            let (kind, tracks) = (&s.kinds[n], s.belief.tracks.iter());
+            let is = |t: &&Track| kind.probability(t, &s.surfaces) >= s.threshold;
+            let sure: Vec<String> = tracks.filter(is).map(|t| named(kind, t)).collect();
+            let (count, of) = (sure.len(), plural(&kind.name));
+            (count > 0).then(|| format!("; {of} that are surely there: {count}, {}", sure.join("; ")))
+        };
+        (0..s.kinds.len()).filter(is_open).filter_map(of_kind).collect()
     }
 
     fn looks(&self) -> String {

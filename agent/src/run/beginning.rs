@@ -56,8 +56,12 @@ impl Beginning {
             return Ok(None);
         };
         let read = serde_json::from_value(document.body);
-        read.map(Some)
-            .map_err(|e| CommandError::broken(format!("record {}: no beginning of a run: {e}", document.id)))
+        let mut beginning: Self = read.map_err(|e| {
+            CommandError::broken(format!("record {}: no beginning of a run: {e}", document.id))
+        })?;
+        // Under that key the record has the text besides.
+        beginning.header.settings.scene = beginning.scene.as_ref().map(|(name, _)| name.clone());
+        Ok(Some(beginning))
     }
 
     /// The domain as it was, and its scene under the name of that time.

@@ -33,16 +33,43 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
         );
         return Err(CommandError::BadInput(text));
     }
-    read_json(&folder.join(HEADER)).or_else(|why| {
-        let record = Record::open_shared(&folder.join(RECORD));
-        let beginning = record.ok().and_then(|record| Beginning::of(&record).ok().flatten());
+    let begun = recorded(folder).as_ref().and_then(begun);
+    own_header(folder, begun.as_ref()).or_else(|why| {
         let expected = "expected the folder of a run; `descry runs` lists them";
-        let Some(beginning) = beginning else {
-            return Err(CommandError::BadInput(format!("{why}\n  {expected}")));
-        };
+        let header = begun.ok_or_else(|| CommandError::BadInput(format!("{why}\n  {expected}")))?;
         tracing::warn!("{why}; what the run was started with is taken from its record");
-        Ok(beginning.header)
+        Ok(header)
     })
+}
+
+/// The record in a run's folder, if it is there and can be read.
+fn recorded(folder: &Path) -> Option<Record> {
+    Record::open_shared(&folder.join(RECORD)).ok()
+}
+
+/// What a record says that its run was started with.
+fn begun(record: &Record) -> Option<Header> {
+    Beginning::of(record).ok().flatten().map(|beginning| beginning.header)
+}
+
+/// What a folder says that its run was started with, if its record says no other.
+fn own_header(folder: &Path, begun: Option<&Header>) -> Result<Header, String> {
+    let path = folder.join(HEADER);
+    let header: Header = read_json(&path)?;
+    let is_own = begun.is_none_or(|begun| {
+        let mut recorded = begun.clone();
+        // That it was cut off stands in the folder alone, and which scene is the domain's own in the record.
+        recorded.resumed.clone_from(&header.resumed);
+        if header.settings.scene.is_none() {
+            recorded.settings.scene = None;
+        }
+        recorded == header
+    });
+    if is_own { Ok(header) } else { Err(of_another(&path)) }
+}
+
+fn of_another(path: &Path) -> String {
+    format!("{} is that of another run: it does not say what the record says", path.display())
 }
 
 /// Whether a folder is that of a run.
@@ -52,7 +79,7 @@ pub(super) fn is_run(folder: &Path) -> bool {
 
 /// What is lost with what a folder says a run was started with, if that is missing or damaged: its record says all else.
 pub fn lost_of_header(folder: &Path) -> Option<String> {
-    let why = read_json::<Header>(&folder.join(HEADER)).err()?;
+    let why = own_header(folder, recorded(folder).as_ref().and_then(begun).as_ref()).err()?;
     Some(format!("whether the run was cut off and gone on with: {why}"))
 }
 
@@ -70,17 +97,24 @@ pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
 /// [`CommandError::Broken`] if it is damaged, and the record has none.
 pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     let path = folder.join(REPORT);
-    read_json(&path).map(Some).or_else(|why| {
-        let record = Record::open_shared(&folder.join(RECORD)).ok();
-        let found = record.and_then(|record| record.newest(REPORTED).ok().flatten());
-        match found.and_then(|document| serde_json::from_value::<Report>(document.body).ok()) {
-            Some(report) => {
-                tracing::warn!("{why}; the report is taken from the record");
-                Ok(Some(Report { run: folder.display().to_string(), ..report }))
-            }
-            None if path.exists() => Err(CommandError::Broken(why)),
-            None => Ok(None),
+    let record = recorded(folder);
+    let found = record.as_ref().and_then(|record| record.newest(REPORTED).ok().flatten());
+    let kept = found.and_then(|document| serde_json::from_value::<Report>(document.body).ok());
+    let told = read_json::<Report>(&path).and_then(|told| {
+        let is_own = match &kept {
+            Some(kept) => told.as_recorded() == kept.as_recorded(),
+            // Earlier versions recorded none.
+            None => record.as_ref().and_then(begun).is_none_or(|of| of.goal == told.goal),
+        };
+        if is_own { Ok(told) } else { Err(of_another(&path)) }
+    });
+    told.map(Some).or_else(|why| match kept {
+        Some(report) => {
+            tracing::warn!("{why}; the report is taken from the record");
+            Ok(Some(Report { run: folder.display().to_string(), ..report }))
         }
+        None if path.exists() => Err(CommandError::Broken(why)),
+        None => Ok(None),
     })
 }
 
@@ -94,8 +128,7 @@ pub fn has_ended(folder: &Path) -> bool {
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be kept.
 pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Result<(), CommandError> {
-    let report =
-        Report { run: String::new(), wall_s: 0.0, planning_s: 0.0, geometry_s: 0.0, ..report.clone() };
+    let report = report.as_recorded();
     let mut draft = Draft { kept: true, ..Draft::new(REPORTED, now_ns.max(0)) };
     draft.meta.body = serde_json::to_value(report).map_err(|e| CommandError::Bug(e.to_string()))?;
     record.put(draft).map(|_| ()).map_err(CommandError::broken)

@@ -73,7 +73,12 @@ impl Folder {
     /// The first folder that is not there yet: a process that makes it at the same time gets the next.
     fn numbered(stem: &Path) -> Result<Self, CommandError> {
         let parent = stem.parent().unwrap_or(Path::new("."));
-        create_dir_all(parent).map_err(|e| refused(parent, e))?;
+        create_dir_all(parent).map_err(|e| {
+            let parent = parent.display();
+            CommandError::BadInput(format!(
+                "{parent}: {e}\n  a new run has its folder there: name another with --run"
+            ))
+        })?;
         for n in 1_u32.. {
             let folder = PathBuf::from(format!("{}-{n:03}", stem.display()));
             match create_dir(&folder) {

@@ -53,7 +53,7 @@ pub struct With {
     #[arg(long, default_value = "sim")]
     robot: String,
     /// Fixes the arrangement, the noise and every choice
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = input::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Who chooses where to look next: plan (weighs gain against cost over several looks), sweep, nearest, random,
     /// most-unknown, rear-side or gain-per-second

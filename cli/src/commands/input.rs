@@ -31,6 +31,11 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
     Ok(Source::new(name, text))
 }
 
+/// A seed on the command line.
+pub fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "a whole number from 0 was expected".into())
+}
+
 /// Where the commands let bodies move and runs go on.
 pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();

@@ -33,7 +33,7 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
     /// Decides every choice that is left open
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = input::seed, allow_negative_numbers = true)]
     seed: u64,
     /// Write the plan to a file (with --anytime, each better one replaces it)
     #[arg(long, value_name = "FILE")]
@@ -110,7 +110,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     }
     if let (Some(path), Some(plan)) = (&arguments.gantt, outcome.plan()) {
         let drawn = std::fs::write(path, descry_pages::gantt::svg(plan));
-        drawn.map_err(|e| CommandError::BadInput(format!("--gantt {}: {e}", path.display())))?;
+        drawn.map_err(|e| {
+            CommandError::BadInput(format!(
+                "--gantt {}: {e}\n  expected a file that can be written",
+                path.display()
+            ))
+        })?;
     }
     let asked = arguments.why_not.as_deref();
     let answer = |asked| why_not::answer(&task, &attachments, outcome.plan(), asked, &options, &stop);

@@ -96,9 +96,8 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     let p = |t: &Track| thing.probability(t, &s.surfaces);
     let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
     if let Some(track) = best.filter(|t| p(t) > 1.0 - s.thresholds.confidence) {
-        // Never more than it is: what is wanted may be just above.
-        let p = (p(track) * 100.0).floor() / 100.0;
-        return Some(format!("what stands at {} may be it ({p:.2})", place(&track.position_m)));
+        let (at, p) = (place(&track.position_m), floored(p(track)));
+        return Some(format!("what stands at {at} may be it ({p:.2}{})", rather(track, thing)));
     }
     if s.chance_lost(what) > s.thresholds.not_there {
         return Some("it was lost out of the hand, and where it lies was not seen".into());
@@ -119,11 +118,29 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
         let there = s.chance_there(what);
         let most = best.filter(|track| p(track) > left);
         let text = most.map_or("there is room for it".into(), |track| {
-            format!("what stands at {} is hardly it ({:.2}), but may be", place(&track.position_m), p(track))
+            let (at, rather) = (place(&track.position_m), rather(track, thing));
+            format!("what stands at {at} is hardly it ({:.2}{rather}), but may be", p(track))
         });
         (there > t.not_there).then(|| format!("{text}; {there:.2} is left in all"))
     };
     out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
+}
+
+/// Never more than it is: what is wanted may be just above.
+fn floored(p: f64) -> f64 {
+    (p * 100.0).floor() / 100.0
+}
+
+/// What an object that is a thing with so much is more likely, and how likely; empty if it is no other known object.
+fn rather(track: &Track, thing: &Thing) -> String {
+    let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
+    likelier(&track.probabilities, track.probability_of(&thing.name), is_it)
+}
+
+fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str) -> bool) -> String {
+    let others = probabilities.iter().filter(|(name, p)| !is_it(name) && *p > than);
+    let most = others.max_by(|a, b| a.1.total_cmp(&b.1));
+    most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {:.2}", floored(*p)))
 }
 
 /// What was looked at for a thing and may be no surface to stand things on at all.
@@ -177,21 +194,28 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     };
     let hidden = s.doubt_of(open).hidden;
     let least = least_sure(s, open).map(is_one);
-    let about = about(least, hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
-    let (all, place) = (s.completeness(open), in_room(s, kind));
+    let all = s.completeness(open);
+    let together = if hidden < 1.0 { all / (1.0 - hidden) } else { 1.0 };
+    let about = about(least, together, hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
+    let (all, place) = (floored(all), in_room(s, kind));
     Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
 }
 
-/// What the doubt about all of a kind is about: the least sure object, and what may stand where nothing was seen, if that alone is
-/// more than is allowed or there is no such object.
-fn about(least: Option<String>, hidden: f64, allowed: f64, is_bare: bool) -> String {
+/// What the doubt about all of a kind is about: the least sure object, or all of them where each is sure enough by itself and they leave
+/// more open than what may stand where nothing was seen; and that, if it alone is more than is allowed or there is no such object.
+fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
     let more = says_hidden.then(|| format!(", there may be more where nothing was seen ({hidden:.2})"));
-    match (least, more) {
-        (None, None) => ", the doubt is about the objects that were seen".into(),
-        (least, more) => least.into_iter().chain(more).collect(),
-    }
+    let all_seen = || {
+        let is_most = more.is_none() || (!is_bare && 1.0 - together > hidden);
+        let of_all = format!(
+            ", each object that was seen is sure enough, all together are not ({:.2})",
+            floored(together)
+        );
+        is_most.then_some(of_all)
+    };
+    least.or_else(all_seen).into_iter().chain(more.clone()).collect()
 }
 
 /// The rooms in which a kind is asked about, in words; empty if it is asked about wherever it is.
@@ -255,19 +279,39 @@ mod tests {
 
     #[test]
     fn doubt_about_all_of_a_kind_is_about_something() {
-        let check = |least: Option<&str>, hidden: f64, is_bare: bool, expected: &str| {
+        let check = |least: Option<&str>, together: f64, hidden: f64, is_bare: bool, expected: &str| {
             assert_eq!(
-                about(least.map(str::to_string), hidden, 0.1, is_bare),
+                about(least.map(str::to_string), together, hidden, 0.1, is_bare),
                 expected,
                 "{least:?} {hidden}"
             );
         };
         let one = ", what stands at (0.10, 0.20) m is one with 0.60";
-        check(Some(one), 0.05, false, one);
-        check(Some(one), 0.2, false, &format!("{one}, there may be more where nothing was seen (0.20)"));
-        check(None, 0.05, false, ", there may be more where nothing was seen (0.05)");
-        check(None, 0.005, false, ", the doubt is about the objects that were seen");
-        check(None, -1e-9, false, ", the doubt is about the objects that were seen");
-        check(None, -1e-9, true, ", there may be more where nothing was seen (0.00)");
+        let hides = |p: f64| format!(", there may be more where nothing was seen ({p:.2})");
+        let seen =
+            |p: f64| format!(", each object that was seen is sure enough, all together are not ({p:.2})");
+        check(Some(one), 0.6, 0.05, false, one);
+        check(Some(one), 0.6, 0.2, false, &format!("{one}{}", hides(0.2)));
+        check(None, 0.96, 0.05, false, &hides(0.05));
+        check(None, 0.89, 0.02, false, &format!("{}{}", seen(0.89), hides(0.02)));
+        check(None, 0.8999, 0.005, false, &seen(0.89));
+        check(None, 0.88, -1e-9, false, &seen(0.88));
+        check(None, 1.0, -1e-9, true, &hides(0.0));
+    }
+
+    #[test]
+    fn what_may_be_it_is_named_as_what_it_is_rather() {
+        let check = |own: &[&str], cup_a: f64, other: f64, than: f64, expected: &str| {
+            let probabilities = [("cup A".to_string(), cup_a), ("other cup".to_string(), other)];
+            assert_eq!(
+                likelier(&probabilities, than, |name| own.contains(&name)),
+                expected,
+                "{own:?} {cup_a} {other}"
+            );
+        };
+        check(&["other cup"], 0.869, 0.12, 0.12, "; rather cup A, 0.86");
+        check(&["other cup"], 0.3, 0.4, 0.4, "");
+        check(&["other cup"], 0.0, 0.1, 0.1, "");
+        check(&["cup A", "other cup"], 0.5, 0.2, 0.7, "");
     }
 }

@@ -112,7 +112,7 @@ fn all_on_a_surface_is_no_thing_that_may_be_somewhere() {
             "the certainty of what stands on the table is ",
             "something stands there unseen",
             "of what kind the least sure one is, and that there are no more",
-            "in all, this was seen: 99 % of the table",
+            "in all, this was seen: 100 % of the table",
         ],
     );
     assert!(!told.to_string().contains("where table may be"), "{told}");
@@ -271,7 +271,7 @@ fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
         &["find", "cup A", "--seed", "17", "--scene", "ring-of-boxes"],
         0,
         &[
-            "pushing object 1 aside from table-3 failed: slipped",
+            "pushing object 0 aside from table-3 failed: slipped",
             "From then on: the robot stands at here-9; no longer: the robot stands at table-3",
         ],
     );

@@ -113,7 +113,7 @@ fn every_surface_in_view_is_looked_at() {
     assert!((height_m - 0.952).abs() < 0.02, "it stands on the higher one: {said}");
     assert!(said["on"].as_str().is_some_and(|on| on.contains("table")), "{said}");
 
-    let far = [[0.0, -2.2], [2.2, -1.4], [2.3, 1.2], [0.0, 2.2], [-2.2, 1.4], [-2.2, -1.3]];
+    let far = [[0.0, -2.35], [2.35, -1.5], [2.45, 1.3], [0.0, 2.35], [-2.35, 1.5], [-2.35, -1.4]];
     record(&folder.path().join("without"), TABLES, &both_tables(far));
     let said = check(folder.path(), &["find", "cup A", "--robot", "recorded:without", "--json"], 1);
     let why = said["why"].as_str().unwrap_or_default();

@@ -2,7 +2,7 @@
 
 use super::frames::frames;
 use super::mosd::cup;
-use descry_perception::merge::{MergeOptions, merge};
+use descry_perception::merge::{MergeOptions, Merger};
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, Published, Range};
 use descry_perception::segment::{SceneOptions, segment};
@@ -124,7 +124,7 @@ fn score(
 ) -> Result<(), String> {
     let height_band_m = Some((table.height - 0.3, table.height + 0.5));
     let options = MergeOptions { up: Some(table.up), height_band_m, ..Default::default() };
-    let merged = merge(set, &options).map_err(|e| e.to_string())?;
+    let merged = Merger::default().merge(set, &options).map_err(|e| e.to_string())?;
     let scene_options = SceneOptions { surface: table.surface(), ..Default::default() };
     let Ok(scene) = segment(&merged.cloud, &merged.visibility, &scene_options) else { return Ok(()) };
     for (recogniser, tally) in recognisers.iter().zip(tallies) {

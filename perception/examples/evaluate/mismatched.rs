@@ -5,7 +5,7 @@ use super::table::{Known, arrangement, judge, options, picture, strewn};
 use super::tabletop::device::{Device, KINECT};
 use super::tabletop::{Draws, Thing, disturbed, on_ring};
 use descry_perception::calibration::{Claim, reliability};
-use descry_perception::merge::merge;
+use descry_perception::merge::Merger;
 use descry_perception::recognise::Descry;
 use descry_perception::{Intrinsics, Percept, View};
 use rayon::prelude::*;
@@ -208,7 +208,7 @@ fn one((name, device, strewn): &World, seed: u64, out: Option<&Path>) -> Result<
         })
         .unzip();
     let after = |&n: &usize| {
-        let merged = merge(&views[..n], &options()).map_err(|e| e.to_string())?;
+        let merged = Merger::default().merge(&views[..n], &options()).map_err(|e| e.to_string())?;
         // Where localisation has the table is not asked here: what is said is laid on the truth by where a view stood.
         let kept = merged.fits.iter().position(|fit| fit.used).unwrap_or_default();
         let truth_from_merged = truths[kept] * merged.fits[kept].world_from_camera.inverse();

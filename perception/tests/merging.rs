@@ -198,7 +198,7 @@ fn what_was_kept_of_other_views_changes_nothing() {
         let fresh = Merger::default().merge(views, &options()).expect("the views are sound");
         assert!(same(&kept, &fresh), "{what}");
         // Half of them find what was done ahead.
-        if views.len() % 2 == 0 {
+        if views.len().is_multiple_of(2) {
             merger.go_ahead(views.to_vec());
         }
     };

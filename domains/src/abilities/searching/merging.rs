@@ -76,3 +76,9 @@ pub(super) fn merged(
     mind.merged = (!mind.known.surfaces[on].whole).then(kept);
     Ok(merged)
 }
+
+/// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
+pub(super) fn without_walls(known: &KnownSurface, mut merged: Merged) -> Merged {
+    merged.cloud = merged.cloud.filter(|p| !known.is_of_wall(&p.cast(), 0.0));
+    merged
+}

@@ -166,7 +166,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         notes.push(Note::Nothing { because });
         return Ok(());
     }
-    let merged = without_walls(&mind.known.surfaces[on], merged);
+    let merged = merging::without_walls(&mind.known.surfaces[on], merged);
     take_in(mind, on, &views, &merged);
     let since_ns = mind.known.stands_since_ns;
     mind.known.errs_by = errs_by(&mind.regions[on], &views, &merged, since_ns).or(mind.known.errs_by);
@@ -224,12 +224,6 @@ fn begin_again(mind: &mut Mind, on: usize) {
     let here = mind.known.candidates[mind.known.at].symbol.clone();
     mind.words.set("observed", vec![here, surface], Some(1.0));
     mind.attend();
-}
-
-/// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
-fn without_walls(known: &KnownSurface, mut merged: Merged) -> Merged {
-    merged.cloud = merged.cloud.filter(|p| !known.is_of_wall(&p.cast(), 0.0));
-    merged
 }
 
 /// Lays each new view of a surface that the map has on its outline by itself. Views of a long surface from its two ends share little

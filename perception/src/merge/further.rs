@@ -1,20 +1,22 @@
 //! A further look at the same place: what was found of the earlier ones is kept.
 //!
 //! What is known of a view by itself is kept as long as the view is the same. A further view alone is aligned, to the views beside it as they
-//! lie, and gathered; what it touches is settled, and the frame stays the average of what localisation said. A real camera bends what it sees,
-//! and errors of one look by one add up: few views, and whenever there are half as many more, are merged together. That need not wait for the
-//! next look, nor the next look for that: it is done ahead, while the body drives. Which views are merged together follows from the views
-//! alone, not from what was merged before: the same views give the same bytes, whatever was kept.
+//! lie, and gathered; what it touches is settled, and the frame stays the average of what localisation said. What few views showed of where
+//! they lie among each other is little: the next ones may move them, and all are gathered anew if they do. A real camera bends what it sees, and
+//! errors of one look by one add up: few views, and whenever there are half as many more, are merged together. That need not wait for the next
+//! look, nor the next look for that: it is done ahead, while the body drives. Which views are merged together follows from the views alone,
+//! not from what was merged before: the same views give the same bytes, whatever was kept.
 
-use super::check::belongs;
+use super::check::{belongs, misfit};
 use super::fuse::{gather, gather_further};
 use super::joint::{Found, Round};
-use super::parts::Part;
+use super::parts::{Part, level_again};
 use super::prepare::Prepared;
 use super::settle::settle;
 use super::{
-    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, WIDE, check,
-    filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on, visibility,
+    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, WIDE,
+    as_stated, check, filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on,
+    visibility,
 };
 use crate::cloud::Cloud;
 use crate::pool;
@@ -28,6 +30,11 @@ use std::thread::{self, JoinHandle};
 
 /// Up to so many earlier views all are merged together. From: chosen.
 const FEW: usize = 6;
+/// Up to so many views the earlier ones may move once a further one is laid on them. From: twice the assumed noise, pose errors and false names.
+const MOVABLE: usize = 4;
+/// What a further view moves the earlier ones by among each other, metres, from which they are gathered anew.
+/// From: twice the assumed noise, three and four views: at 2 mm there are twice as many false names as at none.
+const MOVED_M: f64 = 0.001;
 
 /// Merges the views of one place again and again, as they become more.
 #[derive(Default)]
@@ -117,6 +124,8 @@ impl Kept {
         self.prepare(views, options);
         let earlier = &views[..views.len() - 1];
         let before = if earlier.is_empty() { None } else { self.base_of(earlier, options).ok() };
+        // Of few views the one that was left out may be the one that fits in with the next.
+        let before = before.filter(|base| views.len() > FEW || base.are_all_used());
         let are_all_used = before.as_ref().is_none_or(Base::are_all_used);
         let laid = before.and_then(|before| self.further(before, views, options));
         let is_laid = laid.is_some();
@@ -191,7 +200,7 @@ impl Kept {
         base
     }
 
-    /// The last of the first views with the others as they lie; `None` if it does not fit in.
+    /// The last of the first views with the others, which stay unless they are few; `None` if it does not fit in.
     fn further(&self, mut base: Base, views: &[View], options: &MergeOptions) -> Option<Base> {
         let last = views.len() - 1;
         let (prepared, maps) = (&self.prepared[..=last], &self.maps[..=last]);
@@ -200,14 +209,23 @@ impl Kept {
         }
         let lay = |first: &Round| base.aligned.lay_further(prepared, maps, first);
         let (pose, found, parts) = lay(&FIRST).or_else(|| lay(&WIDE))?;
-        let of_view = (&views[last], &prepared[last]);
-        if !gather_further(&mut base.gathered, last, of_view, &pose, &base.aligned.planes, options) {
-            return None;
-        }
         base.aligned.take(pose, found, parts);
         base.digests.push(self.digests[last]);
-        base.fits.push(fit(&prepared[last], &pose, &found, true, None));
-        let result = format!("view {last} is laid on the others, which stay");
+        let aligned = &mut base.aligned;
+        let moved_m = if last < MOVABLE { aligned.settle_together(prepared, maps)? } else { 0.0 };
+        let result = if moved_m > MOVED_M {
+            base.gathered = gather(views, prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+            base.fits = fits(prepared, aligned);
+            base.settled = 0;
+            format!("view {last} is laid on the others, which it moves by {:.1} mm", 1e3 * moved_m)
+        } else {
+            let of_view = (&views[last], &prepared[last]);
+            if !gather_further(&mut base.gathered, last, of_view, &pose, &aligned.planes, options) {
+                return None;
+            }
+            base.fits.push(fit(&prepared[last], &pose, &found, true, None));
+            format!("view {last} is laid on the others, which stay")
+        };
         base.steps.push(Step { name: "further look".to_owned(), points: found.matched, result });
         Some(base)
     }
@@ -272,6 +290,36 @@ impl Aligned {
         let all: Vec<usize> = (0..last).filter(|&i| self.used[i]).chain([last]).collect();
         let fits = belongs((last, looser, &all), prepared, &parts, &poses, maps, &found);
         fits.then_some((poses[last], found, parts.pop()?))
+    }
+
+    /// Lets all views settle, the last of them laid on the others; how far that moves the others among each other, metres. If that is no more
+    /// than is kept, all stay as they lie. `None` if they contradict each other.
+    fn settle_together(&mut self, prepared: &[Prepared], maps: &[Option<DepthMap>]) -> Option<f64> {
+        let Aligned { used, parts, .. } = &*self;
+        let mut poses = self.poses.clone();
+        let found = joint::align(prepared, used, &as_stated(prepared), &parts.of, &mut poses, &SECOND);
+        if misfit(prepared, used, &parts.of, &poses, maps, &found).is_some() {
+            return None;
+        }
+        let moved_m = self.moved_m(prepared, &poses);
+        if moved_m > MOVED_M {
+            let planes = level_again(&parts.planes, parts.up, prepared, used, &parts.of, &poses);
+            (self.planes, self.poses, self.found) = (planes, poses, found);
+        }
+        Some(moved_m)
+    }
+
+    /// How far what stands on the surface in a view lies from where it lay among the views but the last, metres: that of the view that moved most.
+    fn moved_m(&self, prepared: &[Prepared], poses: &[Isometry3<f64>]) -> f64 {
+        let last = poses.len() - 1;
+        let moved = |i: usize| poses[i] * self.poses[i].inverse();
+        let of_view = |i: usize| {
+            let among_others = moved(0).inv_mul(&moved(i));
+            let points = objects(&prepared[i], &self.parts.of[i], &self.poses[i]);
+            let sum: f64 = points.iter().map(|(p, _)| (among_others * p - p).norm_squared()).sum();
+            (sum / points.len().max(1) as f64).sqrt()
+        };
+        (0..last).map(of_view).fold(0.0, f64::max)
     }
 
     fn take(&mut self, pose: Isometry3<f64>, found: Found, parts: Vec<Part>) {

@@ -27,6 +27,8 @@ const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
 /// What is known so well is not taken for two things that blur into each other.
 const SURE: f64 = 0.8;
+/// An object that is longer than so many diameters of a thing, and not known, may be more than one.
+const LARGE: f64 = 2.0;
 /// How far above an unseen place the top of a body that fills it is looked for, metres.
 const ROOF_M: f64 = 0.5;
 /// The columns of an object's volume that are asked for, in diameters from its middle, and the levels, in heights from its foot.
@@ -94,9 +96,16 @@ pub(super) fn unseen_volume(
     if free > FRAYED_SHARE * all {
         return None;
     }
+    let above = |at| column(at) + surface.up * (height_m * ABOVE);
+    // A thing that touches another may have been seen as one piece with it. What is measured above a place is not of the thing.
+    let is_part = |track: &Track, at| {
+        let is_large = track.size_m[0].max(track.size_m[1]) > LARGE * diameter_m;
+        let is_known = track.certainty() >= SURE && track.label().is_some();
+        is_large && !is_known && !is_roofed(space, &above(at), &surface.up)
+    };
     let explained = COLUMNS.map(|at| {
-        let point = column(at);
-        standing.iter().any(|track| surface.is_of(track, &point, space.voxel_m() / 2.0))
+        let is_of = |track: &Track| surface.is_of(track, &column(at), space.voxel_m() / 2.0);
+        standing.iter().any(|track| is_of(track) && !is_part(track, at))
     });
     // Nothing is looked for in a vessel.
     let fills =
@@ -107,7 +116,7 @@ pub(super) fn unseen_volume(
     let mut unseen = Vec::new();
     let mut measured = 0.0;
     for (n, &at) in COLUMNS.iter().enumerate() {
-        let above = column(at) + surface.up * (height_m * ABOVE);
+        let above = above(at);
         let is_wall = surface.is_of_wall(&above, space.voxel_m())
             || surface.is_of_wall(&above, WALL_BLUR * space.voxel_m()) && space.cell(&above) != Cell::Free;
         for (point, cell) in cells[n] {
@@ -296,6 +305,25 @@ mod tests {
         assert_eq!(likely(0.104, &[]), Some(true));
         assert_eq!(likely(0.20, &[]), Some(false), "it stands below what was measured");
         assert_eq!(likely(0.104, &[&disc()]), None);
+    }
+
+    #[test]
+    fn what_is_one_piece_with_something_larger_may_be_it() {
+        let likely = |disc_m: f64, piece: &Track| {
+            let space = seen_from_above(disc_m);
+            let hidden = unseen_volume(&table(), &space, &[piece], &Point3::origin(), (0.104, 0.07));
+            hidden.map(|hidden| hidden.likely)
+        };
+        let wide = |scale: f64| {
+            let footprint_m = disc().footprint_m.iter().map(|p| p * scale).collect();
+            Track { size_m: [0.07 * scale, 0.07, 0.3], footprint_m, ..disc() }
+        };
+        assert_eq!(likely(0.104, &wide(4.0)), Some(true), "a cup beside a box, both seen as one thing");
+        assert_eq!(likely(0.20, &wide(4.0)), None, "the place is below the box");
+        assert_eq!(likely(0.104, &wide(1.5)), None, "hardly larger than a cup");
+        let known =
+            Track { unknown: 0.05, kinds: vec![], probabilities: vec![("tray".into(), 0.95)], ..wide(4.0) };
+        assert_eq!(likely(0.104, &known), None, "it is known what it is");
     }
 
     #[test]

@@ -321,8 +321,12 @@ mod tests {
         assert_eq!(likely(0.104, &wide(4.0)), Some(true), "a cup beside a box, both seen as one thing");
         assert_eq!(likely(0.20, &wide(4.0)), None, "the place is below the box");
         assert_eq!(likely(0.104, &wide(1.5)), None, "hardly larger than a cup");
-        let known =
-            Track { unknown: 0.05, kinds: vec![], probabilities: vec![("tray".into(), 0.95)], ..wide(4.0) };
+        let known = Track {
+            unknown: 0.05,
+            kinds: vec![("tray".into(), 0.95)],
+            probabilities: vec![("tray".into(), 0.95)],
+            ..wide(4.0)
+        };
         assert_eq!(likely(0.104, &known), None, "it is known what it is");
     }
 

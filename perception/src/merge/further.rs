@@ -30,10 +30,10 @@ use std::thread::{self, JoinHandle};
 
 /// Up to so many earlier views all are merged together. From: chosen.
 const FEW: usize = 6;
-/// Up to so many views the earlier ones may move once a further one is laid on them. From: chosen; fewer false names at twice the assumed noise.
+/// Up to so many views the earlier ones may move once a further one is laid on them. From: chosen, fewer false names at twice the assumed noise.
 const MOVABLE: usize = 4;
 /// What a further view moves the earlier ones by among each other, metres, from which they are gathered anew.
-/// From: chosen; with 2 mm there are twice as many false names at twice the assumed noise, three and four views, as with none.
+/// From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and four views, as with none.
 const MOVED_M: f64 = 0.001;
 
 /// Merges the views of one place again and again, as they become more.

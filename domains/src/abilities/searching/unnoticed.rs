@@ -27,7 +27,7 @@ const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
 /// What is known so well is not taken for two things that blur into each other.
 const SURE: f64 = 0.8;
-/// An object that is longer than so many diameters of a thing, and not known, may be more than one.
+/// An object that is longer than so many diameters of a thing may be more than one where it is not known what it is.
 const LARGE: f64 = 2.0;
 /// How far above an unseen place the top of a body that fills it is looked for, metres.
 const ROOF_M: f64 = 0.5;
@@ -101,7 +101,8 @@ pub(super) fn unseen_volume(
     let is_part = |track: &Track, at| {
         let is_large = track.size_m[0].max(track.size_m[1]) > LARGE * diameter_m;
         let is_known = track.certainty() >= SURE && track.label().is_some();
-        is_large && !is_known && !is_roofed(space, &above(at), &surface.up)
+        let is_beyond = is_beyond_body(track, &column(at), &surface.up, space.voxel_m() / 2.0);
+        is_large && (!is_known || is_beyond) && !is_roofed(space, &above(at), &surface.up)
     };
     let explained = COLUMNS.map(|at| {
         let is_of = |track: &Track| surface.is_of(track, &column(at), space.voxel_m() / 2.0);
@@ -142,6 +143,12 @@ pub(super) fn unseen_volume(
         explained[n] && is_roofed(space, &top, &surface.up)
     };
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unseen { points: unseen, likely })
+}
+
+/// Whether a point lies aside of the round body that was found in what was measured of an object.
+fn is_beyond_body(track: &Track, point: &Point3<f64>, up: &Vector3<f64>, margin_m: f64) -> bool {
+    let radius_m = track.evidence.radius_m;
+    radius_m > 0.0 && (point - track.position_m).cross(up).norm() > radius_m + margin_m
 }
 
 /// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.
@@ -328,6 +335,16 @@ mod tests {
             ..wide(4.0)
         };
         assert_eq!(likely(0.104, &known), None, "it is known what it is");
+        let beside = |aside_m: f64| {
+            let evidence = Evidence { radius_m: 0.05, ..Evidence::default() };
+            Track { position_m: Point3::new(aside_m, 0.0, 0.0), evidence, ..known.clone() }
+        };
+        assert_eq!(
+            likely(0.104, &beside(0.1)),
+            Some(true),
+            "a cup beside a known cylinder, seen as one thing"
+        );
+        assert_eq!(likely(0.104, &beside(0.02)), None, "it is of the cylinder");
     }
 
     #[test]

@@ -97,21 +97,19 @@ pub(super) fn unseen_volume(
         return None;
     }
     let above = |at| column(at) + surface.up * (height_m * ABOVE);
+    let margin_m = space.voxel_m() / 2.0;
+    let is_of = |track: &Track, at| surface.is_of(track, &column(at), margin_m);
+    let is_known = |track: &Track| track.certainty() >= SURE && track.label().is_some();
+    let is_beyond = |track: &Track, at| is_beyond_body(track, &column(at), &surface.up, margin_m);
     // A thing that touches another may have been seen as one piece with it. What is measured above a place is not of the thing.
     let is_part = |track: &Track, at| {
         let is_large = track.size_m[0].max(track.size_m[1]) > LARGE * diameter_m;
-        let is_known = track.certainty() >= SURE && track.label().is_some();
-        let is_beyond = is_beyond_body(track, &column(at), &surface.up, space.voxel_m() / 2.0);
-        is_large && (!is_known || is_beyond) && !is_roofed(space, &above(at), &surface.up)
+        is_large && (!is_known(track) || is_beyond(track, at)) && !is_roofed(space, &above(at), &surface.up)
     };
-    let explained = COLUMNS.map(|at| {
-        let is_of = |track: &Track| surface.is_of(track, &column(at), space.voxel_m() / 2.0);
-        standing.iter().any(|track| is_of(track) && !is_part(track, at))
-    });
+    let explained = COLUMNS.map(|at| standing.iter().any(|track| is_of(track, at) && !is_part(track, at)));
     // Nothing is looked for in a vessel.
-    let fills =
-        |track: &Track| COLUMNS.iter().all(|&at| surface.is_of(track, &column(at), space.voxel_m() / 2.0));
-    if standing.iter().any(|track| track.certainty() >= SURE && track.label().is_some() && fills(track)) {
+    let fills = |track: &Track| COLUMNS.iter().all(|&at| is_of(track, at) && !is_part(track, at));
+    if standing.iter().any(|track| is_known(track) && fills(track)) {
         return None;
     }
     let mut unseen = Vec::new();

@@ -181,15 +181,13 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
         let mut steps = filter_and_thin(views, &prepared, options)?;
         let mut aligned = place(&prepared, &maps, options, &mut steps);
         let seen = visibility(maps, &aligned.used, &aligned.poses);
-        let mut gathered =
-            fuse::gather(views, &prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
-        Ok(merged(&mut gathered, seen, fits(&prepared, &mut aligned), steps))
+        let gathered = fuse::gather(views, &prepared, &aligned, &seen, options, None);
+        Ok(merged(&gathered, seen, fits(&prepared, &mut aligned), steps))
     })
 }
 
 /// The merged cloud of what was gathered, with what is said of it.
-fn merged(gathered: &mut [Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
-    settle::settle(gathered, &seen);
+fn merged(gathered: &[Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
     let fused = settle::fused(gathered);
     steps.push(Step {
         name: "fuse".to_owned(),

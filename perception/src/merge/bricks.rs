@@ -1,4 +1,5 @@
 //! A sparse grid of voxels in bricks of 8 × 8 × 8, or 8 × 8 columns: a surface fills few bricks, and in each many voxels beside each other.
+//! Of columns it fills most: a brick of columns has a cell for each.
 
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
@@ -50,7 +51,11 @@ pub(super) struct Bricks<C> {
     slots: Vec<u32>,
     /// Layers of voxels in a brick, along z.
     layers: usize,
+    /// Those of columns are there, and `empty`, before they are occupied.
     pub cells: Vec<C>,
+    empty: C,
+    /// How many cells are occupied.
+    pub occupied: usize,
     /// Which voxels of each brick were asked for.
     pub touched: Vec<Mask>,
     /// Bricks that were asked for of late, by the last bits of their place.
@@ -60,29 +65,35 @@ pub(super) struct Bricks<C> {
 /// Bricks along each axis of which one may be in `recent`. From: work.
 const RECENT: usize = 4;
 
-impl<C> Bricks<C> {
-    /// No cell yet. Voxels that are columns along z make bricks of one layer.
-    pub fn new(columns: bool) -> Bricks<C> {
+impl<C: Copy> Bricks<C> {
+    /// No cell yet; each begins as `empty`. Voxels that are columns along z make bricks of one layer.
+    pub fn new(columns: bool, empty: C) -> Bricks<C> {
         Bricks {
             numbers: FxHashMap::default(),
             places: Vec::new(),
             slots: Vec::new(),
             layers: if columns { 1 } else { SIDE },
             cells: Vec::new(),
+            empty,
+            occupied: 0,
             touched: Vec::new(),
             recent: [(Place::MAX, NONE); RECENT * RECENT * RECENT],
         }
+    }
+
+    fn are_columns(&self) -> bool {
+        self.layers == 1
     }
 
     fn voxels(&self) -> usize {
         self.layers * SIDE * SIDE
     }
 
-    /// Number of the cell at a place, voxels from the grid's lowest corner; a new one is made if there was none.
+    /// Number of the cell at a place, voxels from the grid's lowest corner; it is occupied from then on.
     #[inline(always)]
-    pub fn cell(&mut self, at: &[f32; 3], new: C) -> u32 {
+    pub fn cell(&mut self, at: &[f32; 3]) -> u32 {
         let mut voxel = at.map(|c| c as i32 as u32);
-        voxel[2] *= u32::from(self.layers > 1);
+        voxel[2] *= u32::from(!self.are_columns());
         let [x, y, z] = voxel.map(|c| c / SIDE as u32);
         let place = Place::from(x) | Place::from(y) << PLACE_BITS | Place::from(z) << (2 * PLACE_BITS);
         let recent = [x, y, z].iter().fold(0, |at, c| at * RECENT + *c as usize % RECENT);
@@ -92,19 +103,26 @@ impl<C> Bricks<C> {
         };
         let [x, y, z] = voxel.map(|c| c as usize % SIDE);
         self.touched[brick][z] |= 1 << (y * SIDE + x);
-        let slot = &mut self.slots[brick * self.layers * SIDE * SIDE + (z * SIDE + y) * SIDE + x];
-        if *slot == NONE {
+        let at = brick * self.voxels() + (z * SIDE + y) * SIDE + x;
+        let slot = &mut self.slots[at];
+        let is_new = *slot == NONE;
+        self.occupied += usize::from(is_new);
+        if self.layers == 1 {
+            // Without asking: nobody could guess the answer.
+            *slot = at as u32;
+        } else if is_new {
             *slot = self.cells.len() as u32;
-            self.cells.push(new);
+            self.cells.push(self.empty);
         }
         *slot
     }
 
     /// Puts the cells into the order of the bricks, so that those beside each other in space are so in memory; gives their former numbers.
-    pub fn sort(&mut self) -> Vec<u32>
-    where
-        C: Copy,
-    {
+    /// Columns are in that order: `None`.
+    pub fn sort(&mut self) -> Option<Vec<u32>> {
+        if self.are_columns() {
+            return None;
+        }
         let mut former = Vec::with_capacity(self.cells.len());
         for slot in self.slots.iter_mut().filter(|slot| **slot != NONE) {
             former.push(*slot);
@@ -114,7 +132,7 @@ impl<C> Bricks<C> {
         let mut cells = Vec::with_capacity(former.len() + former.len() / 2);
         cells.extend(former.iter().map(|&number| self.cells[number as usize]));
         self.cells = cells;
-        former
+        Some(former)
     }
 
     #[inline(never)]
@@ -125,6 +143,9 @@ impl<C> Bricks<C> {
             self.places.push(place);
             self.touched.push(Mask::default());
             self.slots.resize(self.slots.len() + self.voxels(), NONE);
+            if self.are_columns() {
+                self.cells.resize(self.slots.len(), self.empty);
+            }
         }
         self.recent[recent] = (place, brick as u32);
         brick
@@ -207,9 +228,8 @@ impl<C> Bricks<C> {
     pub fn beside(&self, brick: usize) -> Beside {
         let place = self.places[brick];
         // Columns have nothing above and below them.
-        let columns = self.layers == 1;
         let mut beside = [None; 27];
-        for part in if columns { 9..18 } else { 0..27 } {
+        for part in if self.are_columns() { 9..18 } else { 0..27 } {
             let step = |by: usize, bits: u32| (by as Place).wrapping_sub(1) << bits;
             // Beyond the lowest lies a place that is beyond the highest as well: no brick.
             let next = place

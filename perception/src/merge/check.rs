@@ -50,18 +50,19 @@ pub(super) fn misfit(
     })
 }
 
-/// Whether a further view, so loose, belongs with the others as they lie: `all` with it.
+/// Whether a further view, so loose, belongs with those that are used as they lie: itself among them.
 pub(super) fn belongs(
-    (view, loose, all): (usize, f64, &[usize]),
+    (view, loose, used): (usize, f64, &[bool]),
     views: &[Prepared],
     parts: &[Vec<Part>],
     poses: &[Isometry3<f64>],
     maps: &[Option<DepthMap>],
     found: &Found,
 ) -> bool {
+    let all: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
     found.matched >= FEWEST_MATCHED
         && too_far(&views[view], &poses[view], loose).is_none()
-        && contradicted(view, all, views, parts, poses, maps) <= MOST_CONTRADICTED
+        && contradicted(view, &all, views, parts, poses, maps) <= MOST_CONTRADICTED
 }
 
 /// Share of what a view shows, and of what others show, that contradicts the other: the mean over the others. With one other view there

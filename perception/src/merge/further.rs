@@ -12,7 +12,7 @@ use super::fuse::{gather, gather_further};
 use super::joint::{Found, Round};
 use super::parts::{Part, level_again};
 use super::prepare::Prepared;
-use super::settle::settle;
+use super::returns::Looked;
 use super::{
     Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, WIDE,
     as_stated, check, filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on,
@@ -21,11 +21,12 @@ use super::{
 use crate::cloud::Cloud;
 use crate::pool;
 use crate::view::View;
-use crate::visibility::DepthMap;
+use crate::visibility::{DepthMap, Visibility};
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::fmt;
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
 /// Up to so many earlier views all are merged together. From: chosen.
@@ -59,11 +60,12 @@ struct Kept {
 struct Base {
     digests: Vec<u64>,
     aligned: Aligned,
+    seen: Visibility,
     gathered: Vec<Gathered>,
+    /// What was gathered of each view, if they are so few that they may still move.
+    looked: Option<Vec<Arc<Looked>>>,
     fits: Vec<ViewFit>,
     steps: Vec<Step>,
-    /// How many views were settled.
-    settled: usize,
 }
 
 impl fmt::Debug for Merger {
@@ -129,10 +131,8 @@ impl Kept {
         let are_all_used = before.as_ref().is_none_or(Base::are_all_used);
         let laid = before.and_then(|before| self.further(before, views, options));
         let is_laid = laid.is_some();
-        let mut base = laid.map_or_else(|| self.anew(views, options), Ok)?;
-        let seen = visibility(self.maps.clone(), &base.aligned.used, &base.aligned.poses);
-        let mut merged = merged(&mut base.gathered, seen, base.fits.clone(), base.steps.clone());
-        base.settled = views.len();
+        let base = laid.map_or_else(|| self.anew(views, options), Ok)?;
+        let mut merged = merged(&base.gathered, base.seen.clone(), base.fits.clone(), base.steps.clone());
         if is_laid {
             merged = self.onto_priors(merged, &base.aligned);
         }
@@ -172,11 +172,11 @@ impl Kept {
         let begun = kept.as_ref().map_or(anew, |base| base.digests.len());
         let mut base = kept.map_or_else(|| self.anew(&views[..anew], options), Ok);
         for n in begun + 1..=views.len() {
-            let before = base.ok().filter(Base::are_all_used).map(|base| self.settled(base));
+            let before = base.ok().filter(Base::are_all_used);
             let further = before.and_then(|base| self.further(base, &views[..n], options));
             base = further.map_or_else(|| self.anew(&views[..n], options), Ok);
         }
-        base.map(|base| self.settled(base))
+        base
     }
 
     /// The first views, together.
@@ -184,20 +184,12 @@ impl Kept {
         let (prepared, maps) = (&self.prepared[..views.len()], &self.maps[..views.len()]);
         let mut steps = filter_and_thin(views, prepared, options)?;
         let mut aligned = place(prepared, maps, options, &mut steps);
-        let gathered = gather(views, prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+        let mut looked = (views.len() < MOVABLE).then(Vec::new);
+        let seen = visibility(maps.to_vec(), &aligned.used, &aligned.poses);
+        let gathered = gather(views, prepared, &aligned, &seen, options, looked.as_mut());
         let fits = fits(prepared, &mut aligned);
-        Ok(Base { digests: self.digests[..views.len()].to_vec(), aligned, gathered, fits, steps, settled: 0 })
-    }
-
-    /// What the further look touches is settled on what the earlier ones were settled to, whether they were merged by themselves or not.
-    fn settled(&self, mut base: Base) -> Base {
-        let views = base.digests.len();
-        if base.settled < views {
-            let seen = visibility(self.maps[..views].to_vec(), &base.aligned.used, &base.aligned.poses);
-            settle(&mut base.gathered, &seen);
-            base.settled = views;
-        }
-        base
+        let digests = self.digests[..views.len()].to_vec();
+        Ok(Base { digests, aligned, seen, gathered, looked, fits, steps })
     }
 
     /// The last of the first views with the others, which stay unless they are few; `None` if it does not fit in.
@@ -208,25 +200,34 @@ impl Kept {
             return None;
         }
         let lay = |first: &Round| base.aligned.lay_further(prepared, maps, first);
-        let (pose, found, parts) = lay(&FIRST).or_else(|| lay(&WIDE))?;
-        base.aligned.take(pose, found, parts);
-        base.digests.push(self.digests[last]);
+        let Laid { poses, found, parts } = lay(&FIRST).or_else(|| lay(&WIDE))?;
         let aligned = &mut base.aligned;
-        let moved_m = if last < MOVABLE { aligned.settle_together(prepared, maps)? } else { 0.0 };
+        let moved_m = if last < MOVABLE { aligned.moved_m(prepared, &poses) } else { 0.0 };
+        // Where it lies if the others stay.
+        let pose = aligned.poses[0] * poses[0].inv_mul(&poses[last]);
+        aligned.take(pose, found[last], parts);
+        base.digests.push(self.digests[last]);
+        let seen = |Aligned { used, poses, .. }: &Aligned| visibility(maps.to_vec(), used, poses);
+        let matched = found[last].matched;
         let result = if moved_m > MOVED_M {
-            base.gathered = gather(views, prepared, &aligned.used, &aligned.poses, &aligned.planes, options);
+            let Aligned { used, parts, .. } = &*aligned;
+            aligned.planes = level_again(&parts.planes, parts.up, prepared, used, &parts.of, &poses);
+            (aligned.poses, aligned.found) = (poses, found);
+            base.seen = seen(aligned);
+            base.gathered = gather(views, prepared, aligned, &base.seen, options, base.looked.as_mut());
             base.fits = fits(prepared, aligned);
-            base.settled = 0;
             format!("view {last} is laid on the others, which it moves by {:.1} mm", 1e3 * moved_m)
         } else {
             let of_view = (&views[last], &prepared[last]);
-            if !gather_further(&mut base.gathered, last, of_view, &pose, &aligned.planes, options) {
+            let planes = &aligned.planes;
+            base.seen = seen(aligned);
+            if !gather_further(&mut base.gathered, last, of_view, &pose, planes, &base.seen, options) {
                 return None;
             }
-            base.fits.push(fit(&prepared[last], &pose, &found, true, None));
+            base.fits.push(fit(&prepared[last], &pose, &found[last], true, None));
             format!("view {last} is laid on the others, which stay")
         };
-        base.steps.push(Step { name: "further look".to_owned(), points: found.matched, result });
+        base.steps.push(Step { name: "further look".to_owned(), points: matched, result });
         Some(base)
     }
 
@@ -244,6 +245,13 @@ impl Kept {
     }
 }
 
+/// Where the views belong once a further one is laid on the others, with what that found, and what its points belong to.
+struct Laid {
+    poses: Vec<Isometry3<f64>>,
+    found: Vec<Found>,
+    parts: Vec<Part>,
+}
+
 impl Base {
     fn are_all_used(&self) -> bool {
         self.aligned.used.iter().all(|used| *used)
@@ -257,14 +265,9 @@ fn together(views: usize) -> usize {
 }
 
 impl Aligned {
-    /// Where the last of the views belongs if the others stay, its first alignment as asked; `None` if that contradicts them. With what the
-    /// alignment found of it and what its points belong to.
-    fn lay_further(
-        &self,
-        prepared: &[Prepared],
-        maps: &[Option<DepthMap>],
-        first: &Round,
-    ) -> Option<(Isometry3<f64>, Found, Vec<Part>)> {
+    /// Where the last of the views belongs, its first alignment as asked: if the others stay, or all together if they are few. `None` if that
+    /// contradicts them.
+    fn lay_further(&self, prepared: &[Prepared], maps: &[Option<DepthMap>], first: &Round) -> Option<Laid> {
         let last = prepared.len() - 1;
         let view = &prepared[last];
         let mut poses: Vec<Isometry3<f64>> = self.poses.iter().copied().chain([view.prior]).collect();
@@ -286,27 +289,16 @@ impl Aligned {
             let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
             place_on((view, &parts[last], looser), &up, &placed, &levelled, &mut poses[last]);
         }
-        let found = *joint::align(prepared, &used, &loose, &parts, &mut poses, &SECOND).last()?;
-        let all: Vec<usize> = (0..last).filter(|&i| self.used[i]).chain([last]).collect();
-        let fits = belongs((last, looser, &all), prepared, &parts, &poses, maps, &found);
-        fits.then_some((poses[last], found, parts.pop()?))
-    }
-
-    /// Lets all views settle, the last of them laid on the others; how far that moves the others among each other, metres. If that is no more
-    /// than is kept, all stay as they lie. `None` if they contradict each other.
-    fn settle_together(&mut self, prepared: &[Prepared], maps: &[Option<DepthMap>]) -> Option<f64> {
-        let Aligned { used, parts, .. } = &*self;
-        let mut poses = self.poses.clone();
-        let found = joint::align(prepared, used, &as_stated(prepared), &parts.of, &mut poses, &SECOND);
-        if misfit(prepared, used, &parts.of, &poses, maps, &found).is_some() {
-            return None;
+        let all: Vec<bool> = self.used.iter().copied().chain([true]).collect();
+        let (found, fits);
+        if last < MOVABLE {
+            found = joint::align(prepared, &all, &as_stated(prepared), &parts, &mut poses, &SECOND);
+            fits = misfit(prepared, &all, &parts, &poses, maps, &found).is_none();
+        } else {
+            found = joint::align(prepared, &used, &loose, &parts, &mut poses, &SECOND);
+            fits = belongs((last, looser, &all), prepared, &parts, &poses, maps, &found[last]);
         }
-        let moved_m = self.moved_m(prepared, &poses);
-        if moved_m > MOVED_M {
-            let planes = level_again(&parts.planes, parts.up, prepared, used, &parts.of, &poses);
-            (self.planes, self.poses, self.found) = (planes, poses, found);
-        }
-        Some(moved_m)
+        fits.then_some(Laid { poses, found, parts: parts.pop()? })
     }
 
     /// How far what stands on the surface in a view lies from where it lay among the views but the last, metres: that of the view that moved most.

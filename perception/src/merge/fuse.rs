@@ -3,17 +3,18 @@
 //! Returns at depth edges that hang between two surfaces are dropped. The rest are averaged in voxels, each weighted by the spread of its
 //! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
 
-use super::MergeOptions;
 use super::bricks::{Bricks, Grid};
 use super::parts::Plane;
 use super::prepare::Prepared;
-use super::returns::{Return, Returns};
+use super::returns::{Looked, Return};
 use super::settle::Before;
+use super::{Aligned, MergeOptions};
 use crate::cloud::Cloud;
 use crate::view::View;
+use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
-use std::ops::Range;
+use std::sync::Arc;
 
 /// What is known of a voxel: running sums, weighted, while it is gathered; then means.
 #[derive(Clone, Copy)]
@@ -39,10 +40,10 @@ impl Cell {
     };
 
     #[inline(always)]
-    fn add(&mut self, r: &Measured, view: u16) {
-        self.weight += r.weight;
-        self.at += r.at * r.weight;
-        self.normal += r.normal * r.weight;
+    fn add(&mut self, at: Vector3<f32>, normal: Vector3<f32>, weight: f32, view: u16) {
+        self.weight += weight;
+        self.at += at * weight;
+        self.normal += normal * weight;
         self.views += u16::from(self.last != view);
         self.last = view;
     }
@@ -53,18 +54,6 @@ impl Cell {
         let normal = self.normal.try_normalize(CANCELLED).unwrap_or_else(Vector3::zeros);
         Cell { at: self.at / self.weight, normal, ..*self }
     }
-}
-
-/// A return in its grid.
-struct Measured {
-    /// Voxels from the grid's lowest corner.
-    at: Vector3<f32>,
-    weight: f32,
-    /// Zero if unknown.
-    normal: Vector3<f32>,
-    pixel: u32,
-    /// Number of the voxel's cell.
-    cell: u32,
 }
 
 /// Occupied voxels, or columns on a plane.
@@ -88,94 +77,113 @@ pub(super) struct Fused {
     pub voxel_m: f64,
 }
 
-/// Gathers the used views at their corrected poses, with a sheet for each of the level `planes`.
+/// Gathers and settles the used views at their corrected poses, with a sheet for each of the level planes. What is `known` of the first of them
+/// is taken as it is; what is looked through of the others is known then.
 pub(super) fn gather(
     views: &[View],
     prepared: &[Prepared],
-    used: &[bool],
-    poses: &[Isometry3<f64>],
-    planes: &[Plane],
+    Aligned { used, poses, planes, .. }: &Aligned,
+    seen: &Visibility,
     options: &MergeOptions,
+    mut known: Option<&mut Vec<Arc<Looked>>>,
 ) -> Vec<Gathered> {
     /// If there are too many voxels, they grow at least by this. From: chosen.
     const GROWTH: f64 = 1.2;
     let _span = tracing::debug_span!("fuse", views = views.len()).entered();
     let used: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
-    let of = |&i: &usize| Returns::of(&views[i], &prepared[i], &poses[i], planes, options);
-    let of: Vec<Returns> = used.par_iter().map(of).collect();
-    let coloured = of.iter().all(|returns| returns.view.cloud.colours.is_some());
+    let cameras: Vec<Isometry3<f64>> = used.iter().map(|&i| poses[i]).collect();
+    let coloured = used.iter().all(|&i| views[i].cloud.colours.is_some());
+    let gazes = seen.gazes();
+    let of_view = |number: usize, looked: Arc<Looked>| {
+        let colours = views[used[number]].cloud.colours.as_deref().filter(|_| coloured);
+        Taken { number: number as u16, looked, world_from_camera: cameras[number], colours }
+    };
+    let look = |number: usize| {
+        let i = used[number];
+        of_view(number, Arc::new(Looked::at(&views[i], &prepared[i], &poses[i], planes, options)))
+    };
     let mut voxel_m = options.fuse_voxel_m;
     loop {
-        let things = Gathered::over(&of, None, voxel_m, options);
-        let sheets = planes.iter().map(|plane| Gathered::over(&of, Some(plane), voxel_m, options));
+        let things = Gathered::over(&cameras, None, voxel_m, options);
+        let sheets = planes.iter().map(|plane| Gathered::over(&cameras, Some(plane), voxel_m, options));
         let mut all: Vec<Gathered> = std::iter::once(things).chain(sheets).collect();
-        (0..).zip(&of).for_each(|(number, returns)| take(&mut all, returns, number, coloured));
-        let cells: usize = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
-        if cells > options.most_points {
-            // Surfaces: points fall with the square of the side.
-            voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(GROWTH);
-            continue;
+        let before = known.iter().flat_map(|known| known.iter()).take_while(|looked| looked.is_with(planes));
+        let mut taken: Vec<Taken> =
+            before.enumerate().map(|(number, looked)| of_view(number, Arc::clone(looked))).collect();
+        if let Some(known) = &mut known {
+            known.truncate(taken.len());
         }
-        all.par_iter_mut().for_each(Gathered::sort);
-        return all;
+        for number in taken.len()..used.len() {
+            // The next view is looked through while those before it are added.
+            let next = rayon::join(|| add(&mut all, &taken, |_| ()), || look(number)).1;
+            if let Some(known) = &mut known {
+                known.push(Arc::clone(&next.looked));
+            }
+            taken = vec![next];
+        }
+        add(&mut all, &taken, |gathered| {
+            gathered.sort();
+            gathered.settle(&gazes);
+        });
+        let cells: usize = all.iter().map(|gathered| gathered.bricks.occupied).sum();
+        if cells <= options.most_points {
+            return all;
+        }
+        // Surfaces: points fall with the square of the side.
+        voxel_m = all[0].grid.voxel_m * (cells as f64 / options.most_points as f64).sqrt().max(GROWTH);
     }
 }
 
-/// Adds a further view to what was gathered with `planes`, as the view of that number. False, and nothing is added, if it does not go with
-/// it: it lies beyond its voxels, has no colours where that has, or makes it too large.
+/// Adds a further view to what was gathered with `planes`, as the view of that number, and settles what it touches. False, and nothing is added,
+/// if it does not go with it: it lies beyond its voxels, has no colours where that has, or makes it too large.
 pub(super) fn gather_further(
     all: &mut [Gathered],
     number: usize,
     (view, prepared): (&View, &Prepared),
     pose: &Isometry3<f64>,
     planes: &[Plane],
+    seen: &Visibility,
     options: &MergeOptions,
 ) -> bool {
-    let returns = Returns::of(view, prepared, pose, planes, options);
-    let cells: usize = all.iter().map(|gathered| gathered.bricks.cells.len()).sum();
+    let cells: usize = all.iter().map(|gathered| gathered.bricks.occupied).sum();
     let coloured = !all[0].colours.is_empty();
-    let fits = all.iter().all(|gathered| gathered.holds(&returns, options));
     let Ok(number) = u16::try_from(number) else { return false };
-    if !fits || cells + view.cloud.len() > options.most_points || coloured != view.cloud.colours.is_some() {
+    if cells + view.cloud.len() > options.most_points || coloured != view.cloud.colours.is_some() {
         return false;
     }
-    take(all, &returns, number, coloured);
+    let looked = Arc::new(Looked::at(view, prepared, pose, planes, options));
+    let holds = |(grid, gathered): (usize, &Gathered)| {
+        let scale = Scale::of(pose, gathered);
+        looked.of_grid(grid).all(|returns| scale.holds(returns))
+    };
+    if !all.iter().enumerate().all(holds) {
+        return false;
+    }
+    let colours = view.cloud.colours.as_deref();
+    let gazes = seen.gazes();
+    let taken = Taken { number, looked, world_from_camera: *pose, colours };
+    add(all, &[taken], |gathered| gathered.settle(&gazes));
     true
 }
 
-/// Sorts the returns of a view into voxels and sheets: some rows are looked through while those before them are added.
-fn take(all: &mut [Gathered], of: &Returns, view: u16, coloured: bool) {
-    /// Rows that are looked through together, and how many of them beside the adding, which takes less long. From: work.
-    const ROWS: usize = 12;
-    const BESIDE: usize = 4;
-    let colours = of.view.cloud.colours.as_deref().filter(|_| coloured);
-    let scales: Vec<Scale> = all.iter().map(|gathered| Scale::of(&of.world_from_camera, gathered)).collect();
-    let look = |rows: Range<usize>, kept: &mut Lists| {
-        of.visit(rows.start.min(of.rows())..rows.end.min(of.rows()), |found| {
-            let number = found.plane.map_or(0, |plane| plane + 1);
-            kept[number].push(scales[number].measured(&found));
-        });
-    };
-    let lists = || -> [Lists; 2] { [(); 2].map(|()| all.iter().map(|_| Vec::new()).collect()) };
-    let (mut kept, mut next) = (lists(), lists());
-    for first in (0..of.rows() + ROWS).step_by(ROWS) {
-        let [early, late] = &mut next;
-        let mut add_and_look = || {
-            for kept in &mut kept {
-                all.iter_mut().zip(kept).for_each(|(gathered, kept)| gathered.add(kept, view, colours));
-            }
-            look(first..first + BESIDE, early);
-        };
-        match first < of.rows() {
-            true => drop(rayon::join(add_and_look, || look(first + BESIDE..first + ROWS, late))),
-            false => add_and_look(),
-        }
-        std::mem::swap(&mut kept, &mut next);
-    }
+/// What is fused of a view, and from where.
+struct Taken<'a> {
+    number: u16,
+    looked: Arc<Looked>,
+    world_from_camera: Isometry3<f64>,
+    colours: Option<&'a [[u8; 3]]>,
 }
 
-/// Returns for each voxel grid or sheet.
-type Lists = Vec<Vec<Measured>>;
+/// Sorts what is fused of some views into voxels and sheets; each is done with what is to be done then while others are filled.
+fn add(all: &mut [Gathered], some: &[Taken], then: impl Fn(&mut Gathered) + Sync) {
+    all.par_iter_mut().enumerate().for_each(|(grid, gathered)| {
+        for Taken { number, looked, world_from_camera, colours } in some {
+            let scale = Scale::of(world_from_camera, gathered);
+            looked.of_grid(grid).for_each(|returns| gathered.add(returns, &scale, *number, *colours));
+        }
+        then(gathered);
+    });
+}
 
 /// Camera to grid.
 struct Scale {
@@ -194,80 +202,80 @@ impl Scale {
         Scale { turn: (axes / grid.voxel_m).cast(), shift: (shift / grid.voxel_m).cast(), axes: axes.cast() }
     }
 
+    /// True if none of some returns lies below the lowest voxel or so far off that it could not be told from another.
+    fn holds(&self, returns: &[Return]) -> bool {
+        let most = (1 << 19) as f32;
+        returns.iter().all(|r| {
+            let at = self.at(r);
+            (at.min() > 1.0) & (at.max() < most)
+        })
+    }
+
+    /// Voxels from the grid's lowest corner.
     #[inline(always)]
-    fn measured(&self, of: &Return) -> Measured {
-        let normal = if of.normal.x.is_finite() { self.axes * of.normal } else { Vector3::zeros() };
-        let at = self.turn * of.at + self.shift;
-        Measured { at, weight: of.weight, normal, pixel: of.pixel as u32, cell: 0 }
+    fn at(&self, of: &Return) -> Vector3<f32> {
+        self.turn * of.at + self.shift
+    }
+
+    /// Zero if unknown.
+    #[inline(always)]
+    fn normal(&self, of: &Return) -> Vector3<f32> {
+        if of.normal.x.is_finite() { self.axes * of.normal } else { Vector3::zeros() }
     }
 }
 
 impl Gathered {
     /// Puts the cells in the order of their bricks.
     fn sort(&mut self) {
-        let former = self.bricks.sort();
+        let Some(former) = self.bricks.sort() else { return };
         if !self.colours.is_empty() {
             self.colours = former.iter().map(|&number| self.colours[number as usize]).collect();
         }
     }
 
-    /// True if no return of a view lies below the lowest voxel or so far off that it could not be told from another.
-    fn holds(&self, returns: &Returns, options: &MergeOptions) -> bool {
-        let most = f64::from(1 << 19) * self.grid.voxel_m;
-        let scale = Scale::of(&returns.world_from_camera, self);
-        let camera = self.axes_from_world * returns.world_from_camera.translation.vector - self.grid.origin_m;
-        if camera.amin() > options.range_m + self.grid.voxel_m && camera.amax() + options.range_m < most {
-            return true;
-        }
-        let in_range =
-            |p: &&Point3<f32>| p.coords.norm_squared() <= (options.range_m * options.range_m) as f32;
-        let inside = |p: &Point3<f32>| {
-            let at = scale.turn * p.coords + scale.shift;
-            at.min() > 1.0 && f64::from(at.max()) * self.grid.voxel_m < most
-        };
-        returns.view.cloud.points.iter().filter(in_range).all(inside)
-    }
-
     /// Nothing yet, over all that is in range of a camera.
-    fn over(of: &[Returns], on: Option<&Plane>, voxel_m: f64, options: &MergeOptions) -> Gathered {
+    fn over(
+        cameras: &[Isometry3<f64>],
+        on: Option<&Plane>,
+        voxel_m: f64,
+        options: &MergeOptions,
+    ) -> Gathered {
         let axes_from_world = on.map_or_else(UnitQuaternion::identity, |(normal, _)| {
             let turn = UnitQuaternion::rotation_between(normal, &Vector3::z());
             turn.unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
         });
-        let places = of
-            .iter()
-            .map(|returns| Point3::from(axes_from_world * returns.world_from_camera.translation.vector));
+        let places = cameras.iter().map(|camera| Point3::from(axes_from_world * camera.translation.vector));
         let around = places.map(|p| (p, p)).reduce(|a, b| (a.0.inf(&b.0), a.1.sup(&b.1)));
         let (low, high) = around.unwrap_or_default();
         let reach = Vector3::repeat(options.range_m + voxel_m);
         let grid = Grid::over(&(low - reach), &(high + reach), voxel_m);
         let flat = on.is_some();
-        let (bricks, before) = (Bricks::new(flat), Before::default());
+        let (bricks, before) = (Bricks::new(flat, Cell::EMPTY), Before::default());
         Gathered { grid, axes_from_world, flat, bricks, colours: Vec::new(), returns: 0, before }
     }
 
-    /// Adds returns, and takes them out of the list. A pass for each thing that is waited for: what comes from far memory is asked for many
-    /// times at once.
-    fn add(&mut self, kept: &mut Vec<Measured>, view: u16, colours: Option<&[[u8; 3]]>) {
+    /// Adds returns. A pass for each thing that is waited for: what comes from far memory is asked for many times at once.
+    fn add(&mut self, returns: &[Return], scale: &Scale, view: u16, colours: Option<&[[u8; 3]]>) {
         /// Returns that are added together. From: work.
         const SOME: usize = 512;
-        for kept in kept.chunks_mut(SOME) {
-            for r in kept.iter_mut() {
-                r.cell = self.bricks.cell(r.at.as_ref(), Cell::EMPTY);
+        let mut places = [(0, Vector3::zeros()); SOME];
+        for returns in returns.chunks(SOME) {
+            for (place, r) in places.iter_mut().zip(returns) {
+                let at = scale.at(r);
+                *place = (self.bricks.cell(at.as_ref()), at);
             }
-            for r in kept.iter() {
-                self.bricks.cells[r.cell as usize].add(r, view);
+            for (&(cell, at), r) in places.iter().zip(returns) {
+                self.bricks.cells[cell as usize].add(at, scale.normal(r), r.weight, view);
             }
             if let Some(colours) = colours {
                 self.colours.resize(self.bricks.cells.len(), Vector3::zeros());
-                for r in kept.iter() {
+                for (&(cell, _), r) in places.iter().zip(returns) {
                     if let Some(colour) = colours.get(r.pixel as usize) {
-                        self.colours[r.cell as usize] += Vector3::from(colour.map(f32::from)) * r.weight;
+                        self.colours[cell as usize] += Vector3::from(colour.map(f32::from)) * r.weight;
                     }
                 }
             }
         }
-        self.returns += kept.len();
-        kept.clear();
+        self.returns += returns.len();
     }
 }

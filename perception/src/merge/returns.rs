@@ -9,6 +9,7 @@ use crate::normals::{OrganisedOptions, organised_where};
 use crate::surface::BAND;
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -36,6 +37,7 @@ const DROPPED: u32 = u32::MAX;
 const THING: u32 = u32::MAX - 1;
 
 /// A return that is fused.
+#[derive(Clone, Copy)]
 pub(super) struct Return {
     /// Camera frame, metres.
     pub at: Vector3<f32>,
@@ -43,15 +45,47 @@ pub(super) struct Return {
     pub normal: Vector3<f32>,
     /// One by the square of its spread, metres.
     pub weight: f32,
-    pub pixel: usize,
-    /// Number of the plane that it lies on.
-    pub plane: Option<usize>,
+    pub pixel: u32,
+}
+
+/// What of a view is fused: of some rows after others, those off the planes, then those on each.
+pub(super) struct Looked(Vec<Vec<Vec<Return>>>);
+
+impl Looked {
+    /// From its corrected pose, with these planes.
+    pub fn at(
+        view: &View,
+        prepared: &Prepared,
+        world_from_camera: &Isometry3<f64>,
+        planes: &[Plane],
+        options: &MergeOptions,
+    ) -> Looked {
+        /// Rows that one thread looks through. From: work.
+        const ROWS: usize = 16;
+        let returns = Returns::of(view, prepared, world_from_camera, planes, options);
+        let rows = returns.view.cloud.len().div_ceil(returns.width);
+        let look = |first: usize| {
+            let mut found = vec![Vec::new(); 1 + planes.len()];
+            returns.visit(first..rows.min(first + ROWS), |grid, of_grid| found[grid].push(of_grid));
+            found
+        };
+        Looked((0..rows).into_par_iter().step_by(ROWS).map(look).collect())
+    }
+
+    /// True if it was told what lies on as many planes.
+    pub fn is_with(&self, planes: &[Plane]) -> bool {
+        self.0.iter().all(|found| found.len() == 1 + planes.len())
+    }
+
+    /// Those off the planes, or those on that plane, counted from one.
+    pub fn of_grid(&self, grid: usize) -> impl Iterator<Item = &[Return]> {
+        self.0.iter().map(move |found| found[grid].as_slice())
+    }
 }
 
 /// The returns of a view from its corrected pose.
-pub(super) struct Returns<'a> {
-    pub view: &'a View,
-    pub world_from_camera: Isometry3<f64>,
+struct Returns<'a> {
+    view: &'a View,
     within: Within,
     organised: bool,
     /// Pixels a row.
@@ -110,7 +144,7 @@ impl<'a> Facing<'a> {
 }
 
 impl<'a> Returns<'a> {
-    pub fn of(
+    fn of(
         view: &'a View,
         prepared: &'a Prepared,
         world_from_camera: &Isometry3<f64>,
@@ -130,7 +164,6 @@ impl<'a> Returns<'a> {
         let things = things(view, &within, &coarse, &on);
         Returns {
             view,
-            world_from_camera: *world_from_camera,
             within,
             organised: view.cloud.grid.is_some(),
             width: view.cloud.grid.map_or(ROW, |g| g.width).max(1),
@@ -147,63 +180,40 @@ impl<'a> Returns<'a> {
         &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
-    /// How many rows there are.
-    pub fn rows(&self) -> usize {
-        self.view.cloud.len().div_ceil(self.width)
-    }
-
-    /// Calls `found` for those of some rows that are in range, band and region and do not fly.
-    pub fn visit(&self, rows: Range<usize>, mut found: impl FnMut(Return)) {
+    /// Calls `found` for those of some rows that are in range, band and region and do not fly, each with one more than the number of the plane
+    /// that it lies on, or zero.
+    fn visit(&self, rows: Range<usize>, mut found: impl FnMut(usize, Return)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
         if let Some(before) = rows.start.checked_sub(1) {
             lines[1].fill(self.line(before));
         }
         lines[2].fill(self.line(rows.start));
-        let mut around = vec![THING; self.width.next_multiple_of(LANES)];
         for row in rows {
             lines.rotate_left(1);
             lines[2].fill(self.line(row + 1));
-            for (on, column) in around.iter_mut().zip(&self.coarse.columns) {
-                *on = self.on.get(self.coarse.rows[row] + column).copied().unwrap_or(THING);
-            }
-            for (some, around) in around.as_chunks().0.iter().enumerate() {
-                let block = self.block(&lines, some * LANES, around);
+            for first in (0..self.width).step_by(LANES) {
+                let Some(block) = self.block(&lines, row, first) else { continue };
                 for (lane, &on) in block.on.iter().enumerate().filter(|(_, on)| **on != DROPPED) {
-                    let column = some * LANES + lane;
+                    let column = first + lane;
                     let thing = on == THING;
-                    found(Return {
+                    let found_one = Return {
                         at: Vector3::from(block.at.map(|axis| axis[lane])),
                         normal: if thing { &self.things } else { &self.coarse }.normal(row, column),
                         weight: block.weight[lane],
-                        pixel: row * self.width + column,
-                        plane: (!thing).then_some(on as usize),
-                    });
+                        pixel: (row * self.width + column) as u32,
+                    };
+                    found(if thing { 0 } else { on as usize + 1 }, found_one);
                 }
             }
         }
     }
 
-    /// What some pixels in the middle one of three rows are; `around` tells which planes there may be.
-    fn block(&self, lines: &[Line; 3], column: usize, around: &[u32; LANES]) -> Block {
+    /// What some pixels in the middle one of three rows, that of the number, are; `None` if none of them is fused.
+    fn block(&self, lines: &[Line; 3], row: usize, column: usize) -> Option<Block> {
         let [x, y, z] = [0, 1, 2].map(|axis| some(&lines[1].0[axis], column + 1));
-        let [left, right] = [0, 2].map(|aside| some(&lines[1].0[2], column + aside));
-        let [above, below] = [0, 2].map(|line: usize| some(&lines[line].0[2], column + 1));
         let mut block = Block { at: [*x, *y, *z], weight: [0.0; LANES], on: [DROPPED; LANES] };
-        let mut flies = [false; LANES];
         for i in 0..LANES {
-            // In the air: before one neighbour and behind the opposite one.
-            let step = FLYING_SHARE * z[i];
-            let (near, far) = (z[i] - step, z[i] + step);
-            let across = ((left[i] > far) & (right[i] < near)) | ((left[i] < near) & (right[i] > far));
-            let down = ((above[i] > far) & (below[i] < near)) | ((above[i] < near) & (below[i] > far));
-            flies[i] = (across | down) & self.organised;
-        }
-        let mut sigmas_m = [0.0; LANES];
-        for i in 0..LANES {
-            let kept = self.within.holds([x[i], y[i], z[i]]) & !flies[i];
-            block.on[i] = if kept { THING } else { DROPPED };
-            sigmas_m[i] = sigma_m(z[i], x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
-            block.weight[i] = 1.0 / (sigmas_m[i] * sigmas_m[i]);
+            block.on[i] = if self.within.holds([x[i], y[i], z[i]]) { THING } else { DROPPED };
         }
         for (inward, least_m) in &self.within.edges {
             for i in 0..LANES {
@@ -211,6 +221,26 @@ impl<'a> Returns<'a> {
                 block.on[i] = if inside { block.on[i] } else { DROPPED };
             }
         }
+        if block.on == [DROPPED; LANES] {
+            return None;
+        }
+        let [left, right] = [0, 2].map(|aside| some(&lines[1].0[2], column + aside));
+        let [above, below] = [0, 2].map(|line: usize| some(&lines[line].0[2], column + 1));
+        for i in 0..LANES {
+            // In the air: before one neighbour and behind the opposite one.
+            let step = FLYING_SHARE * z[i];
+            let (near, far) = (z[i] - step, z[i] + step);
+            let across = ((left[i] > far) & (right[i] < near)) | ((left[i] < near) & (right[i] > far));
+            let down = ((above[i] > far) & (below[i] < near)) | ((above[i] < near) & (below[i] > far));
+            let flies = (across | down) & self.organised;
+            block.on[i] = if flies { DROPPED } else { block.on[i] };
+        }
+        let mut sigmas_m = [0.0; LANES];
+        for i in 0..LANES {
+            sigmas_m[i] = sigma_m(z[i], x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+            block.weight[i] = 1.0 / (sigmas_m[i] * sigmas_m[i]);
+        }
+        let around = self.around(row, column);
         for (number, plane) in (0..).zip(&self.planes).filter(|(number, _)| around.contains(number)) {
             for i in 0..LANES {
                 let holds = plane.holds([x[i], y[i], z[i]], sigmas_m[i]);
@@ -218,7 +248,16 @@ impl<'a> Returns<'a> {
                 block.on[i] = if counts { number } else { block.on[i] };
             }
         }
-        block
+        Some(block)
+    }
+
+    /// Which planes some pixels may lie on.
+    fn around(&self, row: usize, column: usize) -> [u32; LANES] {
+        let mut around = [THING; LANES];
+        for (on, column) in around.iter_mut().zip(&self.coarse.columns[column..]) {
+            *on = self.on.get(self.coarse.rows[row] + column).copied().unwrap_or(THING);
+        }
+        around
     }
 }
 

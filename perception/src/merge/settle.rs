@@ -8,7 +8,7 @@ use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
 use crate::cloud::{Cloud, is_finite};
-use crate::visibility::{Gaze, Visibility};
+use crate::visibility::Gaze;
 use bytemuck::Zeroable;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -51,12 +51,6 @@ pub(super) struct Before {
     gazes: usize,
 }
 
-/// Settles what was gathered. What is settled is kept for a further look.
-pub(super) fn settle(all: &mut [Gathered], seen: &Visibility) {
-    let gazes = seen.gazes();
-    all.iter_mut().for_each(|gathered| gathered.settle(&gazes));
-}
-
 /// One cloud of what was settled.
 pub(super) fn fused(all: &[Gathered]) -> Fused {
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
@@ -95,8 +89,8 @@ fn of_all<T: Zeroable + Send>(rows: &[&[Settled]], of: impl Fn(&Settled) -> T + 
 }
 
 impl Gathered {
-    /// Settles the cells: what was touched since the last time anew.
-    fn settle(&mut self, gazes: &[Gaze]) {
+    /// Settles the cells: what was touched since the last time anew. What is settled is kept for a further look.
+    pub(super) fn settle(&mut self, gazes: &[Gaze]) {
         let Before { means, mut rows, gazes: known } = std::mem::take(&mut self.before);
         let is_first = rows.is_empty();
         let means = self.means(means);

@@ -385,24 +385,19 @@ fn align_objects(
         .collect();
     let mut retried = vec![false; prepared.len()];
     let loose = as_stated(prepared);
-    if let Some(up) = up {
-        place_objects(prepared, used, parts, &up, &levelled, poses);
+    let objects = up.map(|up| Objects { prepared, parts, maps, up });
+    if let Some(objects) = &objects {
+        objects.place_all(used, &levelled, poses);
     }
     let mut found = joint::align(prepared, used, &loose, parts, poses, &SECOND);
     while let Some((worst, why)) = check::misfit(prepared, used, parts, poses, maps, &found) {
-        if let Some(up) = up.filter(|_| !retried[worst]) {
+        if let Some(objects) = objects.as_ref().filter(|_| !retried[worst]) {
             // The others have settled since: a better model to be placed on than a single view was.
             retried[worst] = true;
-            let others = (0..prepared.len()).filter(|&i| used[i] && i != worst);
-            let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
+            let others: Vec<usize> = (0..prepared.len()).filter(|&i| used[i] && i != worst).collect();
             poses[worst] = levelled[worst];
-            place_on(
-                (&prepared[worst], &parts[worst], 1.0),
-                &up,
-                &placed,
-                &levelled[worst],
-                &mut poses[worst],
-            );
+            let placed = objects.of_all(&others, poses);
+            objects.place_on((worst, 1.0), (&others, &placed), &levelled[worst], poses);
             found = joint::align(prepared, used, &loose, parts, poses, &SECOND);
             continue;
         }
@@ -440,55 +435,72 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-/// Puts the objects of one view after another onto those already placed, nearest camera first.
-fn place_objects(
-    prepared: &[Prepared],
-    used: &[bool],
-    parts: &[Vec<Part>],
-    up: &Unit<Vector3<f64>>,
-    levelled: &[Isometry3<f64>],
-    poses: &mut [Isometry3<f64>],
-) {
-    let mut left: Vec<usize> = (0..prepared.len()).filter(|&i| used[i]).collect();
-    let count = |i: usize| parts[i].iter().filter(|p| **p == Part::Standing).count();
-    let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
-    left.retain(|&i| i != first);
-    poses[first] = levelled[first];
-    let mut placed = objects(&prepared[first], &parts[first], &poses[first]);
-    let mut done = vec![first];
-    while !left.is_empty() {
-        let apart = |i: usize| {
-            let turns = done.iter().map(|&d| poses[i].rotation.angle_to(&poses[d].rotation));
-            turns.min_by(f64::total_cmp).unwrap_or(0.0)
-        };
-        let Some(next) = left.iter().copied().min_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)))
-        else {
-            return;
-        };
-        left.retain(|&i| i != next);
-        place_on((&prepared[next], &parts[next], 1.0), up, &placed, &levelled[next], &mut poses[next]);
-        placed.extend(objects(&prepared[next], &parts[next], &poses[next]));
-        done.push(next);
-    }
+/// What stands on the surface in some views, and how the cameras looked past it.
+struct Objects<'a> {
+    prepared: &'a [Prepared],
+    parts: &'a [Vec<Part>],
+    maps: &'a [Option<DepthMap>],
+    up: Unit<Vector3<f64>>,
 }
 
-/// Puts the objects of one view, so loose, onto placed ones: by search from its levelled pose, unless the pose it has fits them better already.
-fn place_on(
-    (view, parts, loose): (&Prepared, &[Part], f64),
-    up: &Unit<Vector3<f64>>,
-    placed: &[Oriented],
-    levelled: &Isometry3<f64>,
-    pose: &mut Isometry3<f64>,
-) {
-    /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
-    const STAYS: f64 = 0.05;
-    let from = |pose: &Isometry3<f64>| objects(view, parts, pose);
-    let own = from(levelled);
-    let window = window(view, loose, &own, levelled);
-    let Some(found) = search::place(&own, placed, up, window) else { return };
-    let stays = search::fits(&from(pose), placed, up) > found.share + STAYS;
-    if !stays {
-        *pose = found.correction * levelled;
+impl Objects<'_> {
+    /// Puts the objects of one view after another onto those already placed, nearest camera first.
+    fn place_all(&self, used: &[bool], levelled: &[Isometry3<f64>], poses: &mut [Isometry3<f64>]) {
+        let mut left: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
+        let count = |i: usize| self.parts[i].iter().filter(|p| **p == Part::Standing).count();
+        let Some(first) = left.iter().copied().max_by_key(|&i| (count(i), usize::MAX - i)) else { return };
+        left.retain(|&i| i != first);
+        poses[first] = levelled[first];
+        let mut done = vec![first];
+        let mut placed = self.of_all(&done, poses);
+        while !left.is_empty() {
+            let apart = |i: usize| {
+                let turns = done.iter().map(|&d| poses[i].rotation.angle_to(&poses[d].rotation));
+                turns.min_by(f64::total_cmp).unwrap_or(0.0)
+            };
+            let nearest = left.iter().copied().min_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)));
+            let Some(next) = nearest else { return };
+            left.retain(|&i| i != next);
+            self.place_on((next, 1.0), (&done, &placed), &levelled[next], poses);
+            placed.extend(self.of_all(&[next], poses));
+            done.push(next);
+        }
+    }
+
+    /// Points and normals of some views, in the world.
+    fn of_all(&self, views: &[usize], poses: &[Isometry3<f64>]) -> Vec<Oriented> {
+        views.iter().flat_map(|&i| objects(&self.prepared[i], &self.parts[i], &poses[i])).collect()
+    }
+
+    /// Puts the objects of a view, so loose, onto those of others: by search from its levelled pose, unless the pose it has fits them better
+    /// already. Views from opposite sides share little: then that pose counts in which they contradict each other least.
+    fn place_on(
+        &self,
+        (view, loose): (usize, f64),
+        (others, placed): (&[usize], &[Oriented]),
+        levelled: &Isometry3<f64>,
+        poses: &mut [Isometry3<f64>],
+    ) {
+        /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
+        const STAYS: f64 = 0.05;
+        let Objects { prepared, parts, maps, up } = self;
+        let from = |pose: &Isometry3<f64>| objects(&prepared[view], &parts[view], pose);
+        let own = from(levelled);
+        let window = window(&prepared[view], loose, &own, levelled);
+        let Some(found) = search::place(&own, placed, up, window) else { return };
+        let before = poses[view];
+        let all: Vec<usize> = others.iter().copied().chain([view]).collect();
+        let contradicted =
+            |poses: &[Isometry3<f64>]| check::contradicted(view, &all, prepared, parts, poses, maps);
+        let contradicted_before = (!found.is_enough).then(|| contradicted(poses));
+        poses[view] = found.correction * levelled;
+        let stays = match contradicted_before {
+            Some(before) => contradicted(poses) >= before,
+            None => search::fits(&from(&before), placed, up) > found.share + STAYS,
+        };
+        if stays {
+            poses[view] = before;
+        }
     }
 }
 

@@ -14,9 +14,8 @@ use super::parts::{Part, level_again};
 use super::prepare::Prepared;
 use super::returns::Looked;
 use super::{
-    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Ready, SECOND, Step, ViewFit, WIDE,
-    as_stated, check, filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, place_on,
-    visibility,
+    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Objects, Ready, SECOND, Step, ViewFit, WIDE,
+    as_stated, check, filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, visibility,
 };
 use crate::cloud::Cloud;
 use crate::pool;
@@ -285,9 +284,10 @@ impl Aligned {
         parts.push(self.parts.of_view(view, &poses[last]));
         if let Some(up) = self.parts.up {
             let levelled = only_levelled(view, &poses[last], &up);
-            let others = (0..last).filter(|&i| used[i]);
-            let placed: Vec<_> = others.flat_map(|i| objects(&prepared[i], &parts[i], &poses[i])).collect();
-            place_on((view, &parts[last], looser), &up, &placed, &levelled, &mut poses[last]);
+            let others: Vec<usize> = (0..last).filter(|&i| used[i]).collect();
+            let objects = Objects { prepared, parts: &parts, maps, up };
+            let placed = objects.of_all(&others, &poses);
+            objects.place_on((last, looser), (&others, &placed), &levelled, &mut poses);
         }
         let all: Vec<bool> = self.used.iter().copied().chain([true]).collect();
         let (found, fits);

@@ -18,7 +18,7 @@ const TRIED: usize = 220;
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres. From: chosen.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
-/// Smallest share of points that must fall on the others' surfaces. From: chosen.
+/// Smallest share of points that falls on the others' surfaces, with which nobody else need be asked. From: chosen.
 const LEAST_SHARE: f64 = 0.25;
 
 /// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points. From: chosen.
@@ -138,6 +138,8 @@ pub(super) struct Placed {
     pub correction: Isometry3<f64>,
     /// Share of its points that fall on the others' surfaces then.
     pub share: f64,
+    /// False if that are too few to go by.
+    pub is_enough: bool,
 }
 
 /// Share of the view's points that fall on the placed surfaces as they are.
@@ -180,7 +182,7 @@ fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> O
 }
 
 /// The correction (world from world) that puts `view` (points and normals off the planes, world frame) best onto `placed`.
-/// `None` if there is too little to go by or nothing falls together.
+/// `None` if there is too little of either.
 pub(super) fn place(
     view: &[Oriented],
     placed: &[Oriented],
@@ -226,14 +228,12 @@ pub(super) fn place(
         best = distinct(&found, 2.0 * side_m);
     }
     let Candidate { x, y, turn: angle, score } = best[0];
-    if score < LEAST_SHARE {
-        return None;
-    }
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let about = Translation3::from(middle) * turn * Translation3::from(-middle);
     let correction = Translation3::new(x, y, 0.0) * about;
     let costs = PRIOR * (x.hypot(y) / window.shift_m).powi(2) + PRIOR * (angle / window.turn_rad).powi(2);
-    Some(Placed { correction: level.inverse() * correction * level, share: score + costs })
+    let correction = level.inverse() * correction * level;
+    Some(Placed { correction, share: score + costs, is_enough: score >= LEAST_SHARE })
 }
 
 #[derive(Clone, Copy, Debug)]

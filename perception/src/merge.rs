@@ -26,7 +26,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use parts::{Part, Parts, Plane};
 use prepare::Prepared;
 use rayon::prelude::*;
-use search::Oriented;
+use search::{Oriented, PERHAPS_SHARE, SURE_SHARE};
 use serde::{Deserialize, Serialize};
 
 /// How to merge.
@@ -385,7 +385,7 @@ fn align_objects(
         .collect();
     let mut retried = vec![false; prepared.len()];
     let loose = as_stated(prepared);
-    let objects = up.map(|up| Objects { prepared, parts, maps, up });
+    let objects = up.map(|up| Objects { prepared, parts, up });
     if let Some(objects) = &objects {
         objects.place_all(used, &levelled, poses);
     }
@@ -397,7 +397,7 @@ fn align_objects(
             let others: Vec<usize> = (0..prepared.len()).filter(|&i| used[i] && i != worst).collect();
             poses[worst] = levelled[worst];
             let placed = objects.of_all(&others, poses);
-            objects.place_on((worst, 1.0), (&others, &placed), &levelled[worst], poses);
+            objects.place_on((worst, 1.0, PERHAPS_SHARE), &placed, &levelled[worst], &mut poses[worst]);
             found = joint::align(prepared, used, &loose, parts, poses, &SECOND);
             continue;
         }
@@ -435,11 +435,10 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-/// What stands on the surface in some views, and how the cameras looked past it.
+/// What stands on the surface in some views.
 struct Objects<'a> {
     prepared: &'a [Prepared],
     parts: &'a [Vec<Part>],
-    maps: &'a [Option<DepthMap>],
     up: Unit<Vector3<f64>>,
 }
 
@@ -461,7 +460,7 @@ impl Objects<'_> {
             let nearest = left.iter().copied().min_by(|&a, &b| apart(a).total_cmp(&apart(b)).then(a.cmp(&b)));
             let Some(next) = nearest else { return };
             left.retain(|&i| i != next);
-            self.place_on((next, 1.0), (&done, &placed), &levelled[next], poses);
+            self.place_on((next, 1.0, SURE_SHARE), &placed, &levelled[next], &mut poses[next]);
             placed.extend(self.of_all(&[next], poses));
             done.push(next);
         }
@@ -472,34 +471,24 @@ impl Objects<'_> {
         views.iter().flat_map(|&i| objects(&self.prepared[i], &self.parts[i], &poses[i])).collect()
     }
 
-    /// Puts the objects of a view, so loose, onto those of others: by search from its levelled pose, unless the pose it has fits them better
-    /// already. Views from opposite sides share little: then that pose counts in which they contradict each other least.
+    /// Puts the objects of a view, so loose, onto placed ones: by search from its levelled pose, unless the pose it has fits them better already
+    /// or less than the least share of it would fall onto them.
     fn place_on(
         &self,
-        (view, loose): (usize, f64),
-        (others, placed): (&[usize], &[Oriented]),
+        (view, loose, least_share): (usize, f64, f64),
+        placed: &[Oriented],
         levelled: &Isometry3<f64>,
-        poses: &mut [Isometry3<f64>],
+        pose: &mut Isometry3<f64>,
     ) {
         /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
         const STAYS: f64 = 0.05;
-        let Objects { prepared, parts, maps, up } = self;
-        let from = |pose: &Isometry3<f64>| objects(&prepared[view], &parts[view], pose);
-        let own = from(levelled);
-        let window = window(&prepared[view], loose, &own, levelled);
-        let Some(found) = search::place(&own, placed, up, window) else { return };
-        let before = poses[view];
-        let all: Vec<usize> = others.iter().copied().chain([view]).collect();
-        let contradicted =
-            |poses: &[Isometry3<f64>]| check::contradicted(view, &all, prepared, parts, poses, maps);
-        let contradicted_before = (!found.is_enough).then(|| contradicted(poses));
-        poses[view] = found.correction * levelled;
-        let stays = match contradicted_before {
-            Some(before) => contradicted(poses) >= before,
-            None => search::fits(&from(&before), placed, up) > found.share + STAYS,
-        };
-        if stays {
-            poses[view] = before;
+        let (up, view, parts) = (&self.up, &self.prepared[view], &self.parts[view]);
+        let own = objects(view, parts, levelled);
+        let window = window(view, loose, &own, levelled);
+        let Some(found) = search::place(&own, placed, up, window, least_share) else { return };
+        let stays = search::fits(&objects(view, parts, pose), placed, up) > found.share + STAYS;
+        if !stays {
+            *pose = found.correction * levelled;
         }
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn belongs(
 
 /// Share of what a view shows, and of what others show, that contradicts the other: the mean over the others. With one other view there
 /// is nobody to ask who is wrong: the mean over those that can judge blames who disagrees with most.
-pub(super) fn contradicted(
+fn contradicted(
     i: usize,
     active: &[usize],
     views: &[Prepared],

@@ -18,8 +18,11 @@ const TRIED: usize = 220;
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres. From: chosen.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
-/// Smallest share of points that falls on the others' surfaces, with which nobody else need be asked. From: chosen.
-const LEAST_SHARE: f64 = 0.25;
+/// Smallest share of points that must fall on the others' surfaces. From: chosen.
+pub(super) const SURE_SHARE: f64 = 0.25;
+/// The same of a view that does not belong where it is without that: views from opposite sides share little.
+/// From: chosen, so that of pairs of views with twice the assumed noise none of 300 is left out, in place of 15 of 100.
+pub(super) const PERHAPS_SHARE: f64 = 0.0;
 
 /// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points. From: chosen.
 const PRIOR: f64 = 0.15;
@@ -138,8 +141,6 @@ pub(super) struct Placed {
     pub correction: Isometry3<f64>,
     /// Share of its points that fall on the others' surfaces then.
     pub share: f64,
-    /// False if that are too few to go by.
-    pub is_enough: bool,
 }
 
 /// Share of the view's points that fall on the placed surfaces as they are.
@@ -182,12 +183,13 @@ fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> O
 }
 
 /// The correction (world from world) that puts `view` (points and normals off the planes, world frame) best onto `placed`.
-/// `None` if there is too little of either.
+/// `None` if there is too little to go by, or less than the least share of it falls together.
 pub(super) fn place(
     view: &[Oriented],
     placed: &[Oriented],
     up: &Unit<Vector3<f64>>,
     window: Window,
+    least_share: f64,
 ) -> Option<Placed> {
     /// Steps of the turn, coarse and fine, radians. From: chosen.
     const TURN_STEPS_RAD: [f64; 2] = [0.03, 0.009];
@@ -228,12 +230,15 @@ pub(super) fn place(
         best = distinct(&found, 2.0 * side_m);
     }
     let Candidate { x, y, turn: angle, score } = best[0];
+    if score < least_share {
+        return None;
+    }
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let about = Translation3::from(middle) * turn * Translation3::from(-middle);
     let correction = Translation3::new(x, y, 0.0) * about;
     let costs = PRIOR * (x.hypot(y) / window.shift_m).powi(2) + PRIOR * (angle / window.turn_rad).powi(2);
     let correction = level.inverse() * correction * level;
-    Some(Placed { correction, share: score + costs, is_enough: score >= LEAST_SHARE })
+    Some(Placed { correction, share: score + costs })
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -21,7 +21,7 @@ const CELLS_M: [f64; 2] = [0.03, 0.012];
 /// Smallest share of points that must fall on the others' surfaces. From: chosen.
 pub(super) const SURE_SHARE: f64 = 0.25;
 /// The same of a view that does not belong where it is without that: views from opposite sides share little.
-/// From: chosen, so that of pairs of views with twice the assumed noise none of 300 is left out, in place of 15 of 100.
+/// From: chosen, so that of 40 pairs of views from opposite sides none is left out, in place of 16.
 pub(super) const PERHAPS_SHARE: f64 = 0.0;
 
 /// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points. From: chosen.

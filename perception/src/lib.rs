@@ -50,6 +50,7 @@ mod pool;
 pub mod recognise;
 pub mod register;
 mod round;
+mod scale;
 pub mod segment;
 mod spread;
 pub mod surface;

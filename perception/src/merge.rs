@@ -16,6 +16,7 @@ mod settle;
 
 use crate::cloud::Cloud;
 use crate::pool;
+use crate::scale::SPREADS;
 use crate::surface::Region;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
@@ -501,8 +502,6 @@ fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Orient
 
 /// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
 fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
-    /// Spreads of localisation. From: chosen.
-    const SPREADS: f64 = 3.0;
     /// Least and greatest turn, radians, and shift, metres; the greatest shift with what a turn adds. From: chosen, 6° to 8°.
     const TURNS_RAD: (f64, f64) = (0.105, 0.14);
     const SHIFTS_M: (f64, f64) = (0.10, 0.14);

@@ -3,6 +3,7 @@
 mod side;
 
 use crate::draw::Draws;
+use crate::scale::{EDGE_M, PLACE_M};
 use crate::surface::range_sigma_m;
 use nalgebra::{Point3, Vector4};
 use side::{Side, Sums};
@@ -18,14 +19,10 @@ const JUDGES: usize = 160;
 const SCOUTS: usize = 800;
 /// Fewest points of a side that a fit begins with, and fewest near the side that it goes on with. From: chosen.
 const FEWEST: (usize, usize) = (20, 12);
-/// A fit may end so many times as wide as the widest circle that is proposed. From: chosen.
-const WIDER: f64 = 1.2;
 /// Gates of the first steps of a fit, in tolerances. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];
 /// Directions around an axis that are looked at one by one. From: chosen.
 pub(crate) const SECTORS: usize = 36;
-/// So near to the side, or inside, a point is taken for one of it, metres. From: chosen.
-pub(crate) const ON_SIDE_M: f64 = 0.008;
 /// The side is not looked for in these shares of the height, at the foot and below the top. From: chosen.
 pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
 /// Spreads of radius, metres, and slope of things that stand on tables, and the steepest slope that a fit takes. From: chosen.
@@ -34,8 +31,6 @@ pub(crate) const SLOPE_SPREAD: f64 = 0.1;
 pub(crate) const STEEPEST: f64 = 0.6;
 /// Seed of the circles proposed where a segment is measured. From: mark.
 pub(crate) const SEED: u64 = 7;
-/// No point of a body is taken to be measured worse than this, metres. From: chosen.
-const WORST_SIGMA_M: f64 = 0.012;
 
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,9 +84,7 @@ const OUTSIDE_M: f64 = 0.02;
 impl Round {
     /// Radius at a height above the surface, metres.
     pub fn radius_at(&self, z: f64) -> f64 {
-        /// However steep the side: a tip, metres. From: chosen.
-        const LEAST_M: f64 = 0.003;
-        (self.radius_m + self.slope * (z - self.middle_m)).max(LEAST_M)
+        (self.radius_m + self.slope * (z - self.middle_m)).max(EDGE_M)
     }
 
     /// Distance of a point from the side, positive outside, metres.
@@ -161,7 +154,7 @@ pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64,
         round = improve(&round, &few, &[], gate * tolerance, sigma_m)?;
     }
     let round = improve(&round, &side, &[], LAST_GATE * tolerance, sigma_m)?;
-    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * WIDER).then_some(round)
+    (round.radius_m > RADII_M.0).then_some(round)
 }
 
 /// The fit again with what silhouettes say, which depth alone measures badly: how wide the body is.
@@ -181,7 +174,7 @@ pub(crate) fn refit(
         round = improve(&round, &few, edges, LAST_GATE * tolerance, sigma_m)?;
     }
     let round = improve(&round, &side, edges, LAST_GATE * tolerance, sigma_m)?;
-    (round.radius_m > RADII_M.0 && round.radius_m < RADII_M.1 * WIDER).then_some(round)
+    (round.radius_m > RADII_M.0).then_some(round)
 }
 
 impl Round {
@@ -193,13 +186,11 @@ impl Round {
         (base_m, top_m): (f64, f64),
         [to_x, to_y]: [f64; 2],
     ) -> Option<Round> {
-        /// Beside this share of the radius the side falls away too steeply to be placed. From: chosen.
-        const STEEP: f64 = 0.9;
         let band = side_band(base_m, top_m);
         let side = points.iter().filter(|p| band.contains(&p.z)).filter_map(|p| {
             let (x, y, r) = (p.x - self.x, p.y - self.y, self.radius_at(p.z));
             let (along, across) = (x * to_x + y * to_y, x * to_y - y * to_x);
-            (across.abs() < STEEP * r).then(|| along - (r * r - across * across).sqrt())
+            (across.abs() < r).then(|| along - (r * r - across * across).sqrt())
         });
         let mut shifts: Vec<f64> = side.collect();
         let half = shifts.len() / 2;
@@ -229,14 +220,12 @@ impl Round {
 
 /// Spread of a measurement of a body so far from the camera, metres.
 pub(crate) fn sigma_m(distance_m: f64) -> f64 {
-    range_sigma_m(distance_m).min(WORST_SIGMA_M)
+    range_sigma_m(distance_m)
 }
 
 /// How far from the side a point of it may be measured, metres.
 fn tolerance(sigma_m: f64) -> f64 {
-    /// However good the camera, metres. From: chosen.
-    const LEAST_M: f64 = 0.004;
-    (2.0 * sigma_m).clamp(LEAST_M, ON_SIDE_M)
+    (2.0 * sigma_m).clamp(EDGE_M, PLACE_M)
 }
 
 /// Heights between base and top at which what is seen can be the side.
@@ -277,15 +266,11 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
 fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
-    /// What one point weighs at the most. From: chosen.
-    const MOST_EACH: f64 = 0.125;
-    /// An edge that is missed by this has half of its say, metres. From: chosen.
-    const EDGE_FAR_M: f64 = 0.008;
     let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
     if count < FEWEST.1 as f64 {
         return None;
     }
-    let weight = (MOST_INDEPENDENT / count).min(MOST_EACH) / sigma_m.powi(2);
+    let weight = (MOST_INDEPENDENT / count).min(1.0) / sigma_m.powi(2);
     let (mut normal, mut right) = (normal * weight, right * weight);
     for edge in edges {
         let [a, b] = edge.direction;
@@ -293,7 +278,7 @@ fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) 
         let missing = edge.reach_m - (a * round.x + b * round.y + round.radius_m + round.slope * rise);
         let row = Vector4::new(a, b, 1.0, rise);
         // An edge far off is another thing's edge: its pull stays bounded.
-        let w = 1.0 / (EDGE_SIGMA_M.powi(2) * (1.0 + (missing / EDGE_FAR_M).powi(2)));
+        let w = 1.0 / (EDGE_SIGMA_M.powi(2) * (1.0 + (missing / PLACE_M).powi(2)));
         normal += row * row.transpose() * w;
         right += row * (missing * w);
     }

@@ -6,6 +6,7 @@
 use super::parts::Part;
 use super::prepare::{Prepared, Surfel};
 use crate::register::{Partner, Sums};
+use crate::scale::SHAPE_M;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector3,
     Vector6,
@@ -45,8 +46,8 @@ struct Link {
     squares: f64,
 }
 
-/// Spread that all partners have at least: they are seldom the same place, metres. From: chosen.
-const LEAST_SIGMA_M: f32 = 0.002;
+/// Spread that all partners have at least: they are seldom the same place, metres. From: derived, as far as forms differ.
+const LEAST_SIGMA_M: f32 = SHAPE_M as f32;
 /// So many views, the nearest, hold one where it belongs. From: chosen.
 pub(super) const PARTNERS: usize = 5;
 /// Smallest cosine between the normals of partners. From: chosen, about 41°.

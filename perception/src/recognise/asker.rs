@@ -1,6 +1,7 @@
 //! What the cameras know of places around one body, each camera as it lies there.
 
 use crate::round::Round;
+use crate::scale::APART_M;
 use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen, Visibility};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
@@ -12,8 +13,6 @@ const WITNESSES: usize = 160;
 /// A camera that looks through this share of what others see of a body, of what it has in view, is placed wrongly there.
 /// From: chosen.
 const ASTRAY: f64 = 0.5;
-/// How near to a point of a body what a camera measured still counts as the body: places that lie beside each other, metres. From: chosen.
-const BESIDE_M: f64 = 0.02;
 
 /// How far from where a camera measured a place may be and still be what it saw, if only whether it has a body in view is asked, metres.
 /// From: chosen.
@@ -141,7 +140,7 @@ fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<
     let step = points.len().div_ceil(WITNESSES).max(1);
     let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).copied().collect();
     let through = |view: &Lying<'_>| {
-        let looks = witnesses.iter().map(|p| view.look(p, BESIDE_M));
+        let looks = witnesses.iter().map(|p| view.look(p, APART_M));
         let (free, here) = looks.fold((0, 0), |(free, here), seen| match seen {
             Seen::Free => (free + 1, here),
             Seen::Surface => (free, here + 1),

@@ -15,6 +15,7 @@ use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
 use crate::pool;
+use crate::scale::APART_M;
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -327,8 +328,7 @@ impl Descry {
     }
 }
 
-/// Standard deviation of where a thing stands that no circle fits, metres, and what it is for others at the least. From: chosen.
-pub(super) const UNPLACED_SIGMA_M: f64 = 0.02;
+/// Standard deviation of where a thing stands is no less, metres. From: chosen.
 const LEAST_PLACE_SIGMA_M: f64 = 0.001;
 /// Log of the chance that a thing of a family, as measured, is of none of the known kinds.
 fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
@@ -365,7 +365,7 @@ fn percept(
     let round_fits =
         stands.filter(|_| form_log(Some(Shape::Round), &measured) > form_log(Some(Shape::Box), &measured));
     let (x, y) = round_fits.map_or((measured.footprint.x, measured.footprint.y), |r| (r.x, r.y));
-    let sigma = round_fits.map_or(UNPLACED_SIGMA_M, |r| r.place_sigma_m.max(LEAST_PLACE_SIGMA_M));
+    let sigma = round_fits.map_or(APART_M, |r| r.place_sigma_m.max(LEAST_PLACE_SIGMA_M));
     Percept {
         label: named.map(|i| models[i].name.clone()),
         kind: named.map(|i| models[i].kind.clone()),

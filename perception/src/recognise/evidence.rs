@@ -10,7 +10,8 @@ use super::upper::Upper;
 use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
 use crate::round::{self, ENDS, Edge, Round, SECTORS};
-use crate::segment::{Scene, Segment, end, quantile, top_m};
+use crate::scale::{APART_M, EDGE_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M, SPREADS};
+use crate::segment::{Scene, Segment, VOXEL_ENDS, end, quantile, top_m};
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
@@ -22,23 +23,11 @@ const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// foot of a far side is often hidden by the near one. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
-/// Least and greatest reach of a handle out of the body, metres. From: chosen.
-pub(super) const HANDLE_M: (f64, f64) = (0.014, 0.06);
-/// A handle reaches out by at least so many spreads of the body's side. From: chosen.
-const HANDLE_SPREADS: f64 = 4.0;
-/// A circle whose radius is known no better than this is no circle to go by, metres. From: chosen.
-pub(super) const VAGUE_M: f64 = 0.015;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
 /// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
 pub(super) const MOST: f64 = 0.34;
-/// What is this far out of the body is no longer the body itself, metres. From: chosen.
-pub(super) const CLEAR_M: f64 = 0.007;
-/// So many spreads of a measurement are more than noise. From: chosen.
-const CLEAR_SPREADS: f64 = 3.0;
 /// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
 pub(super) const UNSEEN: f64 = 0.08;
-/// Greatest width of a handle across, metres. From: chosen.
-const HANDLE_WIDTH_M: f64 = 0.035;
 /// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
 const ROOT: f64 = 0.35;
 /// An inside is said to be seen, or not to be there, where it is so much likelier, log. From: chosen.
@@ -46,32 +35,15 @@ const SAID: f64 = 1.5;
 /// A handle has one in so many points of the body, far off and near, but at least and at most so many. From: chosen.
 pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
 pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
-/// It is higher than this, metres, and begins above this share of the height. From: chosen.
+/// It is higher than this, metres. From: chosen.
 const HANDLE_HIGH_M: f64 = 0.012;
-const HANDLE_FOOT: f64 = 0.05;
-/// What is left of the error of a height however good the camera, metres.
-/// From: chosen, after spreads of heights in simulated scenes, a third to a fifth of what was stated before.
-const HEIGHT_M: f64 = 0.002;
-/// The side ends this far, and three spreads of a measurement, below the top, metres. From: chosen.
-const BELOW_M: f64 = 0.004;
-/// How far the top of a sliver may be from that of the object, metres. From: chosen.
-const SLIVER_M: f64 = 0.01;
 
-/// Measured worse than this, depth does not tell where the middle of a cup is: it spreads points along the view as far as the side is
-/// deep; and a few of them that stick out together are no handle, metres. From: chosen.
-const FAR_M: f64 = 0.006;
-
-/// Pixels so far beside and above a thing may tell of it, metres. From: chosen.
+/// So far beside and above a thing pixels may tell of it, and beyond its edge free space is asked for, metres. From: chosen.
 const BESIDE_M: f64 = 0.012;
-const ABOVE_M: f64 = 0.012;
 /// Nothing is lower, metres. From: rounding.
 const LEAST_HEIGHT_M: f64 = 0.001;
-/// How far from what a camera measured a place may be and still be what it saw: three spreads, but between these, metres. From: chosen.
-const TOLERANCES_M: (f64, f64) = (0.006, 0.015);
 /// The rim takes at least and at most these shares of the height. From: chosen.
 const RIMS: (f64, f64) = (0.1, 0.45);
-/// No surface is taken to be rougher where the height above it is measured, metres. From: chosen.
-const ROUGHEST_M: f64 = 0.008;
 /// Points of a side that share their error, and how many groups of them count at the most. From: chosen.
 const SHARING: f64 = 12.0;
 const MOST_GROUPS: f64 = 60.0;
@@ -179,7 +151,7 @@ pub(super) fn rays_around(
         y,
         reach_m: half_m + BESIDE_M,
         base_m: segment.base_m,
-        top_m: segment.base_m + m.height_m + ABOVE_M,
+        top_m: segment.base_m + m.height_m + BESIDE_M,
     };
     let others = scene
         .segments
@@ -191,7 +163,7 @@ pub(super) fn rays_around(
 
 /// How far from what a camera measured a place may be and still be what it saw, metres.
 pub(super) fn tolerance_m(sigma_m: f64) -> f64 {
-    (CLEAR_SPREADS * sigma_m).clamp(TOLERANCES_M.0, TOLERANCES_M.1)
+    (SPREADS * sigma_m).clamp(PLACE_M, APART_M)
 }
 
 /// Measures one segment of a scene.
@@ -217,7 +189,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         None => (segment, asker, first, footprint),
     };
     // What is measured of a low thing's top reaches far down its side.
-    let rim_m = (BELOW_M + CLEAR_SPREADS * sigma_m).clamp(RIMS.0 * height_m, RIMS.1 * height_m);
+    let rim_m = (EDGE_M + SPREADS * sigma_m).clamp(RIMS.0 * height_m, RIMS.1 * height_m);
     let side_m = base_m + ENDS.0 * height_m..top - rim_m;
     let side: Vec<Point3<f64>> = segment.points.iter().filter(|p| side_m.contains(&p.z)).copied().collect();
     let mut measured = Measured {
@@ -227,9 +199,9 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         rectangle: outline::fit(&side),
         rival_m: f64::INFINITY,
         height_m,
-        height_sigma_m: HEIGHT_M
+        height_sigma_m: SHAPE_M
             .hypot(0.5 * sigma_m)
-            .hypot(0.5 * scene.surface.residual_m.min(ROUGHEST_M))
+            .hypot(0.5 * scene.surface.residual_m)
             .hypot(this.base_sigma_m),
         top_hidden: top_hidden(&asker, &footprint, top),
         open_sides: open_sides(&asker, &footprint, top),
@@ -247,7 +219,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     if let Some(first) = first {
         let edges = silhouettes(&first, segment, &asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
-        let eye = (sigma_m > FAR_M).then(|| asker.only_from(&first)).flatten();
+        let eye = (sigma_m > PLACE_M).then(|| asker.only_from(&first)).flatten();
         let round =
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= MOST);
@@ -266,14 +238,10 @@ const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
     /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres. From: chosen.
     const LOST_M: f64 = 0.001;
-    /// What is no farther out belongs to the body, and so far beyond its edge free space is asked for, metres. From: chosen.
-    const BESIDE_M: f64 = 0.012;
-    /// Fewest points of a band. From: chosen.
-    const FEWEST: usize = 25;
-    /// Points of a band that are enough to go by. From: work.
-    const ENOUGH: usize = 600;
     /// Share of the points of a band that reach less far than its edge. From: chosen.
     const END: f64 = 0.985;
+    /// Points of a band that are enough to go by. From: work.
+    const ENOUGH: usize = 600;
     let bands = SILHOUETTES.map(|(low, high)| (base_m + low * height, base_m + high * height));
     let in_band = |&(low, high): &(f64, f64)| {
         let near = |p: &&Point3<f64>| p.z >= low && p.z < high && round.outside_m(p) < BESIDE_M;
@@ -292,7 +260,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
         for side in [-1.0, 1.0] {
             // The tangent point leans a little towards the camera: across the ray, not across the table.
             let across = [side * -ey / distance, side * ex / distance];
-            for ((low, high), near) in bands.iter().zip(&near).filter(|(_, near)| near.len() >= FEWEST) {
+            for ((low, high), near) in bands.iter().zip(&near).filter(|(_, near)| !near.is_empty()) {
                 let z = 0.5 * (low + high);
                 let reaches: Vec<f64> = near.iter().map(|p| across[0] * p[0] + across[1] * p[1]).collect();
                 let reach_m = end(&reaches, END) + LOST_M;
@@ -334,7 +302,7 @@ fn measure_round(
     measured.looked_through = sectors.looked_through_share();
     evidence.handle_unseen = sectors.unseen_share();
     let mut spread_m = round.spread_m;
-    let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > FAR_M);
+    let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > PLACE_M);
     if let Some(protrusion) = &protrusion {
         evidence.protrusion_m = protrusion.reach_m;
         // What may be a handle says nothing against the roundness of what it is the handle of.
@@ -360,13 +328,13 @@ fn measure_round(
     };
     measured.seen_fraction =
         SIDES * sectors.covered_share() + (1.0 - SIDES) * (upper.open + upper.lid).min(1.0);
-    if evidence.radius_sigma_m > VAGUE_M {
+    if evidence.radius_sigma_m > APART_M {
         // Beside and above a circle that may as well be another, nothing was looked at.
         (evidence.handle, evidence.handle_unseen, evidence.inside) =
             (Sighting::Unseen, 1.0, Sighting::Unseen);
         measured.looked_through = 0.0;
         // A sliver may be cut off above, too.
-        measured.height_sigma_m = measured.height_sigma_m.hypot(SLIVER_M);
+        measured.height_sigma_m = measured.height_sigma_m.hypot(PLACE_M);
     } else {
         measured.upper = upper;
     }
@@ -382,8 +350,6 @@ struct Sectors {
 
 impl Sectors {
     fn measure(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Sectors {
-        /// How far within the side a look goes that finds it missing, metres. From: chosen.
-        const WITHIN_M: f64 = 0.004;
         let mut sectors = Sectors {
             measured: measured_sectors(round, &segment.points, base_m, height),
             looked_through: [false; SECTORS],
@@ -398,7 +364,7 @@ impl Sectors {
             };
             // Free, or another thing's surface: either way the body's own side is not there.
             sectors.looked_through[i] = !sectors.measured[i]
-                && SIDE_HEIGHTS.iter().filter(|&&share| look(-WITHIN_M, share) >= Seen::Surface).count()
+                && SIDE_HEIGHTS.iter().filter(|&&share| look(-EDGE_M, share) >= Seen::Surface).count()
                     >= THROUGH;
             let free = HANDLE_REACHES_M
                 .iter()
@@ -440,10 +406,8 @@ pub(super) fn measured_sectors(
     base_m: f64,
     height: f64,
 ) -> [bool; SECTORS] {
-    /// So near to the side a point shows it in its direction, metres. From: chosen.
-    const NEAR_M: f64 = 0.009;
     let (low, high) = (base_m + ENDS.0 * height, base_m + (1.0 - ENDS.1) * height);
-    let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < NEAR_M;
+    let on_side = |p: &&Point3<f64>| p.z > low && p.z < high && round.outside_m(p).abs() < PLACE_M;
     let mut counts = [0_u32; SECTORS];
     points.iter().filter(on_side).for_each(|p| counts[sector_of(round, p)] += 1);
     counts.map(|c| c >= 2)
@@ -480,18 +444,14 @@ impl Protrusion {
         const HEIGHTS: (f64, f64) = (0.08, 1.02);
         /// Sectors that are taken together. From: chosen.
         const WINDOW: usize = 3;
-        /// It lies farther from the axis than this share of the radius, and no farther aside than the second, metres. From: chosen.
-        const ALONG: f64 = 0.6;
-        const ASIDE_M: f64 = 0.06;
         /// Fewest points. From: chosen.
         const FEWEST: usize = 3;
-        /// Share of its points that reach less far, and shares that lie beyond its ends across and in height. From: chosen.
-        const REACH: f64 = 0.95;
+        /// Shares of its points that lie beyond its ends across and in height. From: chosen.
         const SPAN: (f64, f64) = (0.1, 0.9);
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);
-            let clear = |sigma_m: f64| outside_m > CLEAR_SPREADS * sigma_m;
-            outside_m > CLEAR_M && asker.support(p).is_some_and(clear)
+            let clear = |sigma_m: f64| outside_m > SPREADS * sigma_m;
+            outside_m > PLACE_M && asker.support(p).is_some_and(clear)
         };
         let out: Vec<&Point3<f64>> = segment
             .points
@@ -512,14 +472,14 @@ impl Protrusion {
                 let (along, across) = along_and_across(round, p, (sin, cos));
                 (along, across, p.z)
             })
-            .filter(|&(along, across, _)| along > ALONG * round.radius_m && across.abs() < ASIDE_M)
+            .filter(|&(along, ..)| along > 0.0)
             .collect();
         if local.len() < FEWEST {
             return None;
         }
         let reach_of = |&(along, across, z): &(f64, f64, f64)| along.hypot(across) - round.radius_at(z);
         let mut reaches: Vec<f64> = local.iter().map(reach_of).collect();
-        let reach_m = quantile(&mut reaches, REACH);
+        let reach_m = quantile(&mut reaches, VOXEL_ENDS.1);
         // What hardly leaves the body is its blurred side, beside the handle or not.
         let (mut across, mut heights): (Vec<f64>, Vec<f64>) =
             local.iter().filter(|l| reach_of(l) > ROOT * reach_m).map(|l| (l.1, l.2)).unzip();
@@ -533,20 +493,20 @@ impl Protrusion {
             points: local.len(),
             least: (segment.points.len() / if far { HANDLE_POINTS.0 } else { HANDLE_POINTS.1 })
                 .clamp(HANDLE_FEWEST.0, HANDLE_FEWEST.1),
-            inside_height: high - low > HANDLE_HIGH_M && low > base_m + HANDLE_FOOT * height,
+            inside_height: high - low > HANDLE_HIGH_M && low > base_m,
         })
     }
 
     /// Whether a point lies where it sticks out.
     fn has(&self, round: &Round, p: &Point3<f64>) -> bool {
         let (along, across) = along_and_across(round, p, self.direction);
-        round.outside_m(p) > CLEAR_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
+        round.outside_m(p) > PLACE_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
     /// Whether it is a handle, and not what is left of misaligned views of a side that spreads so much about its form, metres.
     fn is_handle(&self, spread_m: f64) -> bool {
         self.points >= self.least
-            && (HANDLE_M.0.max(HANDLE_SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
+            && (HANDLE_M.0.max(SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
             && self.width_m < HANDLE_WIDTH_M
             && self.inside_height
     }

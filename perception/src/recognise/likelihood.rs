@@ -1,9 +1,10 @@
 //! How likely what was measured is of sizes, a form, an upper end and a handle.
 
-use super::evidence::{HANDLE_M, Measured};
+use super::evidence::Measured;
 use super::model::{Handle, Range, Shape, Top};
 use super::percept::Sighting;
 use crate::noise::normal_cdf;
+use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 
 /// No density and no chance is taken to be less. From: chosen.
 const LEAST_DENSITY: f64 = 1e-12;
@@ -66,10 +67,8 @@ pub(super) fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measure
 
 pub(super) fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
     if m.round.is_none() {
-        /// How well a footprint tells a diameter, metres. From: chosen.
-        const SIGMA_M: f64 = 0.02;
         // No circle fits; were it round, its footprint would be its diameter.
-        return measure_log(m.footprint.sides_m[0], SIGMA_M, range, everyday);
+        return measure_log(m.footprint.sides_m[0], APART_M, range, everyday);
     }
     measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
 }
@@ -108,18 +107,14 @@ pub(super) fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
 fn taper(m: &Measured) -> (f64, f64) {
     /// Of what no circle fits. From: chosen.
     const UNKNOWN: (f64, f64) = (1.0, 0.2);
-    /// No radius is less, metres. From: chosen.
-    const LEAST_M: f64 = 0.005;
     let Some(round) = m.round else { return UNKNOWN };
-    let sigma = m.height_m * round.slope_sigma / round.radius_m.max(LEAST_M);
+    let sigma = m.height_m * round.slope_sigma / round.radius_m.max(EDGE_M);
     (m.evidence.taper, sigma.hypot(RATIO_SIGMA))
 }
 
 /// Spread of a measured side of a footprint, metres.
 fn side_sigma_m(m: &Measured) -> f64 {
-    /// What is left of the error however good the camera, metres. From: chosen.
-    const LEAST_M: f64 = 0.005;
-    LEAST_M.hypot(2.0 * m.sigma_m)
+    EDGE_M.hypot(2.0 * m.sigma_m)
 }
 
 /// Log density of a side that may go on where no camera could tell, if a thing is at least so long by this chance: any of at least that
@@ -192,41 +187,28 @@ pub(super) fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 
 /// However well a circle fits a part of the side: a round body has nothing beside it but a handle, and what views blur.
 fn beside_log(m: &Measured) -> f64 {
-    /// So far a handle, or views that lie beside each other, reach out of the body, metres. From: chosen.
-    const REACH_M: f64 = 0.04;
-    /// Spread of how far beyond that what belongs to the body reaches, metres. From: chosen.
-    const SIGMA_M: f64 = 0.01;
-    /// However far something reaches out, it may be a view that lies wrongly: no log is lower. From: chosen.
-    const LEAST: f64 = -20.0;
     let Some(round) = m.round else { return 0.0 };
-    let beside_m = (m.footprint.sides_m[0] - 2.0 * round.radius_m - REACH_M).max(0.0);
-    (-0.5 * (beside_m / SIGMA_M).powi(2)).max(LEAST)
+    let beside_m = (m.footprint.sides_m[0] - 2.0 * round.radius_m - HANDLE_M.1).max(0.0);
+    -0.5 * (beside_m / APART_M).powi(2)
 }
 
 fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
-    /// Irregular things miss both forms by about this much, metres. From: chosen.
-    const IRREGULAR_M: f64 = 0.006;
-    /// The miss of what no circle fits at all. From: chosen.
-    const NONE_M: f64 = 0.02;
     let miss = match shape {
-        Some(Shape::Round) => m.round.map_or(NONE_M, |r| r.spread_m),
-        Some(Shape::Box) => m.rectangle.map_or(NONE_M, |r| r.residual_m),
-        None => IRREGULAR_M,
+        Some(Shape::Round) => m.round.map_or(APART_M, |r| r.spread_m),
+        Some(Shape::Box) => m.rectangle.map_or(APART_M, |r| r.residual_m),
+        None => PLACE_M,
     };
     miss_log(miss, m)
 }
 
 /// Log likelihood of a side that misses a form by so much, metres.
 fn miss_log(miss_m: f64, m: &Measured) -> f64 {
-    /// Views that lie so far apart tell a form half as sharply as they would if only the noise of each point counted, metres. From: chosen.
-    const SHARED_M: f64 = 0.003;
-    /// No form is measured more sharply than this, metres, and this share of the spread of a measurement. From: chosen.
-    const SHARPEST_M: f64 = 0.0015;
+    /// No form is measured more sharply than this share of the spread of a measurement. From: chosen.
     const OF_SIGMA: f64 = 0.7;
     let apart = m.apart_m();
-    let floor = SHARPEST_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
+    let floor = SHAPE_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);
     // What lies beside each other by an error that whole views share tells the same again and again.
-    let independent = m.independent / (1.0 + (apart / SHARED_M).powi(2));
+    let independent = m.independent / (1.0 + (apart / EDGE_M).powi(2));
     -independent * miss_m.hypot(floor).ln()
 }
 

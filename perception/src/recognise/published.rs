@@ -1,11 +1,12 @@
 //! The recogniser of paper 004: similarity of size and share of cylinder inliers, averaged.
 
 use super::Recogniser;
-use super::descry::{UNPLACED_SIGMA_M, kinds};
+use super::descry::kinds;
 use super::evidence::{Setting, measure};
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::{Percept, Stance};
 use crate::noise::KINECT;
+use crate::scale::APART_M;
 use crate::segment::Scene;
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -57,7 +58,7 @@ impl Recogniser for Published {
                     probabilities,
                     unknown: 1.0 - score,
                     position_m: scene.surface.surface_from_world.inverse() * place,
-                    position_sigma_m: UNPLACED_SIGMA_M,
+                    position_sigma_m: APART_M,
                     size_m: size,
                     stance: if best.is_some() { Stance::Upright } else { Stance::Unknown },
                     points: segment.indices.len(),

@@ -8,6 +8,7 @@ use super::asker::{Asker, Lying};
 use super::body::{Body, Ray};
 use crate::noise::{CELL_PX, KINECT, Sensor};
 use crate::round::distance;
+use crate::scale::{EDGE_M, PLACE_M, SHAPE_M, SPREADS};
 use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
@@ -24,21 +25,12 @@ const ANYWHERE_M: f64 = 1.0;
 pub(super) const MOST: f64 = 10.0;
 /// Chance that a view says nothing of a body. From: chosen.
 pub(super) const BAD_VIEW: f64 = 0.05;
-/// How far a thing differs from a body of straight sides, metres. From: chosen.
-const ROUGH_M: f64 = 0.0015;
-/// Spread of what all depths of a view of one body err by together, metres. From: chosen.
-const SHARED_M: f64 = 0.004;
 /// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
 /// in common. From: chosen.
 const MOST_LOOKS: f64 = 2.3;
 /// Where rays wander to, in spreads across them: columns and rows. From: derived, three
 /// directions that balance each other.
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
-/// Side of the cells in which other things are told from a body, metres. From: chosen.
-const CELL_M: f64 = 0.01;
-
-/// So many spreads off, a depth is of something else. From: chosen.
-pub(super) const BEYOND: f64 = 3.0;
 
 /// The pixels of all views that may tell of one body.
 pub(super) struct Rays {
@@ -121,7 +113,7 @@ pub(super) fn bounded(log: f64, bad: f64) -> f64 {
 }
 
 fn cell(p: &Point3<f64>) -> [i32; 2] {
-    [p.x, p.y].map(|m| floor(m / CELL_M))
+    [p.x, p.y].map(|m| floor(m / PLACE_M))
 }
 
 impl ViewRays {
@@ -143,7 +135,7 @@ impl ViewRays {
                     continue;
                 }
                 let along: [f64; 3] = ray(u as f64, v as f64).into();
-                let sigma_m = distance(sensor.frontal_sigma_m(depth_m), ROUGH_M);
+                let sigma_m = distance(sensor.frontal_sigma_m(depth_m), SHAPE_M);
                 let p = Point3::from([0, 1, 2].map(|k: usize| from[k] + depth_m * along[k]));
                 let behind_m = (around.base_m - from[2]) / along[2];
                 let density = SURFACE * normal(depth_m - behind_m, sigma_m) + ELSE / ANYWHERE_M;
@@ -167,16 +159,16 @@ impl ViewRays {
         for pixel in &self.pixels {
             let at_m = body.depth_m(&Ray { from: self.from, along: pixel.along });
             let off_m = pixel.depth_m - at_m;
-            if off_m.abs() < BEYOND * (pixel.sigma_m + SHARED_M) && !pixel.other {
+            if off_m.abs() < SPREADS * (pixel.sigma_m + EDGE_M) && !pixel.other {
                 let w = self.looks / (pixel.sigma_m * pixel.sigma_m);
                 (sum, weight) = (sum + w * off_m, weight + w);
             }
             met.push(at_m);
         }
-        let shared_m = sum / (weight + SHARED_M.powi(-2));
+        let shared_m = sum / (weight + EDGE_M.powi(-2));
         let bodies = self.pixels.iter().zip(met).filter(|(_, at_m)| at_m.is_finite());
         let ratios = bodies.map(|(pixel, at_m)| self.ratio(pixel, body, at_m, shared_m));
-        self.looks * log_product(ratios) - 0.5 * (shared_m / SHARED_M).powi(2)
+        self.looks * log_product(ratios) - 0.5 * (shared_m / EDGE_M).powi(2)
     }
 
     /// How much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
@@ -225,7 +217,7 @@ impl Pixel {
         const RANGE_M: f64 = 5.0;
         let off_m = self.depth_m - at_m;
         let nearer = if off_m < 0.0 { NEARER / ANYWHERE_M } else { 0.0 };
-        if self.other && off_m < BEYOND * self.sigma_m {
+        if self.other && off_m < SPREADS * self.sigma_m {
             return self.without;
         }
         (1.0 - NEARER - STRAY) * normal(off_m, self.sigma_m) + nearer + STRAY / RANGE_M

@@ -2,45 +2,27 @@
 //!
 //! Views are merged as wholes, and as such they lie within a centimetre or so of each other: localisation errs, a tracker drifts, and
 //! the front of a lone cup and its back have no point in common that would hold them together. Of a round body each view by itself
-//! tells where the axis stands. So each gets a small shift of its own, as likely as [`SHIFT_M`] says, and axis, radius, slope and
+//! tells where the axis stands. So each gets a small shift of its own, as likely as [`PLACE_M`] says, and axis, radius, slope and
 //! shifts are found together.
 
 use super::asker::{Asker, Lying};
 use crate::round::{
-    self, MOST_INDEPENDENT, ON_SIDE_M, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, distance, side_band,
+    self, MOST_INDEPENDENT, RADIUS_SPREAD_M, Round, SLOPE_SPREAD, STEEPEST, distance, side_band,
 };
+use crate::scale::{EDGE_M, PLACE_M, SHAPE_M};
 use crate::segment::Segment;
 use crate::surface::{floor, range_sigma_m};
 use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix4, Point3, Vector3, Vector4};
 use rustc_hash::FxHashMap;
 
-/// Standard deviation of how far a view lies beside the others at one body, metres.
-/// From: chosen, views lie within a centimetre or so of each other at one body.
-const SHIFT_M: f64 = 0.008;
-/// Views that lie nearer to each other than this are left as they are, metres. From: chosen.
-const LEAST_M: f64 = 0.004;
-/// The views of a side that spreads by less than this, or than a measurement, lie where they belong, metres. From: chosen.
-const TIGHT_M: f64 = 0.002;
 /// The side has to spread by no more than this share of what it did. From: chosen.
 const ROUNDER: f64 = 0.85;
-/// No view is moved farther than this: it shows something else, metres. From: chosen.
-const MOST_M: f64 = 0.03;
 /// Points farther from the side than this tell nothing of it, metres: at first, and once it is near. From: chosen, one a step.
 const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
 /// Points of a view that are enough to go by, and those that it needs. From: chosen.
 const ENOUGH: usize = 400;
 const FEWEST: usize = 40;
-/// Share of what a view shows of the body that has to lie on it, and how well, in spreads of a measurement, when the view is settled.
-/// From: chosen.
-const ON_IT: f64 = 0.7;
-const SPREADS: f64 = 1.3;
-/// However good the camera, a side is no smoother than this, metres. From: chosen.
-const SMOOTH_M: f64 = 0.0025;
-/// Side of the cells in which the points of a body are looked for in the views, and of those that they are thinned to, metres.
-/// From: chosen.
-const CELL_M: f64 = 0.01;
-const FUSE_M: f64 = 0.003;
 
 /// A body whose views are laid on each other.
 pub(super) struct Settled<'a> {
@@ -58,7 +40,7 @@ pub(super) fn settle<'a>(
     (base_m, top_m): (f64, f64),
     sigma_m: f64,
 ) -> Option<Settled<'a>> {
-    if asker.views.len() < 2 || round.spread_m < sigma_m.max(TIGHT_M) {
+    if asker.views.len() < 2 || round.spread_m < sigma_m.max(SHAPE_M) {
         return None;
     }
     let cells = Cells::of(&segment.points);
@@ -75,7 +57,7 @@ pub(super) fn settle<'a>(
         .zip(&shifts)
         .flat_map(|(points, &[x, y])| points.into_iter().map(move |p| Point3::new(p.x - x, p.y - y, p.z)));
     // What lay beside the body before and does so still is another thing, or the edge of one.
-    let of_it = |p: &Point3<f64>| body.outside_m(p) < ON_SIDE_M || cells.holds(p);
+    let of_it = |p: &Point3<f64>| body.outside_m(p) < PLACE_M || cells.holds(p);
     let segment = Segment { points: thinned(moved.filter(of_it)), ..segment.clone() };
     let settled = round::fit(&segment.points, base_m, top_m, sigma_m, round::SEED)?;
     if settled.spread_m > ROUNDER * round.spread_m {
@@ -94,7 +76,7 @@ struct Side {
 
 impl Side {
     fn of<'p>(points: impl Iterator<Item = &'p Point3<f64>>, view: &Lying<'_>, round: &Round) -> Side {
-        let near = |p: &&Point3<f64>| round.outside_m(p).abs() < GATES_M[0] + SHIFT_M;
+        let near = |p: &&Point3<f64>| round.outside_m(p).abs() < GATES_M[0] + PLACE_M;
         let mut points: Vec<Point3<f64>> = points.filter(near).copied().collect();
         let step = points.len().div_ceil(ENOUGH).max(1);
         points = points.into_iter().step_by(step).collect();
@@ -107,7 +89,7 @@ impl Side {
 }
 
 /// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if
-/// there is nothing to move, or if what a view shows does not lie on the body even then.
+/// there is nothing to move.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
     /// Columns before those of the shifts: axis, radius and slope. From: derived, two for the axis and one each for radius and slope.
     const BODY: usize = 4;
@@ -144,8 +126,8 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
                 columns.clone().for_each(|(j, b)| normal[(i, j)] += own[(a, b)]);
             }
             for k in 0..2 {
-                normal[(at + k, at + k)] += SHIFT_M.powi(-2);
-                right[at + k] -= shifts[v][k] * SHIFT_M.powi(-2);
+                normal[(at + k, at + k)] += PLACE_M.powi(-2);
+                right[at + k] -= shifts[v][k] * PLACE_M.powi(-2);
             }
         }
         for (k, spread) in [(2, RADIUS_SPREAD_M), (3, SLOPE_SPREAD)] {
@@ -163,24 +145,7 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
         });
     }
     let far = shifts.iter().map(|s| s[0].hypot(s[1])).fold(0.0, f64::max);
-    let on_it = |(side, shift): (&Side, &[f64; 2])| side.lies_on(&body, *shift);
-    ((LEAST_M..MOST_M).contains(&far) && body.radius_m > 0.0 && sides.iter().zip(&shifts).all(on_it))
-        .then_some((body, shifts))
-}
-
-impl Side {
-    /// Whether what is shown, moved back by a shift, is the side of a body, as smooth as the camera measures.
-    fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
-        /// Farther from the side than this, and than two spreads, a point is not asked whether it lies on it, metres.
-        /// From: derived, the last of the gates.
-        const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
-        let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
-        let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();
-        let spread_m = (near.iter().map(|m| m * m).sum::<f64>() / near.len().max(1) as f64).sqrt();
-        self.points.is_empty()
-            || (near.len() as f64 > ON_IT * self.points.len() as f64
-                && spread_m < SMOOTH_M.max(SPREADS * self.sigma_m))
-    }
+    (far > EDGE_M && body.radius_m > 0.0).then_some((body, shifts))
 }
 
 /// The cells that the points of a body lie in, seen from above, those beside them, and their range of heights.
@@ -201,7 +166,7 @@ impl Cells {
             let reach = points.iter().fold(Point3::new(from, from, from), |a, p| {
                 Point3::new(end(a.x, p.x), end(a.y, p.y), end(a.z, p.z))
             });
-            reach - Vector3::new(1.0, 1.0, 0.0) * (from.signum() * 2.0 * CELL_M)
+            reach - Vector3::new(1.0, 1.0, 0.0) * (from.signum() * 2.0 * PLACE_M)
         };
         let (low, high) = (ends(f64::min, f64::INFINITY), ends(f64::max, f64::NEG_INFINITY));
         let first = Cells::cell(&low);
@@ -225,7 +190,7 @@ impl Cells {
     }
 
     fn cell(p: &Point3<f64>) -> [i32; 2] {
-        [p.x, p.y].map(|m| floor(m / CELL_M))
+        [p.x, p.y].map(|m| floor(m / PLACE_M))
     }
 
     /// Where a point's cell is in the rectangle.
@@ -297,7 +262,7 @@ fn thinned(points: impl Iterator<Item = Point3<f64>>) -> Vec<Point3<f64>> {
     let mut cubes: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();
     for p in points {
-        let cube = [p.x, p.y, p.z].map(|m| floor(m / FUSE_M));
+        let cube = [p.x, p.y, p.z].map(|m| floor(m / EDGE_M));
         let at = *cubes.entry(cube).or_insert_with(|| {
             sums.push((Vector3::zeros(), 0.0));
             sums.len() - 1

@@ -5,8 +5,7 @@
 use super::asker::Asker;
 use super::body::Frustum;
 use super::evidence::{
-    CLEAR_M, HANDLE_FEWEST, HANDLE_M, HANDLE_POINTS, MOST, Measured, Setting, UNSEEN, VAGUE_M,
-    measured_sectors, rays_around, tolerance_m,
+    HANDLE_FEWEST, HANDLE_POINTS, MOST, Measured, Setting, UNSEEN, measured_sectors, rays_around, tolerance_m,
 };
 use super::model::{Handle, ObjectModel, Range, Shape};
 use super::percept::{Evidence, Sighting};
@@ -15,31 +14,18 @@ use super::upper::Upper;
 use super::verify::Own;
 use crate::outline::Rectangle;
 use crate::round::{self, Round, SECTORS, side_band};
-use crate::segment::{Segment, end, quantile};
+use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M};
+use crate::segment::{POINT_ENDS, Segment, VOXEL_ENDS, end, quantile};
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Shares of the points that lie before and beyond its ends. From: chosen, as of heights.
-const LENGTH_ENDS: (f64, f64) = (0.01, 0.99);
 /// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
 /// Points by which the direction of its axis is sought, at the most. From: chosen.
 const SCOUTS: usize = 300;
-/// How far from its radius its axis lies above what it rests on, metres. From: chosen.
-const RESTS_M: f64 = 0.01;
-/// Spread of how long it is however good the camera, metres. From: chosen, twice that of a height: both ends are edges.
-const LENGTH_SIGMA_M: f64 = 0.004;
-/// A model is asked about if what was measured is no farther from its sizes, metres; of its length this share may be hidden.
-/// From: chosen.
-const SLACK_M: f64 = 0.02;
-const HIDDEN: f64 = 0.5;
 /// An end that a camera sees flatter than this tells neither lid nor inside: what it is off by leads far along the ray, cosine of 60
 /// degrees. From: chosen.
 const FACING: f64 = 0.5;
-/// A handle has some of itself so far out of the body, metres. From: chosen, as of what stands.
-const HANDLE_OUT_M: f64 = 0.01;
-/// Share of the points of a handle that reach less far than it is said to. From: chosen, as of what stands.
-const HANDLE_REACH: f64 = 0.95;
 
 /// What was measured of a thing that may lie, with either end for its foot, and the pixels that are asked about each.
 pub(super) struct Toppled {
@@ -125,7 +111,7 @@ impl Way {
             round: Some(round),
             rival_m: m.round.map_or(f64::INFINITY, |upright| upright.spread_m),
             height_m,
-            height_sigma_m: m.height_sigma_m.hypot(LENGTH_SIGMA_M),
+            height_sigma_m: m.height_sigma_m.hypot(EDGE_M),
             looked_through: 0.0,
             upper,
             ..m.clone()
@@ -134,15 +120,15 @@ impl Way {
     }
 }
 
-/// True if a model that lies on its side could be measured so.
+/// True if a model that lies on its side could be measured so: half of its length may be hidden.
 fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
     let (Shape::Round, Some(thick_m)) = (model.shape, model.diameter_m) else { return false };
     let out_m = if model.handle == Handle::None { 0.0 } else { HANDLE_M.1 };
     let long_m =
         Range { low: model.height_m.low.max(thick_m.low), high: model.height_m.high.max(thick_m.high) };
-    let is_near = |value: f64, low: f64, high: f64| value > low - SLACK_M && value < high + SLACK_M;
+    let is_near = |value: f64, low: f64, high: f64| value > low - APART_M && value < high + APART_M;
     is_near(m.height_m, thick_m.low, thick_m.high)
-        && is_near(m.footprint.sides_m[0], HIDDEN * long_m.low, long_m.high + out_m)
+        && is_near(m.footprint.sides_m[0], 0.5 * long_m.low, long_m.high + out_m)
 }
 
 /// A round body about an axis along the surface.
@@ -194,7 +180,7 @@ impl Found {
         let measured = measured_sectors(&round, &self.points, low, high - low);
         let has_room = |sector: usize| {
             let angle = std::f64::consts::TAU * (sector as f64 + 0.5) / SECTORS as f64;
-            round.y + (round.radius_m + HANDLE_OUT_M) * angle.sin() > 0.0
+            round.y + (round.radius_m + PLACE_M) * angle.sin() > 0.0
         };
         let hides = (0..SECTORS).filter(|&sector| has_room(sector) && !measured[sector]).count();
         let unseen = hides as f64 / SECTORS as f64;
@@ -203,14 +189,14 @@ impl Found {
             () if unseen < UNSEEN => Sighting::Absent,
             () => Sighting::Unseen,
         };
-        let reach_m = if sighting == Sighting::Seen { quantile(&mut out, HANDLE_REACH) } else { 0.0 };
+        let reach_m = if sighting == Sighting::Seen { quantile(&mut out, VOXEL_ENDS.1) } else { 0.0 };
         HandleSeen { sighting, unseen, reach_m }
     }
 
     /// What may be a handle says nothing against the roundness of what it is the handle of.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
         let Body { round, ends_m: [low, high], .. } = self.body;
-        round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < CLEAR_M)
+        round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)
     }
 }
 
@@ -247,12 +233,12 @@ fn about(
     let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows)) * origin;
     let points: Vec<Point3<f64>> = points.iter().map(|p| turned * p).collect();
     let places: Vec<f64> = points.iter().map(|p| p.z).collect();
-    let ends_m = [end(&places, LENGTH_ENDS.0), end(&places, LENGTH_ENDS.1)];
+    let ends_m = [end(&places, POINT_ENDS.0), end(&places, POINT_ENDS.1)];
     let round = round::fit(&points, ends_m[0], ends_m[1], sigma_m, round::SEED)?;
-    let rests = (round.y - round.radius_m).abs() < RESTS_M + sigma_m;
-    let is_told = round.radius_sigma_m < VAGUE_M && round.inliers >= MOST;
+    let rests = (round.y - round.radius_m).abs() < PLACE_M + sigma_m;
+    let is_told = round.radius_sigma_m < APART_M && round.inliers >= MOST;
     let band = side_band(ends_m[0], ends_m[1]);
-    let misses = points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p).abs().min(CLEAR_M));
+    let misses = points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p).abs().min(PLACE_M));
     let (count, squares) = misses.fold((0.0, 0.0), |(n, sum), miss| (n + 1.0, sum + miss * miss));
     let miss_m2 = squares / f64::max(count, 1.0);
     (rests && is_told).then_some(Found { body: Body { turned, round, ends_m }, points, angle, miss_m2 })

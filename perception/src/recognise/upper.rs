@@ -1,9 +1,10 @@
 //! What rays tell of a round body's upper end.
 
 use super::body::{Body, Frustum, Ray};
-use super::rays::{BEYOND, ViewRays, bounded, normal};
+use super::rays::{ViewRays, bounded, normal};
 use super::verify::WALL_M;
 use crate::noise::normal_cdf;
+use crate::scale::{EDGE_M, PLACE_M, SPREADS};
 
 /// Chance that a view says nothing of an upper end, whatever it seems to show. From: chosen.
 const BAD_VIEW: f64 = 0.002;
@@ -21,12 +22,8 @@ pub(super) struct Upper {
 impl Upper {
     /// As views of a body tell it.
     pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
-        /// So near to the rim a ray does not tell; what is deeper than the second is an inside, and seen by rays that may come as deep, metres.
-        /// From: chosen.
+        /// So near to the rim a ray does not tell, metres. From: chosen.
         const RIM_M: f64 = 0.006;
-        const INSIDE_M: f64 = 0.012;
-        /// Spread of how high a lid is, and of where an inside is, metres. From: chosen.
-        const LID_M: f64 = 0.004;
         /// A ray that falls less tells of no end. From: rounding.
         const LEVEL: f64 = 1e-3;
         /// Share of the rays into it that tell, and the density of what the others say. From: chosen.
@@ -34,8 +31,6 @@ impl Upper {
         const REST: f64 = 0.02;
         /// Of what is in an open body a ray meets the wall or floor with this chance, else something on the way there. From: chosen.
         const EMPTY: f64 = 0.5;
-        /// No lid is deeper than this share of the least inside. From: chosen.
-        const LID: f64 = 0.75;
         let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
         let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
         for view in views {
@@ -49,10 +44,10 @@ impl Upper {
                 if at_m < 0.0 || dx.hypot(dy) > body.rim_m - RIM_M {
                     continue;
                 }
-                let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(LID_M));
+                let (fall, sigma_m) = (-pixel.along[2], pixel.sigma_m.hypot(EDGE_M));
                 let off_m = pixel.depth_m - at_m;
                 let deep_m = hollow.depth_m(&Ray { from: view.from, along: pixel.along }) - at_m;
-                if off_m < -BEYOND * sigma_m || !(deep_m > 0.0 && deep_m.is_finite()) {
+                if off_m < -SPREADS * sigma_m || !(deep_m > 0.0 && deep_m.is_finite()) {
                     continue;
                 }
                 let on_the_way =
@@ -60,12 +55,12 @@ impl Upper {
                 let within = EMPTY * normal(off_m - deep_m, sigma_m) + (1.0 - EMPTY) * on_the_way;
                 let level = normal(off_m, sigma_m);
                 sum += ((TELL * within + REST) / (TELL * level + REST)).ln();
-                if deep_m * fall < INSIDE_M {
+                if deep_m * fall < PLACE_M {
                     continue;
                 }
                 all += view.looks;
-                open += if off_m * fall > INSIDE_M { view.looks } else { 0.0 };
-                lid += if off_m * fall < LID * INSIDE_M { view.looks } else { 0.0 };
+                open += if off_m * fall > PLACE_M { view.looks } else { 0.0 };
+                lid += if off_m * fall < PLACE_M { view.looks } else { 0.0 };
             }
             let log = view.looks * sum;
             open_log += bounded(log, BAD_VIEW);

@@ -5,6 +5,7 @@ use super::evidence::Measured;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
+use crate::scale::EDGE_M;
 use rayon::prelude::*;
 
 /// Thickness of the walls of vessels, metres. From: chosen.
@@ -12,8 +13,6 @@ pub(super) const WALL_M: f64 = 0.003;
 /// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
 const TRIES: usize = 2;
-/// Spread of how far a view shows a body beside where all show it, metres. From: chosen.
-const SHIFT_M: f64 = 0.005;
 
 /// No round body is narrower, metres of radius. From: rounding.
 const LEAST_M: f64 = 0.01;
@@ -129,7 +128,7 @@ fn placed(view: &ViewRays, frustum: &Frustum, from: [f64; 2]) -> Placed {
         }
         let [dx, dy] = shift_m;
         let moved = Frustum { x: frustum.x + dx, y: frustum.y + dy, ..*frustum };
-        let log = view.log_likelihood(&moved) - 0.5 * (dx * dx + dy * dy) / (SHIFT_M * SHIFT_M);
+        let log = view.log_likelihood(&moved) - 0.5 * (dx * dx + dy * dy) / (EDGE_M * EDGE_M);
         known.push(Placed { log, shift_m });
         Placed { log, shift_m }
     };

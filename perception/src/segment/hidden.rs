@@ -1,30 +1,23 @@
 //! Bodies that something before them parts: two ends of one face, and what lies between them hidden from all views.
 
 use super::patches::Voxels;
-use super::{VOXEL_ENDS, is_upright, members, quantile};
+use super::{SIDE_VOXELS, VOXEL_ENDS, is_upright, members, quantile};
 use crate::pool;
+use crate::scale::PLACE_M;
 use crate::surface::Surface;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::{Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// Fewest voxels of a face that tell where it lies. From: chosen.
-const FEWEST: usize = 12;
 /// Upright faces that a view shows of a box. From: derived, one of two that are across from each other is turned away.
 const FACES: usize = 2;
-/// Normals of one upright face turn by no more about it (15°), as a cosine; those of two ends of one by no more (10°).
-/// From: chosen.
+/// Normals of one upright face, and those of two ends of one, turn by no more about it (15°), as a cosine. From: chosen.
 const FLAT: f64 = 0.966;
-const PARALLEL: f64 = 0.985;
-/// How far an end of a face may lie before or behind the plane of the other, and how far apart their tops may be, metres. From: chosen.
-const FLUSH_M: f64 = 0.008;
 /// Widest part of a face that is taken to be hidden, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
 /// Steps in which what is between is looked at, metres, and at which shares of its height. From: work.
 const STEP_M: f64 = 0.01;
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
-/// Share of these places that all views must miss. None may be looked through. From: chosen.
-const HIDDEN: f64 = 0.8;
 
 /// An upright face of a part, surface frame.
 struct Face {
@@ -68,7 +61,7 @@ impl Body {
 
     /// Whether a face of both lies in one plane, is as high on both sides, and is hidden between them.
     fn goes_on_in(&self, other: &Body, seen: &Visibility, surface: &Surface) -> bool {
-        (self.top_m - other.top_m).abs() < FLUSH_M
+        (self.top_m - other.top_m).abs() < PLACE_M
             && self.faces.iter().any(|a| {
                 let top_m = self.top_m.min(other.top_m);
                 other.faces.iter().any(|b| a.gap_to(b).is_some_and(|gap| gap.is_hidden(top_m, seen, surface)))
@@ -86,7 +79,7 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
     /// Directions that are tried. From: work.
     const TRIED: usize = 25;
     let mut faces = Vec::new();
-    while side.len() >= FEWEST && faces.len() < FACES {
+    while side.len() >= SIDE_VOXELS && faces.len() < FACES {
         let like = |to: &Vector2<f64>| side.iter().filter(|(_, n)| n.dot(to) > FLAT).count();
         // Every few are enough to try.
         let tried = side.iter().step_by(side.len().div_ceil(TRIED));
@@ -107,11 +100,15 @@ impl Face {
         let on: Vec<&Point3<f64>> = of
             .iter()
             .map(|(p, _)| p)
-            .filter(|p| (normal.dot(&p.xy().coords) - offset_m).abs() < FLUSH_M)
+            .filter(|p| (normal.dot(&p.xy().coords) - offset_m).abs() < PLACE_M)
             .collect();
         let mut along: Vec<f64> = on.iter().map(|p| p.x * -normal.y + p.y * normal.x).collect();
         let span_m = (quantile(&mut along, VOXEL_ENDS.0), quantile(&mut along, VOXEL_ENDS.1));
-        (on.len() >= FEWEST && on.len() * 10 >= of.len() * 7).then_some(Face { normal, offset_m, span_m })
+        (on.len() >= SIDE_VOXELS && on.len() * 10 >= of.len() * 7).then_some(Face {
+            normal,
+            offset_m,
+            span_m,
+        })
     }
 
     /// A place in its plane so far along it.
@@ -122,7 +119,7 @@ impl Face {
 
     /// What lies between it and another that may be the same face.
     fn gap_to<'a>(&'a self, other: &'a Face) -> Option<Gap<'a>> {
-        if self.normal.dot(&other.normal) < PARALLEL {
+        if self.normal.dot(&other.normal) < FLAT {
             return None;
         }
         let (left, right) = if self.span_m.0 < other.span_m.0 { (self, other) } else { (other, self) };
@@ -131,8 +128,8 @@ impl Face {
         let off = |face: &Face, p: &Point3<f64>| (face.normal.dot(&p.xy().coords) - face.offset_m).abs();
         let middle = from + (to - from) / 2.0;
         ((STEP_M..WIDEST_M).contains(&wide_m)
-            && off(left, &middle) < FLUSH_M
-            && off(right, &middle) < FLUSH_M)
+            && off(left, &middle) < PLACE_M
+            && off(right, &middle) < PLACE_M)
             .then_some(Gap { face: left, from_m: left.span_m.1, wide_m })
     }
 }
@@ -153,7 +150,7 @@ impl Gap<'_> {
             let along_m = self.from_m + self.wide_m * k as f64 / steps as f64;
             for share in SHARES {
                 let place = world_from_surface * self.face.at(along_m, share * top_m);
-                match seen.look(&place, FLUSH_M) {
+                match seen.look(&place, PLACE_M) {
                     Seen::Free => return false,
                     Seen::Hidden => hidden += 1,
                     Seen::Surface | Seen::Never => {}
@@ -161,6 +158,7 @@ impl Gap<'_> {
                 all += 1;
             }
         }
-        f64::from(hidden) >= HIDDEN * f64::from(all)
+        // All views miss most of it.
+        2 * hidden > all
     }
 }

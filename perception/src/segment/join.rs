@@ -4,6 +4,7 @@ use super::SceneOptions;
 use super::mend::mend;
 use super::patches::{SOME, Voxels};
 use crate::pool;
+use crate::scale::PLACE_M;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -175,8 +176,6 @@ struct Patch {
 fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
     /// One over the curvature of a ball, whose normals tell nothing. From: derived, equal moments along three axes.
     const PER_BALL: f64 = 3.0;
-    /// What a normal counts for at the least. From: chosen.
-    const LEAST_WEIGHT: f64 = 0.05;
     /// Normals that add up to less cancel out. From: rounding.
     const CANCELLED: f64 = 1e-9;
     let count = patch_of.iter().max().map_or(0, |&m| m as usize + 1);
@@ -186,7 +185,7 @@ fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
     for (&i, &p) in of.iter().zip(patch_of) {
         let patch = &mut patches[p as usize];
         patch.centre.coords += voxels.centres[i].coords;
-        patch.normal += voxels.normals[i] * (1.0 - PER_BALL * voxels.curvatures[i]).max(LEAST_WEIGHT);
+        patch.normal += voxels.normals[i] * (1.0 - PER_BALL * voxels.curvatures[i]).max(0.0);
         patch.points += voxels.counts[i];
         patch.voxels += 1;
     }
@@ -239,8 +238,6 @@ fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
 
 /// True if the surface bends outwards from one patch to the other, or hardly bends.
 fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
-    /// Patches farther aside of each other than this are steps, metres. From: chosen.
-    const STEP_M: f64 = 0.012;
     /// Normals that differ by less (sine) have no crease. From: rounding.
     const NO_CREASE: f64 = 1e-3;
     /// Cosine of the least angle between the crease and the line between the centres. From: chosen.
@@ -253,7 +250,7 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     let angle = a.normal.dot(&b.normal).clamp(-1.0, 1.0).acos();
     // A step sideways between parallel patches (a box before another) is no smooth surface.
     let step = between.dot(&(a.normal + b.normal)).abs() / 2.0;
-    let smooth = angle < SMOOTH_RAD && step < STEP_M;
+    let smooth = angle < SMOOTH_RAD && step < PLACE_M;
     if bend < 0.0 {
         return smooth;
     }

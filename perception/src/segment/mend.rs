@@ -3,6 +3,7 @@
 use super::join::{Border, Piece, Union};
 use super::patches::SOME;
 use super::{VOXEL_ENDS, most_within};
+use crate::scale::PLACE_M;
 use crate::surface::convex_hull;
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -208,17 +209,12 @@ fn is_crumb(small: &Part, large: &Part) -> bool {
 
 /// The inside of a vessel: within the outline of the body and no higher than its rim.
 fn is_inside(small: &Part, large: &Part) -> bool {
-    /// So much above the rim is still measured as no higher, metres. From: chosen.
-    const RIM_M: f64 = 0.01;
-    small.top_m() < large.top_m() + RIM_M && most_within(large.hull(), &small.places, |p| *p)
+    small.top_m() < large.top_m() + PLACE_M && most_within(large.hull(), &small.places, |p| *p)
 }
 
 /// A handle: small, lifted off the surface, not above the body.
 fn hangs_on(small: &Part, large: &Part) -> bool {
-    /// It begins so far above the foot of the body, and ends no farther above its rim than the second, metres. From: chosen.
-    const LIFTED_M: f64 = 0.01;
-    const RIM_M: f64 = 0.005;
     f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
-        && small.low_m() > large.low_m() + LIFTED_M
-        && small.top_m() < large.top_m() + RIM_M
+        && small.low_m() > large.low_m() + PLACE_M
+        && small.top_m() < large.top_m() + PLACE_M
 }

@@ -6,10 +6,11 @@
 use super::patches::Voxels;
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
-use super::{VOXEL_ENDS, is_upright, members, quantile, take_away};
+use super::{SIDE_VOXELS, VOXEL_ENDS, is_upright, members, quantile, take_away};
 use crate::outline;
 use crate::pool;
 use crate::round::{SECTORS, distance, sector};
+use crate::scale::{APART_M, PLACE_M};
 use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
 use rayon::prelude::*;
@@ -19,9 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 const RADII_M: (f64, f64) = (0.025, 0.085);
 /// Their step and that of places, metres. From: derived, so many radii in that range.
 const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
-/// Fewest voxels of a side. From: chosen.
-const FEWEST: usize = 25;
-/// What is this far out of the body is no longer the body itself, metres. From: chosen.
+/// What is this far out of the body is no longer the body itself, metres.
+/// From: chosen, a millimetre less leaves a piece beside one thing in 32.
 const CLEAR_M: f64 = 0.009;
 /// What is this far out is no image of the body itself in a view that is misplaced, metres. From: chosen.
 const BESIDE_M: f64 = 0.035;
@@ -34,9 +34,8 @@ const ROUND_SHARE: f64 = 0.75;
 const LEAST_SECTORS: usize = 12;
 /// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
-/// How well the normals of a box stand at right angles (1: all of them), and how well a rectangle fits it, metres. From: chosen.
+/// How well the normals of a box stand at right angles (1: all of them). From: chosen.
 const SQUARE: f64 = 0.55;
-const BOX_M: f64 = 0.008;
 
 /// Parts round bodies off, and joins what of them creases parted. Parts are named by one of their voxels.
 pub(super) fn part(
@@ -86,7 +85,7 @@ fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     if square <= SQUARE {
         return false;
     }
-    outline::fits(&voxels.points_of(&side, points), BOX_M)
+    outline::fits(&voxels.points_of(&side, points), PLACE_M)
 }
 
 /// A round body, and what is left of the parts that it takes voxels from.
@@ -135,18 +134,15 @@ impl Cut {
 /// Whether what is left beside a body is more than its handle, its frayed edge or its image in a view that lies beside the others, or
 /// rises above it.
 fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
-    /// What hangs begins so far above the foot, metres; what rises above the body does so by more than the second. From: chosen.
-    const LIFTED_M: f64 = 0.015;
-    const RISES_M: f64 = 0.02;
     let heights = |of: &[usize]| {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
         (quantile(&mut heights, VOXEL_ENDS.0), quantile(&mut heights, VOXEL_ENDS.1))
     };
     let ((low_m, top_m), (base_m, rim_m)) = (heights(rest), heights(body));
-    let hangs = low_m > base_m + LIFTED_M && top_m < rim_m;
+    let hangs = low_m > base_m + APART_M && top_m < rim_m;
     let beyond = |v: &&usize| axis.distance_m(&voxels.centres[**v]) > axis.radius_m + BESIDE_M;
-    let is_object = !hangs && rest.iter().filter(beyond).count() >= FEWEST;
-    is_object || top_m > rim_m + RISES_M
+    let is_object = !hangs && rest.iter().filter(beyond).count() >= SIDE_VOXELS;
+    is_object || top_m > rim_m + APART_M
 }
 
 /// Whether the side of the voxels is that of an upright round body.
@@ -207,7 +203,7 @@ impl Axis {
         const FEW: u16 = 3;
         /// Axes are apart by more than so many steps. From: chosen.
         const APART: f64 = 3.0;
-        let mut cells = votes.peaks(FEW, FEWEST as u32);
+        let mut cells = votes.peaks(FEW, SIDE_VOXELS as u32);
         cells.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
         let mut axes: Vec<Axis> = Vec::new();
         for (_, [i, j, k]) in cells {
@@ -253,7 +249,7 @@ impl Axis {
             *top = top.max(place.z);
         }
         let mut seen: Vec<f64> = tops.into_iter().filter(|top| top.is_finite()).collect();
-        let wide = side.len() >= FEWEST && seen.len() >= LEAST_SECTORS;
+        let wide = side.len() >= SIDE_VOXELS && seen.len() >= LEAST_SECTORS;
         // What it touches may be taller.
         let top_m = quantile(&mut seen, 0.5);
         let belongs = |v: &usize| {

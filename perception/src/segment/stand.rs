@@ -2,6 +2,7 @@
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
 use crate::round::{SECTORS, sector};
+use crate::scale::{APART_M, PLACE_M};
 use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -19,12 +20,6 @@ const BEARS: usize = 15;
 /// Tells for each segment what it stands on: the surface, another segment that is seen around its foot, or the bottom of one that is
 /// around it. Gives all tops.
 pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
-    /// What begins lower stands on the surface, or in something, metres. From: chosen.
-    const LIFTED_M: f64 = 0.01;
-    /// A lower edge this high has been cut or hidden rather than set on something of which nothing is seen around it, metres. From: chosen.
-    const CUT_M: f64 = 0.02;
-    /// What stands in another thing is in its middle rather than along its wall: so far from that, metres. From: chosen.
-    const WALL_M: f64 = 0.02;
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
     let (tops, boxes): (Vec<f64>, Vec<_>) = parts.par_iter().with_max_len(1).map(of).unzip();
     let outlines: Vec<OnceLock<Outline>> = parts.iter().map(|_| OnceLock::new()).collect();
@@ -40,22 +35,21 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
         let above = Point3::new(x, y, 0.0);
         let is_below = |other: &usize| *other != i && tops[*other] > low - MEETS_M && is_over(*other, &above);
         let below: Vec<usize> = (0..parts.len()).filter(is_below).collect();
-        let lifted = below.iter().filter(|_| low > LIFTED_M);
-        let borne =
-            lifted.filter_map(|&other| borne_at_m(part, outline(i), (place, low), &parts[other].points));
+        let lifted = below.iter().filter(|_| low > PLACE_M);
+        let borne = lifted.filter_map(|&other| borne_at_m(outline(i), (place, low), &parts[other].points));
         if let Some(at) = borne.max_by(f64::total_cmp) {
             return (at, 0.0);
         }
         let is_around = |&other: &usize| {
             is_wider(&boxes[other], &boxes[i])
-                && outline(other).covers(&above, -WALL_M)
+                && outline(other).covers(&above, -APART_M)
                 && directions(parts[other].points.iter(), place) >= AROUND
         };
         if below.iter().any(is_around) {
             return BOTTOM_M;
         }
         // What lies along the rim of another is most likely a piece of that.
-        let rims = below.iter().map(|&other| tops[other]).filter(|top| low > CUT_M && *top < low + MEETS_M);
+        let rims = below.iter().map(|&other| tops[other]).filter(|top| low > APART_M && *top < low + MEETS_M);
         (rims.max_by(f64::total_cmp).unwrap_or(0.0), 0.0)
     };
     let bases: Vec<(f64, f64)> = parts.par_iter().with_max_len(1).enumerate().map(base).collect();
@@ -66,24 +60,14 @@ pub(super) fn on(parts: &mut [Segment]) -> Vec<f64> {
 }
 
 /// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
-fn borne_at_m(
-    part: &Segment,
-    outline: &Outline,
-    (place, low): ([f64; 2], f64),
-    other: &[Point3<f64>],
-) -> Option<f64> {
-    /// It is seen no farther out of the part's outline, and no farther within, metres. From: chosen.
-    const BESIDE_M: (f64, f64) = (0.015, 0.01);
-    /// In so many points: at least, and one for so many of the part's own. From: chosen.
-    const SEEN: (usize, usize) = (5, 20);
+fn borne_at_m(outline: &Outline, (place, low): ([f64; 2], f64), other: &[Point3<f64>]) -> Option<f64> {
     /// Share of them that lie lower than the top. From: chosen.
     const TOP: f64 = 0.8;
     let is_beside = |p: &&Point3<f64>| {
-        (p.z - low).abs() < MEETS_M && outline.covers(p, BESIDE_M.0) && !outline.covers(p, -BESIDE_M.1)
+        (p.z - low).abs() < MEETS_M && outline.covers(p, APART_M) && !outline.covers(p, -PLACE_M)
     };
     let beside: Vec<&Point3<f64>> = other.iter().filter(is_beside).collect();
-    let bears = beside.len() >= SEEN.0.max(part.points.len() / SEEN.1)
-        && directions(beside.iter().copied(), place) >= BEARS;
+    let bears = directions(beside.iter().copied(), place) >= BEARS;
     let mut heights: Vec<f64> = beside.iter().map(|p| p.z).collect();
     bears.then(|| quantile(&mut heights, TOP))
 }

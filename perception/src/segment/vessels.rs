@@ -1,40 +1,24 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{OUTSIDE, Segment, bounds, hull_from_above, middle, most_within, top_m};
+use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, most_within, top_m};
 use crate::outline;
-use crate::round::{self, ON_SIDE_M, Round, SECTORS, STEEPEST, distance, sector};
+use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
+use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Parts this far apart can be one vessel, metres. From: chosen.
-const APART_M: f64 = 0.015;
-/// Their tops are this level, metres. From: chosen.
-const LEVEL_M: f64 = 0.015;
 /// Widest vessel, metres of radius. From: chosen.
 const WIDEST_M: f64 = 0.14;
 /// Share of the points of both that lie on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
-/// Share of a rim that lies on a circle: its handles do not. From: chosen.
-const ON_RIM: f64 = 0.7;
-/// How far down from the top the rim of a vessel is looked for, metres. From: chosen.
-const RIM_DEEP_M: f64 = 0.02;
 /// Share of the side of each of two parts that must lie on its own round body for both to be images of one. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
 /// From: chosen, two bodies cannot stand so near to each other.
 const ONE_PLACE: f64 = 0.5;
-/// Widest vessel that has a handle, metres of radius; how wide a handle with its noise is and how far it reaches, and how far from the
-/// wall its nearest part is measured, metres. From: chosen.
-const GRASPED_M: f64 = 0.06;
-const HANDLE_M: (f64, f64) = (0.045, 0.055);
-const TOUCHES_M: f64 = 0.015;
-/// The smaller part has at least this share of the points. From: chosen.
-const LEAST_SHARE: f64 = 0.08;
-/// And at least so many. From: chosen.
-const FEWEST: usize = 12;
-/// What is inside ends no farther above the rim, metres. From: chosen.
-const RIM_M: f64 = 0.005;
+/// How near a body's side has to be to what it is the side of, as a share of how near any box is. From: chosen.
+const OF_BOX: f64 = 0.6;
 
 /// A part with what the pairs ask of it again and again.
 struct Candidate {
@@ -116,17 +100,12 @@ fn union(a: &Segment, b: &Segment) -> Segment {
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    /// By so much the share of one part may be smaller that lies on a body of both. From: chosen.
-    const LESS: f64 = 0.1;
     /// Points of both that tell a body. From: work.
     const ENOUGH: usize = 2000;
-    if small.segment.indices.len() < FEWEST {
-        return false;
-    }
     if !near(large, small) {
         return is_level(large, small) && is_in_reach(large, small) && one_rim([large, small], viewpoints);
     }
-    let inside = small.top_m < large.top_m + RIM_M && footprint_inside(large, small);
+    let inside = small.top_m < large.top_m + PLACE_M && footprint_inside(large, small);
     let fitted = large.fitted(viewpoints).filter(|f| f.is_tight(&large.segment.points));
     if inside && fitted.is_some() || fitted.is_some_and(|f| is_handle(&f.body, large, small)) {
         return true;
@@ -144,7 +123,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     let top = large.top_m.max(small.top_m);
     round_body(&both, large.low.z.min(small.low.z), top, viewpoints).is_some_and(|body| {
         // Each part on its own must keep to the common body: one alone may carry the fit.
-        [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY - LESS)
+        [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY)
     }) || one_rim([large, small], viewpoints)
 }
 
@@ -153,17 +132,16 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let top_m = parts[0].top_m.max(parts[1].top_m);
     let rims = parts.map(|part| {
         let points = part.segment.points.iter().copied();
-        points.filter(|p| p.z > top_m - RIM_DEEP_M).collect::<Vec<_>>()
+        points.filter(|p| p.z > top_m - APART_M).collect::<Vec<_>>()
     });
     let both = rims.concat();
-    let Some(fitted) = Fitted::to(&both, top_m - RIM_DEEP_M, top_m, viewpoints) else { return false };
+    let Some(fitted) = Fitted::to(&both, top_m - APART_M, top_m, viewpoints) else { return false };
     let body = &fitted.body;
-    let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < ON_SIDE_M;
+    let is_on = |p: &&Point3<f64>| body.outside_m(p).abs() < PLACE_M;
     let on = |of: &[Point3<f64>]| of.iter().filter(is_on).count() as f64 / of.len().max(1) as f64;
     let mut seen = [false; SECTORS];
     both.iter().filter(is_on).for_each(|p| seen[sector(p.x - body.x, p.y - body.y)] = true);
-    let is_within =
-        |p: &&Point3<f64>| distance(p.x - body.x, p.y - body.y) < body.radius_at(top_m) + TOUCHES_M;
+    let is_within = |p: &&Point3<f64>| distance(p.x - body.x, p.y - body.y) < body.radius_at(top_m) + APART_M;
     let holds = |part: &Candidate| {
         let points = &part.segment.points;
         points.iter().filter(is_within).count() as f64 >= ON_BODY * points.len() as f64
@@ -171,13 +149,12 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     seen.iter().filter(|seen| **seen).count() * 2 >= SECTORS
         && rims.iter().all(|rim| on(rim) >= ON_MOST)
         && parts.into_iter().all(holds)
-        && fitted.is_near(&both, ON_RIM)
+        && fitted.is_near(&both, ON_MOST)
 }
 
-/// Whether two parts are as high, and neither is a crumb of the other.
+/// Whether two parts are as high.
 fn is_level(large: &Candidate, small: &Candidate) -> bool {
-    let (n, m) = (large.segment.indices.len() as f64, small.segment.indices.len() as f64);
-    (large.top_m - small.top_m).abs() <= LEVEL_M && m >= LEAST_SHARE * n
+    (large.top_m - small.top_m).abs() <= APART_M
 }
 
 /// The round body that nearly all of the side of the points lies on, if it is one rather than a box.
@@ -220,19 +197,13 @@ impl Fitted {
 
     /// Whether so large a share of its points lies on it, as near as they are measured, and much nearer than to a box.
     fn is_near(&self, points: &[Point3<f64>], share: f64) -> bool {
-        /// Beyond two spreads of a measurement, what a good fit may miss by, metres. From: chosen.
-        const MISS_M: f64 = 0.0015;
-        /// Share of the miss of a box. From: chosen.
-        const OF_BOX: f64 = 0.6;
-        self.body.residual_m < 2.0 * self.sigma_m + MISS_M
+        self.body.residual_m < 2.0 * self.sigma_m + SHAPE_M
             && self.body.inliers >= share
             && self.beats_box(points, OF_BOX)
     }
 
     /// Whether most of its points lie on it, nearer than to a box, and tell where it stands.
     fn is_placed(&self, points: &[Point3<f64>]) -> bool {
-        /// Share of the miss of a box. From: chosen.
-        const OF_BOX: f64 = 0.8;
         self.body.inliers >= ON_MOST
             && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m
             && self.beats_box(points, OF_BOX)
@@ -251,28 +222,23 @@ fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> boo
 /// Whether a part is what sticks out of a vessel's side: it begins at the wall, is no wider than a handle, reaches no further, and ends
 /// below the rim.
 fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
-    /// One in so many points may lie nearer than where it begins, and one farther than where it ends. From: chosen.
-    const STRAY: usize = 20;
-    /// Of the second number of points, the first are no wider than a handle. From: chosen.
-    const NARROW: (usize, usize) = (9, 10);
     let points = &small.segment.points;
     let [x, y] = middle(points);
     let (dx, dy) = (x - body.x, y - body.y);
     let far_m = dx.hypot(dy);
-    if body.radius_m > GRASPED_M || far_m < body.radius_m / 2.0 || small.top_m > large.top_m + LEVEL_M {
+    if far_m < body.radius_m / 2.0 || small.top_m > large.top_m + APART_M {
         return false;
     }
     let out = |p: &Point3<f64>| ((p.x - body.x) * dx + (p.y - body.y) * dy) / far_m - body.radius_m;
     let aside = |p: &Point3<f64>| ((p.x - body.x) * dy - (p.y - body.y) * dx) / far_m;
-    let mut outs: Vec<f64> = points.iter().map(out).collect();
-    outs.sort_by(f64::total_cmp);
-    let (first, last) = (outs[outs.len() / STRAY], outs[outs.len() - 1 - outs.len() / STRAY]);
-    let within = points.iter().filter(|p| aside(p).abs() < HANDLE_M.0 / 2.0).count();
-    first < TOUCHES_M && last < HANDLE_M.1 && within * NARROW.1 >= points.len() * NARROW.0
+    let outs: Vec<f64> = points.iter().map(out).collect();
+    let (first, last) = (end(&outs, POINT_ENDS.0), end(&outs, POINT_ENDS.1));
+    let within = points.iter().filter(|p| aside(p).abs() < 0.5 * (HANDLE_WIDTH_M + PLACE_M)).count();
+    first < APART_M && last < HANDLE_M.1 && within as f64 >= ON_BODY * points.len() as f64
 }
 
 fn share_on(body: &Round, part: &Segment) -> f64 {
-    let on = part.points.iter().filter(|p| body.outside_m(p) < ON_SIDE_M).count();
+    let on = part.points.iter().filter(|p| body.outside_m(p) < PLACE_M).count();
     on as f64 / part.points.len().max(1) as f64
 }
 
@@ -283,7 +249,7 @@ fn near(a: &Candidate, b: &Candidate) -> bool {
 
 /// True if the widest vessel could reach both.
 fn is_in_reach(a: &Candidate, b: &Candidate) -> bool {
-    let across_m = 2.0 * (WIDEST_M + STEEPEST * RIM_DEEP_M + TOUCHES_M);
+    let across_m = 2.0 * (WIDEST_M + STEEPEST * APART_M + APART_M);
     (0..2).all(|k| a.low[k] - across_m < b.high[k] && b.low[k] - across_m < a.high[k])
 }
 

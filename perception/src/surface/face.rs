@@ -6,6 +6,7 @@ use super::planes::{FEWEST, Plane, Sample, least_squares};
 use super::tiles::Tiles;
 use super::{Role, Sign, Surface, floor};
 use crate::cloud::Cloud;
+use crate::scale::{APART_M, SHAPE_M};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -18,15 +19,11 @@ const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
 /// Fewer samples are no piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
-/// A part whose points lie on average so far off the common plane has one of its own, metres. From: chosen.
-const OWN_PLANE_M: f64 = 0.002;
 
 /// The connected parts of a plane, most returns first. None if no camera is above it.
 pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Visibility) -> Vec<Surface> {
-    /// A camera no higher than this sees nothing of a plane, metres. From: chosen.
-    const LEAST_EYE_M: f64 = 0.02;
     let viewpoints = seen.viewpoints();
-    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < LEAST_EYE_M) {
+    if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < APART_M) {
         return Vec::new();
     }
     let (mut held, mut beside, mut squares) = (Vec::with_capacity(samples.len()), Vec::new(), 0.0);
@@ -78,7 +75,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         }
         // The plane is the largest part's; another may lie a little off it.
         let mean = members.iter().map(|s| plane.distance(&s.point)).sum::<f64>() / members.len() as f64;
-        let own = (n > 0 && mean.abs() > OWN_PLANE_M)
+        let own = (n > 0 && mean.abs() > SHAPE_M)
             .then(|| least_squares(members.iter().copied(), &plane.normal))
             .flatten();
         let hull = hull_of(cells, grid.side_m);

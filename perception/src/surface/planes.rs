@@ -1,6 +1,7 @@
 //! The large planes of a sample of points.
 
 use crate::draw::Draws;
+use crate::scale;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
@@ -24,8 +25,9 @@ const BLOCK: usize = 128;
 /// Points that one thread takes in a row. From: work.
 const SOME: usize = 2048;
 
-/// A measurement of a plane lies within this many spreads of its own and this distance of it, metres. From: chosen.
-pub(crate) const BAND: (f64, f64) = (3.0, 0.004);
+/// A measurement of a plane lies within this many spreads of its own and this distance of it, metres.
+/// From: derived, as exactly as an edge is known.
+pub(crate) const BAND: (f64, f64) = (scale::SPREADS, scale::EDGE_M);
 
 #[derive(Clone, Copy)]
 pub(super) struct Plane {

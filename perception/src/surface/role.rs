@@ -5,6 +5,7 @@
 
 use super::planes::Sample;
 use super::{Level, MOST, Surface, SurfaceOptions, TALLEST_M};
+use crate::scale::APART_M;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
 use rayon::prelude::*;
@@ -115,8 +116,6 @@ const AROUND_RAYS: usize = 5;
 const LEVEL_M: f64 = 0.012;
 /// What is lower than this on another surface is a thing, or on the floor a step, metres. From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
-/// Boards that keep what is on them are measured as well as this, root mean square, metres. From: chosen.
-const BOARD_RESIDUAL_M: f64 = 0.015;
 /// So many samples so far within an outline and below it were seen beneath it, metres. From: chosen.
 const BENEATH: usize = 15;
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
@@ -163,7 +162,7 @@ pub(super) fn tell(
     assign(surfaces, told);
     let ground = surfaces.iter().filter(|s| s.role == Role::Floor).max_by_key(|s| s.points).cloned();
     let is_board =
-        |(s, open): &(&Surface, &bool)| s.role == Role::Support && s.residual_m < BOARD_RESIDUAL_M && **open;
+        |(s, open): &(&Surface, &bool)| s.role == Role::Support && s.residual_m < APART_M && **open;
     let boards: Vec<&Surface> = surfaces.iter().zip(&open).filter(is_board).map(|(s, _)| s).collect();
     let over: Vec<Vec<Level>> = surfaces.iter().map(|s| over(s, &boards)).collect();
     for (surface, over) in surfaces.iter_mut().zip(over) {

@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Files and folders of `src` whose constants have to say so.
-pub const PARTS: [&str; 6] = ["noise", "segment", "recognise", "round", "surface", "merge"];
+pub const PARTS: [&str; 7] = ["scale", "noise", "segment", "recognise", "round", "surface", "merge"];
 
 /// Where a value may be from, and whether it has to be said further what that is.
 const KINDS: [(&str, bool); 8] = [

@@ -16,6 +16,8 @@ use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix4, Point3, Vector3, Vector4};
 use rustc_hash::FxHashMap;
 
+/// No view is moved farther than this: it shows something else, metres. From: chosen.
+const MOST_M: f64 = 0.03;
 /// The side has to spread by no more than this share of what it did. From: chosen.
 const ROUNDER: f64 = 0.85;
 /// Points farther from the side than this tell nothing of it, metres: at first, and once it is near. From: chosen, one a step.
@@ -23,6 +25,10 @@ const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
 /// Points of a view that are enough to go by, and those that it needs. From: chosen.
 const ENOUGH: usize = 400;
 const FEWEST: usize = 40;
+/// Share of what a view shows of the body that has to lie on it, and how well, in spreads of a measurement, when the view is settled.
+/// From: chosen.
+const ON_IT: f64 = 0.7;
+const WELL: f64 = 1.3;
 
 /// A body whose views are laid on each other.
 pub(super) struct Settled<'a> {
@@ -89,7 +95,7 @@ impl Side {
 }
 
 /// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if
-/// there is nothing to move.
+/// there is nothing to move, or if what a view shows does not lie on the body even then.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
     /// Columns before those of the shifts: axis, radius and slope. From: derived, two for the axis and one each for radius and slope.
     const BODY: usize = 4;
@@ -145,7 +151,24 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
         });
     }
     let far = shifts.iter().map(|s| s[0].hypot(s[1])).fold(0.0, f64::max);
-    (far > EDGE_M && body.radius_m > 0.0).then_some((body, shifts))
+    let on_it = |(side, shift): (&Side, &[f64; 2])| side.lies_on(&body, *shift);
+    ((EDGE_M..MOST_M).contains(&far) && body.radius_m > 0.0 && sides.iter().zip(&shifts).all(on_it))
+        .then_some((body, shifts))
+}
+
+impl Side {
+    /// Whether what is shown, moved back by a shift, is the side of a body, as smooth as the camera measures.
+    fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
+        /// Farther from the side than this, and than two spreads, a point is not asked whether it lies on it, metres.
+        /// From: derived, the last of the gates.
+        const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
+        let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
+        let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();
+        let spread_m = (near.iter().map(|m| m * m).sum::<f64>() / near.len().max(1) as f64).sqrt();
+        self.points.is_empty()
+            || (near.len() as f64 > ON_IT * self.points.len() as f64
+                && spread_m < SHAPE_M.max(WELL * self.sigma_m))
+    }
 }
 
 /// The cells that the points of a body lie in, seen from above, those beside them, and their range of heights.

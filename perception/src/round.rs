@@ -4,7 +4,6 @@ mod side;
 
 use crate::draw::Draws;
 use crate::scale::{EDGE_M, PLACE_M};
-use crate::surface::range_sigma_m;
 use nalgebra::{Point3, Vector4};
 use side::{Side, Sums};
 use std::ops::Range;
@@ -216,11 +215,6 @@ impl Round {
         let (n, squares) = misses.fold((0.0, 0.0), |(n, s), d| (n + 1.0, s + d.min(OUTSIDE_M).powi(2)));
         (squares / f64::max(n, 1.0)).sqrt()
     }
-}
-
-/// Spread of a measurement of a body so far from the camera, metres.
-pub(crate) fn sigma_m(distance_m: f64) -> f64 {
-    range_sigma_m(distance_m)
 }
 
 /// How far from the side a point of it may be measured, metres.

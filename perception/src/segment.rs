@@ -116,7 +116,7 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
 
 /// Shares of a segment's points that lie below its lower edge and below its top: beyond are the few that may be noise. From: chosen.
 pub(crate) const POINT_ENDS: (f64, f64) = (0.01, 0.99);
-/// The same of the voxels of a part. From: chosen.
+/// The same of the voxels of a part, and of what sticks out of a body. From: chosen.
 pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
 /// Fewest voxels that tell an upright side. From: chosen.
 const SIDE_VOXELS: usize = 25;

@@ -12,6 +12,7 @@ use crate::outline::{self, Rectangle};
 use crate::round::{self, ENDS, Edge, Round, SECTORS};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M, SPREADS};
 use crate::segment::{Scene, Segment, VOXEL_ENDS, end, quantile, top_m};
+use crate::surface::range_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
@@ -178,7 +179,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let place = Point3::new(footprint.x, footprint.y, 0.5 * (base_m + top));
     let far = |v: &Point3<f64>| (world_from_surface * place - v).norm();
     let near = seen.viewpoints().iter().map(far).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = round::sigma_m(near);
+    let sigma_m = range_sigma_m(near);
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m(sigma_m));
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));
@@ -219,6 +220,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     if let Some(first) = first {
         let edges = silhouettes(&first, segment, &asker, base_m, height_m);
         let round = round::refit(&first, &segment.points, &edges, base_m, top, sigma_m);
+        // Measured worse than a place is known, depth spreads points along the view as far as the side is deep.
         let eye = (sigma_m > PLACE_M).then(|| asker.only_from(&first)).flatten();
         let round =
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
@@ -302,6 +304,7 @@ fn measure_round(
     measured.looked_through = sectors.looked_through_share();
     evidence.handle_unseen = sectors.unseen_share();
     let mut spread_m = round.spread_m;
+    // As far off, a few points that stick out together are no handle.
     let protrusion = Protrusion::find(round, segment, asker, (base_m, height), measured.sigma_m > PLACE_M);
     if let Some(protrusion) = &protrusion {
         evidence.protrusion_m = protrusion.reach_m;

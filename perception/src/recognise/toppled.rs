@@ -235,6 +235,7 @@ fn about(
     let places: Vec<f64> = points.iter().map(|p| p.z).collect();
     let ends_m = [end(&places, POINT_ENDS.0), end(&places, POINT_ENDS.1)];
     let round = round::fit(&points, ends_m[0], ends_m[1], sigma_m, round::SEED)?;
+    // It rests on its side, about a circle that is one to go by.
     let rests = (round.y - round.radius_m).abs() < PLACE_M + sigma_m;
     let is_told = round.radius_sigma_m < APART_M && round.inliers >= MOST;
     let band = side_band(ends_m[0], ends_m[1]);

@@ -4,6 +4,7 @@ use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, 
 use crate::outline;
 use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
 use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};
+use crate::surface::range_sigma_m;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -12,7 +13,8 @@ use std::sync::OnceLock;
 const WIDEST_M: f64 = 0.14;
 /// Share of the points of both that lie on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
-/// Share of the side of each of two parts that must lie on its own round body for both to be images of one. From: chosen, more than half.
+/// Share of the side of each of two parts that must lie on its own round body for both to be images of one, and of a rim on its circle:
+/// its handles do not. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
 /// From: chosen, two bodies cannot stand so near to each other.
@@ -180,7 +182,7 @@ impl Fitted {
         const SEED: u64 = 3;
         let first = points.first()?;
         let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-        let sigma_m = round::sigma_m(near);
+        let sigma_m = range_sigma_m(near);
         let body = round::fit(points, low_m, top_m, sigma_m, SEED)?;
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }

@@ -73,7 +73,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
         if n > 0 && members.len() < FEWEST {
             return None;
         }
-        // The plane is the largest part's; another may lie a little off it.
+        // The plane is the largest part's; another may lie a little off it, and then has one of its own.
         let mean = members.iter().map(|s| plane.distance(&s.point)).sum::<f64>() / members.len() as f64;
         let own = (n > 0 && mean.abs() > SHAPE_M)
             .then(|| least_squares(members.iter().copied(), &plane.normal))

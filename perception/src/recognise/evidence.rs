@@ -9,7 +9,7 @@ use super::settle::settle;
 use super::upper::Upper;
 use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
-use crate::round::{self, ENDS, Edge, Round, SECTORS};
+use crate::round::{self, ENDS, Edge, NO_CIRCLE, Round, SECTORS};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M, SPREADS};
 use crate::segment::{Scene, Segment, VOXEL_ENDS, end, quantile, top_m};
 use crate::surface::range_sigma_m;
@@ -24,9 +24,6 @@ const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// foot of a far side is often hidden by the near one. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
-/// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
-/// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
-pub(super) const MOST: f64 = 0.34;
 /// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
 pub(super) const UNSEEN: f64 = 0.08;
 /// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
@@ -224,7 +221,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         let eye = (sigma_m > PLACE_M).then(|| asker.only_from(&first)).flatten();
         let round =
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
-        measured.round = round.filter(|round| round.inliers >= MOST);
+        measured.round = round.filter(|round| round.inliers >= NO_CIRCLE);
     }
     let rays = rays(this, (&segment.points, &measured), &asker, setting);
     if let Some(round) = measured.round {

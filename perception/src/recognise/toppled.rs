@@ -5,24 +5,20 @@
 use super::asker::Asker;
 use super::body::Frustum;
 use super::evidence::{
-    HANDLE_FEWEST, HANDLE_POINTS, MOST, Measured, Setting, UNSEEN, measured_sectors, rays_around, tolerance_m,
+    HANDLE_FEWEST, HANDLE_POINTS, Measured, Setting, UNSEEN, measured_sectors, rays_around, tolerance_m,
 };
 use super::model::{Handle, ObjectModel, Range, Shape};
 use super::percept::{Evidence, Sighting};
 use super::rays::{Rays, ViewRays};
 use super::upper::Upper;
 use super::verify::Own;
-use crate::outline::Rectangle;
-use crate::round::{self, Round, SECTORS, side_band};
+use crate::round::lying::{self, Found, Lying};
+use crate::round::{SECTORS, side_band};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M};
-use crate::segment::{POINT_ENDS, Segment, VOXEL_ENDS, end, quantile};
+use crate::segment::{Segment, VOXEL_ENDS, quantile};
 use crate::visibility::Visibility;
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Point3;
 
-/// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
-const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
-/// Points by which the direction of its axis is sought, at the most. From: chosen.
-const SCOUTS: usize = 300;
 /// An end that a camera sees flatter than this tells neither lid nor inside: what it is off by leads far along the ray, cosine of 60
 /// degrees. From: chosen.
 const FACING: f64 = 0.5;
@@ -54,7 +50,7 @@ impl Toppled {
         if measured.top_hidden || !models.iter().any(|model| may_lie(model, measured)) {
             return None;
         }
-        let mut found = fit(segment, &measured.footprint, measured.sigma_m)?;
+        let mut found = lying::fit(&segment.points, &measured.footprint, segment.base_m, measured.sigma_m)?;
         let asker = Asker::of(
             seen,
             setting.scene.surface.surface_from_world.inverse(),
@@ -84,8 +80,8 @@ impl Toppled {
 }
 
 impl Way {
-    fn of(m: &Measured, flat: &Rays, body: &Body, handle: &HandleSeen) -> Way {
-        let Body { turned, round, ends_m: [foot_m, rim_m] } = *body;
+    fn of(m: &Measured, flat: &Rays, body: &Lying, handle: &HandleSeen) -> Way {
+        let Lying { turned, round, ends_m: [foot_m, rim_m] } = *body;
         let rays = flat.moved(&turned);
         let (at_foot, at_rim) = (round.radius_at(foot_m), round.radius_at(rim_m));
         let height_m = rim_m - foot_m;
@@ -131,35 +127,6 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
         && is_near(m.footprint.sides_m[0], 0.5 * long_m.low, long_m.high + out_m)
 }
 
-/// A round body about an axis along the surface.
-#[derive(Clone, Copy)]
-struct Body {
-    /// Surface to a frame in which the axis is z and y leads away from the surface.
-    turned: Isometry3<f64>,
-    /// The body there, and where it ends.
-    round: Round,
-    ends_m: [f64; 2],
-}
-
-impl Body {
-    /// The same with its other end down.
-    fn over(&self) -> Body {
-        let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
-        let Body { turned, round, ends_m: [foot, rim] } = *self;
-        let round = Round { x: -round.x, slope: -round.slope, middle_m: -round.middle_m, ..round };
-        Body { turned: over * turned, round, ends_m: [-rim, -foot] }
-    }
-}
-
-/// A body that was found, the points in its frame, and the direction of its axis.
-struct Found {
-    body: Body,
-    points: Vec<Point3<f64>>,
-    angle: f64,
-    /// Mean squared distance of the points from the side, each at most that of what is clear of it, square metres.
-    miss_m2: f64,
-}
-
 /// Whether what lies has a handle.
 struct HandleSeen {
     sighting: Sighting,
@@ -172,7 +139,7 @@ struct HandleSeen {
 impl Found {
     /// The handle lies beside the body or above it: what it rests on leaves no room below.
     fn handle(&self) -> HandleSeen {
-        let Body { round, ends_m: [low, high], .. } = self.body;
+        let Lying { round, ends_m: [low, high], .. } = self.body;
         let band = side_band(low, high);
         let out = self.points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p));
         let mut out: Vec<f64> = out.filter(|out| (HANDLE_M.0..HANDLE_M.1).contains(out)).collect();
@@ -195,52 +162,7 @@ impl Found {
 
     /// What may be a handle says nothing against the roundness of what it is the handle of.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
-        let Body { round, ends_m: [low, high], .. } = self.body;
+        let Lying { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)
     }
-}
-
-/// The best round body about an axis along the surface.
-fn fit(segment: &Segment, bounds: &Rectangle, sigma_m: f64) -> Option<Found> {
-    let points = &segment.points;
-    let few: Vec<Point3<f64>> =
-        points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();
-    let sides = [0.0, std::f64::consts::FRAC_PI_2];
-    let angle = bounds.turn.0.atan2(bounds.turn.1);
-    let angles = sides.into_iter().flat_map(|side| TURNS.map(|by| angle + side + by));
-    let origin = Translation3::new(-bounds.x, -bounds.y, -segment.base_m);
-    let best = |a: &Found, b: &Found| a.miss_m2.total_cmp(&b.miss_m2);
-    let scouted = angles.filter_map(|angle| about(&few, &origin, (angle, 0.0), sigma_m)).min_by(best)?;
-    let found = about(points, &origin, (scouted.angle, 0.0), sigma_m)?;
-    // What narrows rests on its side: its axis rises towards the wider end.
-    let rise = found.body.round.slope.atan();
-    let risen = about(points, &origin, (found.angle, rise), sigma_m);
-    [Some(found), risen].into_iter().flatten().min_by(best)
-}
-
-/// The round body about an axis in a direction, which rises by an angle, if it rests on what is below it.
-fn about(
-    points: &[Point3<f64>],
-    origin: &Translation3<f64>,
-    (angle, rise): (f64, f64),
-    sigma_m: f64,
-) -> Option<Found> {
-    let (sin, cos) = angle.sin_cos();
-    let (up, level) = rise.sin_cos();
-    let along = Vector3::new(level * cos, level * sin, up);
-    let across = Vector3::new(-sin, cos, 0.0);
-    let rows = Matrix3::from_rows(&[across.transpose(), along.cross(&across).transpose(), along.transpose()]);
-    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows)) * origin;
-    let points: Vec<Point3<f64>> = points.iter().map(|p| turned * p).collect();
-    let places: Vec<f64> = points.iter().map(|p| p.z).collect();
-    let ends_m = [end(&places, POINT_ENDS.0), end(&places, POINT_ENDS.1)];
-    let round = round::fit(&points, ends_m[0], ends_m[1], sigma_m, round::SEED)?;
-    // It rests on its side, about a circle that is one to go by.
-    let rests = (round.y - round.radius_m).abs() < PLACE_M + sigma_m;
-    let is_told = round.radius_sigma_m < APART_M && round.inliers >= MOST;
-    let band = side_band(ends_m[0], ends_m[1]);
-    let misses = points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p).abs().min(PLACE_M));
-    let (count, squares) = misses.fold((0.0, 0.0), |(n, sum), miss| (n + 1.0, sum + miss * miss));
-    let miss_m2 = squares / f64::max(count, 1.0);
-    (rests && is_told).then_some(Found { body: Body { turned, round, ends_m }, points, angle, miss_m2 })
 }

@@ -2,6 +2,7 @@
 
 use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, most_within, top_m};
 use crate::outline;
+use crate::round::lying::{self, Lying};
 use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
 use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};
 use crate::surface::range_sigma_m;
@@ -33,19 +34,45 @@ struct Candidate {
     /// Seen from above.
     hull: OnceLock<Vec<[f64; 2]>>,
     fitted: OnceLock<Option<Fitted>>,
+    lying: OnceLock<Option<Lying>>,
 }
 
 impl Candidate {
     fn new(number: Option<usize>, segment: Segment) -> Candidate {
         let (low, high) = bounds(&segment.points);
         let top_m = top_m(&segment);
-        Candidate { number, segment, low, high, top_m, hull: OnceLock::new(), fitted: OnceLock::new() }
+        Candidate {
+            number,
+            segment,
+            low,
+            high,
+            top_m,
+            hull: OnceLock::new(),
+            fitted: OnceLock::new(),
+            lying: OnceLock::new(),
+        }
     }
 
     fn fitted(&self, viewpoints: &[Point3<f64>]) -> Option<&Fitted> {
         self.fitted
             .get_or_init(|| Fitted::to(&self.segment.points, self.low.z, self.top_m, viewpoints))
             .as_ref()
+    }
+
+    /// The round body on its side that it is, if it is one rather than a box.
+    fn lying(&self, viewpoints: &[Point3<f64>]) -> Option<&Lying> {
+        let fit = || {
+            let points = &self.segment.points;
+            // What is higher than it is long stands.
+            if (self.high - self.low).xy().norm() < self.top_m {
+                return None;
+            }
+            let (bounds, sigma_m) = (outline::bounding(points)?, sigma_m(points, viewpoints)?);
+            let found = lying::fit(points, &bounds, 0.0, sigma_m)?;
+            let fitted = Fitted { body: found.body.round, sigma_m };
+            fitted.is_tight(&found.points).then_some(found.body)
+        };
+        self.lying.get_or_init(fit).as_ref()
     }
 
     fn hull(&self) -> &[[f64; 2]] {
@@ -112,6 +139,9 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     if inside && fitted.is_some() || fitted.is_some_and(|f| is_handle(&f.body, large, small)) {
         return true;
     }
+    if lies_within(large, small, viewpoints) {
+        return true;
+    }
     if !is_level(large, small) {
         return false;
     }
@@ -127,6 +157,17 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
         // Each part on its own must keep to the common body: one alone may carry the fit.
         [large, small].iter().all(|part| share_on(&body, &part.segment) >= ON_BODY)
     }) || one_rim([large, small], viewpoints)
+}
+
+/// Whether a part lies within the round body that another is, which lies on its side.
+fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
+    large.lying(viewpoints).is_some_and(|Lying { turned, round, ends_m: [low, high] }| {
+        let ends_m = low - PLACE_M..high + PLACE_M;
+        let points = &small.segment.points;
+        let own = points.iter().map(|p| turned * p);
+        let within = own.filter(|p| ends_m.contains(&p.z) && round.outside_m(p) < PLACE_M).count();
+        within as f64 >= ON_BODY * points.len() as f64
+    })
 }
 
 /// Whether the upper ends of two parts lie on one circle that holds both: near outside and far inside of a bowl, whose side is no cone's.
@@ -169,6 +210,13 @@ pub(super) fn round_body(
     Fitted::to(points, low_m, top_m, viewpoints).filter(|f| f.is_tight(points)).map(|f| f.body)
 }
 
+/// Spread of one measurement of points, metres.
+fn sigma_m(points: &[Point3<f64>], viewpoints: &[Point3<f64>]) -> Option<f64> {
+    let first = points.first()?;
+    let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
+    Some(range_sigma_m(near))
+}
+
 /// The round body that comes nearest to points, however badly.
 struct Fitted {
     body: Round,
@@ -180,9 +228,7 @@ impl Fitted {
     fn to(points: &[Point3<f64>], low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Fitted> {
         /// Of the circles proposed. From: mark.
         const SEED: u64 = 3;
-        let first = points.first()?;
-        let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-        let sigma_m = range_sigma_m(near);
+        let sigma_m = sigma_m(points, viewpoints)?;
         let body = round::fit(points, low_m, top_m, sigma_m, SEED)?;
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }
@@ -323,18 +369,41 @@ mod tests {
         (0..4800).map(at).collect()
     }
 
+    /// How many parts are left of two.
+    fn count(parts: [Vec<Point3<f64>>; 2]) -> usize {
+        let mut from = 0;
+        let parts = parts.map(|points| {
+            let indices = (from..from + points.len() as u32).collect();
+            from += points.len() as u32;
+            Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 }
+        });
+        whole(parts.into(), &[Point3::new(1.0, 0.0, 0.8)]).len()
+    }
+
+    #[test]
+    fn both_sides_of_what_lies_are_one() {
+        // What is 8 cm thick and 16 cm long, between two angles about its axis in degrees: at a radius of that angle.
+        let along = |from: f64, to: f64, radius_m: &dyn Fn(f64) -> f64| -> Vec<Point3<f64>> {
+            let at = |k: usize| {
+                let angle = (from + (to - from) * (k % 60) as f64 / 59.0).to_radians();
+                let (sin, cos) = angle.sin_cos();
+                let out_m = radius_m(angle);
+                Point3::new(0.16 * (k / 60) as f64 / 39.0, out_m * cos, 0.04 + out_m * sin)
+            };
+            (0..2400).map(at).collect()
+        };
+        let round = |_: f64| 0.04;
+        let square = |angle: f64| 0.04 / angle.sin().abs().max(angle.cos().abs());
+        // A strip of its side that reaches nearly as high.
+        let strip = |radius_m| along(140.0, 200.0, radius_m);
+        assert_eq!(count([along(0.0, 120.0, &round), strip(&round)]), 1);
+        assert_eq!(count([along(0.0, 120.0, &square), strip(&square)]), 2, "a carton has no such side");
+        let wide = |_: f64| 0.055;
+        assert_eq!(count([along(0.0, 120.0, &round), strip(&wide)]), 2, "it stands beside it");
+    }
+
     #[test]
     fn the_inside_and_the_outside_of_a_bowl_are_one() {
-        let eyes = [Point3::new(1.0, 0.0, 0.8)];
-        let count = |walls: [Vec<Point3<f64>>; 2]| {
-            let mut from = 0;
-            let parts = walls.map(|points| {
-                let indices = (from..from + points.len() as u32).collect();
-                from += points.len() as u32;
-                Segment { indices, points, base_m: 0.0, base_sigma_m: 0.0 }
-            });
-            whole(parts.into(), &eyes).len()
-        };
         // The near outside and the far inside, which do not touch.
         assert_eq!(count([wall(290, 430, 0.0), wall(105, 255, 0.0)]), 1);
         // Two halves that are farther apart, and two that show too little of a rim.

@@ -1,0 +1,87 @@
+//! A round body that lies on its side: about an axis along the surface.
+
+use super::{NO_CIRCLE, Round, SEED, side_band};
+use crate::outline::Rectangle;
+use crate::scale::{APART_M, PLACE_M};
+use crate::segment::{POINT_ENDS, end};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+/// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
+const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
+/// Points by which the direction of its axis is sought, at the most. From: chosen.
+const SCOUTS: usize = 300;
+
+/// A round body about an axis along the surface.
+#[derive(Clone, Copy)]
+pub(crate) struct Lying {
+    /// Surface to a frame in which the axis is z and y leads away from the surface.
+    pub turned: Isometry3<f64>,
+    /// The body there, and where it ends.
+    pub round: Round,
+    pub ends_m: [f64; 2],
+}
+
+impl Lying {
+    /// The same with its other end down.
+    pub fn over(&self) -> Lying {
+        let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
+        let Lying { turned, round, ends_m: [foot, rim] } = *self;
+        let round = Round { x: -round.x, slope: -round.slope, middle_m: -round.middle_m, ..round };
+        Lying { turned: over * turned, round, ends_m: [-rim, -foot] }
+    }
+}
+
+/// A body that was found, the points in its frame, and the direction of its axis.
+pub(crate) struct Found {
+    pub body: Lying,
+    pub points: Vec<Point3<f64>>,
+    angle: f64,
+    /// Mean squared distance of the points from the side, each at most that of what is clear of it, square metres.
+    miss_m2: f64,
+}
+
+/// The best round body about an axis along the surface.
+///
+/// Bounds of the points seen from above, the height that they rest on, and the spread of one measurement, metres.
+pub(crate) fn fit(points: &[Point3<f64>], bounds: &Rectangle, base_m: f64, sigma_m: f64) -> Option<Found> {
+    let few: Vec<Point3<f64>> =
+        points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();
+    let sides = [0.0, std::f64::consts::FRAC_PI_2];
+    let angle = bounds.turn.0.atan2(bounds.turn.1);
+    let angles = sides.into_iter().flat_map(|side| TURNS.map(|by| angle + side + by));
+    let origin = Translation3::new(-bounds.x, -bounds.y, -base_m);
+    let best = |a: &Found, b: &Found| a.miss_m2.total_cmp(&b.miss_m2);
+    let scouted = angles.filter_map(|angle| about(&few, &origin, (angle, 0.0), sigma_m)).min_by(best)?;
+    let found = about(points, &origin, (scouted.angle, 0.0), sigma_m)?;
+    // What narrows rests on its side: its axis rises towards the wider end.
+    let rise = found.body.round.slope.atan();
+    let risen = about(points, &origin, (found.angle, rise), sigma_m);
+    [Some(found), risen].into_iter().flatten().min_by(best)
+}
+
+/// The round body about an axis in a direction, which rises by an angle, if it rests on what is below it.
+fn about(
+    points: &[Point3<f64>],
+    origin: &Translation3<f64>,
+    (angle, rise): (f64, f64),
+    sigma_m: f64,
+) -> Option<Found> {
+    let (sin, cos) = angle.sin_cos();
+    let (up, level) = rise.sin_cos();
+    let along = Vector3::new(level * cos, level * sin, up);
+    let across = Vector3::new(-sin, cos, 0.0);
+    let rows = Matrix3::from_rows(&[across.transpose(), along.cross(&across).transpose(), along.transpose()]);
+    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rows)) * origin;
+    let points: Vec<Point3<f64>> = points.iter().map(|p| turned * p).collect();
+    let places: Vec<f64> = points.iter().map(|p| p.z).collect();
+    let ends_m = [end(&places, POINT_ENDS.0), end(&places, POINT_ENDS.1)];
+    let round = super::fit(&points, ends_m[0], ends_m[1], sigma_m, SEED)?;
+    // It rests on its side, about a circle that is one to go by.
+    let rests = (round.y - round.radius_m).abs() < PLACE_M + sigma_m;
+    let is_told = round.radius_sigma_m < APART_M && round.inliers >= NO_CIRCLE;
+    let band = side_band(ends_m[0], ends_m[1]);
+    let misses = points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p).abs().min(PLACE_M));
+    let (count, squares) = misses.fold((0.0, 0.0), |(n, sum), miss| (n + 1.0, sum + miss * miss));
+    let miss_m2 = squares / f64::max(count, 1.0);
+    (rests && is_told).then_some(Found { body: Lying { turned, round, ends_m }, points, angle, miss_m2 })
+}

@@ -101,10 +101,20 @@ pub(super) fn unseen_volume(
     let is_of = |track: &Track, at| surface.is_of(track, &column(at), margin_m);
     let is_known = |track: &Track| track.certainty() >= SURE && track.label().is_some();
     let is_beyond = |track: &Track, at| is_beyond_body(track, &column(at), &surface.up, margin_m);
-    // A thing that touches another may have been seen as one piece with it. What is measured above a place is not of the thing.
+    // A thing that touches another may have been seen as one piece with it, and of one between others no more than strips. What is
+    // measured above a place is not of the thing.
+    let is_strip = |track: &Track| {
+        let top_m = (track.position_m - centre).dot(&surface.up) + track.size_m[2];
+        let (long_m, wide_m) = (track.size_m[0].max(track.size_m[1]), track.size_m[0].min(track.size_m[1]));
+        !is_known(track)
+            && wide_m < diameter_m / 2.0
+            && long_m < diameter_m + margin_m
+            && top_m < height_m + margin_m
+    };
     let is_part = |track: &Track, at| {
         let is_large = track.size_m[0].max(track.size_m[1]) > LARGE * diameter_m;
-        is_large && (!is_known(track) || is_beyond(track, at)) && !is_roofed(space, &above(at), &surface.up)
+        let may_be = is_strip(track) || is_large && (!is_known(track) || is_beyond(track, at));
+        may_be && !is_roofed(space, &above(at), &surface.up)
     };
     let explained = COLUMNS.map(|at| standing.iter().any(|track| is_of(track, at) && !is_part(track, at)));
     // Nothing is looked for in a vessel.
@@ -291,6 +301,31 @@ mod tests {
             first_ns: 0,
             last_ns: 0,
         }
+    }
+
+    #[test]
+    fn strips_between_others_may_be_of_one_thing() {
+        let likely = |pieces: &[&Track]| {
+            let space = seen_from_the_side(0.0, 0.075, 0.03);
+            let hidden = unseen_volume(&table(), &space, pieces, &Point3::origin(), (0.104, 0.07));
+            hidden.map(|hidden| hidden.likely)
+        };
+        let piece = |wide_m: f64| {
+            let narrow = |p: Point3<f64>| Point3::new(p.x * wide_m / 0.08, p.y, 0.0);
+            let footprint_m = disc().footprint_m.into_iter().map(narrow);
+            Track { size_m: [0.07, wide_m, 0.1], footprint_m: footprint_m.collect(), ..disc() }
+        };
+        assert_eq!(likely(&[&piece(0.03)]), Some(true));
+        assert_eq!(likely(&[&piece(0.06)]), None, "so much of it was seen that it is known not to be it");
+        let known = Track {
+            unknown: 0.05,
+            kinds: vec![("box".into(), 0.95)],
+            probabilities: vec![("box".into(), 0.95)],
+            ..piece(0.03)
+        };
+        assert_eq!(likely(&[&known]), None);
+        assert_eq!(likely(&[&Track { size_m: [0.07, 0.03, 0.16], ..piece(0.03) }]), None, "higher than it");
+        assert_eq!(likely(&[&Track { size_m: [0.12, 0.03, 0.1], ..piece(0.03) }]), None, "longer");
     }
 
     /// Whether a cup of 7 cm may stand unnoticed under what was seen.

@@ -2,7 +2,7 @@
 //!
 //! Points above the surface are gathered into voxels, voxels into small flat patches. Patches of one object meet convexly or
 //! smoothly; where two objects touch, the surface has a concave crease. Vessels are the exception that is mended afterwards: what lies inside
-//! the outline of a body and below its top is the body's own inside.
+//! the outline of a body and below its top, or within a round body that lies on its side, is the body's own inside.
 
 mod hidden;
 mod join;

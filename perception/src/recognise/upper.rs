@@ -1,6 +1,7 @@
 //! What rays tell of a round body's upper end.
 
 use super::body::{Body, Frustum, Ray};
+use super::likelihood::log_sum;
 use super::rays::{ViewRays, bounded, normal};
 use super::verify::WALL_M;
 use crate::noise::normal_cdf;
@@ -32,9 +33,12 @@ impl Upper {
         /// Of what is in an open body a ray meets the wall or floor with this chance, else something on the way there. From: chosen.
         const EMPTY: f64 = 0.5;
         let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
-        let (mut all, mut open, mut lid, mut open_log) = (0.0, 0.0, 0.0, 0.0);
+        /// A lid lies so many spreads of a measurement below what is taken for the top, one as likely as the other: noise makes things
+        /// higher. From: derived, the highest but one in a hundred lies two spreads above the middle.
+        const LOWER: [f64; 3] = [0.0, 1.0, 2.0];
+        let (mut all, mut open, mut lid, mut lid_logs) = (0.0, 0.0, 0.0, [0.0; LOWER.len()]);
         for view in views {
-            let mut sum = 0.0;
+            let mut sums = [0.0; LOWER.len()];
             for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -LEVEL) {
                 let at_m = (body.top_m - view.from[2]) / pixel.along[2];
                 let [x, y] = [body.x, body.y];
@@ -53,8 +57,10 @@ impl Upper {
                 let on_the_way =
                     (normal_cdf(off_m / sigma_m) - normal_cdf((off_m - deep_m) / sigma_m)) / deep_m;
                 let within = EMPTY * normal(off_m - deep_m, sigma_m) + (1.0 - EMPTY) * on_the_way;
-                let level = normal(off_m, sigma_m);
-                sum += ((TELL * within + REST) / (TELL * level + REST)).ln();
+                for (sum, lower) in sums.iter_mut().zip(LOWER) {
+                    let level = normal(off_m - lower * pixel.sigma_m, sigma_m);
+                    *sum += ((TELL * level + REST) / (TELL * within + REST)).ln();
+                }
                 if deep_m * fall < PLACE_M {
                     continue;
                 }
@@ -62,9 +68,11 @@ impl Upper {
                 open += if off_m * fall > PLACE_M { view.looks } else { 0.0 };
                 lid += if off_m * fall < PLACE_M { view.looks } else { 0.0 };
             }
-            let log = view.looks * sum;
-            open_log += bounded(log, BAD_VIEW);
+            for (log, sum) in lid_logs.iter_mut().zip(sums) {
+                *log -= bounded(-view.looks * sum, BAD_VIEW);
+            }
         }
+        let open_log = (LOWER.len() as f64).ln() - log_sum(&lid_logs);
         let share = |looks: f64| looks / f64::max(all, f64::MIN_POSITIVE);
         Upper { open_log, open: share(open), lid: share(lid) }
     }
@@ -115,5 +123,17 @@ mod tests {
         // What looks in so flatly that it meets the far wall just below the rim has seen neither inside nor lid.
         let flat = Upper::of([&view(&cup, 0.22, 0)], &cup);
         assert!(flat.open_log >= 0.0 && (flat.open, flat.lid) == (0.0, 0.0), "{flat:?}");
+    }
+
+    #[test]
+    fn a_lid_that_noise_makes_higher_is_a_lid() {
+        let tin =
+            Frustum { x: 0.0, y: 0.0, base_m: 0.0, top_m: 0.1, foot_m: 0.035, rim_m: 0.035, wall_m: None };
+        let mut seen = view(&tin, 0.7, 0);
+        seen.pixels.iter_mut().for_each(|pixel| pixel.sigma_m = 0.006);
+        let higher = |by_m: f64| Upper::of([&seen], &Frustum { top_m: tin.top_m + by_m, ..tin }).open_log;
+        assert!(higher(0.0) < -1.0 && higher(0.009) < -0.5, "{} {}", higher(0.0), higher(0.009));
+        // What is two centimetres below the rim is no lid.
+        assert!(higher(0.03) > 2.0, "{}", higher(0.03));
     }
 }

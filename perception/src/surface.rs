@@ -452,6 +452,11 @@ pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
     if distance_m > 0.0 { KINECT.frontal_sigma_m(distance_m) } else { KINECT.axial_m }
 }
 
+/// Spread of one measurement of a point from the nearest of the places that it was seen from, metres.
+pub(crate) fn nearest_sigma_m(p: &Point3<f64>, viewpoints: &[Point3<f64>]) -> f64 {
+    range_sigma_m(viewpoints.iter().map(|v| (p - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0))
+}
+
 fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
     /// However far off a point is measured, metres. From: chosen.
     const WORST_SIGMA_M: f64 = 0.02;
@@ -462,11 +467,9 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
         Some(grid) if stride > 1 && grid.width % stride == 0 => stride + 1,
         _ => stride,
     };
-    let near =
-        |p: &Point3<f64>| viewpoints.iter().map(|v| (p - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
     let sample = |p: &Point3<f32>| {
         let point = p.cast::<f64>();
-        let sigma_m = range_sigma_m(near(&point)).min(WORST_SIGMA_M);
+        let sigma_m = nearest_sigma_m(&point, viewpoints).min(WORST_SIGMA_M);
         Sample { point, sigma_m }
     };
     let half = (cloud.len() / 2).next_multiple_of(stride).min(cloud.len());

@@ -12,7 +12,7 @@ use crate::outline::{self, Rectangle};
 use crate::round::{self, ENDS, Edge, NO_CIRCLE, Round, SECTORS};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M, SPREADS};
 use crate::segment::{Scene, Segment, VOXEL_ENDS, end, quantile, top_m};
-use crate::surface::range_sigma_m;
+use crate::surface::nearest_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
@@ -174,9 +174,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
     let footprint = bounding(segment);
     let world_from_surface = scene.surface.surface_from_world.inverse();
     let place = Point3::new(footprint.x, footprint.y, 0.5 * (base_m + top));
-    let far = |v: &Point3<f64>| (world_from_surface * place - v).norm();
-    let near = seen.viewpoints().iter().map(far).min_by(f64::total_cmp).unwrap_or(1.0);
-    let sigma_m = range_sigma_m(near);
+    let sigma_m = nearest_sigma_m(&(world_from_surface * place), &seen.viewpoints());
     let asker = Asker::of(seen, world_from_surface, &segment.points, tolerance_m(sigma_m));
     let first = round::fit(&segment.points, base_m, top, sigma_m, round::SEED);
     let settled = first.and_then(|round| settle(&round, segment, &asker, (base_m, top), sigma_m));

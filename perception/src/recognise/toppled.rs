@@ -12,7 +12,7 @@ use super::percept::{Evidence, Sighting};
 use super::rays::{Rays, ViewRays};
 use super::upper::Upper;
 use super::verify::Own;
-use crate::round::lying::{self, Found, Lying};
+use crate::round::lying::{self, Found, LyingRound};
 use crate::round::{SECTORS, side_band};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M};
 use crate::segment::{Segment, VOXEL_ENDS, quantile};
@@ -80,8 +80,8 @@ impl Toppled {
 }
 
 impl Way {
-    fn of(m: &Measured, flat: &Rays, body: &Lying, handle: &HandleSeen) -> Way {
-        let Lying { turned, round, ends_m: [foot_m, rim_m] } = *body;
+    fn of(m: &Measured, flat: &Rays, body: &LyingRound, handle: &HandleSeen) -> Way {
+        let LyingRound { turned, round, ends_m: [foot_m, rim_m] } = *body;
         let rays = flat.moved(&turned);
         let (at_foot, at_rim) = (round.radius_at(foot_m), round.radius_at(rim_m));
         let height_m = rim_m - foot_m;
@@ -139,7 +139,7 @@ struct HandleSeen {
 impl Found {
     /// The handle lies beside the body or above it: what it rests on leaves no room below.
     fn handle(&self) -> HandleSeen {
-        let Lying { round, ends_m: [low, high], .. } = self.body;
+        let LyingRound { round, ends_m: [low, high], .. } = self.body;
         let band = side_band(low, high);
         let out = self.points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p));
         let mut out: Vec<f64> = out.filter(|out| (HANDLE_M.0..HANDLE_M.1).contains(out)).collect();
@@ -162,7 +162,7 @@ impl Found {
 
     /// What may be a handle says nothing against the roundness of what it is the handle of.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
-        let Lying { round, ends_m: [low, high], .. } = self.body;
+        let LyingRound { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)
     }
 }

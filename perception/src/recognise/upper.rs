@@ -32,11 +32,11 @@ impl Upper {
         const REST: f64 = 0.02;
         /// Of what is in an open body a ray meets the wall or floor with this chance, else something on the way there. From: chosen.
         const EMPTY: f64 = 0.5;
-        let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
         /// A lid lies so many spreads of a measurement below what is taken for the top, one as likely as the other: noise makes things
         /// higher. From: derived, the highest but one in a hundred lies two spreads above the middle.
         const LOWER: [f64; 3] = [0.0, 1.0, 2.0];
-        let (mut all, mut open, mut lid, mut lid_logs) = (0.0, 0.0, 0.0, [0.0; LOWER.len()]);
+        let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
+        let (mut all, mut open, mut lid, mut open_logs) = (0.0, 0.0, 0.0, [0.0; LOWER.len()]);
         for view in views {
             let mut sums = [0.0; LOWER.len()];
             for pixel in view.pixels.iter().filter(|p| !p.other && p.along[2] < -LEVEL) {
@@ -59,7 +59,7 @@ impl Upper {
                 let within = EMPTY * normal(off_m - deep_m, sigma_m) + (1.0 - EMPTY) * on_the_way;
                 for (sum, lower) in sums.iter_mut().zip(LOWER) {
                     let level = normal(off_m - lower * pixel.sigma_m, sigma_m);
-                    *sum += ((TELL * level + REST) / (TELL * within + REST)).ln();
+                    *sum += ((TELL * within + REST) / (TELL * level + REST)).ln();
                 }
                 if deep_m * fall < PLACE_M {
                     continue;
@@ -68,11 +68,11 @@ impl Upper {
                 open += if off_m * fall > PLACE_M { view.looks } else { 0.0 };
                 lid += if off_m * fall < PLACE_M { view.looks } else { 0.0 };
             }
-            for (log, sum) in lid_logs.iter_mut().zip(sums) {
-                *log -= bounded(-view.looks * sum, BAD_VIEW);
+            for (log, sum) in open_logs.iter_mut().zip(sums) {
+                *log += bounded(view.looks * sum, BAD_VIEW);
             }
         }
-        let open_log = (LOWER.len() as f64).ln() - log_sum(&lid_logs);
+        let open_log = (LOWER.len() as f64).ln() - log_sum(&open_logs.map(|log| -log));
         let share = |looks: f64| looks / f64::max(all, f64::MIN_POSITIVE);
         Upper { open_log, open: share(open), lid: share(lid) }
     }

@@ -13,7 +13,7 @@ const SCOUTS: usize = 300;
 
 /// A round body about an axis along the surface.
 #[derive(Clone, Copy)]
-pub(crate) struct Lying {
+pub(crate) struct LyingRound {
     /// Surface to a frame in which the axis is z and y leads away from the surface.
     pub turned: Isometry3<f64>,
     /// The body there, and where it ends.
@@ -21,19 +21,19 @@ pub(crate) struct Lying {
     pub ends_m: [f64; 2],
 }
 
-impl Lying {
+impl LyingRound {
     /// The same with its other end down.
-    pub fn over(&self) -> Lying {
+    pub fn over(&self) -> LyingRound {
         let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
-        let Lying { turned, round, ends_m: [foot, rim] } = *self;
+        let LyingRound { turned, round, ends_m: [foot, rim] } = *self;
         let round = Round { x: -round.x, slope: -round.slope, middle_m: -round.middle_m, ..round };
-        Lying { turned: over * turned, round, ends_m: [-rim, -foot] }
+        LyingRound { turned: over * turned, round, ends_m: [-rim, -foot] }
     }
 }
 
 /// A body that was found, the points in its frame, and the direction of its axis.
 pub(crate) struct Found {
-    pub body: Lying,
+    pub body: LyingRound,
     pub points: Vec<Point3<f64>>,
     angle: f64,
     /// Mean squared distance of the points from the side, each at most that of what is clear of it, square metres.
@@ -83,5 +83,5 @@ fn about(
     let misses = points.iter().filter(|p| band.contains(&p.z)).map(|p| round.outside_m(p).abs().min(PLACE_M));
     let (count, squares) = misses.fold((0.0, 0.0), |(n, sum), miss| (n + 1.0, sum + miss * miss));
     let miss_m2 = squares / f64::max(count, 1.0);
-    (rests && is_told).then_some(Found { body: Lying { turned, round, ends_m }, points, angle, miss_m2 })
+    (rests && is_told).then_some(Found { body: LyingRound { turned, round, ends_m }, points, angle, miss_m2 })
 }

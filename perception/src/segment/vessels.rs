@@ -2,10 +2,10 @@
 
 use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, most_within, top_m};
 use crate::outline;
-use crate::round::lying::{self, Lying};
+use crate::round::lying::{self, LyingRound};
 use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
 use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};
-use crate::surface::range_sigma_m;
+use crate::surface::nearest_sigma_m;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -34,7 +34,7 @@ struct Candidate {
     /// Seen from above.
     hull: OnceLock<Vec<[f64; 2]>>,
     fitted: OnceLock<Option<Fitted>>,
-    lying: OnceLock<Option<Lying>>,
+    lying: OnceLock<Option<LyingRound>>,
 }
 
 impl Candidate {
@@ -60,14 +60,15 @@ impl Candidate {
     }
 
     /// The round body on its side that it is, if it is one rather than a box.
-    fn lying(&self, viewpoints: &[Point3<f64>]) -> Option<&Lying> {
+    fn lying(&self, viewpoints: &[Point3<f64>]) -> Option<&LyingRound> {
         let fit = || {
             let points = &self.segment.points;
             // What is higher than it is long stands.
             if (self.high - self.low).xy().norm() < self.top_m {
                 return None;
             }
-            let (bounds, sigma_m) = (outline::bounding(points)?, sigma_m(points, viewpoints)?);
+            let (bounds, sigma_m) =
+                (outline::bounding(points)?, nearest_sigma_m(points.first()?, viewpoints));
             let found = lying::fit(points, &bounds, 0.0, sigma_m)?;
             let fitted = Fitted { body: found.body.round, sigma_m };
             fitted.is_tight(&found.points).then_some(found.body)
@@ -161,7 +162,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
 
 /// Whether a part lies within the round body that another is, which lies on its side.
 fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    large.lying(viewpoints).is_some_and(|Lying { turned, round, ends_m: [low, high] }| {
+    large.lying(viewpoints).is_some_and(|LyingRound { turned, round, ends_m: [low, high] }| {
         let ends_m = low - PLACE_M..high + PLACE_M;
         let points = &small.segment.points;
         let own = points.iter().map(|p| turned * p);
@@ -210,13 +211,6 @@ pub(super) fn round_body(
     Fitted::to(points, low_m, top_m, viewpoints).filter(|f| f.is_tight(points)).map(|f| f.body)
 }
 
-/// Spread of one measurement of points, metres.
-fn sigma_m(points: &[Point3<f64>], viewpoints: &[Point3<f64>]) -> Option<f64> {
-    let first = points.first()?;
-    let near = viewpoints.iter().map(|v| (first - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0);
-    Some(range_sigma_m(near))
-}
-
 /// The round body that comes nearest to points, however badly.
 struct Fitted {
     body: Round,
@@ -228,7 +222,7 @@ impl Fitted {
     fn to(points: &[Point3<f64>], low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Fitted> {
         /// Of the circles proposed. From: mark.
         const SEED: u64 = 3;
-        let sigma_m = sigma_m(points, viewpoints)?;
+        let sigma_m = nearest_sigma_m(points.first()?, viewpoints);
         let body = round::fit(points, low_m, top_m, sigma_m, SEED)?;
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }

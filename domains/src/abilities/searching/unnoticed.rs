@@ -103,16 +103,16 @@ pub(super) fn unseen_volume(
     let is_beyond = |track: &Track, at| is_beyond_body(track, &column(at), &surface.up, margin_m);
     // A thing that touches another may have been seen as one piece with it, and of one between others no more than strips. What is
     // measured above a place is not of the thing.
+    let long_m = |track: &Track| track.size_m[0].max(track.size_m[1]);
     let is_strip = |track: &Track| {
         let top_m = (track.position_m - centre).dot(&surface.up) + track.size_m[2];
-        let (long_m, wide_m) = (track.size_m[0].max(track.size_m[1]), track.size_m[0].min(track.size_m[1]));
         !is_known(track)
-            && wide_m < diameter_m / 2.0
-            && long_m < diameter_m + margin_m
+            && track.size_m[0].min(track.size_m[1]) < diameter_m / 2.0
+            && long_m(track) < diameter_m + margin_m
             && top_m < height_m + margin_m
     };
     let is_part = |track: &Track, at| {
-        let is_large = track.size_m[0].max(track.size_m[1]) > LARGE * diameter_m;
+        let is_large = long_m(track) > LARGE * diameter_m;
         let may_be = is_strip(track) || is_large && (!is_known(track) || is_beyond(track, at));
         may_be && !is_roofed(space, &above(at), &surface.up)
     };

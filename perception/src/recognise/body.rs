@@ -1,5 +1,6 @@
 //! Bodies that a ray may meet: frusta, open or closed at the top, and boxes.
 
+use crate::outline::Rectangle;
 use crate::round::Round;
 
 /// An upright frustum; metres.
@@ -42,6 +43,9 @@ pub(super) struct Ray {
 pub(super) trait Body {
     /// The least depth at which a ray meets it, infinite if it passes by, metres.
     fn depth_m(&self, ray: &Ray) -> f64;
+
+    /// The same so far beside, along both axes of the surface, metres.
+    fn moved(&self, shift_m: [f64; 2]) -> Self;
 }
 
 impl Frustum {
@@ -72,6 +76,10 @@ impl Frustum {
 }
 
 impl Body for Frustum {
+    fn moved(&self, [dx, dy]: [f64; 2]) -> Frustum {
+        Frustum { x: self.x + dx, y: self.y + dy, ..*self }
+    }
+
     #[inline(always)]
     fn depth_m(&self, ray: &Ray) -> f64 {
         let from = [ray.from[0] - self.x, ray.from[1] - self.y, ray.from[2] - self.base_m];
@@ -97,7 +105,46 @@ impl Body for Frustum {
     }
 }
 
+impl Cuboid {
+    /// The box that stands on a rectangle, between two heights.
+    pub fn around(rectangle: &Rectangle, base_m: f64, top_m: f64) -> Cuboid {
+        let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
+        Cuboid {
+            x: rectangle.x,
+            y: rectangle.y,
+            turn: rectangle.turn,
+            low: [-half_x, -half_y, base_m],
+            high: [half_x, half_y, top_m],
+        }
+    }
+
+    /// The same that goes on at one of its four ends: both of its first side, and both of its second.
+    pub fn longer(&self, end: usize, by_m: f64) -> Cuboid {
+        let mut longer = *self;
+        match end % 2 {
+            0 => longer.low[end / 2] -= by_m,
+            _ => longer.high[end / 2] += by_m,
+        }
+        longer
+    }
+
+    /// How long the side with an end is, metres.
+    pub fn length_m(&self, end: usize) -> f64 {
+        self.high[end / 2] - self.low[end / 2]
+    }
+
+    /// The same turned about what its sides are told from.
+    pub fn turned(&self, by_rad: f64) -> Cuboid {
+        let ((sin, cos), (sin_by, cos_by)) = (self.turn, by_rad.sin_cos());
+        Cuboid { turn: (sin * cos_by + cos * sin_by, cos * cos_by - sin * sin_by), ..*self }
+    }
+}
+
 impl Body for Cuboid {
+    fn moved(&self, [dx, dy]: [f64; 2]) -> Cuboid {
+        Cuboid { x: self.x + dx, y: self.y + dy, ..*self }
+    }
+
     fn depth_m(&self, ray: &Ray) -> f64 {
         let (sin, cos) = self.turn;
         let own = |x: f64, y: f64, z: f64| [cos * x + sin * y, cos * y - sin * x, z];

@@ -6,8 +6,8 @@
 use super::Recogniser;
 use super::evidence::{Measured, Setting, measure};
 use super::likelihood::{
-    HEIGHTS, STRANGER, WIDTHS, alike_sides_log, diameter_log, diameter_sigma_m, form_log, handle_log,
-    height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
+    HEIGHTS, STRANGER, WIDTHS, alike_sides_log, box_sides_log, diameter_log, diameter_sigma_m, form_log,
+    handle_log, height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::percept::{Percept, Stance};
@@ -41,7 +41,8 @@ pub struct Descry {
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out. From: chosen.
     pub temper: f64,
-    /// Exponent on how much less likely rays find a known object than what was measured: real things differ from their models.
+    /// Exponent on how much less likely rays find a known object, or a length of a box, than what was measured: real things differ from
+    /// their models.
     /// From: chosen.
     pub verified: f64,
 }
@@ -117,7 +118,7 @@ impl Recogniser for Descry {
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
         pool::within(tracing::debug_span!("recognise", segments = scene.segments.len()), || {
-            let setting = Setting::of(scene, fitted(scene, seen));
+            let setting = Setting::of(scene, fitted(scene, seen), models);
             let judge = |segment: &Segment| self.judge(&setting, segment, seen, models);
             pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge)
         })
@@ -152,6 +153,9 @@ impl Descry {
         models: &[ObjectModel],
     ) -> Percept {
         let mut looked = measure(setting, segment, seen);
+        for side in looked.measured.sides.iter_mut().flatten() {
+            side.soften(self.verified);
+        }
         let toppled = Toppled::of(setting, segment, seen, &looked.measured, models);
         if let Some(toppled) = &toppled {
             looked.measured.rival_m = toppled.spread_m();
@@ -267,7 +271,7 @@ impl Descry {
         };
         let wide = match model.shape {
             Shape::Round => round_log(model.diameter_m, m) + taper_log(Some(taper), m),
-            Shape::Box => sides_log(model.width_m.zip(model.depth_m), m) + form_log(Some(Shape::Box), m),
+            Shape::Box => box_sides_log(model.width_m.zip(model.depth_m), m) + form_log(Some(Shape::Box), m),
         };
         self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
     }
@@ -284,7 +288,7 @@ impl Descry {
         const LIDDED: f64 = 0.3;
         const FLAT: f64 = 0.2;
         const TAPERED: f64 = 0.3;
-        const LONGER: f64 = 0.3;
+        const LONGER: f64 = 0.5;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / UNIFORM));
         let height = near(model.height_m);
         let width = model.diameter_m.or(model.width_m).map_or(WIDTHS, near);
@@ -321,7 +325,8 @@ impl Descry {
     fn family_log(&self, family: &Family, m: &Measured) -> f64 {
         let wide = match family.shape {
             Some(Shape::Round) => diameter_log(None, family.width, m) + taper_log(None, m),
-            _ => sides_log(None, m),
+            Some(Shape::Box) if m.sides.is_some() => alike_sides_log([family.width; 2], m),
+            _ => sides_log(m),
         };
         let metric = height_log(None, family.height, m) + wide + form_log(family.shape, m);
         self.temper * metric + top_log(family.top, m) + handle_log(family.handle, m)

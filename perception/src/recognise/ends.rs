@@ -1,9 +1,14 @@
 //! Where a thing ends, and whether that was seen: its top, and the sides of its footprint.
 
 use super::asker::Asker;
+use super::body::{Body, Cuboid};
+use super::model::Range;
+use super::rays::Rays;
+use super::verify::{Placed, placed};
 use crate::outline::Rectangle;
-use crate::scale::APART_M;
+use crate::scale::{APART_M, EDGE_M};
 use crate::visibility::Seen;
+use rayon::prelude::*;
 
 /// True if most places just above the object are hidden by something nearer to the cameras.
 pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool {
@@ -19,28 +24,232 @@ pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool
     !asker.views.is_empty() && 2 * hidden > places.len()
 }
 
-/// Whether the longer and the shorter side of a footprint end where nothing was seen beyond: a box may be longer there.
-pub(super) fn open_sides(asker: &Asker, footprint: &Rectangle, top: f64) -> [bool; 2] {
-    /// It is asked beyond these places of an end, shares of its length. From: chosen.
-    const PLACES: [f64; 3] = [-0.3, 0.0, 0.3];
-    if asker.views.is_empty() {
-        return [false; 2];
+/// How likely each length of one side of a box makes what the cameras saw, against the likeliest.
+#[derive(Clone, Debug)]
+pub(super) struct Side {
+    /// The least of the lengths that were tried, [`EDGE_M`] apart, metres, and the log of each.
+    least_m: f64,
+    logs: Vec<f64>,
+}
+
+impl Side {
+    /// So much of what it tells is kept, as an exponent.
+    pub fn soften(&mut self, exponent: f64) {
+        self.logs.iter_mut().for_each(|log| *log *= exponent);
     }
-    let (sin, cos) = footprint.turn;
-    let [along, across] = footprint.along_m;
-    // Had it gone on, its top would have been measured there, or a camera have looked through it.
-    let is_open = |end: [f64; 2], edge: [f64; 2]| {
-        let tells_nothing = |share: &&f64| {
-            let [u, v] = [end[0] + **share * edge[0], end[1] + **share * edge[1]];
-            let at = [footprint.x + cos * u - sin * v, footprint.y + sin * u + cos * v];
-            asker.look(at[0], at[1], top) < Seen::Surface
+
+    /// The lengths that were tried, metres, and the log of each.
+    fn tried(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.logs.iter().enumerate().map(|(n, log)| (self.least_m + EDGE_M * n as f64, *log))
+    }
+
+    /// How likely a length is: ends are known no better than an edge, and beyond the longest that was tried nothing more is told.
+    fn likelihood(&self, length_m: f64) -> f64 {
+        let near = |(tried_m, log): (f64, f64)| log - 0.5 * ((length_m - tried_m) / EDGE_M).powi(2);
+        let beyond = self.logs.last().copied().filter(|_| length_m > self.longest_m());
+        self.tried().map(near).chain(beyond).fold(f64::NEG_INFINITY, f64::max).exp()
+    }
+
+    /// The mean likelihood of the lengths of a range.
+    pub fn mean(&self, range: Range) -> f64 {
+        let steps = 1 + ((range.high - range.low) / STEP_M) as u32;
+        let length_m =
+            |n: u32| range.low + (f64::from(n) + 0.5) / f64::from(steps) * (range.high - range.low);
+        (0..steps).map(|n| self.likelihood(length_m(n))).sum::<f64>() / f64::from(steps)
+    }
+
+    /// The integral of the likelihood over lengths of a density, metres, of which there is so much beyond the longest that was tried.
+    pub fn sum(&self, density: impl Fn(f64) -> f64, beyond: f64) -> f64 {
+        /// Shorter by so many steps than the least that was tried it is not. From: rounding.
+        const SHORTER: usize = 8;
+        let steps = SHORTER + ((self.longest_m() - self.least_m) / STEP_M).round() as usize;
+        let lengths_m = (0..steps).map(|n| self.longest_m() - (n as f64 + 0.5) * STEP_M);
+        let tried: f64 = lengths_m.map(|at_m| density(at_m) * self.likelihood(at_m) * STEP_M).sum();
+        tried + beyond * self.logs.last().map_or(0.0, |log| log.exp())
+    }
+
+    /// The longest that was tried, metres.
+    pub fn longest_m(&self) -> f64 {
+        self.least_m + EDGE_M * self.logs.len().saturating_sub(1) as f64
+    }
+
+    /// The likeliest length, metres: of equals the longest.
+    pub fn likeliest_m(&self) -> f64 {
+        self.tried().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(length_m, _)| length_m)
+    }
+}
+
+/// Lengths are summed up in such steps, metres. From: work.
+const STEP_M: f64 = 0.5 * EDGE_M;
+/// Where an end lies is beyond doubt by this log. From: chosen.
+const SURE: f64 = 40.0;
+/// Steps by which the sides of a box and its turn are sought, one after the other, metres and radians, and how often each at the most.
+/// From: work, a turn moves the ends of what is 15 cm long by as much.
+const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
+const TRIES: usize = 8;
+
+/// A box, and where it suits each view.
+struct Boxed<'a> {
+    rays: &'a Rays,
+    placed: Vec<Placed>,
+    body: Cuboid,
+    log: f64,
+}
+
+impl Boxed<'_> {
+    fn of<'a>(rays: &'a Rays, rectangle: &Rectangle, (base_m, top_m): (f64, f64)) -> Boxed<'a> {
+        let body = Cuboid::around(rectangle, base_m, top_m);
+        let placed = rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2])).collect();
+        let mut boxed = Boxed { rays, placed, body, log: 0.0 };
+        boxed.log = boxed.log_of(&body);
+        boxed
+    }
+
+    /// Log of how likely another box makes all views.
+    fn log_of(&self, body: &Cuboid) -> f64 {
+        let views = self.rays.views.par_iter().zip(&self.placed);
+        let each = views.map(|(view, placed)| view.log_likelihood(&body.moved(placed.shift_m)));
+        each.collect::<Vec<f64>>().iter().sum()
+    }
+
+    /// Moves its ends and turns it to where it suits all views best.
+    fn settle(&mut self) {
+        for (step_m, step_rad) in SOUGHT {
+            for _ in 0..TRIES {
+                let ends = (0..4).flat_map(|end| [-step_m, step_m].map(|by_m| self.body.longer(end, by_m)));
+                let turns = [-step_rad, step_rad].map(|by_rad| self.body.turned(by_rad));
+                let tried = ends.chain(turns).map(|body| (self.log_of(&body), body));
+                match tried.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(log, _)| *log > self.log) {
+                    Some(better) => (self.log, self.body) = better,
+                    None => break,
+                }
+            }
+        }
+    }
+
+    /// The logs of the boxes that are longer at one end in steps, against this one, and how many of them are shorter.
+    fn end(&self, end: usize, longest_m: f64) -> (Vec<f64>, usize) {
+        let length_m = self.body.length_m(end);
+        let walk = |step_m: f64, reach_m: f64| {
+            let mut logs = Vec::new();
+            for n in 1..=(reach_m / EDGE_M).max(0.0) as usize {
+                logs.push(self.log_of(&self.body.longer(end, step_m * n as f64)) - self.log);
+                if logs.last().is_some_and(|log| *log < -SURE) {
+                    break;
+                }
+            }
+            logs
         };
-        2 * PLACES.iter().filter(tells_nothing).count() > PLACES.len()
-    };
-    let of_axis = |out: [f64; 2], edge: [f64; 2]| is_open(out, edge) || is_open(out.map(|m| -m), edge);
-    let open = [
-        of_axis([0.5 * along + APART_M, 0.0], [0.0, across]),
-        of_axis([0.0, 0.5 * across + APART_M], [along, 0.0]),
-    ];
-    if along >= across { open } else { [open[1], open[0]] }
+        let mut logs = walk(-EDGE_M, length_m - EDGE_M);
+        let shorter = logs.len();
+        logs.reverse();
+        logs.push(0.0);
+        logs.extend(walk(EDGE_M, longest_m - length_m));
+        (logs, shorter)
+    }
+
+    /// How long the side may be that has these ends: each length by the likelier ends.
+    fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
+        let [(low, less), (high, fewer)] = ends.map(|end| self.end(end, longest_m));
+        let mut logs = vec![f64::NEG_INFINITY; low.len() + high.len() - 1];
+        for (i, a) in low.iter().enumerate() {
+            for (j, b) in high.iter().enumerate() {
+                logs[i + j] = logs[i + j].max(a + b);
+            }
+        }
+        let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        logs.iter_mut().for_each(|log| *log -= best);
+        Side { least_m: self.body.length_m(ends[0]) - EDGE_M * (less + fewer) as f64, logs }
+    }
+}
+
+/// How long both sides of a box may be by what rays met around it, up to a length, if it stands about where one of two rectangles lies.
+pub(super) fn sides(rays: &Rays, about: [&Rectangle; 2], heights_m: (f64, f64), longest_m: f64) -> [Side; 2] {
+    let [mut one, other] = about.map(|rectangle| Boxed::of(rays, rectangle, heights_m));
+    if other.log > one.log {
+        one = other;
+    }
+    one.settle();
+    [one.side([0, 1], longest_m), one.side([2, 3], longest_m)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Intrinsics;
+    use crate::noise::KINECT;
+    use crate::recognise::body::Ray;
+    use crate::recognise::rays::{Around, EDGE_PIXELS};
+    use crate::visibility::{DepthMap, Visibility};
+    use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+    /// A box of 20 by 9 by 12 cm that is turned.
+    fn there() -> Cuboid {
+        let (sin, cos) = 0.3_f64.sin_cos();
+        Cuboid { x: 0.02, y: -0.01, turn: (sin, cos), low: [-0.1, -0.045, 0.0], high: [0.1, 0.045, 0.12] }
+    }
+
+    /// What cameras see of it on a plane, each from a direction, as seen along its longer side, and a height.
+    fn seen_from(eyes: &[(f64, f64)]) -> Visibility {
+        let (width, height) = (320, 240);
+        let intrinsics = Intrinsics { width, height, fx: 400.0, fy: 400.0, cx: 160.0, cy: 120.0 };
+        let map = |&(towards_rad, up_m): &(f64, f64)| {
+            let eye = Point3::new((0.3 + towards_rad).cos(), (0.3 + towards_rad).sin(), up_m);
+            let forward = (Point3::origin() - eye).normalize();
+            let right = forward.cross(&Vector3::z()).normalize();
+            let turn = Rotation3::from_basis_unchecked(&[right, forward.cross(&right), forward]);
+            let depth_m = |n: usize| {
+                let (u, v) = ((n % width) as f64 - 160.0, (n / width) as f64 - 120.0);
+                let along: [f64; 3] = (turn * Vector3::new(u / 400.0, v / 400.0, 1.0)).into();
+                let plane_m = if along[2] < 0.0 { -eye.z / along[2] } else { f64::INFINITY };
+                let met_m = there().depth_m(&Ray { from: eye.into(), along }).min(plane_m);
+                if met_m.is_finite() { met_m as f32 } else { f32::NAN }
+            };
+            let turn = UnitQuaternion::from_rotation_matrix(&turn);
+            let world_from_camera = Isometry3::from_parts(Translation3::from(eye.coords), turn);
+            let depths_m = (0..width * height).map(depth_m).collect();
+            DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
+        };
+        Visibility { maps: eyes.iter().map(map).collect(), held: true }
+    }
+
+    /// What is told of both sides, sought from a footprint that is so much too short at one end of each.
+    fn told(eyes: &[(f64, f64)], short_m: f64) -> [Side; 2] {
+        let seen = seen_from(eyes);
+        let asker = Asker::of(&seen, Isometry3::identity(), &[], APART_M);
+        let around =
+            Around { x: 0.02, y: -0.01, reach_m: 0.25, base_m: 0.0, top_m: 0.13, pixels: EDGE_PIXELS };
+        let rays = Rays::of(&asker, &KINECT, &around, &[], std::iter::empty());
+        let short = there().longer(1, -short_m).longer(3, -short_m);
+        let [u, v] = [0, 1].map(|k| 0.5 * (short.low[k] + short.high[k]));
+        let (sin, cos) = short.turn;
+        let along_m = [short.length_m(0), short.length_m(2)];
+        let (x, y) = (short.x + cos * u - sin * v, short.y + sin * u + cos * v);
+        let about = Rectangle { x, y, sides_m: along_m, turn: short.turn, along_m, residual_m: 0.0 };
+        sides(&rays, [&about; 2], (0.0, 0.12), 0.3)
+    }
+
+    #[test]
+    fn sides_are_as_long_as_rays_meet_them_however_short_a_footprint_is() {
+        for short_m in [0.0, 0.012, 0.03] {
+            let [long, short] = told(&[(0.4, 0.8), (2.0, 0.8), (4.2, 0.8)], short_m);
+            let off_m = [long.likeliest_m() - 0.2, short.likeliest_m() - 0.09];
+            assert!(off_m.iter().all(|m| m.abs() < 0.005), "{off_m:?} m off, from {short_m} m");
+            for (side, other_m) in [(&long, 0.17), (&long, 0.23), (&short, 0.07), (&short, 0.11)] {
+                let other = side.likelihood(other_m);
+                assert!(other < 1e-3, "{other_m} m: {other}, from {short_m} m");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_hidden_behind_a_front_may_be_any_length() {
+        // Level with its top, along its longer side: nothing but its narrow front is seen.
+        let [long, short] = told(&[(0.0, 0.12)], 0.0);
+        assert!(long.likelihood(0.28) > 0.5 && long.likelihood(0.1) > 0.5, "{long:?}");
+        assert!(short.likelihood(0.07) < 0.1 && short.likelihood(0.11) < 0.1, "{short:?}");
+        // As likely up to any length, it is as long as things are of which half are longer than 20 cm.
+        let longer = long.sum(|at_m| if at_m > 0.2 { 2.5 } else { 0.0 }, 0.0);
+        assert!((0.15..0.35).contains(&longer), "{longer}");
+    }
 }

@@ -2,9 +2,10 @@
 
 use super::asker::{Asker, IN_VIEW_M};
 use super::body::Frustum;
-use super::ends::{open_sides, top_hidden};
+use super::ends::{Side, sides, top_hidden};
+use super::model::{ObjectModel, Range};
 use super::percept::{Evidence, Sighting};
-use super::rays::{Around, Rays};
+use super::rays::{Around, EDGE_PIXELS, PIXELS, Rays};
 use super::settle::settle;
 use super::upper::Upper;
 use crate::noise::Sensor;
@@ -64,8 +65,8 @@ pub(super) struct Measured {
     pub top_hidden: bool,
     /// What bounds it seen from above, surface frame.
     pub footprint: Rectangle,
-    /// Whether the longer and the shorter side of that may go on where no camera could tell.
-    pub open_sides: [bool; 2],
+    /// How long its sides may be, were it a box; only of what may be one that is asked about.
+    pub sides: Option<[Side; 2]>,
     /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
     pub looked_through: f64,
     /// Points that tell the side's form, counted once for each group that shares its error.
@@ -95,13 +96,31 @@ pub(super) struct Looked {
 pub(super) struct Setting<'a> {
     pub scene: &'a Scene,
     pub sensor: Sensor,
+    /// The sides of the boxes that are asked about, heights too.
+    box_sides_m: Vec<Range>,
     /// Of each segment.
     reaches: Vec<Reach>,
 }
 
 impl<'a> Setting<'a> {
-    pub fn of(scene: &'a Scene, sensor: Sensor) -> Setting<'a> {
-        Setting { scene, sensor, reaches: scene.segments.iter().map(Reach::of).collect() }
+    pub fn of(scene: &'a Scene, sensor: Sensor, models: &[ObjectModel]) -> Setting<'a> {
+        let box_sides_m = models.iter().filter_map(ObjectModel::box_sides_m).flatten().collect();
+        Setting { scene, sensor, box_sides_m, reaches: scene.segments.iter().map(Reach::of).collect() }
+    }
+
+    /// How long a thing may be to be a box that is asked about, or be told from one by its length; none if it is too high or too low,
+    /// metres.
+    fn longest_box_m(&self, m: &Measured) -> Option<f64> {
+        /// What may be so many times as long as a known box is told from it. From: chosen.
+        const LONGER: f64 = 1.3;
+        /// So many spreads of a height are beyond doubt. From: chosen.
+        const SURE: f64 = 6.0;
+        let out_m = SURE * m.height_sigma_m;
+        let may_be = |range: &&Range| {
+            m.height_m < range.high + out_m && (m.top_hidden || m.height_m > range.low - out_m)
+        };
+        let longest_m = self.box_sides_m.iter().map(|range| range.high).reduce(f64::max);
+        self.box_sides_m.iter().find(may_be).and(longest_m).map(|longest_m| LONGER * longest_m)
     }
 }
 
@@ -133,16 +152,16 @@ fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, sett
     let half_m = m.round.map_or(0.5 * m.footprint.sides_m[0], |r| {
         r.radius_at(segment.base_m).max(r.radius_at(segment.base_m + m.height_m))
     });
-    rays_around(([x, y], half_m), segment, own, asker, setting)
+    rays_around(([x, y], half_m, PIXELS), segment, own, asker, setting)
 }
 
-/// The pixels around a thing that reaches so far from a place.
+/// So many of the pixels of each view around a thing that reaches so far from a place.
 pub(super) fn rays_around(
-    ([x, y], half_m): ([f64; 2], f64),
+    ([x, y], half_m, pixels): ([f64; 2], f64, f64),
     segment: &Segment,
     (own, m): (&[Point3<f64>], &Measured),
     asker: &Asker,
-    Setting { scene, sensor, reaches }: &Setting,
+    Setting { scene, sensor, reaches, .. }: &Setting,
 ) -> Rays {
     let around = Around {
         x,
@@ -150,6 +169,7 @@ pub(super) fn rays_around(
         reach_m: half_m + BESIDE_M,
         base_m: segment.base_m,
         top_m: segment.base_m + m.height_m + BESIDE_M,
+        pixels,
     };
     let others = scene
         .segments
@@ -200,7 +220,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
             .hypot(0.5 * scene.surface.residual_m)
             .hypot(this.base_sigma_m),
         top_hidden: top_hidden(&asker, &footprint, top),
-        open_sides: open_sides(&asker, &footprint, top),
+        sides: None,
         footprint,
         looked_through: 0.0,
         independent: (side.len() as f64 / SHARING).clamp(1.0, MOST_GROUPS),
@@ -220,6 +240,14 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         let round =
             round.map(|r| eye.and_then(|eye| r.behind(&segment.points, (base_m, top), eye)).unwrap_or(r));
         measured.round = round.filter(|round| round.inliers >= NO_CIRCLE);
+    }
+    if let Some(longest_m) = setting.longest_box_m(&measured) {
+        let [long_m, short_m] = footprint.sides_m;
+        let reach_m = 0.5 * long_m.hypot(short_m) + (longest_m - short_m).max(0.0);
+        let place = ([footprint.x, footprint.y], reach_m, EDGE_PIXELS);
+        let rays = rays_around(place, this, (&segment.points, &measured), &asker, setting);
+        let about = [measured.rectangle.as_ref().unwrap_or(&footprint), &footprint];
+        measured.sides = Some(sides(&rays, about, (base_m, top), longest_m));
     }
     let rays = rays(this, (&segment.points, &measured), &asker, setting);
     if let Some(round) = measured.round {

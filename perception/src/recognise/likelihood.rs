@@ -1,8 +1,10 @@
 //! How likely what was measured is of sizes, a form, an upper end and a handle.
 
+use super::ends::Side;
 use super::evidence::Measured;
 use super::model::{Handle, Range, Shape, Top};
 use super::percept::Sighting;
+use super::rays::BELL;
 use crate::noise::normal_cdf;
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 
@@ -117,53 +119,47 @@ fn side_sigma_m(m: &Measured) -> f64 {
     EDGE_M.hypot(2.0 * m.sigma_m)
 }
 
-/// Log density of a side that may go on where no camera could tell, if a thing is at least so long by this chance: any of at least that
-/// length looks so.
-fn open_side_log(value: f64, at_least: f64) -> f64 {
-    ((1.0 - ASTRAY) * at_least + ASTRAY).ln() + everyday_density(value, WIDTHS).max(LEAST_DENSITY).ln()
+/// Log density of the sides of a footprint, of a thing that is no known box: one side only, as for a round body, since densities of as
+/// many measures must be compared.
+pub(super) fn sides_log(m: &Measured) -> f64 {
+    measure_log(m.footprint.sides_m[0], side_sigma_m(m), None, WIDTHS)
+        + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
 }
 
-/// A footprint is measured only as far as it was seen: a side may be longer than it looks.
-pub(super) fn sides_log(ranges: Option<(Range, Range)>, m: &Measured) -> f64 {
-    /// What is only known to be long enough is so often just the known thing. From: chosen.
-    const LONG_ENOUGH: f64 = 0.25;
-    let sigma = side_sigma_m(m);
-    let side = |n: usize, range: Range| {
-        let value = m.footprint.sides_m[n];
-        match m.open_sides[n] {
-            false => measure_log(value, sigma, Some(range), WIDTHS),
-            true => LONG_ENOUGH.ln() + open_side_log(value, 1.0 - normal_cdf((value - range.high) / sigma)),
+/// Log density of what rays tell of both sides of a box of the given ones, either of which may be the longer.
+pub(super) fn box_sides_log(sides: Option<(Range, Range)>, m: &Measured) -> f64 {
+    let known = |range: Range| {
+        move |side: &Side| {
+            let astray = ASTRAY * everyday_density(side.likeliest_m(), WIDTHS);
+            (1.0 - ASTRAY) * side.mean(range) / SIDE_UNIT_M + astray
         }
     };
-    match ranges {
-        Some((width, depth)) if m.open_sides == [false; 2] => side(0, width) + side(1, depth),
-        // The side that is longer as far as it was seen may be the shorter one.
-        Some((width, depth)) => {
-            0.5_f64.ln() + log_sum(&[side(0, width) + side(1, depth), side(0, depth) + side(1, width)])
-        }
-        // One side only, as for a round body: densities of as many measures must be compared.
-        None => {
-            measure_log(m.footprint.sides_m[0], sigma, None, WIDTHS)
-                + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
-        }
-    }
+    let none = || both_sides_log(m, [|_: &Side| LEAST_DENSITY; 2]);
+    sides.map_or_else(none, |(width, depth)| both_sides_log(m, [known(width), known(depth)]))
 }
 
-/// The same for the sides of things alike: median and log-normal spread of the longer and of the shorter, blurred by the measurement.
-pub(super) fn alike_sides_log(near: [(f64, f64); 2], m: &Measured) -> f64 {
-    let side = |n: usize, (median, spread): (f64, f64)| {
-        let value = m.footprint.sides_m[n];
-        let spread = spread.hypot(side_sigma_m(m) / median);
-        match m.open_sides[n] {
-            false => measure_log(value, side_sigma_m(m), None, (median, spread)),
-            true => open_side_log(value, 1.0 - normal_cdf((value / median).ln() / spread)),
-        }
-    };
-    let [width, depth] = near;
-    match m.open_sides {
-        [false, false] => side(0, width) + side(1, depth),
-        _ => 0.5_f64.ln() + log_sum(&[side(0, width) + side(1, depth), side(0, depth) + side(1, width)]),
-    }
+/// The same for things alike: median and log-normal spread of the one side and of the other.
+pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
+    both_sides_log(
+        m,
+        sides.map(|alike| {
+            move |side: &Side| {
+                let longer = 1.0 - normal_cdf((side.longest_m() / alike.0).ln() / alike.1);
+                side.sum(|length_m| everyday_density(length_m, alike), longer) / SIDE_UNIT_M
+            }
+        }),
+    )
+}
+
+/// What the likelihood of a length is divided by to be a density as of a measurement, metres.
+/// From: derived, the integral of one whose spread is that of an edge.
+const SIDE_UNIT_M: f64 = EDGE_M * BELL;
+
+/// Log density of both sides, either of which may be the one; without what rays tell it is no box that is asked about.
+fn both_sides_log(m: &Measured, [one, other]: [impl Fn(&Side) -> f64; 2]) -> f64 {
+    let Some([a, b]) = &m.sides else { return 2.0 * LEAST_DENSITY.ln() };
+    let log = |density: f64| density.max(LEAST_DENSITY).ln();
+    0.5_f64.ln() + log_sum(&[log(one(a)) + log(other(b)), log(one(b)) + log(other(a))])
 }
 
 /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell. From: chosen.

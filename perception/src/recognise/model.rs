@@ -109,18 +109,21 @@ pub struct ObjectModel {
 }
 
 impl ObjectModel {
+    /// The sides of a box, its height too; none of what is no box.
+    pub(super) fn box_sides_m(&self) -> Option<[Range; 3]> {
+        let (width, depth) = self.width_m.zip(self.depth_m).filter(|_| self.shape == Shape::Box)?;
+        Some([width, depth, self.height_m])
+    }
+
     /// A closed box with each of its other sides down; none of what is open, has a handle or is no box.
     pub(super) fn on_other_sides(&self) -> Vec<ObjectModel> {
-        let sides = self.width_m.zip(self.depth_m).filter(|_| self.shape == Shape::Box);
-        let Some((width, depth)) = sides.filter(|_| self.top != Top::Open && self.handle != Handle::One)
-        else {
-            return Vec::new();
-        };
+        let sides = self.box_sides_m().filter(|_| self.top != Top::Open && self.handle != Handle::One);
+        let Some([width, depth, height]) = sides else { return Vec::new() };
         let turned = |(up, one, other): (Range, Range, Range)| {
             let (width, depth) = if one.middle() < other.middle() { (other, one) } else { (one, other) };
             ObjectModel { height_m: up, width_m: Some(width), depth_m: Some(depth), ..self.clone() }
         };
-        [(width, self.height_m, depth), (depth, self.height_m, width)].map(turned).into()
+        [(width, height, depth), (depth, height, width)].map(turned).into()
     }
 }
 

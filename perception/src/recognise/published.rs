@@ -34,7 +34,7 @@ impl Recogniser for Published {
     }
 
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept> {
-        let setting = Setting::of(scene, KINECT);
+        let setting = Setting::of(scene, KINECT, &[]);
         scene
             .segments
             .iter()

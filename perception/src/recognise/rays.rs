@@ -13,8 +13,9 @@ use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Pixels of a view that are asked, about. From: work.
-const PIXELS: f64 = 300.0;
+/// Pixels of a view that are asked, about: whether there is a body, and where it ends. From: work.
+pub(super) const PIXELS: f64 = 300.0;
+pub(super) const EDGE_PIXELS: f64 = 1200.0;
 /// Chance of something nearer, of what is behind being the surface, and of its being something else. From: chosen.
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
@@ -68,6 +69,8 @@ pub(super) struct Around {
     pub reach_m: f64,
     pub base_m: f64,
     pub top_m: f64,
+    /// About so many of a view.
+    pub pixels: f64,
 }
 
 impl Rays {
@@ -121,7 +124,7 @@ impl ViewRays {
         let camera = &lying.map.intrinsics;
         let surface_from_camera = lying.surface_from_camera;
         let [columns, rows] = window(lying, &surface_from_camera.inverse(), around)?;
-        let step = ((columns.len() * rows.len()) as f64 / PIXELS).sqrt().ceil().max(1.0) as usize;
+        let step = ((columns.len() * rows.len()) as f64 / around.pixels).sqrt().ceil().max(1.0) as usize;
         let from: [f64; 3] = surface_from_camera.translation.vector.into();
         let turn = surface_from_camera.rotation.to_rotation_matrix();
         let ray = |u: f64, v: f64| {
@@ -224,14 +227,15 @@ impl Pixel {
     }
 }
 
+/// Integral of a bell of height and spread 1. From: derived, the root of two pi.
+pub(super) const BELL: f64 = 2.506_628_274_631_000_2;
+
 #[inline(always)]
 pub(super) fn normal(off: f64, sigma: f64) -> f64 {
-    /// Root of two pi. From: derived, the integral of a bell.
-    const ROOT: f64 = 2.506_628_274_631_000_2;
     /// So many spreads off there is nothing left. From: rounding.
     const NONE: f64 = 6.0;
     let spreads = off / sigma;
-    if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * ROOT) }
+    if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * BELL) }
 }
 
 /// The pixels that a place may fall on: columns and rows. None if it is not in view, or reaches behind the camera.

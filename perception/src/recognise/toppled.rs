@@ -9,7 +9,7 @@ use super::evidence::{
 };
 use super::model::{Handle, ObjectModel, Range, Shape};
 use super::percept::{Evidence, Sighting};
-use super::rays::{Rays, ViewRays};
+use super::rays::{PIXELS, Rays, ViewRays};
 use super::upper::Upper;
 use super::verify::Own;
 use crate::round::lying::{self, Found, LyingRound};
@@ -57,7 +57,8 @@ impl Toppled {
             &segment.points,
             tolerance_m(measured.sigma_m),
         );
-        let place = ([measured.footprint.x, measured.footprint.y], 0.5 * measured.footprint.sides_m[0]);
+        let place =
+            ([measured.footprint.x, measured.footprint.y], 0.5 * measured.footprint.sides_m[0], PIXELS);
         let flat = rays_around(place, segment, (&segment.points, measured), &asker, setting);
         let handle = found.handle();
         if handle.sighting == Sighting::Seen {

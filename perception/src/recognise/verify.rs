@@ -1,6 +1,6 @@
 //! How much worse a known model explains what the cameras saw around a thing than the thing's own measures do.
 
-use super::body::{Cuboid, Frustum};
+use super::body::{Body, Cuboid, Frustum};
 use super::evidence::Measured;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
@@ -19,9 +19,9 @@ const LEAST_M: f64 = 0.01;
 
 /// How well a body suits a view, and how far it was moved for that along both axes of the surface, metres.
 #[derive(Clone, Copy)]
-struct Placed {
-    log: f64,
-    shift_m: [f64; 2],
+pub(super) struct Placed {
+    pub log: f64,
+    pub shift_m: [f64; 2],
 }
 
 /// What a known model is compared with: the best body of a thing's own measures.
@@ -42,14 +42,7 @@ impl<'a> Own<'a> {
             rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2])).collect::<Vec<_>>()
         });
         let cuboid = measured.rectangle.map(|rectangle| {
-            let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
-            let body = Cuboid {
-                x: rectangle.x,
-                y: rectangle.y,
-                turn: rectangle.turn,
-                low: [-half_x, -half_y, base_m],
-                high: [half_x, half_y, base_m + measured.height_m],
-            };
+            let body = Cuboid::around(&rectangle, base_m, base_m + measured.height_m);
             rays.views.iter().map(|view| view.log_likelihood(&body)).collect::<Vec<f64>>()
         });
         let round = frustum.as_ref().map(|placed| placed.iter().map(|p| p.log).collect());
@@ -118,8 +111,8 @@ fn total(logs: &[f64]) -> f64 {
     logs.iter().sum()
 }
 
-/// A frustum where it suits a view best, were it a good one, near where it lies moved already.
-fn placed(view: &ViewRays, frustum: &Frustum, from: [f64; 2]) -> Placed {
+/// A body where it suits a view best, were it a good one, near where it lies moved already.
+pub(super) fn placed(view: &ViewRays, body: &impl Body, from: [f64; 2]) -> Placed {
     let mut known: Vec<Placed> = Vec::with_capacity(1 + STEPS_M.len() * TRIES * 4);
     let mut at = |shift_m: [f64; 2]| {
         // A step back leads to where it was already.
@@ -127,8 +120,7 @@ fn placed(view: &ViewRays, frustum: &Frustum, from: [f64; 2]) -> Placed {
             return *known;
         }
         let [dx, dy] = shift_m;
-        let moved = Frustum { x: frustum.x + dx, y: frustum.y + dy, ..*frustum };
-        let log = view.log_likelihood(&moved) - 0.5 * (dx * dx + dy * dy) / (EDGE_M * EDGE_M);
+        let log = view.log_likelihood(&body.moved(shift_m)) - 0.5 * (dx * dx + dy * dy) / (EDGE_M * EDGE_M);
         known.push(Placed { log, shift_m });
         Placed { log, shift_m }
     };

@@ -250,7 +250,7 @@ fn a_box_is_told_by_its_sides_from_one_like_it() {
                 found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max)
             };
             let (itself, like) = (taken(known_m), taken(like_m));
-            assert!(itself > 0.7, "{known_m:?}, seed {seed}: {itself}");
+            assert!(itself > 0.6, "{known_m:?}, seed {seed}: {itself}");
             assert!(like < 0.5, "{like_m:?} for {known_m:?}, seed {seed}: {like}");
         }
     }

@@ -288,7 +288,11 @@ impl Descry {
         const LIDDED: f64 = 0.3;
         const FLAT: f64 = 0.2;
         const TAPERED: f64 = 0.3;
-        const LONGER: f64 = 0.5;
+        const LONGER: f64 = 0.3;
+        /// Shares of things alike but for one side, which is longer or shorter by a factor: what of a side is hidden may be so.
+        /// From: chosen, so that an end that no look showed leaves it in doubt.
+        const OTHER_SIDE: f64 = 0.25;
+        const BY: f64 = 1.2;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / UNIFORM));
         let height = near(model.height_m);
         let width = model.diameter_m.or(model.width_m).map_or(WIDTHS, near);
@@ -318,6 +322,12 @@ impl Descry {
             logs.push(
                 LONGER.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
             );
+            for (by, too) in [(BY, 1.0), (1.0 / BY, 1.0), (1.0, BY), (1.0, 1.0 / BY)] {
+                let scaled = |r: Range, by: f64| Some(Range { low: by * r.low, high: by * r.high });
+                let (width_m, depth_m) = (scaled(sides.0, by), scaled(sides.1, too));
+                let other = ObjectModel { width_m, depth_m, ..model.clone() };
+                logs.push(OTHER_SIDE.ln() + self.model_log(&other, Stance::Upright, m));
+            }
         }
         log_sum(&logs)
     }

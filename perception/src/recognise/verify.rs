@@ -5,14 +5,18 @@ use super::evidence::Measured;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
-use crate::scale::EDGE_M;
+use crate::scale::{EDGE_M, PLACE_M};
 use rayon::prelude::*;
 
 /// Thickness of the walls of vessels, metres. From: chosen.
 pub(super) const WALL_M: f64 = 0.003;
-/// Steps by which a body is moved to where it suits a view best, one after the other, and how often each is tried at most, metres. From: work.
+/// Steps by which a body is moved to where it suits a view best, one after the other, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
-const TRIES: usize = 2;
+/// How far off views are that were laid on each other, and how often each step is tried at the most.
+/// From: derived, as exactly as an edge is known; work.
+const LAID: (f64, usize) = (EDGE_M, 2);
+/// The same of views that lie as they were merged. From: derived, a place; work, so that they are moved up to 3 cm.
+pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
 /// No round body is narrower, metres of radius. From: rounding.
 const LEAST_M: f64 = 0.01;
@@ -22,6 +26,11 @@ const LEAST_M: f64 = 0.01;
 pub(super) struct Placed {
     pub log: f64,
     pub shift_m: [f64; 2],
+}
+
+impl Placed {
+    /// Where it lies, of which nothing is known. From: mark.
+    pub const UNMOVED: Placed = Placed { log: 0.0, shift_m: [0.0; 2] };
 }
 
 /// What a known model is compared with: the best body of a thing's own measures.
@@ -39,7 +48,7 @@ impl<'a> Own<'a> {
         let frustum = measured.round.map(|round| {
             let body = Frustum::around(&round, base_m, base_m + measured.height_m);
             let body = Frustum { wall_m: wall_m(measured), ..body };
-            rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2])).collect::<Vec<_>>()
+            rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2], LAID)).collect::<Vec<_>>()
         });
         let cuboid = measured.rectangle.map(|rectangle| {
             let body = Cuboid::around(&rectangle, base_m, base_m + measured.height_m);
@@ -50,13 +59,13 @@ impl<'a> Own<'a> {
         // What no body was fitted to is compared with none: each view is as likely as without one.
         let none = || vec![0.0; rays.views.len()];
         let logs = own.max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_else(none);
-        let unmoved = || vec![Placed { log: 0.0, shift_m: [0.0; 2] }; rays.views.len()];
+        let unmoved = || vec![Placed::UNMOVED; rays.views.len()];
         Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
     }
 
     /// The same of the thing turned as if it stood; what explains it best as it lies stays.
     pub fn turned<'b>(&self, rays: &'b Rays, measured: &'b Measured, base_m: f64) -> Own<'b> {
-        let placed = vec![Placed { log: 0.0, shift_m: [0.0; 2] }; rays.views.len()];
+        let placed = vec![Placed::UNMOVED; rays.views.len()];
         Own { rays, measured, base_m, placed, logs: self.logs.clone() }
     }
 
@@ -86,7 +95,8 @@ impl<'a> Own<'a> {
                 wall_m: wall_m(m),
             };
             let views = self.rays.views.par_iter().zip(&self.placed).zip(&self.logs);
-            let each = views.map(|((view, own), log)| against(placed(view, &body, own.shift_m).log - log));
+            let each =
+                views.map(|((view, own), log)| against(placed(view, &body, own.shift_m, LAID).log - log));
             total(&each.collect::<Vec<f64>>())
         };
         let (middle, own) =
@@ -112,21 +122,27 @@ fn total(logs: &[f64]) -> f64 {
 }
 
 /// A body where it suits a view best, were it a good one, near where it lies moved already.
-pub(super) fn placed(view: &ViewRays, body: &impl Body, from: [f64; 2]) -> Placed {
-    let mut known: Vec<Placed> = Vec::with_capacity(1 + STEPS_M.len() * TRIES * 4);
+pub(super) fn placed(
+    view: &ViewRays,
+    body: &impl Body,
+    from: [f64; 2],
+    (spread_m, tries): (f64, usize),
+) -> Placed {
+    let mut known: Vec<Placed> = Vec::with_capacity(1 + STEPS_M.len() * tries * 4);
     let mut at = |shift_m: [f64; 2]| {
         // A step back leads to where it was already.
         if let Some(known) = known.iter().find(|known| known.shift_m == shift_m) {
             return *known;
         }
         let [dx, dy] = shift_m;
-        let log = view.log_likelihood(&body.moved(shift_m)) - 0.5 * (dx * dx + dy * dy) / (EDGE_M * EDGE_M);
+        let log =
+            view.log_likelihood(&body.moved(shift_m)) - 0.5 * (dx * dx + dy * dy) / (spread_m * spread_m);
         known.push(Placed { log, shift_m });
         Placed { log, shift_m }
     };
     let mut best = at(from);
     for step_m in STEPS_M {
-        for _ in 0..TRIES {
+        for _ in 0..tries {
             let [x, y] = best.shift_m;
             let around = [[x + step_m, y], [x - step_m, y], [x, y + step_m], [x, y - step_m]].map(&mut at);
             match around.into_iter().max_by(|a, b| a.log.total_cmp(&b.log)).filter(|to| to.log > best.log) {

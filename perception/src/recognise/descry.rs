@@ -289,10 +289,10 @@ impl Descry {
         const FLAT: f64 = 0.2;
         const TAPERED: f64 = 0.3;
         const LONGER: f64 = 0.3;
-        /// Shares of things alike but for one side, which is longer or shorter by a factor: what of a side is hidden may be so.
-        /// From: chosen, so that an end that no look showed leaves it in doubt.
+        /// Shares of things alike but for one side, which is longer or shorter by a part of it, but no less than can be told apart: what of
+        /// a side is hidden may be so. From: chosen, so that an end that no look showed leaves it in doubt.
         const OTHER_SIDE: f64 = 0.25;
-        const BY: f64 = 1.2;
+        const BY: f64 = 0.2;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / UNIFORM));
         let height = near(model.height_m);
         let width = model.diameter_m.or(model.width_m).map_or(WIDTHS, near);
@@ -322,11 +322,15 @@ impl Descry {
             logs.push(
                 LONGER.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
             );
-            for (by, too) in [(BY, 1.0), (1.0 / BY, 1.0), (1.0, BY), (1.0, 1.0 / BY)] {
-                let scaled = |r: Range, by: f64| Some(Range { low: by * r.low, high: by * r.high });
-                let (width_m, depth_m) = (scaled(sides.0, by), scaled(sides.1, too));
-                let other = ObjectModel { width_m, depth_m, ..model.clone() };
-                logs.push(OTHER_SIDE.ln() + self.model_log(&other, Stance::Upright, m));
+            let other = |r: Range, way: f64| {
+                let by_m = way * (BY * r.middle()).max(APART_M);
+                Some(Range { low: r.low + by_m, high: r.high + by_m })
+            };
+            for way in [-1.0, 1.0] {
+                let wider = ObjectModel { width_m: other(sides.0, way), ..model.clone() };
+                let deeper = ObjectModel { depth_m: other(sides.1, way), ..model.clone() };
+                let log = |other: &ObjectModel| OTHER_SIDE.ln() + self.model_log(other, Stance::Upright, m);
+                logs.extend([&wider, &deeper].map(log));
             }
         }
         log_sum(&logs)

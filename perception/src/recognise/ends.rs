@@ -109,9 +109,7 @@ impl Boxed<'_> {
 
     /// Moves each view to where the box suits it best.
     fn place(&mut self) {
-        let Boxed { rays, body, placed: before, .. } = &*self;
-        let views = rays.views.par_iter().zip(before);
-        self.placed = views.map(|(view, before)| placed(view, body, before.shift_m, MERGED)).collect();
+        self.placed = self.suited(&self.body, &self.placed);
         self.log = self.log_of(&self.body);
     }
 
@@ -137,13 +135,18 @@ impl Boxed<'_> {
         }
     }
 
-    /// The logs of the boxes that are longer at one end in steps, against this one, and how many of them are shorter.
-    fn end(&self, end: usize, longest_m: f64) -> (Vec<f64>, usize) {
-        let length_m = self.body.length_m(end);
+    /// How long the side may be that has these ends: each length by the likelier end, with the views where they suit it best.
+    fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
+        let length_m = self.body.length_m(ends[0]);
+        let log = |placed: &[Placed]| placed.iter().map(|view| view.log).sum::<f64>();
+        let own = log(&self.suited(&self.body, &self.placed));
         let walk = |step_m: f64, reach_m: f64| {
+            let mut placed = ends.map(|_| self.placed.clone());
             let mut logs = Vec::new();
             for n in 1..=(reach_m / EDGE_M).max(0.0) as usize {
-                logs.push(self.log_of(&self.body.longer(end, step_m * n as f64)) - self.log);
+                let at = |end: usize| self.body.longer(end, step_m * n as f64);
+                placed = [0, 1].map(|k| self.suited(&at(ends[k]), &placed[k]));
+                logs.push(log(&placed[0]).max(log(&placed[1])) - own);
                 if logs.last().is_some_and(|log| *log < -SURE) {
                     break;
                 }
@@ -151,25 +154,19 @@ impl Boxed<'_> {
             logs
         };
         let mut logs = walk(-EDGE_M, length_m - EDGE_M);
-        let shorter = logs.len();
+        let least_m = length_m - EDGE_M * logs.len() as f64;
         logs.reverse();
         logs.push(0.0);
         logs.extend(walk(EDGE_M, longest_m - length_m));
-        (logs, shorter)
-    }
-
-    /// How long the side may be that has these ends: each length by the likelier ends.
-    fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
-        let [(low, less), (high, fewer)] = ends.map(|end| self.end(end, longest_m));
-        let mut logs = vec![f64::NEG_INFINITY; low.len() + high.len() - 1];
-        for (i, a) in low.iter().enumerate() {
-            for (j, b) in high.iter().enumerate() {
-                logs[i + j] = logs[i + j].max(a + b);
-            }
-        }
         let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         logs.iter_mut().for_each(|log| *log -= best);
-        Side { least_m: self.body.length_m(ends[0]) - EDGE_M * (less + fewer) as f64, logs }
+        Side { least_m, logs }
+    }
+
+    /// Where another box suits each view best, from near where this one does.
+    fn suited(&self, body: &Cuboid, from: &[Placed]) -> Vec<Placed> {
+        let views = self.rays.views.par_iter().zip(from);
+        views.map(|(view, from)| placed(view, body, from.shift_m, MERGED)).collect()
     }
 }
 

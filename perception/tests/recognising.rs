@@ -256,6 +256,30 @@ fn a_box_is_told_by_its_sides_from_one_like_it() {
     }
 }
 
+#[test]
+fn a_box_of_a_kind_whose_sizes_have_ranges_is_of_it() {
+    let range = |low: f64, high: f64| Range { low, high };
+    let carton = ObjectModel {
+        width_m: Some(range(0.08, 0.25)),
+        depth_m: Some(range(0.05, 0.18)),
+        height_m: range(0.05, 0.3),
+        ..known_box([0.1; 3])
+    };
+    for (half, height, least, most) in [
+        ([0.06, 0.04], 0.16, 0.7, 1.0),
+        ([0.11, 0.08], 0.08, 0.7, 1.0),
+        ([0.2, 0.08], 0.08, 0.0, 0.3),
+        ([0.06, 0.04], 0.4, 0.0, 0.3),
+    ] {
+        let thing = Thing::Block { x: 0.05, y: 0.02, half, height, turn_rad: 0.6 };
+        let (cloud, seen) = seen_from(&[thing], 0.3, 1.2);
+        let scene = segment(&cloud, &seen, &options()).expect("there is a table");
+        let found = Descry::default().recognise(&scene, &seen, std::slice::from_ref(&carton));
+        let p = found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max);
+        assert!((least..=most).contains(&p), "{half:?} x {height}: {p}");
+    }
+}
+
 /// A circle fits to the side of a low box that is seen from far off, and must not be cut out of its top.
 #[test]
 fn a_low_box_far_off_is_in_one_piece() {

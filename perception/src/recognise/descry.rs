@@ -4,6 +4,7 @@
 //! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
 
 use super::Recogniser;
+use super::ends::Side;
 use super::evidence::{Measured, Setting, measure};
 use super::likelihood::{
     HEIGHTS, STRANGER, WIDTHS, alike_sides_log, box_sides_log, diameter_log, diameter_sigma_m, form_log,
@@ -15,7 +16,7 @@ use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
 use crate::pool;
-use crate::scale::APART_M;
+use crate::scale::{APART_M, EDGE_M};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
@@ -319,19 +320,20 @@ impl Descry {
             let metric = height_log(None, height, m)
                 + alike_sides_log([near(sides.0), near(sides.1)], m)
                 + form_log(Some(Shape::Box), m);
-            logs.push(
-                LONGER.ln() + self.temper * metric + top_log(model.top, m) + handle_log(model.handle, m),
-            );
-            let other = |r: Range, way: f64| {
-                let by_m = way * (BY * r.middle()).max(APART_M);
-                Some(Range { low: r.low + by_m, high: r.high + by_m })
+            let (shape, top, handle) = (Some(Shape::Box), model.top, model.handle);
+            let alike = Family { share: LONGER, shape, top, handle, height, width };
+            let as_made = top_log(top, m) + handle_log(handle, m);
+            logs.push(alike.share.ln() + stranger_log(&alike, models, m) + self.temper * metric + as_made);
+            // As wide a range as the known one, beyond either of its ends.
+            let beyond = |r: Range| {
+                let (by_m, width_m) = ((BY * r.middle()).max(APART_M), r.high - r.low);
+                let (low, high) = (r.low - by_m, r.high + by_m);
+                [Range { low: low - width_m, high: low }, Range { low: high, high: high + width_m }]
             };
-            for way in [-1.0, 1.0] {
-                let wider = ObjectModel { width_m: other(sides.0, way), ..model.clone() };
-                let deeper = ObjectModel { depth_m: other(sides.1, way), ..model.clone() };
-                let log = |other: &ObjectModel| OTHER_SIDE.ln() + self.model_log(other, Stance::Upright, m);
-                logs.extend([&wider, &deeper].map(log));
-            }
+            let wider = beyond(sides.0).map(|r| ObjectModel { width_m: Some(r), ..model.clone() });
+            let deeper = beyond(sides.1).map(|r| ObjectModel { depth_m: Some(r), ..model.clone() });
+            let log = |other: &ObjectModel| OTHER_SIDE.ln() + self.model_log(other, Stance::Upright, m);
+            logs.extend(wider.iter().chain(&deeper).map(log));
         }
         log_sum(&logs)
     }
@@ -360,11 +362,23 @@ fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
 fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
     let same_make =
         family.shape == Some(model.shape) && model.top == family.top && model.handle == family.handle;
-    let Some(width) = model.diameter_m.filter(|_| same_make && m.round.is_some() && !m.top_hidden) else {
+    if !same_make || m.top_hidden {
         return 0.0;
+    }
+    let wide = match (model.shape, &m.sides) {
+        (Shape::Round, _) => model
+            .diameter_m
+            .filter(|_| m.round.is_some())
+            .map(|diameter| inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), diameter)),
+        (Shape::Box, Some([a, b])) => model.width_m.zip(model.depth_m).map(|(width, depth)| {
+            let both = |one: &Side, other: &Side| {
+                inside(one.likeliest_m(), EDGE_M, width) * inside(other.likeliest_m(), EDGE_M, depth)
+            };
+            both(a, b).max(both(b, a))
+        }),
+        (Shape::Box, None) => None,
     };
-    inside(m.height_m, m.height_sigma_m, model.height_m)
-        * inside(2.0 * m.evidence.radius_m, diameter_sigma_m(m), width)
+    wide.map_or(0.0, |wide| wide * inside(m.height_m, m.height_sigma_m, model.height_m))
 }
 
 #[allow(clippy::too_many_arguments)]

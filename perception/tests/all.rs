@@ -1,5 +1,6 @@
 //! What perception promises, from outside: one program, so that what all tests share is built and linked once.
 
+mod boxes;
 mod constants;
 mod corridor;
 mod dining_room;

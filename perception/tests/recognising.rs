@@ -1,16 +1,15 @@
 //! Single things on a table: what they are, and what must stay in doubt.
 
-use crate::tabletop;
 use crate::tabletop::{Draws, TABLE_M, Thing, look, on_ring};
 use descry_perception::merge::{MergeOptions, merge};
 use descry_perception::nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use descry_perception::recognise::Stance;
-use descry_perception::recognise::{Descry, Handle, Published, Range, Shape, Top, check_models};
+use descry_perception::recognise::{Descry, Handle, Published, Range, Top, check_models};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::{SurfaceError, SurfaceOptions};
 use descry_perception::{Cloud, ObjectModel, Percept, Recogniser, Sighting, View, Visibility};
 
-fn cup_a() -> ObjectModel {
+pub fn cup_a() -> ObjectModel {
     let exactly = |x: f64| Range { low: x, high: x };
     ObjectModel {
         name: "cup A".into(),
@@ -27,7 +26,7 @@ fn cup_a() -> ObjectModel {
     }
 }
 
-fn options() -> SceneOptions {
+pub fn options() -> SceneOptions {
     let surface = SurfaceOptions {
         up: Some(Unit::new_normalize(Vector3::z())),
         height_band_m: Some((0.6, 0.9)),
@@ -37,7 +36,7 @@ fn options() -> SceneOptions {
 }
 
 /// One view from its true pose, as a cloud in the world.
-fn seen_from(things: &[Thing], angle_rad: f64, away_m: f64) -> (Cloud, Visibility) {
+pub fn seen_from(things: &[Thing], angle_rad: f64, away_m: f64) -> (Cloud, Visibility) {
     let pose = on_ring(angle_rad, away_m, 1.4);
     let view: View = look(things, &pose, &pose, &mut Draws(11));
     (view.cloud.transformed(&pose), Visibility::from_views(&[view]))
@@ -168,174 +167,6 @@ fn what_lies_on_its_side_is_known_and_told_from_what_is_like_it() {
         assert!((least..=most).contains(&p), "{name}: {p} {:?}", found[0].evidence);
         let lies = found[0].stance == Stance::Lying;
         assert_eq!(lies, p > 0.5 && matches!(thing, Thing::Lying { .. }), "{name}: {:?}", found[0].stance);
-    }
-}
-
-fn known_box([width_m, depth_m, height_m]: [f64; 3]) -> ObjectModel {
-    let exactly = |x: f64| Range { low: x, high: x };
-    ObjectModel {
-        name: "box".into(),
-        kind: "box".into(),
-        shape: Shape::Box,
-        height_m: exactly(height_m),
-        diameter_m: None,
-        width_m: Some(exactly(width_m)),
-        depth_m: Some(exactly(depth_m)),
-        top: Top::Closed,
-        ..cup_a()
-    }
-}
-
-/// What a view from so far takes a box for that stands alone, turned: the probability that it is a known one.
-fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad: f64, away_m: f64) -> f64 {
-    let half = [0.5 * width_m, 0.5 * depth_m];
-    let thing = Thing::Block { x: 0.05, y: 0.02, half, height: height_m, turn_rad };
-    let (cloud, seen) = seen_from(&[thing], 0.3, away_m);
-    let scene = segment(&cloud, &seen, &options()).expect("there is a table");
-    let found = Descry::default().recognise(&scene, &seen, &[known_box(known_m)]);
-    let case = format!("{width_m} x {depth_m} x {height_m} turned by {turn_rad} from {away_m} m");
-    assert_eq!(found.len(), 1, "{case}: in one piece");
-    found[0].probability_of("box")
-}
-
-/// Of a low box most of what is seen is its top: that says nothing against its sides.
-#[test]
-fn a_known_box_is_known_however_low() {
-    for size_m in [[0.12, 0.08, 0.16], [0.25, 0.18, 0.06], [0.18, 0.11, 0.045]] {
-        for turn_rad in [0.1, 0.6, 1.2] {
-            let p = taken_for(size_m, size_m, turn_rad, 1.2);
-            assert!(p > 0.7, "{size_m:?} turned by {turn_rad}: {p}");
-        }
-    }
-}
-
-#[test]
-fn a_known_box_is_known_whichever_side_is_down() {
-    for (there_m, known) in [
-        ([0.16, 0.12, 0.08], true),
-        ([0.16, 0.08, 0.12], true),
-        ([0.16, 0.12, 0.11], false),
-        ([0.12, 0.12, 0.08], false),
-        ([0.19, 0.08, 0.12], false),
-    ] {
-        for turn_rad in [0.1, 0.6, 1.2] {
-            let p = taken_for([0.12, 0.08, 0.16], there_m, turn_rad, 1.2);
-            assert!(if known { p > 0.5 } else { p < 0.3 }, "{there_m:?} turned by {turn_rad}: {p}");
-        }
-    }
-}
-
-/// From views whose poses err, what bounds a box from above is some millimetres too wide: its sides are told by where rays pass it.
-#[test]
-fn a_box_is_told_by_its_sides_from_one_like_it() {
-    for (known_m, like_m) in [
-        ([0.09, 0.09, 0.14], [0.09, 0.07, 0.14]),
-        ([0.15, 0.10, 0.08], [0.18, 0.10, 0.08]),
-        ([0.11, 0.08, 0.21], [0.11, 0.10, 0.21]),
-    ] {
-        for seed in 1..=4 {
-            let taken = |[width_m, depth_m, height]: [f64; 3]| {
-                let mut draws = Draws(seed);
-                let (turn_rad, first_rad) = (1.5 * draws.next(), 6.2 * draws.next());
-                let half = [0.5 * width_m, 0.5 * depth_m];
-                let thing = Thing::Block { x: 0.1, y: -0.12, half, height, turn_rad };
-                let views = [0.0, 1.4, 3.1].map(|angle_rad| {
-                    let truth = on_ring(first_rad + angle_rad, 1.3, 1.3);
-                    let stated = tabletop::disturbed(&truth, 0.02, 0.01, &mut draws);
-                    look(&[thing], &truth, &stated, &mut draws)
-                });
-                let merged = merge(&views, &MergeOptions::default()).expect("views of one table");
-                let scene = segment(&merged.cloud, &merged.visibility, &options()).expect("a table");
-                let found = Descry::default().recognise(&scene, &merged.visibility, &[known_box(known_m)]);
-                found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max)
-            };
-            let (itself, like) = (taken(known_m), taken(like_m));
-            assert!(itself > 0.6, "{known_m:?}, seed {seed}: {itself}");
-            assert!(like < 0.5, "{like_m:?} for {known_m:?}, seed {seed}: {like}");
-        }
-    }
-}
-
-#[test]
-fn a_box_of_a_kind_whose_sizes_have_ranges_is_of_it() {
-    let range = |low: f64, high: f64| Range { low, high };
-    let carton = ObjectModel {
-        width_m: Some(range(0.08, 0.25)),
-        depth_m: Some(range(0.05, 0.18)),
-        height_m: range(0.05, 0.3),
-        ..known_box([0.1; 3])
-    };
-    for (half, height, least, most) in [
-        ([0.06, 0.04], 0.16, 0.7, 1.0),
-        ([0.11, 0.08], 0.08, 0.7, 1.0),
-        ([0.2, 0.08], 0.08, 0.0, 0.3),
-        ([0.06, 0.04], 0.4, 0.0, 0.3),
-    ] {
-        let thing = Thing::Block { x: 0.05, y: 0.02, half, height, turn_rad: 0.6 };
-        let (cloud, seen) = seen_from(&[thing], 0.3, 1.2);
-        let scene = segment(&cloud, &seen, &options()).expect("there is a table");
-        let found = Descry::default().recognise(&scene, &seen, std::slice::from_ref(&carton));
-        let p = found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max);
-        assert!((least..=most).contains(&p), "{half:?} x {height}: {p}");
-    }
-}
-
-/// A circle fits to the side of a low box that is seen from far off, and must not be cut out of its top.
-#[test]
-fn a_low_box_far_off_is_in_one_piece() {
-    let mut pieces = Vec::new();
-    for (half, height) in [([0.125, 0.09], 0.06), ([0.09, 0.055], 0.045)] {
-        for seed in 1..=12 {
-            let mut draws = Draws(seed);
-            let turn_rad = std::f64::consts::TAU * draws.next();
-            let thing = Thing::Block { x: 0.3, y: -0.19, half, height, turn_rad };
-            let first_rad = std::f64::consts::TAU * draws.next();
-            let views: Vec<View> = [first_rad, first_rad + 1.6]
-                .iter()
-                .map(|&angle_rad| {
-                    let truth = on_ring(angle_rad, 1.6, 1.3);
-                    let stated = tabletop::disturbed(&truth, 0.02, 0.012, &mut draws);
-                    look(&[thing], &truth, &stated, &mut draws)
-                })
-                .collect();
-            let merged = merge(&views, &MergeOptions::default()).expect("views of one table");
-            let scene = segment(&merged.cloud, &merged.visibility, &options()).expect("there is a table");
-            pieces.push((height, seed, scene.segments.len()));
-        }
-    }
-    let broken: Vec<_> = pieces.iter().filter(|(.., count)| *count != 1).collect();
-    assert!(broken.is_empty(), "height, seed, pieces: {broken:?}");
-}
-
-/// From far off the camera passes closely over the top of a tall box and may see its front alone, or in pieces: it may be the known one.
-#[test]
-fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
-    let size_m = [0.20, 0.15, 0.25];
-    for turn_rad in [0.1, 0.5, 0.9, 1.3] {
-        for away_m in [1.6, 2.0, 2.3] {
-            let half = [0.5 * size_m[0], 0.5 * size_m[1]];
-            let thing = Thing::Block { x: 0.05, y: 0.02, half, height: size_m[2], turn_rad };
-            let (cloud, seen) = seen_from(&[thing], 0.3, away_m);
-            let scene = segment(&cloud, &seen, &options()).expect("there is a table");
-            let found = Descry::default().recognise(&scene, &seen, &[known_box(size_m)]);
-            let p = found.iter().map(|percept| percept.probability_of("box")).fold(0.0, f64::max);
-            assert!(p > 0.1, "turned by {turn_rad} from {away_m} m, {} pieces: {p}", found.len());
-        }
-    }
-}
-
-/// From far off sides are measured to centimetres: a box that is a little shorter may be another, and is not sure to be the known one.
-#[test]
-fn a_box_of_nearly_the_size_is_not_surely_the_known_one() {
-    for (known_m, there_m) in [
-        ([0.25, 0.18, 0.06], [0.22, 0.18, 0.06]),
-        ([0.25, 0.18, 0.06], [0.22, 0.18, 0.07]),
-        ([0.17, 0.11, 0.22], [0.17, 0.11, 0.20]),
-    ] {
-        for (turn_rad, away_m) in [(0.1, 1.2), (0.6, 1.6), (0.9, 1.8)] {
-            let p = taken_for(known_m, there_m, turn_rad, away_m);
-            assert!(p < 0.8, "{there_m:?} for {known_m:?}, turned by {turn_rad}, from {away_m} m: {p}");
-        }
     }
 }
 

@@ -6,8 +6,10 @@ use descry_agent::exit::Exit;
 use descry_agent::stop::Stop;
 use descry_cli::commands;
 use tokio::signal::unix::{SignalKind, signal};
-use tracing_subscriber::EnvFilter;
-use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Merging asks for tens of megabytes a look and gives them back: one that keeps them for the next is quicker.
 #[global_allocator]
@@ -71,9 +73,10 @@ fn hear(stop: &Stop) -> std::io::Result<()> {
 
 /// Lets warnings reach people, on standard error; `RUST_LOG` asks for more or less.
 fn warn_people() {
-    let filter = EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy();
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter = asked.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
     // It would panic over what it cannot write, as to a full disk.
-    let lines = lines.log_internal_errors(false);
-    lines.with_ansi(commands::is_coloured()).without_time().with_target(false).init();
+    let lines = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).log_internal_errors(false);
+    let lines = lines.with_ansi(commands::is_coloured()).without_time().with_target(false);
+    tracing_subscriber::registry().with(lines.with_filter(filter)).init();
 }

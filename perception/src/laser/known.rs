@@ -55,7 +55,7 @@ impl KnownShape {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecogniseOptions {
     /// Shapes whose features, or width, are off by more spreads are not aligned: measured at most 5.8 for the same thing, scanned from three to nine
-    /// sides; see `examples/shapes`.
+    /// sides; see `experiments/measure/src/shapes`.
     pub gate: f64,
     /// Features of a hull count where its outline is known to so much, metres.
     pub tight_m: f64,

@@ -18,7 +18,7 @@ pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// That a thing is none of those known, before the first scan.
 const STRANGER: f64 = 0.5;
 /// Known shapes that scans fit to none, up to so loose a shape (metres): measured one of 210 where the outline is closed, see
-/// `perception/examples/shapes`. Scans of an open one hold each other in place too loosely: it is not called unknown before it was scanned once more.
+/// `experiments/measure/src/shapes`. Scans of an open one hold each other in place too loosely: it is not called unknown before it was scanned once more.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
 /// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
 /// as long as several shapes were left.

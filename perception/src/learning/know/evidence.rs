@@ -42,7 +42,7 @@ pub struct Judge {
 }
 
 impl Default for Judge {
-    /// Weights in the order of [`Evidence::measures`], as part `judge` of `examples/learning` with seed 501 and 80 scenes fits them to drawn objects that
+    /// Weights in the order of [`Evidence::measures`], as part `judge` of `experiments/measure/src/learning` with seed 501 and 80 scenes fits them to drawn objects that
     /// no evaluation knows, half of them known from all sides and half from one or two looks, among furniture and leaflets that no model is of.
     fn default() -> Self {
         Judge { weights: [8.30, 8.01, 1.52, -15.86, 1.41, -4.78, -2.84, -9.09, -7.26] }

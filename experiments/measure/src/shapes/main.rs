@@ -1,14 +1,14 @@
 //! The experiment of Modayil and Kuipers in a simulated lab, beside the figures of their paper, and what they did not try:
-//! `cargo run --release -p descry-perception --example shapes -- [SEED] [DIR]`. Plots are written to DIR as SVG.
+//! `cargo run --release -p descry-measure --bin shapes -- [SEED] [DIR]`. Plots are written to DIR as SVG.
 
 mod draw;
-#[path = "../../tests/lab/mod.rs"]
+#[path = "../../../../perception/tests/lab/mod.rs"]
 mod lab;
 mod plot;
 mod scanning;
 mod strangers;
 mod tables;
-#[path = "../../tests/tabletop/mod.rs"]
+#[path = "../../../../perception/tests/tabletop/mod.rs"]
 mod tabletop;
 mod times;
 mod variations;

@@ -29,7 +29,7 @@ fn files(dir: &Path, ending: &str) -> Vec<PathBuf> {
 
 pub fn print(page: &mut Page) -> Result<(), String> {
     page.heading("Recordings");
-    let shared = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let shared = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     if !shared.is_dir() {
         page.say("skipped: no ../shared/data beside the workspace");
         return Ok(());

@@ -1,8 +1,8 @@
 //! The drive of Viejo and Cazorla in a simulated building, and what they did not try:
-//! `cargo run --release -p descry-perception --example rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG,
+//! `cargo run --release -p descry-measure --bin rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG,
 //! and the drive as clouds (PART `drive`), on which `peers.py` beside this file runs what others offer. PART is one of them alone, by the name of its file.
 
-#[path = "../../tests/corridor/mod.rs"]
+#[path = "../../../../perception/tests/corridor/mod.rs"]
 mod corridor;
 mod drive;
 mod exploring;
@@ -10,7 +10,7 @@ mod pillars;
 mod plot;
 mod poses;
 mod recorded;
-#[path = "../../tests/tabletop/mod.rs"]
+#[path = "../../../../perception/tests/tabletop/mod.rs"]
 mod tabletop;
 mod times;
 mod variations;

@@ -1,4 +1,4 @@
-//! What a record withstands, measured: `cargo run --release -p descry-memory --example endurance -- WHAT DIR [SIZE]`.
+//! What a record withstands, measured: `cargo run --release -p descry-measure --bin endurance -- WHAT DIR [SIZE]`.
 //!
 //! | WHAT | shows | SIZE |
 //! |---|---|---|

@@ -1,6 +1,6 @@
 //! How long an editor waits for the findings after a key: in a domain of so many lines, a key at a time.
 //!
-//! `cargo run --release -p descry-cli --example keystroke [LINES [KEYS]]`, 2,000 lines and 200 keys if left out.
+//! `cargo run --release -p descry-measure --bin keystroke [LINES [KEYS]]`, 2,000 lines and 200 keys if left out.
 
 use std::time::{Duration, Instant};
 

@@ -1,11 +1,11 @@
 //! The evaluation of Fäulhammer et al. in a simulated room, and on recordings:
-//! `cargo run --release -p descry-perception --example learning -- SEED DIR [PART] [COUNT]`. DIR/page.html has tables, plots and pictures. PART is one of
+//! `cargo run --release -p descry-measure --bin learning -- SEED DIR [PART] [COUNT]`. DIR/page.html has tables, plots and pictures. PART is one of
 //! them alone, by the name of its file; COUNT is how many objects `modelling` learns, and how many scenes the others look at.
 
 mod curves;
 #[path = "../evaluate/frames.rs"]
 mod frames;
-#[path = "../../tests/household/mod.rs"]
+#[path = "../../../../perception/tests/household/mod.rs"]
 mod household;
 mod judge;
 mod knowing;
@@ -16,7 +16,7 @@ mod page;
 mod plot;
 mod recorded;
 mod runs;
-#[path = "../../tests/tabletop/mod.rs"]
+#[path = "../../../../perception/tests/tabletop/mod.rs"]
 mod tabletop;
 
 use page::Page;

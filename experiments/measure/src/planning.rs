@@ -1,4 +1,4 @@
-//! What a planning round of the tabletop domain takes: `cargo run --release -p descry-planner --example tabletop`
+//! What a planning round of the tabletop domain takes: `cargo run --release -p descry-measure --bin planning`
 //!
 //! A table with posts that hide parts of it from parts of the room; a look shows the spots that no post hides, and
 //! is expected to raise the confidence by the share of the spots that no earlier look has shown. For 5, 20 and 100
@@ -13,7 +13,7 @@ use descry_planner::{
 };
 use serde_json::json;
 
-const DOMAIN: &str = include_str!("../../domains/tabletop/domain.pddl");
+const DOMAIN: &str = include_str!("../../../domains/tabletop/domain.pddl");
 const ROUNDS: usize = 15;
 
 /// Speed of a drive, as in the simulated room.

@@ -1,7 +1,7 @@
 //! What a program costs as a body: 640 x 480 depths of 16 bits from a Python program that has them ready, over pipes and sockets, and
 //! beside it the same bytes through a bare pipe in the same run.
 //!
-//! `cargo run --release -p descry-robots --example throughput [-- FRAMES]`
+//! `cargo run --release -p descry-measure --bin throughput [-- FRAMES]`
 
 use descry_robots::nalgebra::Point3;
 use descry_robots::program::{Limits, ProgramRobot};
@@ -10,7 +10,7 @@ use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-const BODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/programs/frames.py");
+const BODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/tests/programs/frames.py");
 const FRAME_BYTES: usize = 2 * 640 * 480;
 /// Questions whose answer is short, for each frame.
 const QUESTIONS: usize = 10;

@@ -1,9 +1,9 @@
 //! Segmentation, merging and recognition against what is known, how long single views take, and where the values of all constants are
 //! from, as tables:
-//! `cargo run --release -p descry-perception --example evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
-#[path = "../../tests/constants/mod.rs"]
+#[path = "../../../../perception/tests/constants/mod.rs"]
 mod constants;
 mod frames;
 mod further;
@@ -12,7 +12,7 @@ mod mismatched;
 mod mosd;
 mod surfaces;
 mod table;
-#[path = "../../tests/tabletop/mod.rs"]
+#[path = "../../../../perception/tests/tabletop/mod.rs"]
 mod tabletop;
 mod times;
 mod variants;
@@ -71,7 +71,7 @@ fn main() -> ExitCode {
 
 /// The constants of this copy of the sources and where their values are from, in Markdown.
 fn constants() -> Result<(), String> {
-    let found = constants::all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+    let found = constants::all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../perception/src"));
     print!("{}", constants::table(&found));
     match constants::faults(&found).as_slice() {
         [] => Ok(()),

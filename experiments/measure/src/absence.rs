@@ -1,5 +1,5 @@
 //! What "it is there" is said with while looks go on, against how often it is there:
-//! `cargo run --release -p descry-experiments --example absence -- COUNT SEED HOLES [PLOT.svg]`.
+//! `cargo run --release -p descry-measure --bin absence -- COUNT SEED HOLES [PLOT.svg]`.
 //!
 //! As many arrangements have cup A, nearly hidden from the start, as have it not. Each is looked at from the start and then from three
 //! poses of the ring, drawn for each; the camera loses a share of its returns in patches.

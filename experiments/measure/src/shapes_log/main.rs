@@ -1,5 +1,5 @@
 //! Shapes of the things in the logs of robots, in CARMEN's format with corrected poses:
-//! `cargo run --release -p descry-perception --example shapes_log -- LOG… [--plots DIR]`. Plots are SVG.
+//! `cargo run --release -p descry-measure --bin shapes_log -- LOG… [--plots DIR]`. Plots are SVG.
 //!
 //! Things are what stands apart and was scanned from five directions or more. Each has two models, of scans that have none in common: whether the second is nearest to
 //! the first of all is the test of recognition.

@@ -27,7 +27,7 @@ pub(crate) const TOO_LATE: &str = "; no plan would do in the time that is left";
 /// Why a look is taken although the goal holds.
 const NOT_DENIED: &str = "nothing that was seen speaks against it, and not enough was seen";
 /// Before what is said of the goal where steps of the plan are left that were to reach it.
-pub(crate) const AT_THE_END: &str = "at the end of the plan ";
+pub const AT_THE_END: &str = "at the end of the plan ";
 
 /// An agent at work on one goal.
 pub struct Agent<'a> {

@@ -1,16 +1,25 @@
 //! Why a run went as it did, from its record alone, in plain sentences: why each plan was made and why it was this one, what came of it,
 //! and what the verdict rests on. What the record does not say is said not to be known.
 
-mod brief;
-mod chapters;
+#[doc(hidden)]
+pub mod brief;
+#[doc(hidden)]
+pub mod chapters;
 mod domains;
-mod looks;
-mod numbers;
-mod outcomes;
-mod plans;
-mod rivals;
-mod standings;
-mod states;
+#[doc(hidden)]
+pub mod looks;
+#[doc(hidden)]
+pub mod numbers;
+#[doc(hidden)]
+pub mod outcomes;
+#[doc(hidden)]
+pub mod plans;
+#[doc(hidden)]
+pub mod rivals;
+#[doc(hidden)]
+pub mod standings;
+#[doc(hidden)]
+pub mod states;
 mod summary;
 mod verdict;
 pub mod wording;
@@ -165,19 +174,19 @@ const COUNTED: &str = "Beside the time that a plan takes, the planner counts for
                        something and the farther it is, so that what is likely and near comes first (--figures says how).";
 
 /// What a run was asked, as far as plans depend on it.
-struct Asked<'a> {
+pub struct Asked<'a> {
     /// The goal in PDDL.
-    goal: String,
+    pub goal: String,
     /// Who chose where to look next, if not the planner.
-    policy: Option<String>,
+    pub policy: Option<String>,
     /// What an action's seconds are besides those that are fixed.
-    counts: &'a dyn Fn(&str) -> Option<String>,
+    pub counts: &'a dyn Fn(&str) -> Option<String>,
     /// What surfaces are called, by symbol.
-    name: looks::Names<'a>,
+    pub name: looks::Names<'a>,
     /// Whether there is a verdict.
-    has_ended: bool,
+    pub has_ended: bool,
     /// Whether seconds are counted that do not pass: for having looked in vain.
-    counts_in_vain: bool,
+    pub counts_in_vain: bool,
 }
 
 impl Asked<'_> {

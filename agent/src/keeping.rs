@@ -1,6 +1,7 @@
 //! Where and how the record of a run is kept.
 
-mod remote;
+#[doc(hidden)]
+pub mod remote;
 
 use std::path::Path;
 

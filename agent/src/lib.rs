@@ -40,7 +40,8 @@
 pub mod agent;
 pub mod basis;
 pub mod body;
-mod compared;
+#[doc(hidden)]
+pub mod compared;
 pub mod exit;
 pub mod explain;
 pub mod keeping;

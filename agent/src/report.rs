@@ -208,7 +208,7 @@ impl Report {
 }
 
 /// A time in which little happens: milliseconds below a second.
-fn brief(time_s: f64) -> String {
+pub fn brief(time_s: f64) -> String {
     match time_s {
         s if s >= 1.0 => format!("{s:.1} s"),
         s if s >= 1e-3 => format!("{:.0} ms", s * 1e3),
@@ -276,52 +276,5 @@ impl fmt::Display for Report {
             writeln!(f, "  at most {plan} to plan and {geometry} for its questions to geometry")?;
         }
         write!(f, "  record: {}", self.run)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use descry_domains::goal;
-    use descry_domains::lexicon::{Lexicon, Places};
-    use descry_domains::load::Domain;
-
-    #[test]
-    fn what_is_in_the_hand_stands_nowhere() {
-        let domain = Domain::load("home").unwrap();
-        let lexicon = Lexicon::new(&domain, &Places::default());
-        let goal = goal::read("pick up cup A", &domain, &lexicon).unwrap();
-        let check = |object: Option<&str>, position_m: Option<[f64; 3]>, expected: &str| {
-            let seen = serde_json::json!({
-                "label": "the red one", "confidence": 0.97, "position_m": position_m,
-                "size_m": [0.07, 0.07, 0.1], "asked": true,
-            });
-            let report = Report {
-                object: object.map(str::to_string),
-                confidence: 0.97,
-                position_m,
-                objects: vec![serde_json::from_value(seen).unwrap()],
-                ..Report::begin(&goal, "run".into())
-            };
-            let said = report.to_string();
-            assert!(said.contains(expected), "{expected}: {said}");
-            assert_eq!(said.contains(" m, confidence"), said.contains(" at ("), "{said}");
-        };
-        let one = Some("the red one");
-        check(one, None, "  the red one in the hand, confidence 0.97\n");
-        check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.000, 2.000, 0.800) m, confidence 0.97\n");
-        check(None, None, "  the red one      0.97 in the hand\n");
-    }
-
-    #[test]
-    fn no_time_is_said_to_be_none() {
-        let cases = [
-            (0.0, "less than 1 ms"),
-            (0.0004, "less than 1 ms"),
-            (0.0021, "2 ms"),
-            (0.9, "900 ms"),
-            (1.26, "1.3 s"),
-        ];
-        cases.iter().for_each(|(time_s, said)| assert_eq!(brief(*time_s), *said));
     }
 }

@@ -2,10 +2,12 @@
 
 mod beginning;
 mod files;
-mod folder;
+#[doc(hidden)]
+pub mod folder;
 pub mod programs;
 mod remembering;
-mod resumed;
+#[doc(hidden)]
+pub mod resumed;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -241,7 +243,7 @@ pub async fn live_through(
 }
 
 /// Says of a run that was stopped, or that the body or the record has failed, how it goes on.
-fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
+pub fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
     let folder = folder.display().to_string();
     let resume = format!("descry do --resume {}", shell::word(&folder));
     match error {
@@ -302,32 +304,4 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<R
 pub fn events(record: &Record) -> Result<(Vec<Value>, Vec<Fault>), CommandError> {
     let (documents, faults) = record.find_whole(&Query::of_kind("event")).map_err(CommandError::broken)?;
     Ok((documents.into_iter().map(|d| d.body).collect(), faults))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::exit::Exit;
-
-    #[test]
-    fn a_run_that_did_not_end_says_how_it_goes_on() {
-        let check = |folder: &str, expected: &str| {
-            let stopped = CommandError::Stopped { said: "stopped".into(), signal: 2 };
-            let full = CommandError::Broken("no room left".into());
-            for (error, exit) in [(stopped, Exit::Interrupted), (full, Exit::Broken)] {
-                let error = how_to_go_on(error, Path::new(folder));
-                let said = error.to_string();
-                assert_eq!(error.exit(), exit, "{said}");
-                assert!(said.ends_with(&format!("go on with: descry do --resume {expected}")), "{said}");
-            }
-            for other in
-                [CommandError::BadInput("no such word".into()), CommandError::Broken("--max-bytes".into())]
-            {
-                let said = other.to_string();
-                assert_eq!(how_to_go_on(other, Path::new(folder)).to_string(), said);
-            }
-        };
-        check("runs/mug", "runs/mug");
-        check("my runs/mug", "'my runs/mug'");
-    }
 }

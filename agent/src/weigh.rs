@@ -1,7 +1,8 @@
 //! What a plan was weighed against: the same steps with other objects, what each would take and gain, by the answers of the calls
 //! that the plan itself rests on. It is kept beside the plan, so that it can be told later why it was this one.
 
-mod steps;
+#[doc(hidden)]
+pub mod steps;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -3,9 +3,11 @@
 
 mod declared;
 mod findings;
-mod keys;
+#[doc(hidden)]
+pub mod keys;
 mod mends;
-mod texts;
+#[doc(hidden)]
+pub mod texts;
 mod units;
 mod words;
 

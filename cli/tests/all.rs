@@ -24,5 +24,6 @@ mod surfaces;
 mod survey;
 mod terminal;
 mod tutorial;
+mod unit;
 mod unmapped;
 mod writing;

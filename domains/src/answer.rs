@@ -528,7 +528,7 @@ impl Asker<'_> {
 }
 
 /// What has changed on a surface since an earlier run looked at it; `name` is what people call it.
-fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
+pub fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
     if !past.has_looked_at(surface) {
         return never_seen(name);
     }
@@ -552,23 +552,4 @@ fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> Strin
 
 fn never_seen(surface: &str) -> String {
     format!("nothing is remembered of the {surface}: no earlier run looked at it")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use descry_memory::belief::Belief;
-
-    #[test]
-    fn changes_are_told_of_what_was_looked_at() {
-        let check = |looked_at: &[&str], surface: &str, expected: &str| {
-            let looked_at: Vec<String> = looked_at.iter().map(|s| s.to_string()).collect();
-            let past = Remembered::default().after(&Belief::default(), &looked_at, 0.0);
-            assert_eq!(changes(&past, &[], surface, "lower board"), expected, "{looked_at:?}");
-        };
-        let never = "nothing is remembered of the lower board: no earlier run looked at it";
-        check(&[], "lower-board", never);
-        check(&["desk"], "lower-board", never);
-        check(&["desk", "lower-board"], "lower-board", "nothing has changed");
-    }
 }

@@ -5,7 +5,7 @@ use crate::vocabulary::Vocabulary;
 
 /// The lines that declare objects, each a symbol and a type, and their symbols. Types that the domain does not have declare nothing; what is
 /// of a type is of its supertypes, and the domain's constants are declared already.
-pub(crate) fn lines<'a>(
+pub fn lines<'a>(
     objects: impl IntoIterator<Item = (&'a str, &'a str)>,
     vocabulary: &Vocabulary,
 ) -> (Vec<String>, Vec<String>) {
@@ -36,31 +36,4 @@ pub(crate) fn lines<'a>(
         several => format!("{symbols} - (either {})", several.join(" ")),
     };
     (lines.iter().map(declared).collect(), types.iter().map(|(symbol, _)| (*symbol).to_string()).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use descry_planner::Source;
-
-    use super::*;
-
-    #[test]
-    fn what_has_one_symbol_is_one_object() {
-        let pddl = "(define (domain d) (:requirements :typing)
-            (:types pose thing kind - object cup - thing) (:constants sofa - thing) (:predicates (at ?p - pose)))";
-        let vocabulary = Vocabulary::read(&Source::new("d.pddl", pddl)).unwrap();
-        let check = |objects: &[(&str, &str)], expected: &[&str]| {
-            assert_eq!(lines(objects.iter().copied(), &vocabulary).0, expected, "{objects:?}");
-        };
-        check(&[], &[]);
-        check(&[("a", "pose"), ("b", "pose"), ("c", "thing")], &["a b - pose", "c - thing"]);
-        check(
-            &[("mug", "thing"), ("b", "pose"), ("mug", "kind")],
-            &["mug - (either thing kind)", "b - pose"],
-        );
-        check(&[("a", "pose"), ("a", "pose")], &["a - pose"]);
-        check(&[("a", "cup"), ("a", "thing")], &["a - cup"]);
-        check(&[("a", "thing"), ("a", "pose"), ("a", "cup")], &["a - (either pose cup)"]);
-        check(&[("a", "room"), ("sofa", "pose")], &[]);
-    }
 }

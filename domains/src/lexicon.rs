@@ -77,7 +77,7 @@ impl Places {
     }
 
     /// Two places of one type, or one, that nothing tells apart or names: letters and digits alone do.
-    pub(crate) fn unclear(&self) -> Option<String> {
+    pub fn unclear(&self) -> Option<String> {
         let all = [
             ("surface", &self.surfaces),
             ("room", &self.rooms),
@@ -228,39 +228,4 @@ pub fn plural(name: &str) -> String {
 fn in_plural(thing: &Named) -> Named {
     let plurals = thing.names.iter().map(|name| plural(name));
     Named { symbol: thing.symbol.clone(), names: plurals.chain(thing.names.iter().cloned()).collect() }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn several_are_called_as_people_call_them() {
-        let check = |name: &str, expected: &str| assert_eq!(plural(name), expected);
-        check("cup", "cups");
-        check("white cylinder", "white cylinders");
-        check("box", "boxes");
-        check("glass", "glasses");
-        check("brush", "brushes");
-        check("berry", "berries");
-        check("tray", "trays");
-        check("y", "ys");
-    }
-
-    #[test]
-    fn places_have_names_of_their_own() {
-        let check = |surfaces: &[&str], rooms: &[&str], expected: Option<&str>| {
-            let own = |list: &[&str]| list.iter().map(|name| name.to_string()).collect();
-            let places = Places { surfaces: own(surfaces), rooms: own(rooms), ..Places::default() };
-            assert_eq!(places.unclear().as_deref(), expected, "{surfaces:?} {rooms:?}");
-        };
-        check(&["table", "table 2"], &["table"], None);
-        check(
-            &["table", "Table"],
-            &[],
-            Some("nothing tells the surface \"Table\" from the surface \"table\""),
-        );
-        check(&["a b", "c", "a-b"], &[], Some("nothing tells the surface \"a-b\" from the surface \"a b\""));
-        check(&["table"], &["--"], Some("\"--\" is no name of a room"));
-    }
 }

@@ -21,7 +21,8 @@ pub mod answer;
 pub mod asked;
 pub mod check;
 pub mod config;
-mod declared;
+#[doc(hidden)]
+pub mod declared;
 pub mod function;
 pub mod goal;
 pub mod lexicon;
@@ -33,7 +34,8 @@ mod programs;
 pub mod situation;
 pub mod template;
 pub mod vocabulary;
-mod walls;
+#[doc(hidden)]
+pub mod walls;
 pub mod words;
 pub mod world;
 

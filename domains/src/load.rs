@@ -1,6 +1,7 @@
 //! A domain's folder: the PDDL text, what may be said, the known objects and the scenes.
 
-mod names;
+#[doc(hidden)]
+pub mod names;
 mod program_texts;
 
 use std::collections::BTreeMap;
@@ -153,7 +154,8 @@ pub fn objects(folder: &Path) -> Result<Vec<ObjectModel>, LoadError> {
     parse_objects(&files)
 }
 
-fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
+#[doc(hidden)]
+pub fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
     let of_objects = files.iter().filter(|(key, _)| key.starts_with("objects/"));
     let read: Vec<names::Read<'_>> = of_objects
         .map(|(_, file)| Ok((file, parse::<ObjectModel>(&file.0, &file.1)?)))

@@ -130,35 +130,18 @@ fn checked(source: &Source, cluster: &Cluster) -> Result<Box<dyn Kind>, Experime
 }
 
 /// A name that schedulers take: small letters, digits and hyphens, at most 63 of them.
-fn name(said: &str) -> String {
+pub fn name(said: &str) -> String {
     let plain = said.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     let name: String = "descry-".chars().chain(plain).take(63).collect();
     name.trim_end_matches('-').into()
 }
 
 /// A path as a word of a shell.
-fn quoted(path: &Path) -> String {
+pub fn quoted(path: &Path) -> String {
     shell::quoted(&path.to_string_lossy())
 }
 
 /// A text as YAML has it within quotation marks, which is how JSON has it.
-fn text(said: &str) -> String {
+pub fn text(said: &str) -> String {
     serde_json::Value::from(said).to_string()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_and_words_are_what_schedulers_and_shells_take() {
-        let cases =
-            [("Two tables", "descry-two-tables"), ("a_b!", "descry-a-b"), ("", "descry"), ("ü", "descry")];
-        for (said, expected) in cases {
-            assert_eq!(name(said), expected);
-        }
-        assert_eq!(name(&"x".repeat(99)).len(), 63);
-        assert_eq!(quoted(Path::new("it's $HOME")), r"'it'\''s $HOME'");
-        assert_eq!(text("a: \"b\"\n"), r#""a: \"b\"\n""#);
-    }
 }

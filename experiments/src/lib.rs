@@ -11,7 +11,8 @@ pub mod plot;
 mod runner;
 pub mod statistics;
 pub mod table;
-mod write;
+#[doc(hidden)]
+pub mod write;
 
 use descry_agent::stop::Stop;
 use std::collections::{BTreeMap, BTreeSet};
@@ -272,7 +273,8 @@ pub fn run(source: &Source, options: &Options) -> Result<Ended, ExperimentError>
     carry_out(&*kinds::read(source)?, source, options)
 }
 
-fn carry_out(kind: &dyn Kind, source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
+#[doc(hidden)]
+pub fn carry_out(kind: &dyn Kind, source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
     let jobs = kind.jobs();
     check_unique(&jobs)?;
     let header = header(source, kind, jobs.len());
@@ -376,6 +378,3 @@ fn perform(
     done.extend(finished.into_iter().map(|job| (job.job.clone(), job)));
     Ok(())
 }
-
-#[cfg(test)]
-mod tests;

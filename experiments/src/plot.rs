@@ -5,7 +5,8 @@ use std::fmt::Write;
 
 use descry_pages::escaped;
 
-mod axis;
+#[doc(hidden)]
+pub mod axis;
 
 use axis::Scale;
 
@@ -133,7 +134,8 @@ struct Frame {
     bottom: f64,
 }
 
-fn lines(
+#[doc(hidden)]
+pub fn lines(
     title: &str,
     x: &Axis,
     y: &Axis,
@@ -201,7 +203,8 @@ fn lines(
     svg + "</svg>\n"
 }
 
-fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> String {
+#[doc(hidden)]
+pub fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> String {
     let row = (10.0 + 13.0 * series.len() as f64).max(26.0);
     let widest = categories.iter().map(|c| c.chars().count()).max().unwrap_or(0) as f64;
     let height = TITLE + 8.0 + row * categories.len().max(1) as f64 + BOTTOM;
@@ -305,7 +308,8 @@ fn count_strip(svg: &mut String, xs: &Scale, f: &Frame, counts: &[(f64, usize)])
     );
 }
 
-fn legend(svg: &mut String, series: &[Series]) {
+#[doc(hidden)]
+pub fn legend(svg: &mut String, series: &[Series]) {
     let left = WIDTH - LEGEND + 18.0;
     for (n, s) in series.iter().enumerate() {
         let y = TITLE + 20.0 + 20.0 * n as f64;
@@ -359,70 +363,4 @@ fn mark(svg: &mut String, x: f64, y: f64, n: usize) {
         2 => writeln!(svg, r#"<path d="M{x:.1},{:.1} l4.6,8 h-9.2 z" {style}/>"#, y - 5.0),
         _ => writeln!(svg, r#"<path d="M{x:.1},{:.1} l4.6,4.6 l-4.6,4.6 l-4.6,-4.6 z" {style}/>"#, y - 4.6),
     };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn series(values: &[f64]) -> Series {
-        let points = values.iter().zip(0..);
-        let points = points.map(|(&value, at)| Point {
-            at: f64::from(at),
-            value,
-            interval: Some([value - 0.1, value + 0.1]),
-        });
-        Series { name: "a & b".into(), points: points.collect(), broken: false }
-    }
-
-    fn numbers_are_finite(svg: &str) {
-        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        assert_eq!(svg.matches("<svg").count(), 1);
-        assert!(svg.ends_with("</svg>\n"));
-    }
-
-    #[test]
-    fn a_plot_says_everything() {
-        let plot = Plot::Lines {
-            name: "p".into(),
-            title: "T <1>".into(),
-            x: Axis::free("views"),
-            y: Axis::fixed("recall", 0.0, 1.0),
-            series: vec![series(&[0.5, 0.75, 1.0])],
-            diagonal: true,
-            counts: vec![(1.0, 7)],
-        };
-        let svg = plot.svg();
-        for part in
-            ["T &lt;1&gt;", "a &amp; b", ">views<", ">recall<", "<polyline", ">7<", "stroke-dasharray"]
-        {
-            assert!(svg.contains(part), "{part} is not in\n{svg}");
-        }
-        assert_eq!(svg.matches("<circle").count(), 4, "three points and one in the legend");
-        numbers_are_finite(&svg);
-    }
-
-    #[test]
-    fn no_data_and_one_value_are_plots_too() {
-        for values in [&[][..], &[3.0], &[2.0, 2.0]] {
-            let dots = Plot::Dots {
-                name: "d".into(),
-                title: "D".into(),
-                categories: values.iter().map(ToString::to_string).collect(),
-                x: Axis::free("m"),
-                series: vec![series(values)],
-            };
-            numbers_are_finite(&dots.svg());
-            let lines = Plot::Lines {
-                name: "l".into(),
-                title: "L".into(),
-                x: Axis::free("s"),
-                y: Axis::free("m"),
-                series: vec![series(values)],
-                diagonal: false,
-                counts: vec![],
-            };
-            numbers_are_finite(&lines.svg());
-        }
-    }
 }

@@ -104,7 +104,7 @@ pub(super) fn failures<'a>(finished: impl IntoIterator<Item = &'a Finished>) -> 
 }
 
 /// A line a row; the columns are all names that occur, in the order of their first occurrence (RFC 4180).
-fn csv(finished: &[Finished], rows: impl Fn(&Finished) -> Vec<Row>) -> String {
+pub fn csv(finished: &[Finished], rows: impl Fn(&Finished) -> Vec<Row>) -> String {
     let all: Vec<(&Finished, Row)> =
         finished.iter().flat_map(|job| rows(job).into_iter().map(move |row| (job, row))).collect();
     let mut seen = BTreeSet::new();
@@ -168,26 +168,4 @@ fn clock_table(finished: &[Finished]) -> Option<Table> {
         ]);
     }
     (!table.rows.is_empty()).then_some(table)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn csv_quotes_and_lines_up() {
-        let row = |value: Value| value.as_object().cloned().unwrap_or_default();
-        let job = |id: &str, rows: Vec<Row>, error: Option<&str>| Finished {
-            job: id.into(),
-            rows,
-            clock: Row::new(),
-            error: error.map(str::to_string),
-        };
-        let finished = [
-            job("a", vec![row(json!({ "x": 1, "y": "p,q" })), row(json!({ "x": 2.5, "z": true }))], None),
-            job("b", vec![row(json!({ "x": null }))], Some("say \"why\"")),
-        ];
-        let expected = "job,x,y,z,error\na,1,\"p,q\",,\na,2.5,,true,\nb,,,,\"say \"\"why\"\"\"\n";
-        assert_eq!(csv(&finished, |job| job.rows.clone()), expected);
-    }
 }

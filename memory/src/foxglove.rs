@@ -3,7 +3,8 @@
 //! Fields may stand in any order on that wire. The bytes of a blob are always written last, so that what stands before
 //! them follows from the document alone and the bytes themselves lie in the file as one piece.
 
-mod descriptor;
+#[doc(hidden)]
+pub mod descriptor;
 pub(crate) mod wire;
 
 use crate::document::{BlobInfo, Document, Form};
@@ -20,7 +21,7 @@ pub(crate) struct Schema {
 }
 
 /// How messages of a form are encoded, in the words of MCAP.
-pub(crate) const PROTOBUF: &str = "protobuf";
+pub const PROTOBUF: &str = "protobuf";
 /// How documents are encoded.
 pub(crate) const JSON: &str = "json";
 

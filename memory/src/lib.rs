@@ -20,18 +20,23 @@
 //! ```
 
 pub mod belief;
-mod clouds;
-mod document;
+#[doc(hidden)]
+pub mod clouds;
+#[doc(hidden)]
+pub mod document;
 mod error;
 mod export;
 mod flusher;
-mod foxglove;
+#[doc(hidden)]
+pub mod foxglove;
 pub mod learned;
-mod packed;
+#[doc(hidden)]
+pub mod packed;
 mod record;
 pub mod remember;
 mod retrace;
-mod scans;
+#[doc(hidden)]
+pub mod scans;
 pub mod space;
 pub mod stores;
 pub mod transforms;

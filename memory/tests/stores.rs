@@ -1,7 +1,6 @@
 //! The store on the disk does what every store must do.
 
-mod suite;
-
+use crate::suite;
 use descry_memory::{LocalOptions, LocalStore, Retention};
 
 #[test]

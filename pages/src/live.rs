@@ -3,7 +3,8 @@
 //! Readers ask and get; nothing that they send reaches what is shown. A page of another site that makes a browser ask is refused: by
 //! the `Host` that it names (a name of its own that leads here), by its `Origin`, and by what browsers are told in the answer.
 
-mod answers;
+#[doc(hidden)]
+pub mod answers;
 mod news;
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};

@@ -2,14 +2,14 @@
 
 /// A stream of draws that its seed fixes.
 #[derive(Clone, Debug)]
-pub(crate) struct Draws(u64);
+pub struct Draws(u64);
 
 impl Draws {
-    pub(crate) fn new(seed: u64) -> Draws {
+    pub fn new(seed: u64) -> Draws {
         Draws(seed)
     }
 
-    pub(crate) fn next(&mut self) -> u64 {
+    pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let a = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let b = (a ^ (a >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);

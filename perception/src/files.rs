@@ -1,7 +1,8 @@
 //! Clouds and depth images from bytes and back. Nothing here touches a file system.
 
 pub mod depth;
-mod lzf;
+#[doc(hidden)]
+pub mod lzf;
 pub mod pcd;
 pub mod ply;
 

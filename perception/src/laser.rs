@@ -11,13 +11,18 @@ mod background;
 mod features;
 mod fit;
 mod known;
-mod least_squares;
+#[doc(hidden)]
+pub mod least_squares;
 mod next;
 mod scan;
-mod shape;
-mod simplex;
-mod solve;
-mod violation;
+#[doc(hidden)]
+pub mod shape;
+#[doc(hidden)]
+pub mod simplex;
+#[doc(hidden)]
+pub mod solve;
+#[doc(hidden)]
+pub mod violation;
 
 pub use crate::occupancy::{Occupancy, Space};
 pub use align::{Alignment, align, align_consistent};

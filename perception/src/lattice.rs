@@ -4,13 +4,13 @@ use nalgebra::{Point3, Vector3};
 
 /// Numbers the voxels of a part of the world: x counts most, then y, then z. The lattice is fixed to the world's origin.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lattice {
-    per_m: f64,
+pub struct Lattice {
+    pub per_m: f64,
     /// Lowest voxel, with a layer of margin.
     low: [f64; 3],
     /// How far x and y are shifted in a key.
     shift: [u32; 2],
-    bits: u32,
+    pub bits: u32,
 }
 
 impl Lattice {
@@ -74,7 +74,7 @@ impl Lattice {
 }
 
 /// Walks along sorted keys and keeps track of the occupied voxels around.
-pub(crate) struct Around<'a> {
+pub struct Around<'a> {
     keys: &'a [u64],
     columns: [i64; 9],
     starts: [usize; 9],
@@ -104,54 +104,5 @@ impl<'a> Around<'a> {
                 at += 1;
             }
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn lattice() -> Lattice {
-        Lattice::over(&Point3::new(-1.0, -0.5, 0.2), &Point3::new(0.7, 0.5, 0.9), 0.05)
-    }
-
-    proptest! {
-        #[test]
-        fn a_walk_finds_what_a_search_of_all_finds(
-            places in prop::collection::vec((-1.0..0.7_f64, -0.5..0.5_f64, 0.2..0.9_f64), 1..1000)
-        ) {
-            let lattice = lattice();
-            let voxel = |p: &(f64, f64, f64)| [p.0, p.1, p.2].map(|c| (c / 0.05).floor() as i64);
-            let mut entries: Vec<(u64, u32)> = (0..).zip(&places)
-                .map(|(i, p)| (lattice.key(&Vector3::new(p.0, p.1, p.2)), i))
-                .collect();
-            let mut expected = entries.clone();
-            expected.sort();
-            lattice.sort(&mut entries, &mut Vec::new());
-            prop_assert_eq!(&entries, &expected);
-            entries.dedup_by_key(|e| e.0);
-            let keys: Vec<u64> = entries.iter().map(|e| e.0).collect();
-            let first = keys.len() / 3;
-            let mut around = Around::from(&lattice, &keys, first);
-            for (key, own) in entries.iter().skip(first) {
-                let own = voxel(&places[*own as usize]);
-                let near = |other: &[i64; 3]| (0..3).all(|k| (own[k] - other[k]).abs() <= 1);
-                let expected: Vec<usize> = entries.iter().enumerate()
-                    .filter(|(_, e)| near(&voxel(&places[e.1 as usize])))
-                    .map(|(at, _)| at)
-                    .collect();
-                let mut found = Vec::new();
-                around.visit(*key, |at| found.push(at));
-                prop_assert_eq!(found, expected);
-            }
-        }
-    }
-
-    #[test]
-    fn a_box_beyond_all_numbers_gets_wider_voxels() {
-        let far = 1e9;
-        let lattice = Lattice::over(&Point3::new(-far, -far, -far), &Point3::new(far, far, far), 0.003);
-        assert!(lattice.per_m < 1.0 / 0.003 && lattice.bits < 64);
     }
 }

@@ -10,8 +10,10 @@ mod error;
 mod frame;
 mod fuse;
 mod grow;
-mod know;
-mod mask;
+#[doc(hidden)]
+pub mod know;
+#[doc(hidden)]
+pub mod mask;
 mod model;
 mod notice;
 mod planes;

@@ -29,11 +29,13 @@ pub mod calibration;
 pub mod camera;
 pub mod cloud;
 pub mod cluster;
-mod draw;
+#[doc(hidden)]
+pub mod draw;
 pub mod files;
 pub mod hull;
 pub mod laser;
-mod lattice;
+#[doc(hidden)]
+pub mod lattice;
 pub mod learning;
 pub mod locate;
 pub mod mapping;
@@ -43,16 +45,21 @@ pub mod noise;
 pub mod normals;
 pub mod occupancy;
 pub mod outliers;
-mod outline;
+#[doc(hidden)]
+pub mod outline;
 pub mod picture;
 pub mod plane;
-mod pool;
+#[doc(hidden)]
+pub mod pool;
 pub mod recognise;
 pub mod register;
-mod round;
-mod scale;
+#[doc(hidden)]
+pub mod round;
+#[doc(hidden)]
+pub mod scale;
 pub mod segment;
-mod spread;
+#[doc(hidden)]
+pub mod spread;
 pub mod surface;
 pub mod view;
 pub mod visibility;

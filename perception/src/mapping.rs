@@ -12,16 +12,20 @@ mod closure;
 mod cylinder;
 mod error;
 mod field;
-mod frontier;
+#[doc(hidden)]
+pub mod frontier;
 mod fuse;
-mod graph;
+#[doc(hidden)]
+pub mod graph;
 mod grid;
-mod orientation;
+#[doc(hidden)]
+pub mod orientation;
 mod outlook;
 mod pair;
 mod patch;
 mod room;
-mod station;
+#[doc(hidden)]
+pub mod station;
 
 pub use cells::{Cells, CellsError, Facet, NormalOptions, by_regions};
 pub use closure::{Closure, ClosureOptions, closures, correct_drive, relocate};

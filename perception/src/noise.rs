@@ -87,7 +87,7 @@ pub fn lateral_sigma_m(z_m: f64, angle_rad: f64, focal_px: f64) -> Option<f64> {
 
 /// [`Sensor::frontal_sigma_m`] of the [`KINECT`].
 #[inline(always)]
-pub(crate) fn frontal_sigma_m(z_m: f32) -> f32 {
+pub fn frontal_sigma_m(z_m: f32) -> f32 {
     let beyond_m = z_m - KINECT.range_m.0 as f32;
     KINECT.axial_m as f32 + KINECT.growth_per_m as f32 * (beyond_m * beyond_m)
 }
@@ -95,20 +95,4 @@ pub(crate) fn frontal_sigma_m(z_m: f32) -> f32 {
 /// Standard normal distribution function.
 pub fn normal_cdf(x: f64) -> f64 {
     libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2) / 2.0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn grows_with_depth_and_angle_and_ends() {
-        let axial = |z, degrees: f64| axial_sigma_m(z, degrees.to_radians());
-        let lateral_m = |z, angle| KINECT.lateral_sigma_m(z, angle, 525.0);
-        assert!((axial(0.4, 0.0).unwrap() - 0.0012).abs() < 1e-12);
-        assert!(axial(2.0, 0.0) > axial(1.0, 0.0) && axial(1.0, 80.0) > axial(1.0, 20.0));
-        assert_eq!((axial(1.0, 86.0), lateral_m(1.0, 1.5)), (None, None));
-        assert!((f64::from(frontal_sigma_m(1.7)) - axial(1.7, 0.0).unwrap()).abs() < 1e-8);
-        assert!((lateral_m(1.0, 0.0).unwrap() - 0.8 / 525.0).abs() < 1e-12);
-    }
 }

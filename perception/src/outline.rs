@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 /// An upright box in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rectangle {
+pub struct Rectangle {
     /// Middle, metres.
     pub x: f64,
     /// Middle, metres.
@@ -35,7 +35,7 @@ const BLOCK: usize = 16;
 
 /// Fits a rectangle to points by turning it: the extents bound nearly all points, and once it is turned each edge lies amid the points
 /// that are nearest to it; the residual tells how well they keep to the edges.
-pub(crate) fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
+pub fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
     }
@@ -323,37 +323,5 @@ impl Turned {
             along_m: [a, b],
             residual_m,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn two_sides_of_a_box_are_a_rectangle() {
-        let edge = |i: i32| f64::from(i) / 100.0;
-        let turn = |x: f64, y: f64| Point3::new(0.8 * x - 0.6 * y + 1.0, 0.6 * x + 0.8 * y, 0.05);
-        let points: Vec<_> =
-            (0..100).flat_map(|i| [turn(0.12 * edge(i), 0.0), turn(0.0, 0.07 * edge(i))]).collect();
-        let found = fit(&points);
-        let close = found.is_some_and(|r| {
-            (r.sides_m[0] - 0.12).abs() < 0.008 && (r.sides_m[1] - 0.07).abs() < 0.008 && r.residual_m < 0.003
-        });
-        assert!(close, "{found:?}");
-    }
-
-    #[test]
-    fn noise_does_not_carry_edges_outwards() {
-        let noise = |i: usize| 0.02 * (f64::from((i * 7919 % 101) as u32) / 100.0 - 0.5);
-        let places = (0..600).map(|i| (f64::from(i) / 600.0, noise(i as usize)));
-        let points: Vec<_> = places
-            .flat_map(|(along, off)| {
-                [Point3::new(0.12 * along, off, 0.05), Point3::new(off, 0.07 * along, 0.05)]
-            })
-            .collect();
-        let spread_m = 0.02 / 12.0_f64.sqrt();
-        let found = fit(&points).expect("a rectangle");
-        assert!(found.residual_m < 1.1 * spread_m, "{found:?}, of a spread of {spread_m} m");
     }
 }

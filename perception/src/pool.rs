@@ -10,7 +10,7 @@ pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R 
 }
 
 /// What comes of each, in their order. The heaviest are begun first, so that none is left to one thread in the end.
-pub(crate) fn heaviest_first<T: Sync, R: Send>(
+pub fn heaviest_first<T: Sync, R: Send>(
     all: &[T],
     weight: impl Fn(&T) -> usize,
     each: impl Fn(&T) -> R + Sync + Send,
@@ -20,16 +20,4 @@ pub(crate) fn heaviest_first<T: Sync, R: Send>(
     let mut done: Vec<(usize, R)> = order.into_iter().par_bridge().map(|n| (n, each(&all[n]))).collect();
     done.sort_unstable_by_key(|(n, _)| *n);
     done.into_iter().map(|(_, result)| result).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_comes_of_each_is_in_the_order_of_all() {
-        let squares = heaviest_first(&[3, 1, 4, 1, 5, 9, 2, 6], |n| *n, |n| n * n);
-        assert_eq!(squares, [9, 1, 16, 1, 25, 81, 4, 36]);
-        assert_eq!(heaviest_first(&[] as &[usize], |n| *n, |n| n * n), []);
-    }
 }

@@ -1,18 +1,23 @@
 //! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
 
-mod asker;
-mod body;
+#[doc(hidden)]
+pub mod asker;
+#[doc(hidden)]
+pub mod body;
 mod descry;
-mod ends;
+#[doc(hidden)]
+pub mod ends;
 mod evidence;
 mod likelihood;
 mod model;
 mod percept;
 mod published;
-mod rays;
+#[doc(hidden)]
+pub mod rays;
 mod settle;
 mod toppled;
-mod upper;
+#[doc(hidden)]
+pub mod upper;
 mod verify;
 
 use crate::segment::Scene;

@@ -1,7 +1,9 @@
 //! Fitting an upright body of revolution with straight sides (a cylinder, a cup) to one object.
 
-pub(crate) mod lying;
-mod side;
+#[doc(hidden)]
+pub mod lying;
+#[doc(hidden)]
+pub mod side;
 
 use crate::draw::Draws;
 use crate::scale::{EDGE_M, PLACE_M};
@@ -22,13 +24,13 @@ const FEWEST: (usize, usize) = (20, 12);
 /// Gates of the first steps of a fit, in tolerances. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];
 /// Directions around an axis that are looked at one by one. From: chosen.
-pub(crate) const SECTORS: usize = 36;
+pub const SECTORS: usize = 36;
 /// The side is not looked for in these shares of the height, at the foot and below the top. From: chosen.
 pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
 /// Spreads of radius, metres, and slope of things that stand on tables, and the steepest slope that a fit takes. From: chosen.
 pub(crate) const RADIUS_SPREAD_M: f64 = 0.05;
 pub(crate) const SLOPE_SPREAD: f64 = 0.1;
-pub(crate) const STEEPEST: f64 = 0.6;
+pub const STEEPEST: f64 = 0.6;
 /// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
 /// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
 pub(crate) const NO_CIRCLE: f64 = 0.34;
@@ -37,7 +39,7 @@ pub(crate) const SEED: u64 = 7;
 
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Round {
+pub struct Round {
     /// Axis, metres.
     pub x: f64,
     /// Axis, metres.
@@ -98,7 +100,7 @@ impl Round {
 
 /// In which of the [`SECTORS`] directions around an axis a place lies that is `x` and `y` from it.
 #[inline]
-pub(crate) fn sector(x: f64, y: f64) -> usize {
+pub fn sector(x: f64, y: f64) -> usize {
     /// Where the sectors of a quarter end but for the last, as tangents. From: derived, every ten degrees.
     const ENDS: [f64; SECTORS / 4 - 1] = [
         0.176_326_980_708_464_98,
@@ -123,14 +125,14 @@ pub(crate) fn sector(x: f64, y: f64) -> usize {
 
 /// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.
 #[inline(always)]
-pub(crate) fn distance(x: f64, y: f64) -> f64 {
+pub fn distance(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
 /// Fits the side of a round body to the points between `base_m` and `top_m`; `sigma_m` is the spread of a measurement.
 ///
 /// `None` if there are too few side points or they lie on no circle of a sensible size.
-pub(crate) fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
+pub fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
     let height = top_m - base_m;
     let side = Side::between(points, base_m, top_m);
     if side.len() < FEWEST.0 {
@@ -301,75 +303,4 @@ fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) 
         inliers: count / side.len() as f64,
     };
     [improved.x, improved.y, improved.radius_m].iter().all(|v| v.is_finite()).then_some(improved)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::TAU;
-
-    /// Points on the side of a cup, over an arc, with a ripple in place of noise.
-    fn cup(x: f64, y: f64, base: f64, top: f64, arc_rad: f64) -> Vec<Point3<f64>> {
-        (0..2000)
-            .map(|i| {
-                let z = f64::from(i % 40) / 40.0 * 0.1;
-                let angle = f64::from(i / 40) / 50.0 * arc_rad;
-                let r = base + (top - base) * z / 0.1 + 0.001 * f64::from(i).sin();
-                Point3::new(x + r * angle.cos(), y + r * angle.sin(), z)
-            })
-            .collect()
-    }
-
-    #[test]
-    fn radius_place_and_taper_come_back() {
-        let cases = [
-            ("all around", 0.0, 0.0, 0.035, 0.035, TAU),
-            ("half", 0.4, -0.2, 0.035, 0.035, 2.6),
-            ("a tapered cup", -0.3, 0.1, 0.025, 0.04, 3.0),
-        ];
-        for (name, x, y, base, top, arc) in cases {
-            let found = fit(&cup(x, y, base, top, arc), 0.0, 0.1, 0.001, 1);
-            let close = found.is_some_and(|r| {
-                (r.x - x).abs() < 0.001
-                    && (r.y - y).abs() < 0.001
-                    && (r.radius_at(0.0) - base).abs() < 0.001
-                    && (r.radius_at(0.1) - top).abs() < 0.001
-            });
-            assert!(close, "{name}: {found:?}");
-        }
-    }
-
-    #[test]
-    fn directions_around_an_axis_are_those_of_the_angle() {
-        for k in 0..7200 {
-            let angle = TAU * (f64::from(k) + 0.5) / 7200.0;
-            assert_eq!(sector(0.3 * angle.cos(), 0.3 * angle.sin()), k as usize / 200, "{angle} rad");
-        }
-        let axes = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0)];
-        assert_eq!(axes.map(|(x, y)| sector(x, y)), [0, 9, 18, 27, 0]);
-    }
-
-    #[test]
-    fn far_off_a_body_stands_behind_what_was_seen_of_it() {
-        // Depth along y comes in steps of 2.5 cm, as at nearly three metres.
-        let (x, y, r) = (0.3, 2.7, 0.035);
-        let across = |i: usize| -0.95 * r + 1.9 * r * (i % 20) as f64 / 19.0;
-        let seen = |i: usize| {
-            let depth = y - (r * r - across(i).powi(2)).sqrt();
-            Point3::new(x + across(i), (depth / 0.025).round() * 0.025, 0.1 * (i / 20) as f64 / 10.0)
-        };
-        let points: Vec<Point3<f64>> = (0..200).map(seen).collect();
-        let drawn =
-            Round { x, y: y - 0.03, radius_m: r, ..fit(&cup(x, y, r, r, TAU), 0.0, 0.1, 0.001, 1).unwrap() };
-        let off =
-            drawn.behind(&points, (0.0, 0.1), [0.0, -1.0]).map(|found| (found.x - x).hypot(found.y - y));
-        assert!(off.is_some_and(|off| off < 0.012), "{off:?} m off");
-    }
-
-    #[test]
-    fn what_is_no_circle_is_none() {
-        assert_eq!(fit(&[], 0.0, 0.1, 0.001, 1), None);
-        let same = vec![Point3::new(0.1, 0.1, 0.05); 100];
-        assert_eq!(fit(&same, 0.0, 0.1, 0.001, 1), None);
-    }
 }

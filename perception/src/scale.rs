@@ -4,9 +4,9 @@
 /// From: chosen, what is left of poses that err by centimetres; most uses bear half of it and twice as much.
 pub(crate) const PLACE_M: f64 = 0.008;
 /// What is farther apart is in two places, whichever way both are off, metres. From: derived, two of them.
-pub(crate) const APART_M: f64 = 2.0 * PLACE_M;
+pub const APART_M: f64 = 2.0 * PLACE_M;
 /// How exactly an edge or an end is known, metres. From: derived, half of a place.
-pub(crate) const EDGE_M: f64 = 0.5 * PLACE_M;
+pub const EDGE_M: f64 = 0.5 * PLACE_M;
 /// How far real things differ from the straight forms that they are compared with, metres. From: derived, half of an edge.
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
 /// So many spreads of a measurement are more than noise. From: chosen.

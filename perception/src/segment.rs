@@ -8,11 +8,15 @@ mod hidden;
 mod join;
 mod mend;
 mod patches;
-mod quantile;
+#[doc(hidden)]
+pub mod quantile;
 mod rounds;
-mod stand;
-mod vessels;
-mod votes;
+#[doc(hidden)]
+pub mod stand;
+#[doc(hidden)]
+pub mod vessels;
+#[doc(hidden)]
+pub mod votes;
 
 use crate::cloud::Cloud;
 use crate::pool;
@@ -20,7 +24,7 @@ use crate::surface::{Rows, Surface, SurfaceError, SurfaceOptions, TALLEST_M, con
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Vector3};
 use patches::Voxels;
-pub(crate) use quantile::{end, quantile};
+pub use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -115,13 +119,13 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
 }
 
 /// Shares of a segment's points that lie below its lower edge and below its top: beyond are the few that may be noise. From: chosen.
-pub(crate) const POINT_ENDS: (f64, f64) = (0.01, 0.99);
+pub const POINT_ENDS: (f64, f64) = (0.01, 0.99);
 /// The same of the voxels of a part, and of what sticks out of a body. From: chosen.
 pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
 /// Fewest voxels that tell an upright side. From: chosen.
 const SIDE_VOXELS: usize = 25;
 /// Of the second number of places, the first may lie outside of what holds most of them. From: chosen.
-const OUTSIDE: (usize, usize) = (3, 10);
+pub const OUTSIDE: (usize, usize) = (3, 10);
 
 /// The points of each part, in order of its first point.
 fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxel: &[u32]) -> Vec<Segment> {
@@ -212,7 +216,7 @@ fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, optio
 }
 
 /// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
-pub(crate) fn top_m(segment: &Segment) -> f64 {
+pub fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
     end(&heights, POINT_ENDS.1)
 }
@@ -236,7 +240,8 @@ fn is_upright(normal: &Vector3<f64>) -> bool {
     normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
 }
 
-fn middle(points: &[Point3<f64>]) -> [f64; 2] {
+#[doc(hidden)]
+pub fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     let n = points.len().max(1) as f64;
     let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
     [x / n, y / n]
@@ -252,7 +257,7 @@ fn take_away(from: &mut Vec<usize>, others: &[usize]) {
 }
 
 /// Lowest and highest corner of the box around points.
-fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
+pub fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
     let first = points.first().copied().unwrap_or_else(Point3::origin);
     let (mut low, mut high) = (first, first);
     for p in points {
@@ -265,12 +270,12 @@ fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
 }
 
 /// The convex outline of points.
-fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
+pub fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
     convex_hull(points.iter().map(|p| [p.x, p.y]).collect())
 }
 
 /// True if a convex anticlockwise outline holds most of the places: all but [`OUTSIDE`].
-fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -> bool {
+pub fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -> bool {
     let outside = of.iter().filter(|p| !holds(hull, place(p)));
     // The first that is too many settles it.
     outside.take(of.len() * OUTSIDE.0 / OUTSIDE.1 + 1).count() * OUTSIDE.1 <= of.len() * OUTSIDE.0

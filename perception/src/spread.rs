@@ -55,7 +55,7 @@ pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64;
 
 /// The direction of least spread.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Least {
+pub struct Least {
     pub normal: [f64; 3],
     /// Least eigenvalue as a part of all three: 0 flat, 1/3 round.
     pub share: f64,
@@ -71,7 +71,7 @@ const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
 #[inline(always)]
-pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
+pub fn least(c: &[f64; 6]) -> Option<Least> {
     let [least] = least_of(&c.map(|value| [value]));
     least
 }
@@ -80,7 +80,7 @@ pub(crate) fn least(c: &[f64; 6]) -> Option<Least> {
 ///
 /// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
 #[inline(always)]
-pub(crate) fn least_of<const N: usize>(c: &[[f64; N]; 6]) -> [Option<Least>; N] {
+pub fn least_of<const N: usize>(c: &[[f64; N]; 6]) -> [Option<Least>; N] {
     let scale = lanes::<N>(|i| c[0][i].max(c[3][i]).max(c[5][i]));
     let per = lanes::<N>(|i| 1.0 / scale[i]);
     let [xx, xy, xz, yy, yz, zz] = c.each_ref().map(|c| lanes::<N>(|i| c[i] * per[i]));
@@ -143,39 +143,4 @@ pub(crate) fn tangents(n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         Vector3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
         Vector3::new(b, sign + n.y * n.y * a, -n.y),
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::Matrix3;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn agrees_with_an_iterative_solver(v in proptest::array::uniform9(-1.0f64..1.0)) {
-            let a = Matrix3::from_row_slice(&v);
-            let m = a.transpose() * a;
-            let c = [m[(0, 0)], m[(0, 1)], m[(0, 2)], m[(1, 1)], m[(1, 2)], m[(2, 2)]];
-            let values = m.symmetric_eigenvalues();
-            let mut sorted = [values[0], values[1], values[2]];
-            sorted.sort_by(f64::total_cmp);
-            prop_assume!(sorted[1] > 1e-3 && sorted[1] - sorted[0] > 1e-3);
-            let found = least(&c).unwrap();
-            let n = Vector3::from(found.normal);
-            prop_assert!((m * n - n * sorted[0]).norm() < 1e-6);
-            // Whatever lies beside it.
-            let [same, none] = least_of(&c.map(|value| [value, 0.0]));
-            prop_assert_eq!(same.map(|same| same.normal), Some(found.normal));
-            prop_assert!(none.is_none());
-        }
-    }
-
-    #[test]
-    fn no_direction_for_a_line_or_a_place() {
-        assert!(least(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]).is_none());
-        assert!(least(&[0.0; 6]).is_none());
-        assert!(least(&[f64::NAN; 6]).is_none());
-        assert!(least(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]).is_some_and(|l| l.normal[2].abs() == 1.0));
-    }
 }

@@ -2,11 +2,14 @@
 
 mod extent;
 mod face;
-mod hull;
-mod outline;
+#[doc(hidden)]
+pub mod hull;
+#[doc(hidden)]
+pub mod outline;
 mod planes;
 mod role;
-mod tiles;
+#[doc(hidden)]
+pub mod tiles;
 mod upright;
 
 use crate::cloud::{Cloud, is_finite};
@@ -20,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::mpsc;
 
 pub(crate) use extent::TALLEST_M;
-pub(crate) use hull::{convex_hull, largest_part};
+pub use hull::{convex_hull, largest_part};
 pub use outline::Outline;
 pub(crate) use outline::Rows;
 pub(crate) use planes::{BAND, dominant_planes};

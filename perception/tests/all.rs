@@ -21,3 +21,4 @@ mod shapes;
 mod surfaces;
 mod tabletop;
 mod told;
+mod unit;

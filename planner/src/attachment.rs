@@ -5,7 +5,8 @@
 //! hands over the values of exactly those facts with every call, so a call is plain data that can be cached, sent
 //! to another process, batched, and answered on any thread.
 
-mod registry;
+#[doc(hidden)]
+pub mod registry;
 
 use std::fmt;
 use std::sync::Arc;

@@ -21,7 +21,7 @@ use crate::task::{Module, ModuleId, Task};
 use self::terms::{Origin, Sources, Terms};
 
 /// A failed call on its way up to [`crate::plan`].
-pub(crate) type Failure = Box<AttachmentError>;
+pub type Failure = Box<AttachmentError>;
 
 /// What all calls of a module share.
 struct Asked<'a> {
@@ -54,7 +54,7 @@ type Known = FxHashMap<Box<[u64]>, Answer>;
 type Refusal = (CallId, bool, Option<Arc<str>>);
 
 /// Every call of a ground task, bound to its attachment.
-pub(crate) struct Calls<'a> {
+pub struct Calls<'a> {
     task: &'a Task,
     ground: &'a GroundTask,
     attachments: &'a Attachments,

@@ -22,29 +22,37 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod attachment;
-mod calls;
-mod classical;
-mod clauses;
+#[doc(hidden)]
+pub mod attachment;
+#[doc(hidden)]
+pub mod calls;
+#[doc(hidden)]
+pub mod classical;
+#[doc(hidden)]
+pub mod clauses;
 pub mod diagnostic;
 mod explain;
 pub mod ground;
 mod grouped;
-mod heuristics;
-mod memory;
-mod model;
+#[doc(hidden)]
+pub mod heuristics;
+#[doc(hidden)]
+pub mod memory;
+#[doc(hidden)]
+pub mod model;
 mod outcome;
 pub mod pddl;
 pub mod plan;
-mod search;
+#[doc(hidden)]
+pub mod search;
 pub mod semantics;
-#[cfg(test)]
-mod small;
 mod solve;
 pub mod state;
 pub mod task;
-mod temporal;
-mod validate;
+#[doc(hidden)]
+pub mod temporal;
+#[doc(hidden)]
+pub mod validate;
 
 pub use attachment::{
     Answer, Attachment, AttachmentError, Attachments, Call, CallError, CallKind, CallStatistics, FactValue,

@@ -4,7 +4,7 @@ use std::ops::{Index, IndexMut};
 
 /// How much memory planning may take.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MemoryLimit {
+pub struct MemoryLimit {
     bytes: usize,
     /// What the process has in use, where somebody can tell.
     used: Option<fn() -> u64>,
@@ -15,7 +15,7 @@ const RESERVE: usize = 32;
 
 impl MemoryLimit {
     /// `None` for no limit; `used` tells what the whole process has in use.
-    pub(crate) fn new(bytes: Option<u64>, used: Option<fn() -> u64>) -> MemoryLimit {
+    pub fn new(bytes: Option<u64>, used: Option<fn() -> u64>) -> MemoryLimit {
         let bytes = bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
         MemoryLimit { bytes: bytes - bytes / RESERVE, used: used.filter(|_| bytes != usize::MAX) }
     }
@@ -26,7 +26,7 @@ impl MemoryLimit {
     }
 
     /// The same limit beside something else that takes so much.
-    pub(crate) fn beside(self, others: usize) -> MemoryLimit {
+    pub fn beside(self, others: usize) -> MemoryLimit {
         match self.used {
             Some(_) => self,
             None => MemoryLimit { bytes: self.bytes.saturating_sub(others), ..self },
@@ -34,7 +34,7 @@ impl MemoryLimit {
     }
 
     /// Whether there is room for so many more bytes beside those `counted`.
-    pub(crate) fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
+    pub fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
         let used = match self.used {
             Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
             None => counted(),
@@ -53,7 +53,7 @@ const PIECE_BYTES: usize = 1 << 20;
 
 /// Rows of the same length one after another, kept in pieces: growing copies nothing, and takes one piece at a time.
 #[derive(Debug)]
-pub(crate) struct Rows<T> {
+pub struct Rows<T> {
     pieces: Vec<Vec<T>>,
     width: usize,
     /// Binary logarithm of the rows in a piece.
@@ -63,13 +63,13 @@ pub(crate) struct Rows<T> {
 
 impl<T> Rows<T> {
     /// No rows; each will have so many items.
-    pub(crate) fn new(width: usize) -> Rows<T> {
+    pub fn new(width: usize) -> Rows<T> {
         let fitting = PIECE_BYTES / (width * size_of::<T>()).max(1);
         Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }
     }
 
     /// How many rows.
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.len
     }
 
@@ -86,7 +86,7 @@ impl<T> Rows<T> {
     }
 
     /// Bytes taken.
-    pub(crate) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         self.pieces.iter().map(|piece| piece.capacity() * size_of::<T>()).sum()
     }
 
@@ -103,7 +103,7 @@ impl<T> Rows<T> {
 
     /// One row.
     #[inline]
-    pub(crate) fn row(&self, index: usize) -> &[T] {
+    pub fn row(&self, index: usize) -> &[T] {
         let start = (index & ((1 << self.shift) - 1)) * self.width;
         &self.pieces[index >> self.shift][start..start + self.width]
     }
@@ -132,7 +132,7 @@ impl<T> Rows<T> {
 
 impl<T: Clone> Rows<T> {
     /// Appends a row.
-    pub(crate) fn push_row(&mut self, row: &[T]) {
+    pub fn push_row(&mut self, row: &[T]) {
         debug_assert_eq!(self.width, row.len());
         self.last().extend_from_slice(row);
     }
@@ -160,7 +160,7 @@ impl<T> IndexMut<usize> for Rows<T> {
 
 /// A queue that gives the least item first.
 #[derive(Debug)]
-pub(crate) struct Heap<T> {
+pub struct Heap<T> {
     items: Rows<T>,
 }
 
@@ -172,7 +172,7 @@ impl<T> Default for Heap<T> {
 
 impl<T: Ord + Copy> Heap<T> {
     /// Whether nothing is left.
-    pub(crate) fn is_empty(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.items.len() == 0
     }
 
@@ -182,7 +182,7 @@ impl<T: Ord + Copy> Heap<T> {
     }
 
     /// Adds an item.
-    pub(crate) fn push(&mut self, item: T) {
+    pub fn push(&mut self, item: T) {
         let mut at = self.items.len();
         self.items.push(item);
         while at > 0 {
@@ -197,7 +197,7 @@ impl<T: Ord + Copy> Heap<T> {
     }
 
     /// Takes the least item.
-    pub(crate) fn pop(&mut self) -> Option<T> {
+    pub fn pop(&mut self) -> Option<T> {
         let last = self.items.pop()?;
         let len = self.items.len();
         if len == 0 {
@@ -221,45 +221,5 @@ impl<T: Ord + Copy> Heap<T> {
         }
         self.items[at] = last;
         Some(least)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Heap, MemoryLimit, Rows};
-
-    #[test]
-    fn rows_are_found_again_in_every_piece() {
-        for width in [0, 1, 3, 70_000] {
-            let mut rows = Rows::<u64>::new(width);
-            let count = if width > 1000 { 9 } else { 300_000 };
-            for row in 0..count {
-                rows.push_row(&vec![row as u64; width]);
-            }
-            assert_eq!(rows.len(), count);
-            assert!((0..count).all(|row| rows.row(row).iter().all(|&item| item == row as u64)), "{width}");
-            assert!(rows.bytes() <= count * width * 8 + (2 << 20), "{width}: {}", rows.bytes());
-        }
-    }
-
-    #[test]
-    fn a_heap_gives_the_least_first() {
-        let mut heap = Heap::default();
-        let mixed = |n: u64| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40, n);
-        (0..200_000).for_each(|n| heap.push(mixed(n)));
-        let mut expected: Vec<_> = (0..200_000).map(mixed).collect();
-        expected.sort_unstable();
-        assert!(expected.iter().all(|&item| heap.pop() == Some(item)));
-        assert!(heap.pop().is_none() && heap.is_empty());
-    }
-
-    #[test]
-    fn a_limit_asks_the_process_where_it_can() {
-        let counted = MemoryLimit::new(Some(3200), None);
-        assert!(counted.has_room(|| 3000, 100) && !counted.has_room(|| 3000, 101));
-        assert!(!counted.beside(1).has_room(|| 3000, 100));
-        let told = MemoryLimit::new(Some(3200), Some(|| 1000));
-        assert!(told.beside(3000).has_room(|| 9000, 2100) && !told.has_room(|| 0, 2101));
-        assert!(MemoryLimit::new(None, Some(|| 1000)).has_room(|| 0, usize::MAX / 2));
     }
 }

@@ -14,5 +14,6 @@ mod preferences;
 mod reading;
 mod solving;
 mod temporal;
+mod unit;
 mod unsolvable;
 mod validating;

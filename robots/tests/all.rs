@@ -13,4 +13,5 @@ mod scene;
 mod scenes;
 mod sim;
 mod taped;
+mod unit;
 mod unmapped;

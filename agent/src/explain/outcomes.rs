@@ -115,7 +115,7 @@ fn left_out_as(said: &str) -> String {
 }
 
 /// What a sweep of the laser shows; what is only seen from afar is counted.
-fn swept(things: &[String]) -> String {
+pub fn swept(things: &[String]) -> String {
     let (far, near): (Vec<&String>, Vec<&String>) = things.iter().partition(|thing| thing.ends_with(AFAR));
     let far = (!far.is_empty()).then(|| format!("{} {AFAR}", far.len()));
     let all: Vec<String> = near.into_iter().cloned().chain(far).collect();
@@ -124,20 +124,4 @@ fn swept(things: &[String]) -> String {
         n => format!("{n} things on the floor"),
     };
     format!("{on_the_floor}: {}.", all.join("; "))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_far_away_is_counted() {
-        let things = ["this at (1.00, 2.00) m: 1 scan", "thing-2 at (3.00, 1.00) m: seen from afar"]
-            .map(str::to_string);
-        assert_eq!(
-            swept(&things),
-            "2 things on the floor: this at (1.00, 2.00) m: 1 scan; 1 seen from afar."
-        );
-        assert_eq!(swept(&things[..1]), "1 thing on the floor: this at (1.00, 2.00) m: 1 scan.");
-    }
 }

@@ -17,16 +17,16 @@ const SAME: f64 = 5e-3;
 
 /// What a round began with.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct State {
-    facts: BTreeSet<String>,
+pub struct State {
+    pub facts: BTreeSet<String>,
     numbers: BTreeMap<String, f64>,
     /// When the first of what is to come by itself comes, seconds from then.
-    comes_s: Option<f64>,
+    pub comes_s: Option<f64>,
 }
 
 impl State {
     /// The `:init` of a problem in PDDL.
-    fn read(pddl: &str) -> Self {
+    pub fn read(pddl: &str) -> Self {
         let mut state = State::default();
         let Some((_, init)) = pddl.split_once("(:init") else { return state };
         let (mut depth, mut from) = (0_usize, 0);
@@ -71,7 +71,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    fn between(before: &State, after: &State) -> Self {
+    pub fn between(before: &State, after: &State) -> Self {
         let number = |(name, now): (&String, &f64)| {
             let was = before.numbers.get(name)?;
             ((now - was).abs() > SAME).then(|| (name.clone(), *was, *now))
@@ -151,35 +151,5 @@ impl States {
     pub fn since(&self, id: RecordId) -> Option<Difference> {
         let next = self.0.iter().find(|(round, _)| *round > id)?;
         Some(Difference::between(&next.1, &self.0.last()?.1))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BEFORE: &str = "(define (problem a) (:init (at start) (hand-free) (= (sure) 0.8)\n    (= (presence cup-a desk) 0.850000)) (:goal (at end)))";
-
-    #[test]
-    fn what_changed_is_told() {
-        let check = |after: &str, told: &str| {
-            let [before, after] = [BEFORE, after].map(State::read);
-            assert_eq!(Difference::between(&before, &after).to_string(), told);
-        };
-        check(BEFORE, "");
-        check(
-            "(:init (at start) (shut door) (= (sure) 0.8) (= (presence cup-a desk) 0.400000))",
-            "(shut door); no longer: (hand-free); (presence cup-a desk) is 0.40 instead of 0.85",
-        );
-        check("(:init (at start) (hand-free) (= (sure) 0.8) (= (presence cup-a desk) 0.851))", "");
-        // That time passes is no change.
-        check("(:init (at start) (hand-free) (at 5.5 (not (time-left))) (= (presence cup-a desk) 0.85))", "");
-        check(
-            "(:init (a) (b) (c) (d) (e) (f) (g) (h) (i) (j) (at start) (hand-free) (= (sure) 0.8))",
-            "(a), (b), (c), (d), (e), (f), (g), (h) and 2 more",
-        );
-        assert!(State::read("nothing").facts.is_empty());
-        let timed = State::read("(:init (at start) (at 60.5 (not (a))) (at 9.25 (b)))");
-        assert_eq!((timed.comes_s, timed.facts.len()), (Some(9.25), 1));
     }
 }

@@ -17,7 +17,7 @@ pub fn fitted(text: &str, width: Option<usize>) -> String {
     text.lines().map(|line| folded(line, width)).collect::<Vec<_>>().join("\n")
 }
 
-fn folded(line: &str, width: usize) -> String {
+pub fn folded(line: &str, width: usize) -> String {
     // What is drawn under a text stays under it.
     let is_drawn = line.chars().any(|sign| ('\u{2500}'..='\u{257f}').contains(&sign));
     if is_drawn || line.chars().count() <= width {
@@ -48,26 +48,4 @@ fn hang(line: &str, most: usize) -> usize {
     let gap = (first..signs.len().saturating_sub(1)).find(|&at| signs[at] == ' ' && signs[at + 1] == ' ');
     let column = gap.and_then(|gap| Some(gap + signs[gap..].iter().position(|sign| *sign != ' ')?));
     column.filter(|at| *at <= most).unwrap_or(first + 2).min(most)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_lines_are_folded_under_their_second_column() {
-        let check = |line: &str, width: usize, folded: &str| {
-            let found = fitted(line, Some(width));
-            assert_eq!(found, folded);
-            assert_eq!(fitted(line, None), line);
-        };
-        check("short", 10, "short");
-        check("do        drive there and look", 20, "do        drive\n          there and\n          look");
-        check("  2 views, 1 replan, 3 m", 15, "  2 views, 1\n    replan, 3 m");
-        check("  [a]     one two\nb", 14, "  [a]     one\n    two\nb");
-        check("averyveryverylongword and more", 10, "averyveryverylongword\n  and more");
-        check("", 10, "");
-        check("a    bb ccc dddd", 14, "a    bb ccc\n     dddd");
-        check("1 │ find me in the text", 10, "1 │ find me in the text");
-    }
 }

@@ -4,23 +4,29 @@ mod check;
 mod experiment;
 mod explain;
 mod find;
-mod fitted;
+#[doc(hidden)]
+pub mod fitted;
 mod fmt;
 mod goals;
 mod input;
-mod keeping;
-mod line;
+#[doc(hidden)]
+pub mod keeping;
+#[doc(hidden)]
+pub mod line;
 mod live;
 mod lsp;
 mod manual;
 mod memory;
-mod name;
+#[doc(hidden)]
+pub mod name;
 mod new;
 mod plan;
-mod recognise;
+#[doc(hidden)]
+pub mod recognise;
 mod replay;
 mod robot;
-mod runs;
+#[doc(hidden)]
+pub mod runs;
 mod show;
 mod validate;
 

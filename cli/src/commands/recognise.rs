@@ -117,7 +117,7 @@ fn look(
 
 /// What was seen from where the sensor stood, and what a person should know of that. An organised cloud tells by its pixels what it looked
 /// through; any other was seen from where it is said, by the option or else by the file.
-fn seen_from(
+pub fn seen_from(
     view: &View,
     told: Option<Point3<f64>>,
     stated: Option<Point3<f64>>,
@@ -136,7 +136,7 @@ fn seen_from(
 }
 
 /// Three finite numbers with commas between them.
-fn triple(text: &str) -> Result<[f64; 3], String> {
+pub fn triple(text: &str) -> Result<[f64; 3], String> {
     let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
     let numbers = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
@@ -144,7 +144,7 @@ fn triple(text: &str) -> Result<[f64; 3], String> {
 }
 
 /// Three numbers that point somewhere.
-fn direction(text: &str) -> Result<[f64; 3], String> {
+pub fn direction(text: &str) -> Result<[f64; 3], String> {
     let up = triple(text)?;
     let length = Vector3::from(up).norm();
     match length.is_finite() && length > 0.0 {
@@ -196,48 +196,4 @@ fn as_text(seen: &Seen) -> String {
         Err(why) => lines.push(format!("  no table: {why}")),
     }
     lines.join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use descry_perception::Grid;
-
-    fn view(grid: Option<Grid>) -> View {
-        let at = |i: i32| f32::from(i as i16);
-        let points =
-            (0..100).map(|i| Point3::new(at(i % 10 - 5) * 0.01, at(i / 10 - 5) * 0.01, 1.0)).collect();
-        View::alone(Cloud { grid, ..Cloud::from_points(points) })
-    }
-
-    #[test]
-    fn where_the_sensor_stood_is_told_stated_or_asked_for() {
-        let (told, stated) = (Point3::new(0.0, 0.0, 2.0), Point3::new(0.0, 3.0, 0.0));
-        let check = |told: Option<Point3<f64>>, stated, eye: Point3<f64>, note: Option<&str>| {
-            let (visibility, said) = seen_from(&view(None), told, stated);
-            let eyes = visibility.viewpoints();
-            assert!(eyes.len() == 1 && (eyes[0] - eye).norm() < 1e-9, "{eyes:?}");
-            assert!(
-                said.is_some() == note.is_some()
-                    && said.unwrap_or_default().contains(note.unwrap_or_default())
-            );
-        };
-        check(Some(told), Some(stated), told, None);
-        check(None, Some(stated), stated, None);
-        check(None, None, Point3::origin(), Some("taken at the origin; give --viewpoint"));
-        let pixels = Some(Grid { width: 10, height: 10 });
-        assert_eq!(seen_from(&view(pixels), None, None).1, None);
-        assert!(seen_from(&view(pixels), Some(told), None).1.is_some_and(|said| said.contains("left out")));
-    }
-
-    #[test]
-    fn places_and_directions_are_three_numbers() {
-        assert_eq!(triple("0, -0.5,1.2"), Ok([0.0, -0.5, 1.2]));
-        for wrong in ["", "1,2", "1,2,3,4", "1,nan,3", "a,b,c"] {
-            assert!(triple(wrong).is_err(), "{wrong}");
-        }
-        assert!(
-            direction("0,0,0").is_err() && direction("1e-300,0,0").is_err() && direction("0,0,-1").is_ok()
-        );
-    }
 }

@@ -5,10 +5,9 @@ mod actions;
 mod conditions;
 mod heard;
 mod phrases;
-pub(crate) mod place;
+#[doc(hidden)]
+pub mod place;
 mod scenes;
-#[cfg(test)]
-mod tests;
 mod words;
 
 use descry_planner::{Diagnostic, Findings, Severity, Span};

@@ -9,12 +9,12 @@ use toml::de::{DeTable, DeValue};
 const TOML: usize = 1;
 
 /// The text of `domain.toml`, to be pointed into.
-pub(crate) struct Places<'a> {
+pub struct Places<'a> {
     text: &'a str,
 }
 
 impl<'a> Places<'a> {
-    pub(crate) fn of(text: &'a str) -> Self {
+    pub fn of(text: &'a str) -> Self {
         Self { text }
     }
 
@@ -26,7 +26,7 @@ impl<'a> Places<'a> {
     }
 
     /// A part of a value; all of it where the part does not stand there.
-    pub(crate) fn within(&self, path: &[&str], part: &str) -> Span {
+    pub fn within(&self, path: &[&str], part: &str) -> Span {
         let whole = self.at(path);
         let (start, end) = (whole.start as usize, whole.end as usize);
         match self.text.get(start..end).and_then(|text| text.find(part)) {
@@ -36,7 +36,7 @@ impl<'a> Places<'a> {
     }
 }
 
-fn span(at: Range<usize>) -> Span {
+pub fn span(at: Range<usize>) -> Span {
     Span { source: TOML as u32, start: at.start as u32, end: at.end as u32 }
 }
 
@@ -49,7 +49,7 @@ fn deepest(table: &DeTable<'_>, path: &[&str]) -> Option<Range<usize>> {
     })
 }
 
-fn within(value: &DeValue<'_>, path: &[&str]) -> Option<Range<usize>> {
+pub fn within(value: &DeValue<'_>, path: &[&str]) -> Option<Range<usize>> {
     match value {
         DeValue::Table(table) => deepest(table, path),
         DeValue::Array(list) => {
@@ -58,26 +58,5 @@ fn within(value: &DeValue<'_>, path: &[&str]) -> Option<Range<usize>> {
             within(element.get_ref(), rest).or_else(|| Some(element.span()))
         }
         _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_are_found() {
-        let text =
-            "a = 1\n[action.move] # move\ndoes = \"move ?x\"\n[[goal]]\nsay = \"x\"\n[[goal]]\nsay = \"y\"\n";
-        let check = |path: &[&str], part: &str, expected: &str| {
-            let span = Places::of(text).within(path, part);
-            assert_eq!(&text[span.start as usize..span.end as usize], expected, "{path:?}");
-        };
-        check(&["action", "move", "does"], "", "\"move ?x\"");
-        check(&["action", "move", "does"], "?x", "?x");
-        check(&["action", "move"], "", "move");
-        check(&["action", "move", "limit_s"], "", "move");
-        check(&["goal", "1", "say"], "", "\"y\"");
-        check(&["nothing"], "", "a = 1");
     }
 }

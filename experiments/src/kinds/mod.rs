@@ -3,7 +3,8 @@
 mod faults;
 mod figure_4;
 mod tasks;
-mod trial;
+#[doc(hidden)]
+pub mod trial;
 mod where_to_look;
 
 use std::collections::BTreeMap;
@@ -59,7 +60,7 @@ pub struct Head {
 }
 
 /// What runs in a domain depend on, by name.
-fn inputs_of<'b>(
+pub fn inputs_of<'b>(
     domain: &Domain,
     scenes: String,
     bodies: impl Iterator<Item = &'b OtherBody>,
@@ -75,7 +76,7 @@ fn inputs_of<'b>(
 /// the truth, so the command takes both.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(try_from = "String")]
-struct OtherBody(String);
+pub struct OtherBody(String);
 
 impl OtherBody {
     /// The program's command line, with places for seed and truth.
@@ -159,6 +160,3 @@ fn refuse(
         input::draw(&source.path.display().to_string(), &source.text, objection).to_string(),
     )
 }
-
-#[cfg(test)]
-mod tests;

@@ -217,7 +217,7 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
 
 /// A finished run, as the summaries read it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Measured {
+pub struct Measured {
     /// Runs in one scene belong together.
     pub group: u64,
     /// Whether the target was there in the end.

@@ -8,7 +8,8 @@
 //! | `names` | a document for each name: its place among them (`index`), the last number it gave to a record (`last`) |
 
 mod keep;
-mod number;
+#[doc(hidden)]
+pub mod number;
 mod query;
 mod write;
 

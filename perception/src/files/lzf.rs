@@ -7,7 +7,7 @@ const HASH_BITS: u32 = 15;
 
 /// Why a stream cannot be unpacked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum LzfError {
+pub enum LzfError {
     #[error("the stream ends inside a run")]
     Truncated { at: usize },
     #[error("a back reference points before the beginning")]
@@ -31,7 +31,7 @@ impl LzfError {
 }
 
 /// Unpacks `packed` to exactly `expected` bytes.
-pub(super) fn unpack(packed: &[u8], expected: usize) -> Result<Vec<u8>, LzfError> {
+pub fn unpack(packed: &[u8], expected: usize) -> Result<Vec<u8>, LzfError> {
     // A back reference of 3 bytes gives at most 264: a header that claims more lies, and must not make us allocate.
     if expected / MAX_MATCH > packed.len() {
         return Err(LzfError::TooShort { at: packed.len(), found: 0, expected });
@@ -84,7 +84,7 @@ fn copy_within(out: &mut Vec<u8>, from: usize, length: usize) {
 }
 
 /// Packs `data`; data that do not shrink grow by one byte in 32.
-pub(super) fn pack(data: &[u8]) -> Vec<u8> {
+pub fn pack(data: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(data.len() / 2 + 16);
     let mut last_at = vec![usize::MAX; 1 << HASH_BITS];
     let mut literal_from = 0;
@@ -124,38 +124,5 @@ fn flush_literals(out: &mut Vec<u8>, run: &[u8]) {
     for part in run.chunks(MAX_LITERAL) {
         out.push((part.len() - 1) as u8);
         out.extend_from_slice(part);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn check(data: &[u8]) {
-        assert_eq!(unpack(&pack(data), data.len()).as_deref(), Ok(data));
-    }
-
-    #[test]
-    fn packs_and_unpacks() {
-        check(b"");
-        check(b"ab");
-        check(&[7; 100_000]);
-        check(b"abcabcabcabcabcabcabcabcabcabcabcabcabcabcabcabcabc");
-    }
-
-    #[test]
-    fn a_claim_no_stream_can_keep_allocates_nothing() {
-        assert!(matches!(unpack(&[0, 1], usize::MAX), Err(LzfError::TooShort { .. })));
-    }
-
-    proptest! {
-        #[test]
-        fn round_trip(data in proptest::collection::vec(0u8..4, 0..3000)) { check(&data); }
-
-        #[test]
-        fn never_panics(data in proptest::collection::vec(any::<u8>(), 0..300), expected in 0usize..2000) {
-            let _ = unpack(&data, expected);
-        }
     }
 }

@@ -1,7 +1,7 @@
 //! The downhill simplex method (Nelder and Mead 1965) with coefficients that suit many dimensions (Gao and Han 2012).
 
 /// Where the simplex ended.
-pub(super) struct Found {
+pub struct Found {
     /// The best place.
     pub at: Vec<f64>,
     /// The value there.
@@ -16,7 +16,7 @@ const FINEST: f64 = 1e-4;
 
 /// Minimises a function near the origin, from a simplex of the given steps. Settled once the corners lie within a ten-thousandth of the first steps, or
 /// their values differ by less than `settle` of them.
-pub(super) fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, settle: f64) -> Found {
+pub fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, settle: f64) -> Found {
     let n = steps.len();
     let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)
         .map(|i| {
@@ -77,32 +77,4 @@ fn settled(corners: &[(f64, Vec<f64>)], steps: &[f64], settle: f64) -> bool {
         c.1.iter().zip(&best.1).zip(steps).all(|((a, b), step)| (a - b).abs() <= FINEST * step)
     };
     worst.0 - best.0 <= settle * best.0 || corners.iter().all(near)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn check(name: &str, cost: impl Fn(&[f64]) -> f64, steps: &[f64], expected: &[f64]) {
-        let found = simplex(&cost, steps, 4000, 1e-12);
-        let near = found.at.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3);
-        assert!(near && found.converged, "{name}: {:?} after {} evaluations", found.at, found.evaluations);
-        assert_eq!(found.cost, cost(&found.at), "{name}");
-    }
-
-    #[test]
-    fn minima_are_found() {
-        let bowl = |x: &[f64]| 1.0 + x.iter().enumerate().map(|(i, v)| (v - i as f64).powi(2)).sum::<f64>();
-        check("one dimension", bowl, &[0.5], &[0.0]);
-        check("six dimensions", bowl, &[0.5; 6], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
-        let valley = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
-        check("a bent valley", valley, &[0.1, 0.1], &[1.0, 1.0]);
-        check("nothing to move", |_: &[f64]| 3.0, &[], &[]);
-    }
-
-    #[test]
-    fn a_cut_is_told() {
-        let found = simplex(|x| x[0] * x[0] - x[0], &[1e-3], 5, 1e-12);
-        assert!(!found.converged && found.evaluations >= 5);
-    }
 }

@@ -78,7 +78,7 @@ impl Default for SolverOptions {
 
 /// Where a solver ended.
 #[derive(Clone, Debug)]
-pub(super) struct Solved {
+pub struct Solved {
     pub poses: Vec<Isometry2<f64>>,
     /// What was minimised, at these poses.
     pub cost: f64,
@@ -89,7 +89,7 @@ pub(super) struct Solved {
 }
 
 /// Groups of scans, where they are, and which of them may move.
-pub(super) struct Problem<'a> {
+pub struct Problem<'a> {
     assembly: &'a Assembly,
     start: &'a [Isometry2<f64>],
     movable: Vec<usize>,

@@ -97,7 +97,7 @@ impl Rays {
 
 /// Scans in groups, each of which moves as one.
 #[derive(Clone, Debug)]
-pub(super) struct Assembly {
+pub struct Assembly {
     parts: Vec<Part>,
     corners: Vec<Point2<f64>>,
     rays: Vec<Rays>,
@@ -108,7 +108,7 @@ pub(super) struct Assembly {
 }
 
 /// An assembly with each group at its pose.
-pub(super) struct Placed {
+pub struct Placed {
     corners: Vec<Point2<f64>>,
     rays: Vec<Rays>,
 }
@@ -116,7 +116,7 @@ pub(super) struct Placed {
 /// Which error: exterior (Eq. 1), interior (Eq. 2), or how far an end of the thing is from the middle between the last ray that met it and the first that
 /// went past, which may have either sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     Exterior,
     Interior,
     Slack,
@@ -124,7 +124,7 @@ pub(super) enum Kind {
 
 /// One violated constraint: `value_m = normal · (at - a point of the line)`, to be made nought.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Residual {
+pub struct Residual {
     pub kind: Kind,
     /// Of the scan whose line it is.
     pub side: Side,

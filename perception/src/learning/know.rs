@@ -4,12 +4,17 @@
 //! thing stands; poses are refined on the scene's surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
 
 pub mod evidence;
-mod feature;
-mod group;
-mod scene;
+#[doc(hidden)]
+pub mod feature;
+#[doc(hidden)]
+pub mod group;
+#[doc(hidden)]
+pub mod scene;
 pub mod several;
-mod skin;
-mod stood;
+#[doc(hidden)]
+pub mod skin;
+#[doc(hidden)]
+pub mod stood;
 
 use crate::cloud::{Cloud, CloudError};
 use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};

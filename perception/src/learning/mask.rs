@@ -4,7 +4,7 @@ use crate::cloud::Grid;
 
 /// Pixels of which something holds, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Mask {
+pub struct Mask {
     pub grid: Grid,
     pub set: Vec<bool>,
 }
@@ -86,34 +86,5 @@ impl Mask {
             }
         }
         out
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `#` is set.
-    fn mask(rows: &[&str]) -> Mask {
-        let grid = Grid { width: rows[0].len(), height: rows.len() };
-        Mask { grid, set: rows.iter().flat_map(|r| r.chars()).map(|c| c == '#').collect() }
-    }
-
-    #[test]
-    fn squares_grow_shrink_fill_and_drop() {
-        let dot = mask(&[".....", ".....", "..#..", ".....", "....."]);
-        let square = mask(&[".....", ".###.", ".###.", ".###.", "....."]);
-        let holed = mask(&[".....", ".###.", ".#.#.", ".###.", "....."]);
-        let cases = [
-            ("grow", dot.dilated(1), &square),
-            ("shrink", square.eroded(1), &dot),
-            ("fill", holed.closed(1), &square),
-            ("drop", dot.opened(1), &Mask::none(dot.grid)),
-            ("keep", square.opened(1), &square),
-        ];
-        for (name, found, expected) in cases {
-            assert_eq!(&found, expected, "{name}");
-        }
-        assert!(!square.touches_border() && square.dilated(1).touches_border());
     }
 }

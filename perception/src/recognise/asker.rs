@@ -20,14 +20,14 @@ pub(super) const IN_VIEW_M: f64 = 0.06;
 
 /// A place above the surface, asked of the cameras.
 #[derive(Clone)]
-pub(super) struct Asker<'a> {
+pub struct Asker<'a> {
     pub views: Vec<Lying<'a>>,
     pub tolerance_m: f64,
 }
 
 /// A camera, and where it is as seen from one body: in the surface's frame.
 #[derive(Clone, Copy)]
-pub(super) struct Lying<'a> {
+pub struct Lying<'a> {
     pub map: &'a DepthMap,
     pub surface_from_camera: Isometry3<f64>,
     pub viewpoint: Point3<f64>,

@@ -15,7 +15,7 @@ use rustc_hash::FxHashSet;
 
 /// Pixels of a view that are asked, about: whether there is a body, and where it ends. From: work.
 pub(super) const PIXELS: f64 = 300.0;
-pub(super) const EDGE_PIXELS: f64 = 1200.0;
+pub const EDGE_PIXELS: f64 = 1200.0;
 /// Chance of something nearer, of what is behind being the surface, and of its being something else. From: chosen.
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
@@ -34,12 +34,12 @@ const MOST_LOOKS: f64 = 2.3;
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 
 /// The pixels of all views that may tell of one body.
-pub(super) struct Rays {
+pub struct Rays {
     pub views: Vec<ViewRays>,
 }
 
 /// The pixels of one view.
-pub(super) struct ViewRays {
+pub struct ViewRays {
     pub from: [f64; 3],
     /// What is added to where a ray goes that wanders by the noise across it, to either side and up.
     pub wander: [[f64; 3]; 3],
@@ -50,7 +50,7 @@ pub(super) struct ViewRays {
 
 /// A pixel with a return.
 #[derive(Clone, Copy)]
-pub(super) struct Pixel {
+pub struct Pixel {
     pub along: [f64; 3],
     pub depth_m: f64,
     /// Spread of the depth, metres.
@@ -62,7 +62,7 @@ pub(super) struct Pixel {
 }
 
 /// What stands around the body that is asked about.
-pub(super) struct Around {
+pub struct Around {
     pub x: f64,
     pub y: f64,
     /// How far pixels tell of it.
@@ -110,7 +110,7 @@ impl Rays {
 }
 
 /// Log of the likelihood ratio of a view that says nothing with a chance, whatever it seems to say for or against.
-pub(super) fn bounded(log: f64, bad: f64) -> f64 {
+pub fn bounded(log: f64, bad: f64) -> f64 {
     let against = |log: f64| ((1.0 - bad) * log.exp() + bad).ln();
     if log < 0.0 { against(log) } else { -against(-log) }
 }
@@ -231,7 +231,7 @@ impl Pixel {
 pub(super) const BELL: f64 = 2.506_628_274_631_000_2;
 
 #[inline(always)]
-pub(super) fn normal(off: f64, sigma: f64) -> f64 {
+pub fn normal(off: f64, sigma: f64) -> f64 {
     /// So many spreads off there is nothing left. From: rounding.
     const NONE: f64 = 6.0;
     let spreads = off / sigma;

@@ -13,7 +13,7 @@ const SCOUTS: usize = 300;
 
 /// A round body about an axis along the surface.
 #[derive(Clone, Copy)]
-pub(crate) struct LyingRound {
+pub struct LyingRound {
     /// Surface to a frame in which the axis is z and y leads away from the surface.
     pub turned: Isometry3<f64>,
     /// The body there, and where it ends.

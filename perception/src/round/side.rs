@@ -9,13 +9,13 @@ const LANES: usize = 4;
 type Lanes = [f32; LANES];
 
 /// Points that judge circles, seen from above, as of [`Side`].
-pub(super) struct Judges {
+pub struct Judges {
     x: Vec<f32>,
     y: Vec<f32>,
 }
 
 /// Points as seen from the first of them, where a tenth of a micrometre is more than they know; filled up with NaN, which is on no side.
-pub(super) struct Side {
+pub struct Side {
     /// In the surface's frame, metres.
     pub origin: [f64; 3],
     x: Vec<f32>,
@@ -25,7 +25,7 @@ pub(super) struct Side {
 }
 
 /// What a step of a fit needs to know of the points near the side of a body.
-pub(super) struct Sums {
+pub struct Sums {
     /// Of the products of what the distance of a point from the side grows with as axis, radius and slope fall.
     pub normal: Matrix4<f64>,
     /// Of the same times the distance.

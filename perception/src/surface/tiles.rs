@@ -8,7 +8,7 @@ const BITS: usize = 3;
 const SIDE: usize = 1 << BITS;
 
 /// A value for each cell: the default where none was set. Neighbours lie in one tile, most often, so that few are looked up.
-pub(super) struct Tiles<T> {
+pub struct Tiles<T> {
     /// Where in `values` each tile begins.
     starts: FxHashMap<[i32; 2], usize>,
     /// The tile that was asked for last, and where it begins.
@@ -93,30 +93,4 @@ impl<T: Copy + Default> Tiles<T> {
 fn place(cell: [i32; 2]) -> usize {
     let [x, y] = cell.map(|at| at.cast_unsigned() as usize % SIDE);
     x * SIDE + y
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-    use std::collections::BTreeMap;
-
-    proptest! {
-        #[test]
-        fn tiles_hold_what_a_map_holds(
-            near in prop::collection::vec(prop::array::uniform2(-20..20_i32), 0..300),
-            far in prop::collection::vec(prop::array::uniform2(any::<i32>()), 0..9),
-        ) {
-            let (mut tiles, mut map) = (Tiles::new(), BTreeMap::new());
-            for cell in near.into_iter().chain(far).chain([[i32::MIN; 2], [i32::MAX; 2]]) {
-                *tiles.at(cell) += 1;
-                *map.entry(cell).or_default() += 1;
-            }
-            for cell in (-25..25).flat_map(|x| (-25..25).map(move |y| [x, y])) {
-                prop_assert_eq!(tiles.get(cell), map.get(&cell).copied().unwrap_or_default());
-            }
-            let all: Vec<([i32; 2], u32)> = tiles.all().into_iter().filter(|(_, count)| *count > 0).collect();
-            prop_assert_eq!(all, map.into_iter().collect::<Vec<_>>());
-        }
-    }
 }

@@ -20,7 +20,7 @@ pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
 /// Lists of different lengths in one array.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Lists<T> {
+pub struct Lists<T> {
     starts: Vec<u32>,
     items: Vec<T>,
 }
@@ -77,7 +77,7 @@ impl<T> Lists<T> {
 
 /// One effect: a fact that comes about where the conditions hold.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Achieve {
+pub struct Achieve {
     /// First condition in [`Compiled::conditions`].
     pub from: u32,
     /// One past the last.
@@ -88,7 +88,7 @@ pub(crate) struct Achieve {
 
 /// The task.
 #[derive(Clone, Debug)]
-pub(crate) struct Compiled {
+pub struct Compiled {
     /// By variable; derived variables after the others, numeric conditions last.
     pub domains: Vec<u32>,
     /// Number of variables that are not derived.
@@ -138,7 +138,7 @@ pub(crate) struct Compiled {
 }
 
 /// Whether the search over instantaneous actions alone can plan for the task.
-pub(crate) fn is_classical(task: &GroundTask) -> bool {
+pub fn is_classical(task: &GroundTask) -> bool {
     let plain = |c: &Conjunction| c.calls.is_empty();
     let plain_effect = |e: &Effect| {
         let outcome = match &e.outcome {
@@ -169,7 +169,7 @@ fn contested(task: &GroundTask) -> Vec<bool> {
 
 impl Compiled {
     /// The task in flat arrays, for tasks that [`is_classical`].
-    pub(crate) fn new(task: &GroundTask) -> Compiled {
+    pub fn new(task: &GroundTask) -> Compiled {
         let compared = std::iter::repeat_n(2, task.comparisons.len());
         let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).chain(compared).collect();
         let numbers = Numbers::new(task, task.variables.len());
@@ -293,7 +293,7 @@ impl Compiled {
 
     /// Whether the operator can be applied.
     #[inline]
-    pub(crate) fn applicable(&self, operator: u32, state: &[u32]) -> bool {
+    pub fn applicable(&self, operator: u32, state: &[u32]) -> bool {
         self.preconditions.get(operator as usize).iter().all(|f| state[f.variable as usize] == f.value)
             && self.possible(operator, state)
     }
@@ -324,7 +324,7 @@ impl Compiled {
     }
 
     /// Whether the goal holds.
-    pub(crate) fn is_goal(&self, state: &[u32]) -> bool {
+    pub fn is_goal(&self, state: &[u32]) -> bool {
         self.goal.iter().all(|f| state[f.variable as usize] == f.value)
     }
 
@@ -345,7 +345,7 @@ impl Compiled {
     }
 
     /// Applies the operator to the state itself.
-    pub(crate) fn advance(&self, operator: u32, state: &mut [u32]) {
+    pub fn advance(&self, operator: u32, state: &mut [u32]) {
         let effects = self.effects.get(operator as usize);
         let conditional = effects.iter().any(|e| e.from != e.to);
         if conditional || !self.numbers.is_empty() {

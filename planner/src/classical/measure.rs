@@ -7,7 +7,7 @@ use super::numbers::{Linear, Numbers, add_linear};
 
 /// How plans are measured.
 #[derive(Clone, Debug)]
-pub(crate) struct Measure {
+pub struct Measure {
     kind: Kind,
     /// By operator: what it costs, or what it is taken to cost where that depends on the state.
     pub estimates: Vec<f64>,

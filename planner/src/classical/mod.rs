@@ -1,6 +1,8 @@
 //! Tasks of instantaneous actions over finite-domain variables and numbers, in flat arrays.
 
-pub(crate) mod compiled;
+#[doc(hidden)]
+pub mod compiled;
 mod measure;
 pub(crate) mod numbers;
-pub(crate) mod successor;
+#[doc(hidden)]
+pub mod successor;

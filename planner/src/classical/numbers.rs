@@ -11,7 +11,7 @@ use super::compiled::Lists;
 
 /// One effect on a number.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct NumberChange {
+pub struct NumberChange {
     /// Facts (those of comparisons included) under which it happens.
     pub conditions: Vec<Fact>,
     /// Which number.
@@ -35,7 +35,7 @@ impl NumberChange {
 
 /// A sum of weighted numbers and a constant.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Linear {
+pub struct Linear {
     /// Numbers with their weights, each number once.
     pub weights: Vec<(u32, f64)>,
     /// The constant.
@@ -44,7 +44,7 @@ pub(crate) struct Linear {
 
 /// The numbers of a task; none for a task without them.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Numbers {
+pub struct Numbers {
     /// Variable of the first comparison.
     pub first: usize,
     /// Words of a state before its numbers.

@@ -6,7 +6,7 @@ use super::compiled::Compiled;
 const EMPTY: u32 = u32::MAX;
 
 /// The tree. A node is either a list of operators followed by the node to go on with, or a variable to switch over.
-pub(crate) struct Successors {
+pub struct Successors {
     /// Switch: `[variable, node if any value, child per value…]`. Leaf: `[LEAF, count, operators…]`.
     nodes: Vec<u32>,
     root: u32,
@@ -17,7 +17,7 @@ const LEAF: u32 = u32::MAX - 1;
 
 impl Successors {
     /// Builds the tree.
-    pub(crate) fn new(task: &Compiled) -> Successors {
+    pub fn new(task: &Compiled) -> Successors {
         let mut operators: Vec<u32> = (0..task.operators() as u32).collect();
         let key = |op: u32| task.preconditions.get(op as usize).iter().map(|f| (f.variable, f.value));
         operators.sort_by(|&a, &b| key(a).cmp(key(b)).then(a.cmp(&b)));

@@ -1,15 +1,16 @@
 //! Clauses over truth values, and the search for values that satisfy them all.
 
 mod learn;
-pub(crate) mod solver;
+#[doc(hidden)]
+pub mod solver;
 
 /// A variable (counted from 0) or its negation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub(crate) struct Literal(pub u32);
+pub struct Literal(pub u32);
 
 impl Literal {
     /// Says that a variable is true, or (`false`) that it is not.
-    pub(crate) fn new(variable: u32, positive: bool) -> Literal {
+    pub fn new(variable: u32, positive: bool) -> Literal {
         Literal(variable << 1 | u32::from(!positive))
     }
 

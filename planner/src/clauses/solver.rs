@@ -21,7 +21,7 @@ const GLUE: u32 = 2;
 
 /// What came of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub enum Answer {
     /// All clauses hold under the values.
     Satisfied,
     /// No values satisfy the clauses.
@@ -31,7 +31,7 @@ pub(crate) enum Answer {
 }
 
 /// Says what to try next.
-pub(crate) trait Decide {
+pub trait Decide {
     /// Appends literals to be tried in this order, as far as they are still open. None where nothing is left that matters: then
     /// all that is open is taken to be false. Returns the work done (see [`Solver::work`]).
     fn next(&mut self, solver: &Solver, out: &mut Vec<Literal>) -> u64;
@@ -45,7 +45,7 @@ pub(super) struct Watch {
 }
 
 /// The clauses and what is known of the variables.
-pub(crate) struct Solver {
+pub struct Solver {
     /// Clauses of three and more, one after another.
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
@@ -80,7 +80,7 @@ pub(crate) struct Solver {
 
 impl Solver {
     /// No clauses over so many variables.
-    pub(crate) fn new(variables: usize) -> Solver {
+    pub fn new(variables: usize) -> Solver {
         Solver {
             arena: Vec::new(),
             learned: Vec::new(),
@@ -112,7 +112,7 @@ impl Solver {
     }
 
     /// Whether a literal is known to be true, or not; `None` while it is open.
-    pub(crate) fn value(&self, literal: Literal) -> Option<bool> {
+    pub fn value(&self, literal: Literal) -> Option<bool> {
         match self.values[literal.at()] {
             0 => None,
             value => Some(value > 0),
@@ -130,7 +130,7 @@ impl Solver {
     }
 
     /// Adds a clause, before the search begins.
-    pub(crate) fn add(&mut self, clause: &[Literal]) {
+    pub fn add(&mut self, clause: &[Literal]) {
         let mut open = Vec::with_capacity(clause.len());
         for &literal in clause {
             match self.value(literal) {
@@ -279,7 +279,7 @@ impl Solver {
     }
 
     /// Searches until so much work is done in all, or `stop` says true.
-    pub(crate) fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Answer {
+    pub fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Answer {
         if self.contradiction {
             return Answer::Unsatisfiable;
         }
@@ -373,120 +373,12 @@ impl Solver {
 }
 
 /// 1 1 2 1 1 2 4 … (Luby, Sinclair and Zuckerman 1993), from 1.
-fn luby(mut index: u64) -> u64 {
+pub fn luby(mut index: u64) -> u64 {
     loop {
         let bits = u64::BITS - index.leading_zeros();
         if index + 1 == 1 << bits {
             return 1 << (bits - 1);
         }
         index -= (1 << (bits - 1)) - 1;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    struct Nothing;
-    impl Decide for Nothing {
-        fn next(&mut self, _: &Solver, _: &mut Vec<Literal>) -> u64 {
-            0
-        }
-    }
-
-    /// Clauses in numbers: variables from 1, negative for negated ones.
-    fn check(variables: usize, clauses: &[Vec<i32>], satisfiable: bool) {
-        let mut solver = Solver::new(variables);
-        let literal = |l: i32| Literal::new(l.unsigned_abs() - 1, l > 0);
-        for clause in clauses {
-            solver.add(&clause.iter().map(|&l| literal(l)).collect::<Vec<_>>());
-        }
-        let answer = loop {
-            // In small pieces: going on must make no difference.
-            let more = solver.work + 1_000;
-            match solver.run(&mut Nothing, more, &|| false) {
-                Answer::Interrupted => {}
-                answer => break answer,
-            }
-        };
-        assert_eq!(answer == Answer::Satisfied, satisfiable, "{clauses:?}");
-        if satisfiable {
-            let holds = |c: &Vec<i32>| c.iter().any(|&l| solver.value(literal(l)) == Some(true));
-            assert!(clauses.iter().all(holds), "{clauses:?}");
-        }
-    }
-
-    /// Every pigeon in a hole, no two in the same.
-    fn pigeons(pigeons: i32, holes: i32) -> Vec<Vec<i32>> {
-        let at = |p: i32, h: i32| p * holes + h + 1;
-        let mut clauses: Vec<Vec<i32>> =
-            (0..pigeons).map(|p| (0..holes).map(|h| at(p, h)).collect()).collect();
-        for h in 0..holes {
-            for p in 0..pigeons {
-                clauses.extend((0..p).map(|q| vec![-at(p, h), -at(q, h)]));
-            }
-        }
-        clauses
-    }
-
-    #[test]
-    fn clauses_are_satisfied_or_proven_not_to_be() {
-        check(1, &[], true);
-        check(1, &[vec![1], vec![-1]], false);
-        check(2, &[vec![1, 2], vec![-1, 2], vec![1, -2]], true);
-        check(2, &[vec![1, 2], vec![-1, 2], vec![1, -2], vec![-1, -2]], false);
-        check(20, &pigeons(5, 4), false);
-        check(20, &pigeons(4, 5), true);
-        check(56, &pigeons(8, 7), false);
-    }
-
-    #[test]
-    fn as_trying_all_values_says() {
-        let mut seed = 7u64;
-        let mut random = move |below: u64| {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (seed >> 33) % below
-        };
-        for round in 0..300 {
-            let clauses: Vec<Vec<i32>> = (0..30 + round % 20)
-                .map(|_| {
-                    let mut clause: Vec<i32> = Vec::new();
-                    while clause.len() < 3 {
-                        let variable = random(9) as i32 + 1;
-                        if !clause.iter().any(|l| l.abs() == variable) {
-                            clause.push(if random(2) == 0 { variable } else { -variable });
-                        }
-                    }
-                    clause
-                })
-                .collect();
-            let holds = |values: i32, l: i32| (values >> (l.abs() - 1) & 1 == 1) == (l > 0);
-            let satisfiable =
-                (0..1 << 9).any(|values| clauses.iter().all(|c| c.iter().any(|&l| holds(values, l))));
-            check(9, &clauses, satisfiable);
-        }
-    }
-
-    /// Counts how often it is asked.
-    struct Asked(u32);
-    impl Decide for Asked {
-        fn next(&mut self, _: &Solver, _: &mut Vec<Literal>) -> u64 {
-            self.0 += 1;
-            0
-        }
-    }
-
-    #[test]
-    fn what_is_left_open_is_set_in_one_go() {
-        let (mut solver, mut asked) = (Solver::new(1_000), Asked(0));
-        solver.add(&[Literal::new(3, true), Literal::new(7, true)]);
-        assert_eq!(solver.run(&mut asked, u64::MAX, &|| false), Answer::Satisfied);
-        assert_eq!(asked.0, 2, "once more at the end");
-    }
-
-    #[test]
-    fn runs_between_restarts_grow_slowly() {
-        let found: Vec<u64> = (1..=15).map(luby).collect();
-        assert_eq!(found, [1, 1, 2, 1, 1, 2, 4, 1, 1, 2, 1, 1, 2, 4, 8]);
     }
 }

@@ -6,11 +6,13 @@ mod build;
 mod earliest;
 mod groups;
 mod instantiate;
-mod invariants;
+#[doc(hidden)]
+pub mod invariants;
 mod metric;
 mod normal;
 mod obstacles;
-mod pairs;
+#[doc(hidden)]
+pub mod pairs;
 mod pddl3;
 mod raw;
 mod reach;
@@ -18,7 +20,8 @@ mod relaxed;
 mod relevant;
 mod rules;
 mod statics;
-mod task;
+#[doc(hidden)]
+pub mod task;
 mod unused;
 mod variables;
 
@@ -27,6 +30,6 @@ pub use build::{GroundError, ground};
 pub(crate) use earliest::Earliest;
 pub(crate) use metric::{added, weights};
 pub use obstacles::{MissingAtom, Obstacle};
-pub(crate) use pairs::exclusive;
+pub use pairs::exclusive;
 pub(crate) use pddl3::{WITNESS, compile};
 pub use task::*;

@@ -11,7 +11,7 @@ const MOST_MEMBERS: usize = 50_000;
 
 /// Groups of facts that exclude each other, such that every pair of different variables found to do so is in one. None for
 /// tasks with axioms, conditional effects or too many facts.
-pub(crate) fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
+pub fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
     let conditional = task.actions.iter().flat_map(|action| &action.effects).any(|e| e.when.is_some());
     let facts: Vec<Fact> = (0..task.variables.len() as u32)
         .flat_map(|variable| {
@@ -160,29 +160,5 @@ impl Pairs {
             group.push(fact);
         }
         group
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::small;
-
-    fn check(domain: &str, problem: &str, expected: &[&str]) {
-        let (task, grounded) = small::read(domain, problem);
-        let said = |group: &Vec<Fact>| {
-            let facts = group.iter().map(|&fact| small::fact(&task, &grounded, fact));
-            facts.collect::<Vec<_>>().join(" ")
-        };
-        let groups: Vec<String> = exclusive(&grounded).iter().map(said).collect();
-        assert_eq!(groups, expected, "{domain}");
-    }
-
-    #[test]
-    fn what_is_never_reached_together_is_grouped() {
-        check(small::SHUTTLE, small::ROW, &["(lies x a) NoneOfThose (lies x b) (lies x c)", "(in x) (free)"]);
-        // Conditional effects are not followed.
-        let slips = small::SHUTTLE.replace("(free) (lies ?b ?p)", "(when (at ?p) (free)) (lies ?b ?p)");
-        check(&slips, small::ROW, &[]);
     }
 }

@@ -18,10 +18,10 @@ const EXPLORATION_WORK: usize = 40_000_000;
 
 /// One landmark: one of the facts (a single one unless it is disjunctive).
 #[derive(Clone, Debug)]
-struct Landmark {
-    facts: Vec<u32>,
+pub struct Landmark {
+    pub facts: Vec<u32>,
     /// Asked for by the goal.
-    goal: bool,
+    pub goal: bool,
     /// Landmarks that are to be seen before this one: those that must be true right before it first becomes true, and
     /// those for which it would have to be given up again.
     before: Vec<u32>,
@@ -32,8 +32,8 @@ struct Landmark {
 }
 
 /// The landmarks of a task.
-pub(crate) struct Landmarks {
-    all: Vec<Landmark>,
+pub struct Landmarks {
+    pub all: Vec<Landmark>,
     /// By fact: landmarks that it makes true.
     by_fact: Lists<u32>,
     /// Those that the goal asks for.
@@ -57,11 +57,7 @@ struct Find<'a> {
 
 impl Landmarks {
     /// Finds the landmarks of a task; those found so far once `stop` says true.
-    pub(crate) fn new(
-        task: &Compiled,
-        mutex_groups: &[Vec<Fact>],
-        stop: &(dyn Fn() -> bool + Sync),
-    ) -> Landmarks {
+    pub fn new(task: &Compiled, mutex_groups: &[Vec<Fact>], stop: &(dyn Fn() -> bool + Sync)) -> Landmarks {
         let mut find = Find::new(task);
         for &fact in &task.goal {
             let id = find.landmark(vec![task.id(fact)]);
@@ -491,32 +487,5 @@ impl Status {
                 !Self::has(bits, l) && landmarks.all[l as usize].before.iter().all(|&b| Self::has(bits, b))
             })
         })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Landmarks;
-    use crate::classical::compiled::Compiled;
-    use crate::ground::Fact;
-    use crate::small;
-
-    #[test]
-    fn what_every_plan_passes_is_found() {
-        let (task, grounded) = small::read(small::SHUTTLE, small::ROW);
-        let compiled = Compiled::new(&grounded);
-        let landmarks = Landmarks::new(&compiled, &grounded.mutex_groups, &|| false);
-        let variable = |id: u32| compiled.variables[id as usize];
-        let named = |id: u32| {
-            let value = id - compiled.offsets[variable(id) as usize];
-            small::fact(&task, &grounded, Fact { variable: variable(id), value })
-        };
-        let single = landmarks.all.iter().filter(|landmark| landmark.facts.len() == 1);
-        let found: Vec<String> = single.map(|landmark| named(landmark.facts[0])).collect();
-        for expected in ["(lies x c)", "(in x)", "(at c)", "(at b)"] {
-            assert!(found.iter().any(|name| name == expected), "{expected} is not among {found:?}");
-        }
-        let goals = landmarks.all.iter().filter(|landmark| landmark.goal);
-        assert_eq!(goals.map(|landmark| named(landmark.facts[0])).collect::<Vec<_>>(), ["(lies x c)"]);
     }
 }

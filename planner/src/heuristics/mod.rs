@@ -1,6 +1,9 @@
 //! Estimates of the cost to the goal.
 
-mod intervals;
-pub(crate) mod landmarks;
+#[doc(hidden)]
+pub mod intervals;
+#[doc(hidden)]
+pub mod landmarks;
 pub(crate) mod queue;
-pub(crate) mod relaxed;
+#[doc(hidden)]
+pub mod relaxed;

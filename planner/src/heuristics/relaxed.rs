@@ -19,7 +19,7 @@ const COST_OVER_STEPS: u32 = 64;
 
 /// How the heuristic counts operators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Counting {
+pub enum Counting {
     /// Every operator counts one.
     Steps,
     /// Cost, plus one unless all costs are one.
@@ -45,7 +45,7 @@ impl Counting {
 
 /// An operator in a relaxed plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Relevant {
+pub struct Relevant {
     /// The estimated cost at which it can be applied and has been.
     pub at: u32,
     /// The operator.
@@ -63,11 +63,11 @@ fn reached(cost: u32, more: u32) -> u32 {
 }
 
 /// What an operator is there for that gives back what others of the relaxed plan use up.
-pub(crate) const REFILL: u32 = u32::MAX - 1;
+pub const REFILL: u32 = u32::MAX - 1;
 
 /// The heuristic with its working memory.
 #[derive(Clone)]
-pub(crate) struct Relaxed {
+pub struct Relaxed {
     /// By node (an operator's unconditional effects, one conditional effect, or an axiom).
     preconditions: Lists<u32>,
     effects: Lists<u32>,
@@ -106,7 +106,7 @@ pub(crate) struct Relaxed {
 
 impl Relaxed {
     /// For a task, counting operators in this way, towards the task's goal.
-    pub(crate) fn new(task: &Compiled, counting: Counting) -> Relaxed {
+    pub fn new(task: &Compiled, counting: Counting) -> Relaxed {
         let all: Vec<u32> = (0..task.operators() as u32).collect();
         let goal = task.goal.iter().map(|&f| task.id(f)).collect();
         Relaxed::with(task, counting, all, goal)
@@ -147,7 +147,7 @@ impl Relaxed {
 
     /// The estimate from a state, or `None` if the goal is out of reach even relaxed. Leaves the relaxed plan and the
     /// preferred operators.
-    pub(crate) fn evaluate(&mut self, task: &Compiled, state: &[u32]) -> Option<u32> {
+    pub fn evaluate(&mut self, task: &Compiled, state: &[u32]) -> Option<u32> {
         if !self.explore(task, state) {
             return None;
         }

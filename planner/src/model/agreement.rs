@@ -32,7 +32,7 @@ fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f
 }
 
 /// Of some changes those that contradict an earlier one, as pairs of places.
-pub(crate) fn contradictions<N: Hash + Eq>(
+pub fn contradictions<N: Hash + Eq>(
     changes: impl Iterator<Item = (N, Assignment, f64)>,
 ) -> Vec<(usize, usize)> {
     let mut first: FxHashMap<N, (usize, Assignment, f64)> = FxHashMap::default();
@@ -47,7 +47,7 @@ pub(crate) fn contradictions<N: Hash + Eq>(
 }
 
 /// Of some values that are set at once the first that another value was given to before, as a pair of places.
-pub(crate) fn reset<N: Hash + Eq, V: PartialEq + Copy>(
+pub fn reset<N: Hash + Eq, V: PartialEq + Copy>(
     values: impl Iterator<Item = (N, V)>,
 ) -> Option<(usize, usize)> {
     let mut first: FxHashMap<N, (usize, V)> = FxHashMap::default();
@@ -55,34 +55,4 @@ pub(crate) fn reset<N: Hash + Eq, V: PartialEq + Copy>(
         let &mut (earlier, other) = first.entry(named).or_insert((place, value));
         (other != value).then_some((earlier, place))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_has_no_result_in_either_order_is_a_contradiction() {
-        use Assignment::{Assign, Decrease, Increase, ScaleDown, ScaleUp};
-        for (changes, expected) in [
-            (vec![(0, Increase, 1.0), (0, Decrease, 3.0), (1, Assign, 1.0)], vec![]),
-            (vec![(0, ScaleUp, 2.0), (0, ScaleDown, 3.0)], vec![]),
-            (vec![(0, Assign, 2.0), (1, Assign, 3.0), (0, Assign, 2.0)], vec![]),
-            (vec![(0, Assign, 2.0), (1, Assign, 3.0), (0, Assign, 3.0)], vec![(0, 2)]),
-            (vec![(1, Assign, f64::NAN), (1, Assign, f64::NAN)], vec![(0, 1)]),
-            (vec![(0, Increase, 2.0), (0, Assign, 3.0)], vec![(0, 1)]),
-            (vec![(0, ScaleUp, 2.0), (0, Increase, 3.0)], vec![(0, 1)]),
-        ] {
-            assert_eq!(contradictions(changes.iter().copied()), expected, "{changes:?}");
-        }
-    }
-
-    #[test]
-    fn one_value_at_once() {
-        for (values, expected) in
-            [(vec![(0, 1), (1, 2), (0, 1)], None), (vec![(0, 1), (1, 2), (1, 3), (0, 2)], Some((1, 2)))]
-        {
-            assert_eq!(reset(values.iter().copied()), expected, "{values:?}");
-        }
-    }
 }

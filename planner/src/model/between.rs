@@ -11,7 +11,7 @@ const EDGE: f64 = 1e-9;
 ///
 /// `differences` are those of the sides of each comparison: at the beginning, in the middle and at the end. They are taken to
 /// change at a rate, or as products of two such numbers do.
-pub(crate) fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
+pub fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
     let mut turns: Vec<f64> = differences.into_iter().flat_map(turns).collect();
     turns.sort_by(f64::total_cmp);
     turns.dedup();
@@ -48,28 +48,4 @@ fn turns([first, middle, last]: [f64; 3]) -> Vec<f64> {
 
 fn is_nothing(difference: f64) -> bool {
     Relation::Equal.holds(difference, 0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_stretch_and_every_turn_is_looked_at() {
-        for (differences, expected) in [
-            (vec![], vec![0.5]),
-            (vec![[1.0, 1.0, 1.0]], vec![0.5]),
-            (vec![[f64::NAN, 1.0, 1.0]], vec![0.5]),
-            // Rising through nothing; from nothing; up to nothing.
-            (vec![[-1.0, 1.0, 3.0]], vec![0.125, 0.25, 0.625]),
-            (vec![[0.0, 1.0, 2.0]], vec![0.5]),
-            (vec![[-2.0, -1.0, -1e-9]], vec![0.5]),
-            // x·(1 - x), less a quarter: it touches nothing in the middle.
-            (vec![[-0.25, 0.0, -0.25]], vec![0.25, 0.5, 0.75]),
-            // Two comparisons.
-            (vec![[-1.0, 0.0, 1.0], [-1.0, 1.0, 3.0]], vec![0.125, 0.25, 0.375, 0.5, 0.75]),
-        ] {
-            assert_eq!(telling_parts(differences.clone()), expected, "{differences:?}");
-        }
-    }
 }

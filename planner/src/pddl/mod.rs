@@ -2,7 +2,8 @@
 
 pub mod ast;
 mod check;
-mod format;
+#[doc(hidden)]
+pub mod format;
 pub mod lex;
 pub mod parse;
 

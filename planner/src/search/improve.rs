@@ -20,7 +20,7 @@ const FIRST_EVALUATIONS: u32 = 12;
 const TRUST_PERCENT: u64 = 80;
 
 /// The work of improving one plan after another.
-pub(crate) struct Improve<'a> {
+pub struct Improve<'a> {
     task: &'a Compiled,
     successors: &'a Successors,
     stop: &'a (dyn Fn() -> bool + Sync),
@@ -47,7 +47,7 @@ pub(crate) struct Improve<'a> {
 
 impl<'a> Improve<'a> {
     /// For a task.
-    pub(crate) fn new(
+    pub fn new(
         task: &'a Compiled,
         successors: &'a Successors,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -85,7 +85,7 @@ impl<'a> Improve<'a> {
 
     /// Improves the plan in place until nothing helps any more, `work` more is done, or stopped. `on_better` hears of
     /// every better plan.
-    pub(crate) fn run(&mut self, plan: &mut Vec<u32>, work: u64, on_better: &mut dyn FnMut(&[u32])) -> bool {
+    pub fn run(&mut self, plan: &mut Vec<u32>, work: u64, on_better: &mut dyn FnMut(&[u32])) -> bool {
         self.work_limit = self.work().saturating_add(work);
         let mut best = self.cost(plan);
         let mut tell = |this: &Self, plan: &[u32]| {
@@ -504,43 +504,5 @@ impl Needs {
         (0..self.events.len())
             .filter_map(|v| needed(&self.events[v]).map(|value| task.offsets[v] + value))
             .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Improve;
-    use crate::classical::compiled::Compiled;
-    use crate::classical::successor::Successors;
-    use crate::small;
-
-    /// Improves a plan of the task; how many steps are left.
-    fn check(steps: &[&str], expected: usize) {
-        let (task, grounded) = small::read(small::SHUTTLE, small::ROW);
-        let compiled = Compiled::new(&grounded);
-        let successors = Successors::new(&compiled);
-        let number = |name: &&str| {
-            let all = 0..grounded.actions.len();
-            all.map(|index| small::action(&task, &grounded, index)).position(|own| own == **name)
-        };
-        let mut plan: Vec<u32> =
-            steps.iter().map(|name| number(name).expect("the action is there") as u32).collect();
-        let mut improve = Improve::new(&compiled, &successors, &|| false);
-        improve.run(&mut plan, 1_000_000, &mut |_| {});
-        let mut state = compiled.initial.clone();
-        for &operator in &plan {
-            assert!(compiled.applicable(operator, &state), "{plan:?}");
-            compiled.advance(operator, &mut state);
-        }
-        assert!(compiled.is_goal(&state));
-        assert_eq!(plan.len(), expected, "{plan:?}");
-    }
-
-    #[test]
-    fn detours_go() {
-        check(&["(take x a)", "(go a b)", "(go b c)", "(put x c)"], 4);
-        check(&["(go a b)", "(go b a)", "(take x a)", "(go a b)", "(go b c)", "(put x c)"], 4);
-        let twice = ["(take x a)", "(go a b)", "(put x b)", "(go b a)", "(go a b)", "(take x b)", "(go b c)"];
-        check(&[&twice[..], &["(put x c)"]].concat(), 4);
     }
 }

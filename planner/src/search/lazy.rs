@@ -44,7 +44,7 @@ pub(crate) struct Strategy {
 
 /// How a search ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum End {
+pub enum End {
     /// A plan.
     Plan(Vec<u32>),
     /// There is no (cheaper) plan.
@@ -59,14 +59,14 @@ pub(crate) enum End {
 
 /// Counts of a search.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Counts {
+pub struct Counts {
     pub evaluated: u64,
     pub expanded: u64,
     pub work: u64,
 }
 
 /// What is shared between searches of one task.
-pub(crate) struct Shared<'a> {
+pub struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
@@ -76,25 +76,9 @@ pub(crate) struct Shared<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-#[cfg(test)]
-impl Shared<'_> {
-    /// Lends what searches of a small task share, without limits.
-    pub(crate) fn lend(ground: &crate::ground::GroundTask, to: impl FnOnce(&Shared<'_>)) {
-        let task = &Compiled::new(ground);
-        to(&Shared {
-            task,
-            successors: &Successors::new(task),
-            landmarks: &Landmarks::new(task, &ground.mutex_groups, &|| false),
-            mutex_groups: &ground.mutex_groups,
-            memory: MemoryLimit::new(None, None),
-            stop: &|| false,
-        });
-    }
-}
-
 /// How far a search may go, all its runs together.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Allowed<'c> {
+pub struct Allowed<'c> {
     /// See [`Relaxed::work`].
     pub work: u64,
     /// States evaluated.
@@ -165,8 +149,8 @@ impl Counts {
 }
 
 /// Memory is looked at after so many entries, of which a round counts for some.
-pub(crate) const MOST_UNSEEN: usize = 4096;
-pub(crate) const UNSEEN_A_ROUND: usize = 16;
+pub const MOST_UNSEEN: usize = 4096;
+pub const UNSEEN_A_ROUND: usize = 16;
 /// A fixed price of making and storing a state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;
 

@@ -1,13 +1,20 @@
 //! Search for plans of instantaneous actions over finite-domain variables and numbers.
 
-mod abreast;
+#[doc(hidden)]
+pub mod abreast;
 pub(crate) mod classical;
-mod horizon;
-mod improve;
-pub(crate) mod lazy;
-mod lookahead;
-mod novelty;
+#[doc(hidden)]
+pub mod horizon;
+#[doc(hidden)]
+pub mod improve;
+#[doc(hidden)]
+pub mod lazy;
+#[doc(hidden)]
+pub mod lookahead;
+#[doc(hidden)]
+pub mod novelty;
 mod open;
-pub(crate) mod run;
+#[doc(hidden)]
+pub mod run;
 mod steer;
 pub(crate) mod store;

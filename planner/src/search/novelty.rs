@@ -35,17 +35,17 @@ struct Memory {
     depth: u32,
 }
 
-struct Novelty {
-    facts: usize,
-    pairs: bool,
+pub struct Novelty {
+    pub facts: usize,
+    pub pairs: bool,
     /// By landmarks left and facts of the relaxed plan made true: facts and pairs of facts seen.
-    seen: FxHashMap<(u32, u32), (Vec<u64>, Vec<u64>)>,
-    bytes: usize,
+    pub seen: FxHashMap<(u32, u32), (Vec<u64>, Vec<u64>)>,
+    pub bytes: usize,
 }
 
 impl Novelty {
     /// 1 for a new fact, 2 for a new pair, 3 for neither. `changed` are the facts that the last operator made true.
-    fn of(&mut self, key: (u32, u32), state: &[u32], changed: &[u32]) -> u32 {
+    pub fn of(&mut self, key: (u32, u32), state: &[u32], changed: &[u32]) -> u32 {
         let words = self.facts.div_ceil(64);
         let (facts, pairs) = self.seen.entry(key).or_insert_with(|| {
             self.bytes += words * 8;
@@ -91,7 +91,7 @@ impl Novelty {
 }
 
 /// The search, which can be gone on with after it ended with [`End::Limit`].
-pub(crate) struct Search<'a, 's> {
+pub struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
@@ -115,7 +115,7 @@ pub(crate) struct Search<'a, 's> {
 
 impl<'a, 's> Search<'a, 's> {
     /// A search that has not begun.
-    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> Search<'a, 's> {
+    pub fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> Search<'a, 's> {
         let task = shared.task;
         Search {
             shared,
@@ -171,7 +171,7 @@ impl<'a, 's> Search<'a, 's> {
     }
 
     /// Searches on as far as is allowed.
-    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+    pub fn run(&mut self, allowed: Allowed) -> End {
         if self.bound == 0 {
             return End::Exhausted;
         }
@@ -319,67 +319,5 @@ impl<'a, 's> Search<'a, 's> {
     fn kind(&self, id: u32) -> (u32, u32) {
         let done = self.done.row(id as usize);
         (self.memory[id as usize].left, done.iter().map(|word| word.count_ones()).sum())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::AtomicBool;
-
-    use rustc_hash::FxHashMap;
-
-    use super::*;
-    use crate::small;
-
-    /// How a search ends, and whether with a plan.
-    fn check(problem: &str, narrow: bool, solvable: bool) {
-        let (_, ground) = small::read(small::SHUTTLE, problem);
-        Shared::lend(&ground, |shared| check_shared(shared, problem, narrow, solvable));
-    }
-
-    fn check_shared(shared: &Shared<'_>, problem: &str, narrow: bool, solvable: bool) {
-        let task = shared.task;
-        let mut search = Search::new(shared, u32::MAX, narrow);
-        let cancelled = &AtomicBool::new(false);
-        let all = Allowed { work: u64::MAX, evaluations: u64::MAX, memory: shared.memory, cancelled };
-        let End::Plan(plan) = search.run(all) else {
-            assert!(!solvable, "{problem}");
-            return;
-        };
-        let mut state = task.initial.clone();
-        for &operator in &plan {
-            assert!(task.applicable(operator, &state));
-            task.advance(operator, &mut state);
-        }
-        assert!(solvable && task.is_goal(&state), "{problem}");
-    }
-
-    #[test]
-    fn narrow_or_in_full_a_plan_is_found() {
-        let two = small::ROW.replace("x - box", "x y - box").replace("(lies x a)", "(lies x a) (lies y b)");
-        let both = two.replace("(:goal (lies x c))", "(:goal (and (lies x c) (lies y a) (at b)))");
-        for narrow in [true, false] {
-            check(small::ROW, narrow, true);
-            check(&both, narrow, true);
-            check(&small::ROW.replace("(road b c)", ""), narrow, false);
-        }
-    }
-
-    #[test]
-    fn a_fact_is_new_once_and_then_its_pairs_are() {
-        let mut novelty = Novelty { facts: 4, pairs: true, seen: FxHashMap::default(), bytes: 0 };
-        let key = (1, 0);
-        for (state, changed, expected) in [
-            (&[0, 2], &[0, 2][..], 1),
-            (&[0, 2], &[0, 2], 3),
-            (&[0, 3], &[3], 1),
-            (&[1, 2], &[1], 1),
-            (&[1, 3], &[1], 2),
-            (&[1, 3], &[3], 3),
-            (&[0, 3], &[], 3),
-        ] {
-            assert_eq!(novelty.of(key, state, changed), expected, "{state:?} {changed:?}");
-        }
-        assert_eq!(novelty.of((2, 0), &[1, 3], &[3]), 1, "states of another kind are not compared");
     }
 }

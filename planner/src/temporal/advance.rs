@@ -15,7 +15,7 @@ use super::world::{Act, Moment, Span, World};
 
 /// An action in progress.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Open {
+pub struct Open {
     /// The action.
     pub act: u32,
     /// The parameter that its grounding module proposed.
@@ -37,7 +37,7 @@ impl Open {
 /// Of the end effects of an action in progress, a bit for each whose conditions at the start or over all failed; no words
 /// where no effect has any.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(crate) struct Gates(Vec<u64>);
+pub struct Gates(Vec<u64>);
 
 impl Gates {
     /// All open, for the effects at the end of an action.
@@ -63,7 +63,7 @@ fn is_remembered(when: &When) -> bool {
 
 /// Where the search stands: a state, the actions in progress, and how many timed effects have happened.
 #[derive(Debug, Clone)]
-pub(crate) struct Situation {
+pub struct Situation {
     /// Facts and numbers.
     pub state: Values,
     /// Actions in progress, in the order of their starts.
@@ -74,7 +74,7 @@ pub(crate) struct Situation {
 
 /// One step of the search.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Step {
+pub struct Step {
     /// The action; meaningless for timed effects.
     pub act: u32,
     /// Which part of it; [`Part::Free`] is the next timed effect.
@@ -306,7 +306,7 @@ impl World<'_> {
 pub(crate) type Touches = (Access, Option<Access>);
 
 /// What the happenings of every action touch, derived variables traced back to what they are derived from.
-pub(crate) struct Accesses<'w, 'a> {
+pub struct Accesses<'w, 'a> {
     /// By action, once it was asked for: most actions of a large task never happen.
     acts: Vec<OnceCell<Touches>>,
     watch: RefCell<Watch<'w, 'a>>,

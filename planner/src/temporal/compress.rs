@@ -20,7 +20,7 @@ use super::world::{Act, NOTHING, Span, World};
 /// A first plan by the classical search, with actions in one go, or with start and end apart where the space has them
 /// so; `None` where the task does not allow it, or where that search finds none; with the states evaluated and the work done. Durations are left out of it: what it
 /// finds may not fit in time.
-pub(crate) fn classical_plan(
+pub fn classical_plan(
     space: &Space,
     memory: MemoryLimit,
     evaluations: u64,
@@ -63,7 +63,7 @@ const MOST_APART: usize = 5_000;
 const MOST_GUARDS: usize = 2_000_000;
 
 /// The task with every action in one go, or as its start and its end; and by its actions the space's.
-fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
+pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     let world = space.world;
     let apart: Vec<u32> = (0..world.acts.len() as u32).filter(|&act| space.open_act[act as usize]).collect();
     let derived = world.ground.variables.iter().any(|variable| variable.stratum.is_some());
@@ -195,60 +195,4 @@ fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
         return None;
     }
     Some(Action { origin: act.origin.clone(), condition, effects, cost: Expression::Constant(seconds) })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{classical_plan, compressed};
-    use crate::attachment::Attachments;
-    use crate::calls::Calls;
-    use crate::ground::Fact;
-    use crate::memory::MemoryLimit;
-    use crate::small;
-    use crate::task::Task;
-    use crate::temporal::envelope::envelopes;
-    use crate::temporal::relaxed::Part;
-    use crate::temporal::space::{Measure, Space};
-    use crate::temporal::world::World;
-
-    fn in_space<R>(domain: &str, problem: &str, look: impl FnOnce(&Task, &Space) -> R) -> R {
-        let (task, grounded) = small::read(domain, problem);
-        let nobody = Attachments::default();
-        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
-        let world = World::new(&task, &grounded, calls);
-        look(&task, &Space::new(&world, envelopes(&world), Measure::Makespan))
-    }
-
-    #[test]
-    fn a_start_and_its_end_enclose_what_needs_them() {
-        let found = in_space(small::CELLAR, small::FUSES, |_, space| {
-            classical_plan(space, MemoryLimit::new(None, None), 1000, &|| false)
-        });
-        let (steps, _, _) = found.expect("the classical search finds a plan");
-        let parts: Vec<Part> = steps.iter().map(|step| step.part).collect();
-        assert_eq!(parts, [Part::Start, Part::Whole, Part::Whole, Part::End]);
-        assert_eq!(steps[0].act, steps[3].act);
-    }
-
-    #[test]
-    fn what_excludes_what_is_known_of_actions_in_one_go() {
-        // While somebody is on the way, a place is neither clear nor somebody's: no transition alone says that it is one of both.
-        let domain = "(define (domain tiles) (:requirements :typing :durative-actions) (:types robot tile)
-          (:predicates (at ?r - robot ?t - tile) (clear ?t - tile))
-          (:durative-action go :parameters (?r - robot ?a ?b - tile) :duration (= ?duration 1)
-            :condition (and (at start (at ?r ?a)) (at start (clear ?b)))
-            :effect (and (at start (not (at ?r ?a))) (at start (not (clear ?b)))
-                         (at end (at ?r ?b)) (at end (clear ?a)))))";
-        let problem = "(define (problem p) (:domain tiles) (:objects r s - robot a b c - tile)
-          (:init (at r a) (at s b) (clear c)) (:goal (at r b)))";
-        let together = in_space(domain, problem, |task, space| {
-            let (compressed, _) = compressed(space)?;
-            let said = |fact: &Fact| small::fact(task, &compressed, *fact);
-            let groups = compressed.mutex_groups.iter();
-            let groups = groups.map(|group| group.iter().map(said).collect::<Vec<_>>().join(" "));
-            Some(groups.collect::<Vec<_>>())
-        });
-        let expected = ["a", "c", "b"].map(|tile| format!("(at r {tile}) (at s {tile}) (clear {tile})"));
-        assert_eq!(together.expect("nothing forbids it"), expected);
-    }
 }

@@ -11,7 +11,7 @@ use super::world::{Act, World};
 
 /// By action, whether it makes something true (or larger) only while it runs that others ask for. All other actions
 /// can be done in one go in the search: what happens inside them is of use to nobody.
-pub(crate) fn envelopes(world: &World) -> Vec<bool> {
+pub fn envelopes(world: &World) -> Vec<bool> {
     let wanted = Wanted::new(world);
     world
         .acts
@@ -22,7 +22,7 @@ pub(crate) fn envelopes(world: &World) -> Vec<bool> {
 }
 
 /// By action, whether it takes time: with all of them apart, the search sees every interleaving.
-pub(crate) fn all_apart(world: &World) -> Vec<bool> {
+pub fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn all_apart(world: &World) -> Vec<bool> {
 /// given from outside, and every action such that its start can wait until its end, or its end follow its start at
 /// once, whatever happens in between (compare the compression-safe actions of Coles et al. 2009). If so, the actions that must
 /// not overlap themselves for that.
-pub(crate) fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
+pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     if !world.ground.timed.is_empty() {
         return None;
     }
@@ -194,36 +194,4 @@ fn undone(fact: Fact, end: &[Effect]) -> bool {
     };
     end.iter().any(|effect| sets(effect).is_some_and(|other| other.value != fact.value))
         && !end.iter().any(|effect| sets(effect) == Some(fact))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{all_apart, envelopes, in_one_go_suffices};
-    use crate::attachment::Attachments;
-    use crate::calls::Calls;
-    use crate::small;
-    use crate::temporal::World;
-
-    /// By schema, whether its start and end are apart; and whether done in one go, everything can be reached.
-    fn check(domain: &str, expected: &[(&str, bool)], suffices: bool) {
-        let (task, grounded) = small::read(domain, small::FUSES);
-        let nobody = Attachments::default();
-        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
-        let world = World::new(&task, &grounded, calls);
-        for (act, apart) in world.acts.iter().zip(envelopes(&world)) {
-            let name = &task.actions[act.origin.schema as usize].name;
-            let own = expected.iter().find(|(expected, _)| expected == name);
-            assert_eq!(own.map(|own| own.1), Some(apart), "{name}");
-        }
-        assert!(all_apart(&world).iter().all(|apart| *apart));
-        assert_eq!(in_one_go_suffices(&world).is_some(), suffices);
-    }
-
-    #[test]
-    fn what_gives_something_while_it_lasts_is_apart() {
-        check(small::CELLAR, &[("burn", true), ("mend", false)], false);
-        // Light that stays needs nobody inside.
-        let lasting = small::CELLAR.replace(" (at end (not (light)))", "");
-        check(&lasting, &[("burn", false), ("mend", false)], true);
-    }
 }

@@ -62,7 +62,7 @@ struct Touch {
 
 /// Moves apart what happens at the same time where one changes what the other mentions; whether it came to an end with that: of a
 /// long plan it does not once asked to stop.
-pub(super) fn keep_apart(
+pub fn keep_apart(
     space: &Space,
     steps: &[Step],
     track: &mut Track,
@@ -315,38 +315,5 @@ fn every(variables: &[Quantified], binding: &mut [u32], visit: &mut dyn FnMut(&m
     for object in first.parameter.objects.iter() {
         binding[first.slot.index()] = object.0;
         every(others, binding, visit);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::attachment::Attachments;
-    use crate::calls::Calls;
-    use crate::small;
-    use crate::temporal::envelope::all_apart;
-    use crate::temporal::space::Measure;
-
-    #[test]
-    fn of_a_long_plan_less_is_done_once_asked_to_stop() {
-        let domain = "(define (domain d) (:requirements :numeric-fluents) (:predicates (p)) (:functions (n))
-          (:action more :parameters () :precondition (>= (n) 0) :effect (and (p) (increase (n) 1))))";
-        let problem = "(define (problem p) (:domain d) (:init (= (n) 0)) (:goal (and (p) (> (n) 0))))";
-        let (task, grounded) = small::read(domain, problem);
-        let nobody = Attachments::default();
-        let calls = Calls::bind(&task, &grounded, &nobody).expect("nothing to bind");
-        let world = World::new(&task, &grounded, calls);
-        let space = Space::new(&world, all_apart(&world), Measure::Makespan);
-        for (count, stopped) in [(1, false), (100, false), (2_000, true)] {
-            let mut steps = vec![Step::whole(0); count];
-            let replayed = space.replay_to_goal(&mut steps, &|| true).expect("no call");
-            assert_eq!(replayed.is_none(), stopped, "{count}");
-            let mut track = space.track(&steps).expect("it fits");
-            assert_eq!(
-                keep_apart(&space, &steps, &mut track, &|| true).is_ok_and(|all| !all),
-                stopped,
-                "{count}"
-            );
-        }
     }
 }

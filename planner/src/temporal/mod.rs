@@ -1,31 +1,42 @@
 //! Search for timed plans.
 
-mod advance;
-mod compress;
+#[doc(hidden)]
+pub mod advance;
+#[doc(hidden)]
+pub mod compress;
 mod destroy;
 mod direction;
-mod envelope;
+#[doc(hidden)]
+pub mod envelope;
 mod estimate;
 mod improve;
-mod joined;
+#[doc(hidden)]
+pub mod joined;
 mod manner;
-mod mentions;
-mod order;
+#[doc(hidden)]
+pub mod mentions;
+#[doc(hidden)]
+pub mod order;
 mod overlap;
-mod relaxed;
+#[doc(hidden)]
+pub mod relaxed;
 mod remaining;
-mod schedule;
+#[doc(hidden)]
+pub mod schedule;
 mod search;
-mod space;
+#[doc(hidden)]
+pub mod space;
 mod store;
 mod timed;
 mod together;
 mod touch;
-mod tours;
-mod world;
+#[doc(hidden)]
+pub mod tours;
+#[doc(hidden)]
+pub mod world;
 
 pub(crate) use improve::{Limits, Progress, Reason, search_plans};
 pub(crate) use manner::Counts;
 pub(crate) use space::Measure;
 pub(crate) use timed::{Timed, to_plan};
-pub(crate) use world::World;
+pub use world::World;

@@ -20,7 +20,7 @@ use super::world::{Act, World};
 
 /// Which part of an action a relaxed operator stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Part {
+pub enum Part {
     /// All of it in one go.
     Whole,
     /// The start of an action that then stays open.

@@ -73,7 +73,7 @@ fn critical_pairs(steps: &[Step], track: &Track) -> Vec<(usize, usize)> {
 }
 
 /// The happenings on a longest path of the network, from the end of the plan back to its beginning.
-fn longest_path(order: &Order) -> Vec<usize> {
+pub fn longest_path(order: &Order) -> Vec<usize> {
     let mut network: DiGraph<(), f64> = DiGraph::with_capacity(order.len() + 1, 4 * order.len());
     let begin = network.add_node(());
     let happenings: Vec<NodeIndex> = (0..order.len()).map(|_| network.add_node(())).collect();
@@ -124,32 +124,4 @@ fn steps_of(steps: &[Step], track: &Track) -> Vec<Option<usize>> {
         }
     }
     step_of
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::order::Access;
-    use super::super::world::Span;
-    use super::*;
-
-    #[test]
-    fn the_longest_path_leads_from_the_end_to_the_beginning() {
-        let access = |reads: &[u32], writes: &[u32]| Access {
-            reads: reads.to_vec(),
-            writes: writes.to_vec(),
-            ..Access::default()
-        };
-        // An action of 3 s and after it one of 4 s, beside one of 5 s: the first two decide.
-        let mut order = Order::new(3);
-        for (reads, writes, seconds) in [(0, 0, 3.0), (1, 1, 5.0), (0, 2, 4.0)] {
-            let start = order.push(&access(&[reads], &[]));
-            let span = Span { least_s: seconds, most_s: seconds };
-            order.push_end(start, &access(&[], &[writes]), span).expect("fits");
-        }
-        assert_eq!(longest_path(&order), [5, 4, 1, 0]);
-        // What is given from outside at 20 s, and asked for by a last happening, is where the path begins.
-        order.push_fixed(&access(&[], &[2]), 20.0).expect("fits");
-        order.push(&access(&[2], &[]));
-        assert_eq!(longest_path(&order), [7, 6]);
-    }
 }

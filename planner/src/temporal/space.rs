@@ -25,7 +25,7 @@ const STEPS_A_LOOK: usize = 256;
 
 /// What plans are measured by.
 #[derive(Debug, Clone)]
-pub(crate) enum Measure {
+pub enum Measure {
     /// When the last action ends.
     Makespan,
     /// Costs of the actions times a sign, plus a weight times the makespan.
@@ -105,7 +105,7 @@ impl Measure {
 }
 
 /// A search space with everything that several searches on it share.
-pub(crate) struct Space<'w, 'a> {
+pub struct Space<'w, 'a> {
     /// The task.
     pub world: &'w World<'a>,
     /// By action, whether its start and end are apart.
@@ -322,7 +322,7 @@ impl<'w, 'a> Space<'w, 'a> {
 
 /// Where a search begins: after some steps.
 #[derive(Debug, Clone)]
-pub(crate) struct Base {
+pub struct Base {
     /// The situation.
     pub situation: Situation,
     /// Additive costs so far.
@@ -335,7 +335,7 @@ pub(crate) struct Base {
 
 /// The order that a sequence of steps stands for, with where its actions start and end.
 #[derive(Debug, Clone)]
-pub(crate) struct Track {
+pub struct Track {
     /// The order.
     pub order: Order,
     /// By step, its start, and its end if it has one by now; `None` for ends and timed effects.

@@ -20,7 +20,7 @@ use super::touch::{Touched, expression_touches};
 
 /// An action of the temporal search; an instantaneous one has everything at its start.
 #[derive(Debug, Clone)]
-pub(crate) struct Act<'a> {
+pub struct Act<'a> {
     /// The lifted action and its arguments.
     pub origin: &'a Origin,
     /// Whether it takes time.
@@ -53,12 +53,12 @@ pub(crate) struct Act<'a> {
 /// Of what bounds on a duration leave, what is tried besides the least where effects depend on it: half of it, and all.
 const SHARES: [f64; 2] = [0.5, 1.0];
 
-pub(super) static NOTHING: Conjunction =
+pub static NOTHING: Conjunction =
     Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
 
 /// A state, with what expressions may refer to besides it.
 #[derive(Clone, Copy)]
-pub(crate) struct Moment<'s> {
+pub struct Moment<'s> {
     /// The state.
     pub state: &'s Values,
     /// `?duration` of the action at hand, in seconds.
@@ -71,7 +71,7 @@ pub(crate) struct Moment<'s> {
 
 /// The duration that an action may take, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Span {
+pub struct Span {
     /// At least.
     pub least_s: f64,
     /// At most; may be infinite.
@@ -103,7 +103,7 @@ impl Span {
 }
 
 /// The ground task in the form that the temporal search applies.
-pub(crate) struct World<'a> {
+pub struct World<'a> {
     /// The lifted task.
     pub task: &'a Task,
     /// The ground task.

@@ -50,7 +50,7 @@ fn steepness(cosine: f32) -> f32 {
 }
 
 /// A standard normal number from 21 bits, by the quantiles of the distribution (interpolated, cut at 3.3 σ).
-pub(crate) fn normal(bits: u64) -> f32 {
+pub fn normal(bits: u64) -> f32 {
     const CELLS: usize = 2048;
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     let table = TABLE.get_or_init(|| {
@@ -82,7 +82,7 @@ fn quantile(share: f64) -> f64 {
 }
 
 /// Sixty-four well mixed bits for a key (the finaliser of SplitMix64).
-pub(crate) fn mix(key: u64) -> u64 {
+pub fn mix(key: u64) -> u64 {
     let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -90,7 +90,7 @@ pub(crate) fn mix(key: u64) -> u64 {
 }
 
 /// A share from 0 to 1 (1 left out) for well mixed bits.
-pub(crate) fn share(bits: u64) -> f64 {
+pub fn share(bits: u64) -> f64 {
     (bits >> 11) as f64 / ((1u64 << 53) as f64)
 }
 

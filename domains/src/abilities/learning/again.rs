@@ -41,13 +41,13 @@ const HALF: f64 = 0.5;
 const LONGER_M: f64 = 0.03;
 const SHORTER: f64 = 0.6;
 const BESIDE_IT_M: f64 = 0.04;
-const NOT_IT: f64 = 0.002;
+pub const NOT_IT: f64 = 0.002;
 
 /// What was made of views so far, by their times.
 pub type Glances = BTreeMap<i64, Arc<Glance>>;
 
 /// A learned thing somewhere.
-pub(super) struct Found {
+pub struct Found {
     /// Its number among [`News::things`].
     pub thing: usize,
     /// Where, and how sure that is.
@@ -255,7 +255,7 @@ fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
 
 /// Spreads probability over the learned things: the one that was found there, or those that looks may have missed at something which is so long with all
 /// that may be of it, metres.
-fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
+pub fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     let mut of_things: Vec<(String, f64)> = Vec::new();
     let is = found.ok().map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
     let left = 1.0 - is.map_or(0.0, |(_, p)| p);
@@ -287,7 +287,7 @@ fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
 
 /// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres. A look at
 /// a side that was never seen tells nothing, and what was seen from few sides may be longer than is known.
-fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f64 {
+pub fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f64 {
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let longest_m = f64::from((high - low).norm());
     let [w, d, h] = percept.size_m;
@@ -298,45 +298,4 @@ fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f
     }
     let not_told = MISSED.max(1.0 - thing.sides).powi(percept.evidence.views as i32);
     PRIOR * not_told / (PRIOR * not_told + 1.0 - PRIOR)
-}
-
-#[cfg(test)]
-mod tests {
-    use descry_memory::learned::Place;
-    use descry_perception::recognise::{Evidence, Stance};
-
-    use super::*;
-
-    /// A thing 20 cm long of which so much was seen, and an object that looks have not told.
-    fn chance(sides: f64, views: usize, height_m: f64) -> f64 {
-        let cloud = Cloud::from_points(vec![Point3::origin(), Point3::new(0.0, 0.0, 0.2)]);
-        let seen = Place { unix_s: 0.0, at_m: Point3::origin(), on: "table".into() };
-        let (name, learned_unix_s) = ("lamp".into(), 0.0);
-        let thing = LearnedThing { name, learned_unix_s, cloud, sides, directions: 0, meetings: 1, seen };
-        let percept = Percept {
-            label: None,
-            kind: None,
-            probabilities: Vec::new(),
-            kinds: Vec::new(),
-            unknown: 1.0,
-            position_m: Point3::origin(),
-            position_sigma_m: 0.001,
-            size_m: [0.05, 0.05, height_m],
-            stance: Stance::Upright,
-            points: 100,
-            seen_fraction: 0.9,
-            evidence: Evidence { views, ..Evidence::default() },
-            indices: Vec::new(),
-        };
-        missed(&percept, &thing, None)
-    }
-
-    #[test]
-    fn looks_tell_less_of_what_was_seen_from_few_sides() {
-        // Three looks exclude what is known from all sides, and hardly what is known from a fifth of them.
-        assert!(chance(1.0, 3, 0.2) < 0.03 && chance(0.2, 3, 0.2) > 0.15);
-        // What is longer than it is not it, unless its model may lack a part.
-        assert_eq!(chance(1.0, 0, 0.3), NOT_IT);
-        assert!(chance(0.2, 0, 0.3) > 0.25);
-    }
 }

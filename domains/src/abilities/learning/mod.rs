@@ -1,12 +1,14 @@
 //! *learning*: places are visited again and again, what is new there is looked at from all around and becomes a model, and is known again by it
 //! (Fäulhammer et al., *Autonomous Learning of Object Models on a Mobile Robot*).
 
-pub(crate) mod again;
+#[doc(hidden)]
+pub mod again;
 mod calls;
 mod facts;
 pub mod news;
 mod stands;
-mod taken;
+#[doc(hidden)]
+pub mod taken;
 mod telling;
 
 use std::sync::Arc;

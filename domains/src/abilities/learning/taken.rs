@@ -116,7 +116,7 @@ pub(super) fn visit(
 /// Why a visit cannot be compared with those before it, if it cannot. One that was laid onto what was there farther off than localisation errs lies wrong,
 /// or the body is not where it believes to be: either way all that always stood there would be new a few centimetres beside, and where localisation alone
 /// has the visit it is not known to what is compared.
-fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
+pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
     /// However exact a body is, no visit is laid more exactly than this, metres and radians: half of what is compared.
     const LAID: (f64, f64) = (0.005, 0.005);
     let [sigma_m, sigma_rad] = [body.pose_sigma_m.max(LAID.0), body.pose_sigma_rad.max(LAID.1)];
@@ -240,7 +240,7 @@ fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
 }
 
 /// Whether a piece hangs over another one: the middle of either is above or below the other, and the gap between them is small.
-fn is_over(piece: &Cloud, below: &Cloud) -> bool {
+pub fn is_over(piece: &Cloud, below: &Cloud) -> bool {
     let (Some(above), Some(under)) = (piece.bounds(), below.bounds()) else { return false };
     let holds = |(low, high): (Point3<f32>, Point3<f32>), (l, h): (Point3<f32>, Point3<f32>)| {
         let middle = center(&l, &h);
@@ -328,7 +328,7 @@ fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
 }
 
 /// Something is to be looked at from around: it is new, or of what it is `taken_for` too little is known. Its symbol, if nobody had noticed it.
-fn new(
+pub fn new(
     mind: &mut Mind,
     eyes: Eyes<'_>,
     on: &str,
@@ -539,42 +539,4 @@ fn keep(
         size(&size_m, &at_m),
         1e2 * sides
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_visit_that_is_laid_farther_off_than_localisation_errs_is_not_compared() {
-        let body = descry_robots::sim::body::description();
-        let view = View::alone(Cloud::from_points(vec![Point3::new(0.0, 0.0, 1.0)]));
-        let laid = |times: f64| Visit {
-            appeared: Vec::new(),
-            gone: Vec::new(),
-            poses: vec![Isometry3::translation(times * body.pose_sigma_m, 0.0, 0.0)],
-            added: 0,
-            removed: 0,
-        };
-        let why = |times: f64| misfit(&body, &Isometry3::identity(), &laid(times), &view);
-        assert_eq!(why(1.0), None);
-        let exact = Description { pose_sigma_m: 0.0, pose_sigma_rad: 0.0, ..body.clone() };
-        let off_m = |x: f64| Visit { poses: vec![Isometry3::translation(x, 0.0, 0.0)], ..laid(0.0) };
-        let why_exact = |x: f64| misfit(&exact, &Isometry3::identity(), &off_m(x), &view);
-        assert!(why_exact(0.003).is_none() && why_exact(0.05).is_some());
-        assert!(why(8.0).is_some_and(|why| why.contains("farther off than localisation errs")));
-    }
-
-    #[test]
-    fn the_shade_of_a_lamp_is_over_its_foot_and_what_stands_beside_is_not() {
-        let block = |x: f32, half: f32, low: f32, high: f32| {
-            Cloud::from_points(vec![Point3::new(x - half, -half, low), Point3::new(x + half, half, high)])
-        };
-        let foot = block(0.0, 0.07, 0.72, 0.86);
-        assert!(is_over(&block(0.02, 0.09, 0.9, 1.01), &foot));
-        assert!(is_over(&block(-0.05, 0.02, 0.84, 0.9), &foot));
-        for (x, low, high) in [(0.2, 0.9, 1.01), (0.0, 1.2, 1.3), (0.0, 0.3, 0.6)] {
-            assert!(!is_over(&block(x, 0.09, low, high), &foot), "{x} {low} {high}");
-        }
-    }
 }

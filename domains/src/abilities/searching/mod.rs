@@ -13,8 +13,10 @@ pub mod perceive;
 mod placing;
 pub mod policies;
 pub mod reasons;
-mod unnoticed;
-mod vanished;
+#[doc(hidden)]
+pub mod unnoticed;
+#[doc(hidden)]
+pub mod vanished;
 
 pub use calls::FirstLook;
 

@@ -132,12 +132,13 @@ fn floored(p: f64) -> f64 {
 }
 
 /// What an object that is a thing with so much is more likely, and how likely; empty if it is no other known object.
-fn rather(track: &Track, thing: &Thing) -> String {
+pub fn rather(track: &Track, thing: &Thing) -> String {
     let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
     likelier(&track.probabilities, track.probability_of(&thing.name), is_it)
 }
 
-fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str) -> bool) -> String {
+#[doc(hidden)]
+pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str) -> bool) -> String {
     let others = probabilities.iter().filter(|(name, p)| !is_it(name) && *p > than);
     let most = others.max_by(|a, b| a.1.total_cmp(&b.1));
     most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {:.2}", floored(*p)))
@@ -203,7 +204,7 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
 
 /// What the doubt about all of a kind is about: the least sure object, or all of them where each is sure enough by itself and they leave
 /// more open than what may stand where nothing was seen; and that, if it alone is more than is allowed or there is no such object.
-fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
+pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
     let more = says_hidden.then(|| format!(", there may be more where nothing was seen ({hidden:.2})"));
@@ -271,47 +272,4 @@ fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
 /// A place in words.
 pub fn place(p: &Point3<f64>) -> String {
     format!("({:.2}, {:.2}) m", p.x, p.y)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn doubt_about_all_of_a_kind_is_about_something() {
-        let check = |least: Option<&str>, together: f64, hidden: f64, is_bare: bool, expected: &str| {
-            assert_eq!(
-                about(least.map(str::to_string), together, hidden, 0.1, is_bare),
-                expected,
-                "{least:?} {hidden}"
-            );
-        };
-        let one = ", what stands at (0.10, 0.20) m is one with 0.60";
-        let hides = |p: f64| format!(", there may be more where nothing was seen ({p:.2})");
-        let seen =
-            |p: f64| format!(", each object that was seen is sure enough, all together are not ({p:.2})");
-        check(Some(one), 0.6, 0.05, false, one);
-        check(Some(one), 0.6, 0.2, false, &format!("{one}{}", hides(0.2)));
-        check(None, 0.96, 0.05, false, &hides(0.05));
-        check(None, 0.89, 0.02, false, &format!("{}{}", seen(0.89), hides(0.02)));
-        check(None, 0.8999, 0.005, false, &seen(0.89));
-        check(None, 0.88, -1e-9, false, &seen(0.88));
-        check(None, 1.0, -1e-9, true, &hides(0.0));
-    }
-
-    #[test]
-    fn what_may_be_it_is_named_as_what_it_is_rather() {
-        let check = |own: &[&str], cup_a: f64, other: f64, than: f64, expected: &str| {
-            let probabilities = [("cup A".to_string(), cup_a), ("other cup".to_string(), other)];
-            assert_eq!(
-                likelier(&probabilities, than, |name| own.contains(&name)),
-                expected,
-                "{own:?} {cup_a} {other}"
-            );
-        };
-        check(&["other cup"], 0.869, 0.12, 0.12, "; rather cup A, 0.86");
-        check(&["other cup"], 0.3, 0.4, 0.4, "");
-        check(&["other cup"], 0.0, 0.1, 0.1, "");
-        check(&["cup A", "other cup"], 0.5, 0.2, 0.7, "");
-    }
 }

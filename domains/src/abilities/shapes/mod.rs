@@ -7,7 +7,8 @@ pub mod floor;
 mod poses;
 mod taken;
 mod telling;
-mod unseen;
+#[doc(hidden)]
+pub mod unseen;
 
 use std::sync::Arc;
 

@@ -73,7 +73,7 @@ pub struct Chart {
 
 impl Chart {
     /// The map with which a run begins: what an earlier one has left, if the domain uses it and the body has none of its own.
-    pub(crate) fn begin(domain: &Domain, past: Option<&Past>, robot: &dyn Robot) -> Self {
+    pub fn begin(domain: &Domain, past: Option<&Past>, robot: &dyn Robot) -> Self {
         let is_used = domain.config.uses.iter().any(|name| name == super::ABILITY.name);
         let mut chart = Chart { poses: domain.config.candidates, ..Chart::default() };
         let kept = past.and_then(|p| p.remembered.surveyed.as_ref());

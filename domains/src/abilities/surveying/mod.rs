@@ -4,7 +4,8 @@
 mod calls;
 pub mod chart;
 mod facts;
-pub(super) mod ground;
+#[doc(hidden)]
+pub mod ground;
 mod picture;
 mod taken;
 mod telling;

@@ -14,7 +14,7 @@ const BITS: u32 = 32;
 const ALL: i64 = 0;
 
 /// Whose records a store is about.
-pub(super) struct Name {
+pub struct Name {
     pub robot: String,
     /// Its place among the names of the store; none if nothing was ever recorded under it.
     pub index: Option<i64>,
@@ -94,23 +94,5 @@ impl MongoStore {
         let newest = numbers.iter().max().copied().unwrap_or(0);
         let keep = doc! { "$max": { "pruned": newest } };
         self.said(self.names.update_one(doc! { "_id": &self.name.robot }, keep).run()).map(|_| ())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Name, RecordId};
-
-    #[test]
-    fn own_numbers_are_short_and_all_are_told_apart() {
-        let [a, b] = [1, 2].map(|index| Name { robot: "x".into(), index: Some(index) });
-        let nobody = Name { robot: String::new(), index: Some(0) };
-        for name in [&a, &b, &nobody] {
-            assert_eq!(name.outward(name.inward(RecordId(7))), RecordId(7));
-        }
-        let seen_by_a = a.outward(b.inward(RecordId(7)));
-        assert_ne!(seen_by_a, RecordId(7));
-        assert_eq!(a.inward(seen_by_a), b.inward(RecordId(7)));
-        assert_eq!(nobody.inward(nobody.outward(b.inward(RecordId(7)))), b.inward(RecordId(7)));
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// A described place.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Feature {
+pub struct Feature {
     pub at: Point3<f32>,
     pub normal: Vector3<f32>,
 }
@@ -19,17 +19,17 @@ const COARSE: u16 = 4;
 
 /// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
 #[derive(Clone, Debug)]
-pub(super) struct Features {
+pub struct Features {
     pub all: Vec<Feature>,
     kind: Kind,
-    blocks: Vec<[u8; BLOCK]>,
+    pub blocks: Vec<[u8; BLOCK]>,
     /// Sums of groups of bytes, coarsely: what is alike has codes that are, and they have a quarter of the bytes or fewer.
-    codes: Vec<[u8; CODE]>,
+    pub codes: Vec<[u8; CODE]>,
 }
 
 /// A feature of one set, the most alike of another's, and how far their descriptors are apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Alike {
+pub struct Alike {
     pub own: usize,
     pub other: usize,
     pub off: u32,
@@ -37,7 +37,7 @@ pub(super) struct Alike {
 
 /// What is described.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     /// How normals are spread around a place.
     Shape,
     /// The colours around a place, in the tangent plane.
@@ -46,7 +46,7 @@ pub(super) enum Kind {
 
 impl Kind {
     /// Bytes of a descriptor, and of its code.
-    const fn lengths(self) -> (usize, usize) {
+    pub const fn lengths(self) -> (usize, usize) {
         match self {
             Kind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
             Kind::Pattern => (3 * CELLS * CELLS, 48),
@@ -86,7 +86,7 @@ impl Features {
         features
     }
 
-    fn push(&mut self, feature: Feature, descriptor: &[u8]) {
+    pub fn push(&mut self, feature: Feature, descriptor: &[u8]) {
         self.all.push(feature);
         let block = |bytes: &[u8]| {
             let mut block = [0; BLOCK];
@@ -103,7 +103,7 @@ impl Features {
     }
 
     /// The descriptor of a feature.
-    fn descriptor(&self, k: usize) -> &[[u8; BLOCK]] {
+    pub fn descriptor(&self, k: usize) -> &[[u8; BLOCK]] {
         let each = self.kind.lengths().0.div_ceil(BLOCK);
         &self.blocks[k * each..(k + 1) * each]
     }
@@ -174,7 +174,7 @@ impl Features {
 
 /// Sum of absolute differences of the bytes of two descriptors, or of two codes.
 #[inline(always)]
-fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
+pub fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
     let of = |(a, b): (&[u8; N], &[u8; N])| -> u32 {
         let mut sum = 0;
         for i in 0..N {
@@ -339,70 +339,4 @@ fn described(cells: &[([f32; 3], f32)]) -> Option<Box<[u8]>> {
     let colour =
         |k: usize| cells.iter().map(move |c| byte(SCALES[1] * if c.1 > 0.0 { value(c, k) } else { mean[k] }));
     Some(lightness.chain(colour(1)).chain(colour(2)).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::draw::Draws;
-
-    /// Features that are drawn, every third near to the one before.
-    fn drawn(kind: Kind, count: usize, seed: u64) -> Features {
-        let mut draws = Draws::new(seed);
-        let mut features = Features::none(kind);
-        let mut bytes = vec![0_u8; kind.lengths().0];
-        for k in 0..count {
-            for byte in &mut bytes {
-                let drawn = (draws.next() >> 32) as u8;
-                *byte = if k % 3 == 2 { byte.saturating_add(drawn % 5) } else { drawn / (1 + k as u8 % 4) };
-            }
-            features.push(Feature { at: Point3::origin(), normal: Vector3::z() }, &bytes);
-        }
-        features
-    }
-
-    #[test]
-    fn what_is_most_alike_is_found() {
-        for kind in [Kind::Shape, Kind::Pattern] {
-            let (own, mut others) = (drawn(kind, 60, 1), drawn(kind, 200, 2));
-            // Three of the others are made of three of these, and alike to them.
-            for (k, from) in [(7, 3), (41, 20), (120, 59)] {
-                let near: Vec<u8> =
-                    own.descriptor(from).as_flattened().iter().map(|b| b.saturating_add(3)).collect();
-                let mut made = Features::none(kind);
-                made.push(own.all[from], &near[..kind.lengths().0]);
-                others.replace(k, &made);
-            }
-            let off = |k: usize, m: usize| distance(others.descriptor(m), own.descriptor(k));
-            let nearest = |k: usize| (0..200).map(|m| (off(k, m), m)).min().expect("there are others");
-            let (found, median) = own.most_alike(&others, 5);
-            assert_eq!(
-                found.iter().take(3).map(|a| a.own).collect::<std::collections::BTreeSet<_>>(),
-                [3, 20, 59].into()
-            );
-            assert!(found.iter().all(|a| nearest(a.own) == (a.off, a.other)), "{kind:?} {found:?}");
-            let mut all: Vec<u32> = (0..60).map(|k| nearest(k).0).collect();
-            all.sort_unstable();
-            assert!((all[15]..=all[45]).contains(&median), "{kind:?} {median} {all:?}");
-        }
-    }
-
-    impl Features {
-        /// Puts the only feature of others in the place of one.
-        fn replace(&mut self, k: usize, by: &Features) {
-            let (each, code) = (by.blocks.len(), by.codes.len());
-            self.all[k] = by.all[0];
-            self.blocks[k * each..(k + 1) * each].copy_from_slice(&by.blocks);
-            self.codes[k * code..(k + 1) * code].copy_from_slice(&by.codes);
-        }
-    }
-
-    #[test]
-    fn what_is_described_alike_at_the_same_place_is_one() {
-        let (mut all, more) = (drawn(Kind::Pattern, 9, 1), drawn(Kind::Pattern, 9, 2));
-        all.add_new(&all.clone());
-        assert_eq!(all.all.len(), 9);
-        all.add_new(&more);
-        assert_eq!((all.all.len(), all.descriptor(17)), (18, more.descriptor(8)));
-    }
 }

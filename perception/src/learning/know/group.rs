@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A place of the model and one of the scene that look alike.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Match<'a> {
-    model: &'a Feature,
-    scene: &'a Feature,
+pub struct Match<'a> {
+    pub model: &'a Feature,
+    pub scene: &'a Feature,
     /// Distance of the descriptors in units of the median of all matches of its kind.
-    off: f32,
+    pub off: f32,
 }
 
 /// Most matches of one kind that are grouped, and most groups begun.
@@ -27,7 +27,7 @@ const FEWEST: usize = 3;
 const OUT_M: f64 = 0.02;
 
 /// Features of the scene with the most alike of the model's, best first.
-pub(super) fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
+pub fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
     let (alike, median) = scene.most_alike(model, MATCHES);
     let median = median.max(1) as f32;
     let found = alike.into_iter().map(|alike| Match {
@@ -40,7 +40,7 @@ pub(super) fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match
 
 /// A pose and the number of matches that speak for it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Vote {
+pub struct Vote {
     pub scene_from_model: Isometry3<f64>,
     pub matches: usize,
 }
@@ -79,7 +79,7 @@ const ONE: (f64, f64) = (0.02, 0.26);
 
 /// Poses of a thing that stands as it stood when it was learned, those that most matches speak for first: where up is known, the place and the normal of one
 /// match say the rest, so that what is small and smooth has a pose by matches that would not agree in groups. `up` is up in the model and in the scene.
-pub(super) fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
+pub fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
     let poses: Vec<Isometry3<f64>> = matches.iter().filter_map(|m| stood(m, up)).collect();
     let is_one = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
         (a.translation.vector - b.translation.vector).norm_squared() < ONE.0 * ONE.0
@@ -127,7 +127,7 @@ fn agree(a: &Match, b: &Match) -> bool {
 }
 
 /// The pose of least squares of the places and of points out along the normals.
-fn pose(group: &[Match]) -> Option<Isometry3<f64>> {
+pub fn pose(group: &[Match]) -> Option<Isometry3<f64>> {
     let out = |f: &Feature| -> [Point3<f64>; 2] {
         let at = f.at.cast::<f64>();
         [at, at + f.normal.cast::<f64>() * OUT_M]
@@ -137,49 +137,4 @@ fn pose(group: &[Match]) -> Option<Isometry3<f64>> {
         [(model[0], scene[0]), (model[1], scene[1])]
     };
     rigid(&group.iter().flat_map(both).collect::<Vec<_>>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_thing_stands_where_single_matches_say() {
-        let feature = |at: [f32; 3], normal: [f32; 3]| Feature {
-            at: Point3::from(at),
-            normal: Vector3::from(normal).normalize(),
-        };
-        let model = [
-            feature([0.04, 0.0, 0.02], [1.0, 0.0, 0.1]),
-            feature([0.0, 0.04, 0.05], [0.0, 1.0, 0.0]),
-            feature([-0.02, 0.03, 0.09], [-0.4, 0.8, 0.0]),
-            // What faces up does not say how it is turned.
-            feature([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]),
-        ];
-        // In the scene, y is down.
-        let up = [Vector3::z(), -Vector3::y()];
-        let upright = Isometry3::rotation(Vector3::x() * std::f64::consts::FRAC_PI_2);
-        let truth = Isometry3::translation(0.3, 0.1, 1.2) * upright * Isometry3::rotation(Vector3::z() * 0.7);
-        // Places are a centimetre off, more than groups allow to differ.
-        let off = [[0.008, 0.0, -0.004], [-0.008, 0.004, 0.0], [0.0, -0.006, 0.008], [0.0; 3]];
-        let scene: Vec<Feature> = model
-            .iter()
-            .zip(off)
-            .map(|(f, off)| Feature {
-                at: (truth * f.at.cast::<f64>()).cast() + Vector3::from(off),
-                normal: (truth.rotation * f.normal.cast::<f64>()).cast(),
-            })
-            .collect();
-        let matches: Vec<Match> =
-            model.iter().zip(&scene).map(|(model, scene)| Match { model, scene, off: 1.0 }).collect();
-        let found = standing(&matches, &up, 9);
-        assert_eq!(found.len(), 1);
-        let pose = found[0].scene_from_model;
-        assert_eq!(found[0].matches, 3);
-        assert!((pose.translation.vector - truth.translation.vector).norm() < 0.015, "{pose}");
-        assert!(pose.rotation.angle_to(&truth.rotation) < 0.1, "{pose}");
-        assert!((pose.rotation * up[0]).angle(&up[1]) < 1e-6);
-        // Two are too few.
-        assert!(standing(&matches[..2], &up, 9).is_empty());
-    }
 }

@@ -13,7 +13,7 @@ use crate::visibility::DepthMap;
 use nalgebra::{Isometry3, Point3};
 
 /// What a camera saw, in its own frame.
-pub(super) struct Seen {
+pub struct Seen {
     pub skin: Skin,
     /// True for points of planes that are wider than any model.
     pub wide: Vec<bool>,

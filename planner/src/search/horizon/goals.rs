@@ -37,7 +37,7 @@ fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<V
 }
 
 /// From the ways to bring each goal about, each with the goals that it clashes with: the goals in order.
-fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
+pub fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
     let goals = ways.len();
     // By goal: those that come before it, directly or not.
     let mut before = vec![vec![false; goals]; goals];
@@ -65,25 +65,4 @@ fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..goals as u32).collect();
     order.sort_by_key(|&goal| before[goal as usize].iter().filter(|&&earlier| earlier).count());
     order
-}
-
-#[cfg(test)]
-mod tests {
-    use super::arranged;
-
-    #[test]
-    fn goals_that_would_be_cut_off_come_first() {
-        for (ways, expected) in [
-            (vec![vec![vec![]], vec![vec![]]], vec![0, 1]),
-            // The first cannot be had once the second holds.
-            (vec![vec![vec![1]], vec![vec![]]], vec![0, 1]),
-            (vec![vec![vec![]], vec![vec![0]]], vec![1, 0]),
-            // A row: from the far end, since the last has one way only, and each then cuts off another way of its neighbour.
-            (vec![vec![vec![], vec![1]], vec![vec![0], vec![2]], vec![vec![1]]], vec![2, 1, 0]),
-            // Each is in the other's way.
-            (vec![vec![vec![1]], vec![vec![0]]], vec![0, 1]),
-        ] {
-            assert_eq!(arranged(&ways), expected, "{ways:?}");
-        }
-    }
 }

@@ -2,8 +2,10 @@
 //! where many operators can share a step and estimates mislead; only for small tasks.
 
 mod form;
-mod goals;
-mod order;
+#[doc(hidden)]
+pub mod goals;
+#[doc(hidden)]
+pub mod order;
 mod support;
 
 use crate::clauses::Literal;
@@ -34,7 +36,7 @@ struct Horizon {
 }
 
 /// The search, which can be gone on with after it ended with [`End::Limit`].
-pub(crate) struct Search<'a, 's> {
+pub struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
@@ -49,13 +51,13 @@ pub(crate) struct Search<'a, 's> {
 
 impl<'a, 's> Search<'a, 's> {
     /// A search that has not begun.
-    pub(crate) fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
+    pub fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
         let counts = Counts::default();
         Search { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
     }
 
     /// What the search took so far.
-    pub(crate) fn counts(&self) -> Counts {
+    pub fn counts(&self) -> Counts {
         self.counts
     }
 
@@ -65,7 +67,7 @@ impl<'a, 's> Search<'a, 's> {
     }
 
     /// Searches on as far as is allowed. Ends with [`End::Exhausted`] where it can do no more, which proves nothing.
-    pub(crate) fn run(&mut self, allowed: Allowed) -> End {
+    pub fn run(&mut self, allowed: Allowed) -> End {
         if !std::mem::replace(&mut self.started, true) {
             self.form = Form::new(self.shared.task, self.shared.mutex_groups);
             let earliest = self.form.as_ref().and_then(|form| form.earliest(self.shared.task));
@@ -146,69 +148,5 @@ impl<'a, 's> Search<'a, 's> {
             true => End::Plan(plan),
             false => End::Exhausted,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::AtomicBool;
-
-    use super::*;
-    use crate::small;
-
-    /// What comes of a search for plans cheaper than a bound: how many operators, if there is a plan.
-    fn check(domain: &str, problem: &str, bound: u32, expected: Option<usize>) {
-        let (_, ground) = small::read(domain, problem);
-        Shared::lend(&ground, |shared| check_shared(shared, bound, expected));
-    }
-
-    fn check_shared(shared: &Shared<'_>, bound: u32, expected: Option<usize>) {
-        let task = shared.task;
-        let mut search = Search::new(shared, bound);
-        let end = loop {
-            // In pieces: going on must make no difference.
-            let work = search.counts().work + 200_000;
-            let cancelled = &AtomicBool::new(false);
-            match search.run(Allowed { work, evaluations: u64::MAX, memory: shared.memory, cancelled }) {
-                End::Limit => {}
-                end => break end,
-            }
-        };
-        let plan = match &end {
-            End::Plan(plan) => Some(plan),
-            _ => None,
-        };
-        assert_eq!(plan.map(Vec::len), expected, "{end:?}");
-        let mut state = task.initial.clone();
-        for &operator in plan.into_iter().flatten() {
-            assert!(task.applicable(operator, &state));
-            task.advance(operator, &mut state);
-        }
-        assert_eq!(task.is_goal(&state), expected.is_some());
-    }
-
-    const LAMPS: &str = "(define (domain lamps) (:requirements :adl) (:types lamp)
-      (:predicates (lit ?l - lamp) (dark))
-      (:action light :parameters (?l - lamp) :precondition (not (lit ?l)) :effect (lit ?l))
-      (:action quench :parameters (?l - lamp) :effect (not (lit ?l))))";
-
-    #[test]
-    fn plans_are_found_whatever_shares_a_step() {
-        check(small::SHUTTLE, small::ROW, u32::MAX, Some(4));
-        check(small::SHUTTLE, small::ROW, 5, Some(4));
-        check(small::SHUTTLE, small::ROW, 4, None);
-        // Nothing to be done, and many things at once.
-        let lamps = "(define (problem p) (:domain lamps) (:objects a b c - lamp) (:init (lit a)) (:goal ";
-        check(LAMPS, &format!("{lamps} (lit a)))"), u32::MAX, Some(0));
-        check(LAMPS, &format!("{lamps} (and (not (lit a)) (lit b) (lit c))))"), u32::MAX, Some(3));
-    }
-
-    #[test]
-    fn tasks_of_other_kinds_are_left_alone() {
-        let when = "(when (dark) (not (lit ?l))))\n (:action draw :effect (not (dark)))";
-        let problem = "(define (problem p) (:domain lamps) (:objects a - lamp) (:init (lit a) (dark))
-          (:goal (not (lit a))))";
-        check(LAMPS, problem, u32::MAX, Some(1));
-        check(&LAMPS.replace("(not (lit ?l))))", &format!("{when})")), problem, u32::MAX, None);
     }
 }

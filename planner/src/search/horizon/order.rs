@@ -57,7 +57,7 @@ pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
 }
 
 /// By node: the number of its strong component; those that it leads to have lower ones (Tarjan 1972).
-fn components(edges: &[Vec<u32>]) -> Vec<u32> {
+pub fn components(edges: &[Vec<u32>]) -> Vec<u32> {
     const OPEN: u32 = u32::MAX;
     let mut found = vec![OPEN; edges.len()];
     let (mut index, mut low) = (vec![OPEN; edges.len()], vec![0u32; edges.len()]);
@@ -99,22 +99,4 @@ fn components(edges: &[Vec<u32>]) -> Vec<u32> {
         }
     }
     found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::components;
-
-    #[test]
-    fn circles_are_found_and_what_they_lead_to_comes_first() {
-        for (edges, expected) in [
-            (vec![vec![], vec![]], vec![0, 1]),
-            (vec![vec![1], vec![]], vec![1, 0]),
-            (vec![vec![1], vec![0]], vec![0, 0]),
-            (vec![vec![1], vec![2], vec![1, 3], vec![]], vec![2, 1, 1, 0]),
-            (vec![vec![1, 2], vec![3], vec![3], vec![0, 4], vec![4]], vec![1, 1, 1, 1, 0]),
-        ] {
-            assert_eq!(components(&edges), expected, "{edges:?}");
-        }
-    }
 }

@@ -12,7 +12,8 @@ mod oracle;
 mod random;
 mod rear_side;
 mod sweep;
-mod unseen;
+#[doc(hidden)]
+pub mod unseen;
 
 use std::collections::BTreeSet;
 
@@ -207,7 +208,7 @@ fn open(situation: &Situation) -> Vec<Look> {
 }
 
 /// Seconds of driving to a candidate, through doors that would have to be opened first where no other way leads.
-fn travel_s(situation: &Situation, to: usize) -> f64 {
+pub fn travel_s(situation: &Situation, to: usize) -> f64 {
     let through_all = || situation.travel_past_s(situation.at, to, &BTreeSet::new());
     match situation.travel_s(situation.at, to) {
         _ if to == situation.at => 0.0,
@@ -217,14 +218,14 @@ fn travel_s(situation: &Situation, to: usize) -> f64 {
 }
 
 /// The share of what the goal leaves in doubt that a look would settle.
-fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
+pub fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
     let doubts = situation.doubts();
     let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, (from, on), Taken::default()));
     shares.sum::<f64>() / doubts.len() as f64
 }
 
 /// The look of the greatest value; among equals the nearest, then the first.
-fn best(looks: &[Look], value: impl Fn(&Look) -> f64) -> Option<Look> {
+pub fn best(looks: &[Look], value: impl Fn(&Look) -> f64) -> Option<Look> {
     let valued = looks.iter().map(|look| (value(look), look));
     let better = |a: &(f64, &Look), b: &(f64, &Look)| {
         a.0.total_cmp(&b.0)
@@ -233,32 +234,4 @@ fn best(looks: &[Look], value: impl Fn(&Look) -> f64) -> Option<Look> {
             .then(b.1.on.cmp(&a.1.on))
     };
     valued.max_by(better).map(|(_, look)| *look)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_and_errors() {
-        for name in names() {
-            let made = named(name, 1, Some(Box::new(|_, _| 0.0)));
-            assert!(made.is_ok(), "{name}");
-        }
-        let error = |name: &str| named(name, 1, None).err().map(|e| e.to_string()).unwrap_or_default();
-        assert_eq!(
-            error("best"),
-            "no policy is called \"best\"\n  expected one of: plan, sweep, nearest, nearest-surface, random, most-unknown, rear-side, gain-per-second, oracle"
-        );
-        assert!(error("oracle").contains("experiments"), "{}", error("oracle"));
-    }
-
-    #[test]
-    fn ties_go_to_the_nearest_then_the_first() {
-        let look = |from, travel_s, gain| Look { from, on: 0, travel_s, gain };
-        let looks = [look(0, 5.0, 0.4), look(1, 3.0, 0.4), look(2, 3.0, 0.4), look(3, 1.0, 0.2)];
-        assert_eq!(best(&looks, |l| l.gain).map(|l| l.from), Some(1));
-        assert_eq!(best(&looks, |_| 0.0).map(|l| l.from), Some(3));
-        assert_eq!(best(&[], |_| 0.0), None);
-    }
 }

@@ -26,7 +26,7 @@ pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point
 }
 
 /// The grid above a surface's outline.
-fn above(surface: &KnownSurface) -> Vec<Point3<f64>> {
+pub fn above(surface: &KnownSurface) -> Vec<Point3<f64>> {
     let Some(centre) = surface.centre() else { return Vec::new() };
     let helper = if surface.up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     let e1 = surface.up.cross(&helper).normalize();
@@ -52,32 +52,4 @@ fn covers(surface: &KnownSurface, point: &Point3<f64>) -> bool {
         surface.up.cross(&(b - a)).dot(&(point - a)) >= 0.0
     };
     n >= 3 && (0..n).all(inside)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_grid_fills_the_space_above_the_outline() {
-        let outline =
-            [(0.0, 0.0), (0.4, 0.0), (0.4, 0.2), (0.0, 0.2)].map(|(x, y)| Point3::new(x, y, 0.7)).to_vec();
-        let (symbol, name) = ("table".into(), "table".into());
-        let (room, floor, up) = (None, Vec::new(), Vector3::z());
-        let surface = KnownSurface {
-            symbol,
-            name,
-            room,
-            floor,
-            outline,
-            up,
-            whole: true,
-            doubtful: None,
-            placed: None,
-        };
-        let points = above(&surface);
-        assert_eq!(points.len(), 9 * 5 * 6);
-        assert!(points.iter().all(|p| p.z > 0.7 && p.z < 1.0 && p.x > -0.01 && p.x < 0.41));
-        assert_eq!(above(&KnownSurface { outline: vec![], ..surface }), vec![]);
-    }
 }

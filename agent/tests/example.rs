@@ -1,7 +1,6 @@
 //! The example of an own body keeps the promises of bodies, and the agent comes to a verdict with it.
 
-#[path = "../examples/own_body.rs"]
-mod own_body;
+use crate::own_body;
 
 #[test]
 fn the_example_passes_and_is_lived_with() {

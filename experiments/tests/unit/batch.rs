@@ -1,12 +1,13 @@
 //! The whole way from a kind of experiment to its results, with a kind that only counts.
 
 use descry_agent::stop::Stop;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
+use descry_experiments::kinds::Kind;
+use descry_experiments::kinds::{Head, Summary};
+use descry_experiments::*;
 use serde_json::json;
-
-use super::kinds::{Head, Summary};
-use super::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Squares numbers; some jobs fail, and some panic.
 struct Squares {

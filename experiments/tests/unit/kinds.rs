@@ -1,7 +1,10 @@
 //! Experiment files as people write them, and each kind on a small scale.
 
-use super::*;
 use descry_agent::stop::Stop;
+use descry_domains::load::{Domain, program_texts};
+use descry_experiments::kinds::*;
+use descry_experiments::{Row, Source};
+use std::path::Path;
 
 /// A file of the tabletop by its name alone, of another domain with the domain before it.
 fn shipped(name: &str) -> String {
@@ -189,7 +192,7 @@ fn one_job(text: String, number: usize) -> Row {
 #[test]
 fn a_run_is_held_against_the_truth() {
     let row = one_job(shipped("where-to-look.toml"), 0);
-    let measured = trial::Measured::read(0, &row);
+    let measured = descry_experiments::kinds::trial::Measured::read(0, &row);
     assert!(measured.is_some_and(|m| m.present && m.views >= 1.0 && m.seconds > 0.0), "{row:?}");
 }
 

@@ -1,0 +1,7 @@
+//! What the agent promises, from outside: one program, so that what all tests share is built and linked once.
+
+#[path = "../examples/own_body.rs"]
+mod own_body;
+
+mod example;
+mod unit;

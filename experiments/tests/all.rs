@@ -1,0 +1,3 @@
+//! What batches of runs promise, from outside: one program, so that what all tests share is built and linked once.
+
+mod unit;

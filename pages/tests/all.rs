@@ -1,0 +1,3 @@
+//! What pages promise, from outside: one program, so that what all tests share is built and linked once.
+
+mod unit;

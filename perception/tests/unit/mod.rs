@@ -1,0 +1,37 @@
+//! Tests of single modules.
+
+mod calibration;
+mod files_depth;
+mod files_lzf;
+mod hull;
+mod laser_least_squares;
+mod laser_simplex;
+mod lattice;
+mod learning_know_evidence;
+mod learning_know_feature;
+mod learning_know_group;
+mod learning_know_skin;
+mod learning_know_stood;
+mod learning_mask;
+mod locate;
+mod mapping_frontier;
+mod mapping_graph;
+mod mapping_orientation;
+mod mapping_station;
+mod noise;
+mod outline;
+mod picture;
+mod pool;
+mod recognise_body;
+mod recognise_ends;
+mod recognise_upper;
+mod round;
+mod segment_quantile;
+mod segment_stand;
+mod segment_vessels;
+mod segment_votes;
+mod spread;
+mod surface_hull;
+mod surface_outline;
+mod surface_tiles;
+mod visibility;

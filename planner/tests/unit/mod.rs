@@ -1,0 +1,32 @@
+//! Tests of single modules.
+
+mod attachment_registry;
+mod clauses_solver;
+mod ground_invariants;
+mod ground_pairs;
+mod heuristics_intervals;
+mod heuristics_landmarks;
+mod memory;
+mod model_agreement;
+mod model_between;
+mod model_relation;
+mod pddl_format;
+mod plan;
+mod plan_format;
+mod search_abreast;
+mod search_horizon;
+mod search_horizon_goals;
+mod search_horizon_order;
+mod search_improve;
+mod search_lookahead;
+mod search_novelty;
+mod search_run;
+mod small;
+mod temporal_compress;
+mod temporal_envelope;
+mod temporal_joined;
+mod temporal_mentions;
+mod temporal_order;
+mod temporal_schedule;
+mod temporal_tours;
+mod validate;

@@ -13,7 +13,7 @@ use crate::abilities::searching::adrift;
 use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
-use crate::goal::{Goal, put_in};
+use crate::goal::Goal;
 use crate::lexicon::{Lexicon, plural, symbol};
 use crate::mind::Mind;
 use crate::situation::{Situation, Thing};
@@ -467,17 +467,15 @@ impl Asker<'_> {
             Verdict::Impossible | Verdict::Failed => &None,
         };
         let text = text.as_ref()?;
-        // What is asked of the state stands for symbols, the rest for names.
         let mut out = String::new();
         let mut rest = text.as_str();
         while let Some((before, behind)) = rest.split_once('{') {
-            let (inside, after) = behind.split_once('}').unwrap_or((behind, ""));
+            let (atom, after) = behind.split_once('}').unwrap_or((behind, ""));
             out += before;
-            let atom = put_in(inside, &self.goal.slots, |f| f.symbol.clone()).ok()?;
-            out += &self.value(&atom);
+            out += &self.value(atom);
             rest = after;
         }
-        put_in(&(out + rest), &self.goal.slots, |f| f.name.clone()).ok()
+        Some(out + rest)
     }
 
     /// What has changed on a surface since an earlier run looked at it.

@@ -34,6 +34,8 @@ pub struct Denied {
 
 /// The function that says how sure it is that a thing is on a surface: a question about that surface alone.
 const PRESENCE: &str = "presence";
+/// The function that says how exactly it is known where a thing stands, wherever that is: it asks about no place.
+const PLACED: &str = "placed";
 /// The function that says how sure it is what stands on a surface.
 const CLARITY: &str = "clarity";
 /// The predicate that says in which room a surface is.
@@ -45,6 +47,7 @@ impl Asked {
     /// Reads a condition.
     pub fn of(condition: &str, vocabulary: &Vocabulary) -> Self {
         let mut asked = Self::default();
+        let mut placed = Vec::new();
         for Mention { words: mention, is_denied, rooms: within } in signed(condition) {
             let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
             let is_denied = is_denied && OF_OBJECTS.contains(&word.name.as_str());
@@ -59,6 +62,10 @@ impl Asked {
             let mut surfaces: Vec<String> = of("surface").collect();
             let anywhere = within.is_empty() && named("surface").any(|a| a.starts_with('?'));
             surfaces.extend(within);
+            if word.name == PLACED {
+                placed.extend(of("thing"));
+                continue;
+            }
             for thing in of("thing") {
                 let restricted = (word.name == PRESENCE || is_denied) && !anywhere && !surfaces.is_empty();
                 note(&mut asked.things, thing, restricted.then(|| surfaces.clone()));
@@ -74,6 +81,11 @@ impl Asked {
             }
             if word.name == CLARITY {
                 asked.surfaces.extend(surfaces);
+            }
+        }
+        for thing in placed {
+            if asked.things.iter().all(|(known, _)| *known != thing) {
+                asked.things.push((thing, None));
             }
         }
         asked

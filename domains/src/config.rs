@@ -80,6 +80,9 @@ fn total_time() -> String {
 pub struct GoalPhrase {
     /// Words and `<slots>`. A slot is called after the type that fills it; where two slots are of one type, `<first:thing>`.
     pub say: String,
+    /// Other words for the same, with the same slots.
+    #[serde(default)]
+    pub also: Vec<String>,
     /// The goal condition in PDDL, with the same slots.
     pub means: String,
     /// Whether the answer is yes or no. Nothing is carried to make it yes.
@@ -94,6 +97,13 @@ pub struct GoalPhrase {
     /// What is answered.
     #[serde(default)]
     pub answer: Answers,
+}
+
+impl GoalPhrase {
+    /// Every wording, the usual one first.
+    pub fn ways(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&self.say).chain(&self.also).map(String::as_str)
+    }
 }
 
 /// What a phrase answers, by how the run ended. `<slots>` stand for what was said, `{(on <thing> ?)}` for the names of the

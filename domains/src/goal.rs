@@ -1,9 +1,17 @@
 //! From what a person says to a PDDL goal, by the phrases of the domain.
 
+mod ending;
+mod english;
+mod nearest;
+mod sentence;
+
 use crate::asked::Asked;
-use crate::config::{Answers, GoalPhrase};
-use crate::lexicon::{Lexicon, Named, symbol};
+use crate::config::Answers;
+use crate::lexicon::Lexicon;
 use crate::load::Domain;
+use ending::Wanted;
+pub(crate) use ending::{CONFIDENCE, DEADLINE};
+use sentence::{Clause, Joint, Miss, Reader, Sentence};
 
 /// A goal that a person gave, with what it means in the planner's language.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,6 +112,20 @@ pub enum GoalError {
         /// What may follow.
         example: &'static str,
     },
+    /// "and" beside "or", two lists of names, and "or" between what is to be known as a whole may be meant in several ways.
+    #[error("\"{said}\" may be meant in several ways\n  say it with \"and\" alone, or as goals of their own")]
+    Several {
+        /// The words as they were given.
+        said: String,
+    },
+    /// A question stands beside a task.
+    #[error(
+        "\"{said}\" is a question and a task\n  a question changes nothing: ask first, then say what is to be done"
+    )]
+    Apart {
+        /// The words as they were given.
+        said: String,
+    },
     /// The phrase itself cannot be used.
     #[error("the phrase \"{phrase}\" in domain.toml: {because}")]
     BadPhrase {
@@ -114,40 +136,54 @@ pub enum GoalError {
     },
 }
 
-/// Reads a goal in the words of the domain.
+/// Reads a goal in the words of the domain: a phrase, or several joined by "and" or "or".
 ///
 /// # Errors
 /// [`GoalError`] names what could have been said instead.
 pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, GoalError> {
-    let (words, wanted) = conditions(said)?;
-    let mut nearest_miss = None;
-    for phrase in &domain.config.goal {
-        for slots in fits(&phrase.say, &words) {
-            match fill(lexicon, &domain.config.open, &slots) {
-                Ok(filled) => return goal_of(said, phrase, filled, wanted, domain),
-                Err(found) => nearest_miss = nearest_miss.or(Some(found)),
+    let (words, wanted) = ending::conditions(said)?;
+    let mut reader = Reader::new(domain, lexicon);
+    let plain = english::plain(&words);
+    let literal = reader.literal(&english::unlisted(&words));
+    reader.misses.clear();
+    let read = literal.or_else(|| reader.sentence(&english::unlisted(&plain)));
+    match read.or_else(|| reader.sentence(&plain)) {
+        Some(sentence) => goal_of(said, &sentence, wanted, domain),
+        None if reader.is_mixed => Err(GoalError::Several { said: said.into() }),
+        None => Err(not_understood(said, &plain, reader)),
+    }
+}
+
+/// Nothing fits: the nearest goals, and what could be said.
+fn not_understood(said: &str, plain: &[String], reader: Reader<'_>) -> GoalError {
+    let Reader { domain, lexicon, misses, .. } = reader;
+    let near = nearest::nearest(plain, domain, lexicon);
+    let goals: Vec<String> = near.goals.iter().map(|goal| format!("\"{goal}\"")).collect();
+    let meant = (!goals.is_empty()).then(|| format!("  did you mean {}?", goals.join(", or ")));
+    let domain_name = domain.config.name.clone();
+    // A word in a slot is a name that is not known, unless there is more in it than a name.
+    let is_name = |miss: &&Miss| !nearest::has_name(&miss.found, domain, lexicon);
+    match misses.iter().filter(is_name).min_by_key(|miss| miss.found.len()) {
+        Some(miss) => GoalError::NoSuchName {
+            suggestions: meant
+                .into_iter()
+                .chain([name_suggestions(lexicon, miss)])
+                .collect::<Vec<_>>()
+                .join("\n"),
+            found: miss.found.clone(),
+            domain: domain_name,
+        },
+        None => {
+            let left = (!near.left.is_empty() && !goals.is_empty())
+                .then(|| format!("  \"{}\" is not understood here", near.left));
+            let all = left.into_iter().chain(meant).chain([phrase_suggestions(domain, lexicon)]);
+            GoalError::NoPhrase {
+                said: said.into(),
+                suggestions: all.collect::<Vec<_>>().join("\n"),
+                domain: domain_name,
             }
         }
     }
-    let domain_name = domain.config.name.clone();
-    Err(match nearest_miss {
-        Some(miss) => GoalError::NoSuchName {
-            suggestions: name_suggestions(lexicon, &miss),
-            found: miss.found,
-            domain: domain_name,
-        },
-        None => GoalError::NoPhrase {
-            said: said.into(),
-            suggestions: phrase_suggestions(domain, lexicon),
-            domain: domain_name,
-        },
-    })
-}
-
-/// A slot that holds a word which nothing is called.
-struct Miss {
-    of_type: String,
-    found: String,
 }
 
 /// The type that fills a slot: `thing` of `thing` and of `first:thing`.
@@ -205,80 +241,83 @@ pub fn put_in(text: &str, slots: &[Filled], with: impl Fn(&Filled) -> String) ->
     Ok(out)
 }
 
-fn goal_of(
-    said: &str,
-    phrase: &GoalPhrase,
-    slots: Vec<Filled>,
-    wanted: Wanted,
-    domain: &Domain,
-) -> Result<Goal, GoalError> {
-    let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
-    let usual = phrase.confidence.unwrap_or(domain.config.thresholds.confidence);
-    let threshold = wanted.confidence.unwrap_or(usual);
-    let means = phrase.means.replace("<threshold>", &threshold.to_string());
-    let pddl = put_in(&means, &slots, |f| f.symbol.clone()).map_err(bad)?;
-    let asked = Asked::of(&pddl, &domain.vocabulary);
+fn goal_of(said: &str, sentence: &Sentence<'_>, wanted: Wanted, domain: &Domain) -> Result<Goal, GoalError> {
+    let question = sentence.is_question(said)?;
+    let usual = |c: &Clause<'_>| c.phrase.confidence.unwrap_or(domain.config.thresholds.confidence);
+    let threshold =
+        wanted.confidence.unwrap_or_else(|| sentence.clauses.iter().map(usual).fold(0.0, f64::max));
+    let parts: Vec<String> =
+        sentence.clauses.iter().map(|c| condition(c, threshold, domain)).collect::<Result<_, _>>()?;
+    let joint = if sentence.joint == Joint::And { "and" } else { "or" };
+    // "which cups are in the kitchen or the study": either would do, or both?
+    let is_whole = |part: &String| {
+        let asked = Asked::of(part, &domain.vocabulary);
+        !asked.kinds.is_empty() || !asked.surfaces.is_empty()
+    };
+    if sentence.joint == Joint::Or && parts.len() > 1 && parts.iter().any(is_whole) {
+        return Err(GoalError::Several { said: said.into() });
+    }
+    let pddl = match parts.as_slice() {
+        [only] => only.clone(),
+        several => format!("({joint} {})", several.join(" ")),
+    };
+    let says: Vec<&str> = sentence.clauses.iter().map(|c| c.phrase.say.as_str()).collect();
     Ok(Goal {
         said: said.into(),
-        phrase: phrase.say.clone(),
+        phrase: says.join(&format!(" {joint} ")),
+        asked: Asked::of(&pddl, &domain.vocabulary),
         pddl,
-        asked,
-        slots,
-        question: phrase.question,
-        answer: phrase.answer.clone(),
+        slots: sentence.clauses.iter().flat_map(|c| c.slots.clone()).collect(),
+        question,
+        answer: answers(sentence)?,
         threshold,
         deadline_s: wanted.deadline_s,
     })
 }
 
-/// How sure, and how soon.
-#[derive(Clone, Copy)]
-pub struct Wanted {
-    confidence: Option<f64>,
-    deadline_s: Option<f64>,
+/// What a clause means, in PDDL.
+fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<String, GoalError> {
+    let phrase = clause.phrase;
+    let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
+    let means = phrase.means.replace("<threshold>", &threshold.to_string());
+    let means = put_in(&means, &clause.slots, |f| f.symbol.clone()).map_err(bad)?;
+    let nowhere = || bad("it cannot be restricted to a place".into());
+    sentence::restricted(&means, &clause.within, domain).ok_or_else(nowhere)
 }
 
-/// Behind these words a goal says how sure it must be.
-pub(crate) const CONFIDENCE: [&str; 2] = ["with", "confidence"];
-/// Behind this word a goal says how soon it must be.
-pub(crate) const DEADLINE: [&str; 1] = ["within"];
+/// What the clauses answer, with what fills their slots: one after the other where all are asked for; their own answers are none of
+/// which may hold alone, nor where one of them has none.
+fn answers(sentence: &Sentence<'_>) -> Result<Answers, GoalError> {
+    let is_joined = sentence.joint == Joint::And;
+    let of = |pick: &dyn Fn(&Answers) -> &Option<String>| -> Result<Option<String>, GoalError> {
+        let texts = sentence.clauses.iter().map(|clause| {
+            let bad = |because| GoalError::BadPhrase { phrase: clause.phrase.say.clone(), because };
+            pick(&clause.phrase.answer)
+                .as_ref()
+                .map(|text| answer_of(text, &clause.slots).map_err(bad))
+                .transpose()
+        });
+        let texts: Option<Vec<String>> = texts.collect::<Result<Vec<_>, _>>()?.into_iter().collect();
+        Ok(texts.filter(|texts| is_joined || texts.len() == 1).map(|texts| texts.join("; ")))
+    };
+    Ok(Answers {
+        achieved: of(&|a| &a.achieved)?,
+        not_found: of(&|a| &a.not_found)?,
+        cannot_tell: of(&|a| &a.cannot_tell)?,
+    })
+}
 
-/// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
-pub fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
-    let mut words: Vec<String> =
-        said.split_whitespace().map(|w| bare(w).to_lowercase()).filter(|w| !w.is_empty()).collect();
-    let mut wanted = Wanted { confidence: None, deadline_s: None };
-    loop {
-        let confidence = words.windows(2).rposition(|w| w == CONFIDENCE);
-        let within = words.windows(1).rposition(|w| w == DEADLINE);
-        match (confidence, within) {
-            (Some(at), within) if within.is_none_or(|w| w < at) => {
-                let found = words.split_off(at)[2..].join(" ");
-                let other = wanted.confidence.replace(confidence_of(found)?);
-                once(other, "with confidence", "0.9")?;
-            }
-            (_, Some(at)) => {
-                let found = words.split_off(at)[1..].join(" ");
-                let other = wanted.deadline_s.replace(seconds(found)?);
-                once(other, "within", "60 seconds")?;
-            }
-            _ => return Ok((words, wanted)),
-        }
+/// An answer with what fills its slots: symbols in braces, where the state is asked, and names elsewhere.
+fn answer_of(text: &str, slots: &[Filled]) -> Result<String, String> {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some((before, behind)) = rest.split_once('{') {
+        let (inside, after) = behind.split_once('}').unwrap_or((behind, ""));
+        let atom = put_in(inside, slots, |f| f.symbol.clone())?;
+        out += &format!("{}{{{atom}}}", put_in(before, slots, |f| f.name.clone())?);
+        rest = after;
     }
-}
-
-/// That nothing was said of a condition before.
-fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> Result<(), GoalError> {
-    other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
-}
-
-/// "0.9": a yes must be likelier than a no.
-fn confidence_of(found: String) -> Result<f64, GoalError> {
-    match found.parse::<f64>() {
-        Ok(c) if c > 0.5 && c < 1.0 => Ok(c),
-        Ok(c) if c > 0.0 && c < 1.0 => Err(GoalError::LowConfidence { found }),
-        _ => Err(GoalError::BadConfidence { found }),
-    }
+    Ok(out + &put_in(rest, slots, |f| f.name.clone())?)
 }
 
 /// A word without the signs around it.
@@ -286,66 +325,32 @@ pub(crate) fn bare(word: &str) -> &str {
     word.trim_matches(|c: char| "\"'.,!?".contains(c))
 }
 
-/// "60 s", "60s", "60 seconds", "1.5 minutes"; a number alone may be meant as either.
-pub fn seconds(found: String) -> Result<f64, GoalError> {
-    let end = found.find(|c: char| c.is_alphabetic()).unwrap_or(found.len());
-    let (number, unit) = (found[..end].trim().parse::<f64>().ok(), &found[end..]);
-    let factor = match unit {
-        "s" | "second" | "seconds" => 1.0,
-        "min" | "minute" | "minutes" => 60.0,
-        "" if number.is_some_and(|n| n > 0.0) => return Err(GoalError::NoUnit { found }),
-        _ => return Err(GoalError::BadDeadline { found }),
+/// The ways in which words fit a pattern with slots, each slot with what it holds; a slot takes one word or more.
+pub fn fits<'a>(
+    pattern: &[&'a str],
+    words: &[String],
+    is_same: fn(&str, &str) -> bool,
+) -> Vec<Vec<(&'a str, String)>> {
+    let Some((&head, rest)) = pattern.split_first() else {
+        return if words.is_empty() { vec![Vec::new()] } else { Vec::new() };
     };
-    let wanted_s = number.map(|n| n * factor).filter(|s| *s > 0.0 && s.is_finite());
-    wanted_s.ok_or(GoalError::BadDeadline { found })
-}
-
-/// The ways in which words fit a phrase with slots, each slot with what it holds; a slot takes one word or more.
-pub fn fits<'a>(say: &'a str, words: &[String]) -> Vec<Vec<(&'a str, String)>> {
-    fn step<'a>(pattern: &[&'a str], words: &[String]) -> Vec<Vec<(&'a str, String)>> {
-        let Some((&head, rest)) = pattern.split_first() else {
-            return if words.is_empty() { vec![Vec::new()] } else { Vec::new() };
-        };
-        let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) else {
-            let fits = words.first().is_some_and(|word| *word == head.to_lowercase());
-            return if fits { step(rest, &words[1..]) } else { Vec::new() };
-        };
-        let with = |n: usize| {
-            let held = (slot, words[..n].join(" "));
-            step(rest, &words[n..]).into_iter().map(move |mut found| {
-                found.insert(0, held.clone());
-                found
-            })
-        };
-        (1..=words.len()).flat_map(with).collect()
-    }
-    step(&pattern(say), words)
+    let Some(slot) = head.strip_prefix('<').and_then(|h| h.strip_suffix('>')) else {
+        let fits_here = words.first().is_some_and(|word| is_same(word, &head.to_lowercase()));
+        return if fits_here { fits(rest, &words[1..], is_same) } else { Vec::new() };
+    };
+    let with = |n: usize| {
+        let held = (slot, words[..n].join(" "));
+        fits(rest, &words[n..], is_same).into_iter().map(move |mut found| {
+            found.insert(0, held.clone());
+            found
+        })
+    };
+    (1..=words.len()).flat_map(with).collect()
 }
 
 /// The words and slots of a phrase, without the signs around them.
-pub(crate) fn pattern(say: &str) -> Vec<&str> {
+pub fn pattern(say: &str) -> Vec<&str> {
     say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect()
-}
-
-fn fill(lexicon: &Lexicon, open: &[String], slots: &[(&str, String)]) -> Result<Vec<Filled>, Miss> {
-    let mut filled: Vec<Filled> = Vec::new();
-    for (slot, found) in slots {
-        let (of_type, wanted) = (type_of_slot(slot), without_article(found));
-        let is_called = |n: &&Named| n.names.iter().any(|name| symbol(name) == symbol(wanted));
-        let is_free = || open.iter().any(|of| of == of_type) && lexicon.is_free(&symbol(wanted));
-        let (called, name) = match lexicon.of_type(of_type).iter().find(is_called) {
-            Some(named) => (named.symbol.clone(), lexicon.name_of(&named.symbol).to_string()),
-            None if is_free() => (symbol(wanted), wanted.to_string()),
-            None => return Err(Miss { of_type: of_type.into(), found: wanted.into() }),
-        };
-        filled.push(Filled {
-            slot: (*slot).into(),
-            number: filled.iter().filter(|f| f.slot == *slot).count(),
-            symbol: called,
-            name,
-        });
-    }
-    Ok(filled)
 }
 
 pub(crate) fn without_article(name: &str) -> &str {
@@ -374,12 +379,7 @@ fn phrase_suggestions(domain: &Domain, lexicon: &Lexicon) -> String {
 
 fn name_suggestions(lexicon: &Lexicon, miss: &Miss) -> String {
     let names: Vec<&String> = lexicon.of_type(&miss.of_type).iter().flat_map(|n| &n.names).collect();
-    let distance = |name: &str| strsim::levenshtein(&name.to_lowercase(), &miss.found);
-    let nearest = names.iter().min_by_key(|n| distance(n));
     let mut lines = Vec::new();
-    if let Some(nearest) = nearest.filter(|n| distance(n) <= 2) {
-        lines.push(format!("  did you mean \"{nearest}\"?"));
-    }
     lines.push(match names.is_empty() {
         true => {
             format!("  the body knows no {} beforehand, and of this type the domain has none", miss.of_type)

@@ -1,3 +1,4 @@
 //! What domains promise, from outside: one program, so that what all tests share is built and linked once.
 
+mod phrases;
 mod unit;

@@ -1,6 +1,6 @@
 //! Whether all that a phrase says is heard: it can be said, it is no other phrase, and what its slots hold means something.
 
-use descry_planner::Diagnostic;
+use descry_planner::{Diagnostic, Span};
 
 use super::Check;
 use crate::asked::mentions;
@@ -36,32 +36,50 @@ impl Check<'_> {
 
     /// That a phrase has words in it that end every goal: how sure, how soon.
     fn never_said(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
-        let words = shape(phrase);
-        let is_there = |ending: &&[&str]| words.windows(ending.len()).any(|part| part == *ending);
-        let ending = [&CONFIDENCE[..], &DEADLINE[..]].into_iter().find(is_there)?.join(" ");
+        let ends = |say: &str| {
+            let words = shape(say);
+            let is_there = |ending: &&[&str]| words.windows(ending.len()).any(|part| part == *ending);
+            [&CONFIDENCE[..], &DEADLINE[..]].into_iter().find(is_there).map(|ending| ending.join(" "))
+        };
+        let (way, ending) = phrase.ways().enumerate().find_map(|(way, say)| Some((way, ends(say)?)))?;
         let message =
             format!("this phrase cannot be said: behind \"{ending}\" every goal says how sure or how soon");
-        let place = self.toml.within(&["goal", &n.to_string(), "say"], &ending);
+        let place = self.way(n, way, &ending);
         Some(self.error("unsayable", message, place, "say it in other words"))
     }
 
     /// That an earlier phrase has the same words and slots.
     fn said_before(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
-        let mut earlier = self.domain.config.goal[..n].iter();
-        let other = earlier.find(|other| shape(other) == shape(phrase))?;
-        let message = format!("\"{}\" is said above already, and means that", other.say);
-        let place = self.toml.at(&["goal", &n.to_string(), "say"]);
-        Some(self.error("same-phrase", message, place, "leave one of the two out, or say it in other words"))
+        let all = self.domain.config.goal[..n].iter().flat_map(GoalPhrase::ways);
+        let mut earlier: Vec<&str> = all.collect();
+        for (way, say) in phrase.ways().enumerate() {
+            if let Some(other) = earlier.iter().find(|other| shape(other) == shape(say)) {
+                let message = format!("\"{other}\" is said above already, and means that");
+                let help = "leave one of the two out, or say it in other words";
+                return Some(self.error("same-phrase", message, self.way(n, way, ""), help));
+            }
+            earlier.push(say);
+        }
+        None
+    }
+
+    /// Where a wording of the `n`-th phrase stands, or a part of it.
+    fn way(&self, n: usize, way: usize, part: &str) -> Span {
+        let n = n.to_string();
+        match way.checked_sub(1) {
+            None => self.toml.within(&["goal", &n, "say"], part),
+            Some(other) => self.toml.within(&["goal", &n, "also", &other.to_string()], part),
+        }
     }
 }
 
 /// The words of a phrase, and the types of what fills its slots.
-fn shape(phrase: &GoalPhrase) -> Vec<String> {
+fn shape(say: &str) -> Vec<String> {
     let word = |word: &str| match word.strip_prefix('<').and_then(|word| word.strip_suffix('>')) {
         Some(slot) => format!("<{}>", type_of_slot(slot)),
         None => word.to_lowercase(),
     };
-    pattern(&phrase.say).into_iter().map(word).collect()
+    pattern(say).into_iter().map(word).collect()
 }
 
 fn is_used(phrase: &GoalPhrase, slot: &str) -> bool {

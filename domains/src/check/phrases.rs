@@ -16,12 +16,34 @@ impl Check<'_> {
         let phrases = self.domain.config.goal.iter().enumerate();
         let all = phrases.flat_map(|(n, phrase)| {
             let mut found = self.phrase(&n.to_string(), phrase);
+            found.extend(self.other_slots(&n.to_string(), phrase));
             if found.is_empty() {
                 found = self.unheard(n, phrase);
             }
             found
         });
         all.collect()
+    }
+
+    /// Other wordings that do not have the slots of the phrase.
+    fn other_slots(&self, n: &str, phrase: &GoalPhrase) -> Vec<Diagnostic> {
+        let sorted = |say: &str| {
+            let mut slots: Vec<String> = slots_of(say).into_iter().map(str::to_string).collect();
+            slots.sort_unstable();
+            slots
+        };
+        let others = phrase.also.iter().enumerate().filter(|(_, say)| sorted(say) != sorted(&phrase.say));
+        let told = others.map(|(at, say)| {
+            let message = format!("\"{say}\" does not have the slots of \"{}\"", phrase.say);
+            let place = self.toml.at(&["goal", n, "also", &at.to_string()]);
+            self.error(
+                "other-slots",
+                message,
+                place,
+                "give it the same slots, or make it a phrase of its own",
+            )
+        });
+        told.collect()
     }
 
     fn phrase(&self, n: &str, phrase: &GoalPhrase) -> Vec<Diagnostic> {

@@ -92,7 +92,7 @@ fn how_sure_and_how_soon_are_said_once() {
 fn words_fit_a_phrase_in_every_way() {
     let check = |say: &str, words: &str, expected: &[&[&str]]| {
         let words: Vec<String> = words.split_whitespace().map(str::to_string).collect();
-        let found: Vec<Vec<String>> = fits(say, &words)
+        let found: Vec<Vec<String>> = fits(&pattern(say), &words, |a, b| a == b)
             .into_iter()
             .map(|way| way.into_iter().map(|(_, held)| held).collect())
             .collect();

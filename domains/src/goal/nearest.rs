@@ -1,0 +1,163 @@
+//! What could have been said instead: the phrases of the domain that are nearest to the words, with the names that were given.
+
+use super::{english, pattern, sentence, spoken_types, type_of_slot};
+use crate::lexicon::Lexicon;
+use crate::load::Domain;
+
+/// Suggestions at most.
+const SHOWN: usize = 2;
+/// Words of a long sentence for which a goal is suggested: its first.
+const HEARD: usize = 24;
+/// Share of the letters in which a mistyped word may differ.
+const MISTYPED: f64 = 0.34;
+
+/// A name that occurs among the words.
+struct Mention {
+    of_type: String,
+    name: String,
+    /// Its words, by position.
+    at: std::ops::Range<usize>,
+    is_exact: bool,
+}
+
+/// A phrase, as near to the words as it comes.
+struct Candidate {
+    text: String,
+    /// Words that neither the phrase nor a name in it has.
+    left: Vec<String>,
+    score: f64,
+}
+
+/// What is near to words that are no goal.
+pub(super) struct Nearest {
+    /// Goals that could be said, the nearest first.
+    pub(super) goals: Vec<String>,
+    /// Words that the nearest does not have.
+    pub(super) left: String,
+}
+
+/// The goals that are nearest to words, in plain form.
+pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> Nearest {
+    let words = &words[..words.len().min(HEARD)];
+    let mut mentions = mentions(words, domain, lexicon, true);
+    mentions.extend(self::mentions(words, domain, lexicon, false));
+    let mut all: Vec<Candidate> = Vec::new();
+    for phrase in &domain.config.goal {
+        let ways = phrase.ways().filter_map(|say| candidate(say, words, &mentions, lexicon));
+        // Other wordings of one phrase are no further suggestions.
+        let best = ways.reduce(|a, b| if b.score > a.score { b } else { a });
+        let usual = candidate(&phrase.say, words, &mentions, lexicon);
+        let best = best.zip(usual).map(|(best, usual)| Candidate { text: usual.text, ..best });
+        all.extend(best.filter(|c| all.iter().all(|known| known.text != c.text)));
+    }
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let least = all.first().map_or(0.0, |best| best.score - 1.0).max(0.5);
+    let shown: Vec<Candidate> = all.into_iter().filter(|c| c.score >= least).take(SHOWN).collect();
+    let left = shown.first().map(|c| c.left.join(" ")).unwrap_or_default();
+    Nearest { goals: shown.into_iter().map(|c| c.text).collect(), left }
+}
+
+/// The names among the words, the longest first: exact, or mistyped.
+fn mentions(words: &[String], domain: &Domain, lexicon: &Lexicon, is_exact: bool) -> Vec<Mention> {
+    let mut types = spoken_types(domain);
+    types.push("kind");
+    let mut found = Vec::new();
+    for length in (1..=words.len().min(sentence::NAME_WORDS)).rev() {
+        for from in 0..=words.len() - length {
+            let at = from..from + length;
+            for of in &types {
+                let (names, span) = (lexicon.of_type(of), &words[at.clone()]);
+                let name = match is_exact {
+                    true => sentence::named(names, span).map(|n| n.names[0].clone()),
+                    false => mistyped(names.iter().flat_map(|n| &n.names), &span.join(" ")),
+                };
+                found.extend(name.map(|name| Mention {
+                    of_type: of.to_string(),
+                    name,
+                    at: at.clone(),
+                    is_exact,
+                }));
+            }
+        }
+    }
+    found
+}
+
+/// Whether a name that is known occurs among words.
+pub(super) fn has_name(words: &str, domain: &Domain, lexicon: &Lexicon) -> bool {
+    let words: Vec<String> = words.split(' ').map(str::to_string).collect();
+    !mentions(&words, domain, lexicon, true).is_empty()
+}
+
+/// The name that is meant by a word with a few other letters.
+fn mistyped<'n>(names: impl Iterator<Item = &'n String>, found: &str) -> Option<String> {
+    let distance = |name: &String| strsim::damerau_levenshtein(&name.to_lowercase(), found);
+    let nearest = names.min_by_key(|name| distance(name))?;
+    is_mistyped(found, &nearest.to_lowercase()).then(|| nearest.clone())
+}
+
+/// Whether few letters differ.
+fn is_mistyped(found: &str, wanted: &str) -> bool {
+    let letters = wanted.chars().count().max(found.chars().count());
+    strsim::damerau_levenshtein(found, wanted) as f64 <= MISTYPED * letters as f64
+}
+
+/// How near one word of a phrase is to any of the words; and which.
+fn likeness(wanted: &str, words: &[String], used: &[bool]) -> Option<(usize, f64)> {
+    let of = |word: &str| match word {
+        same if english::is_same(same, wanted) => 2.0,
+        related if english::is_related(related, wanted) => 1.2,
+        other if is_mistyped(other, wanted) => 1.5,
+        _ => 0.0,
+    };
+    let free = words.iter().enumerate().filter(|(n, _)| !used[*n]).map(|(n, word)| (n, of(word)));
+    free.filter(|(_, like)| *like > 0.0).reduce(|a, b| if b.1 > a.1 { b } else { a })
+}
+
+fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexicon) -> Option<Candidate> {
+    let own: Vec<String> = pattern(say).iter().map(|word| word.to_lowercase()).collect();
+    let mut used = vec![false; words.len()];
+    let (mut score, mut text) = (0.0, Vec::new());
+    let slot_of = |word: &str| word.strip_prefix('<')?.strip_suffix('>').map(|s| type_of_slot(s).to_string());
+    let mut names = Vec::new();
+    for of in own.iter().filter_map(|word| slot_of(word)) {
+        let is_free = |m: &&Mention| m.of_type == of && !used[m.at.clone()].contains(&true);
+        match mentions.iter().find(is_free) {
+            Some(mention) => {
+                used[mention.at.clone()].fill(true);
+                score += if mention.is_exact { 2.0 } else { 1.5 };
+                names.push(mention.name.clone());
+            }
+            None => {
+                score -= 0.5;
+                let usual = lexicon.of_type(&of).iter().map(|named| &named.names[0]);
+                names.push(usual.min_by_key(|name| name.len())?.clone());
+            }
+        }
+    }
+    let mut names = names.into_iter();
+    for word in english::joined(&own) {
+        if slot_of(&word).is_some() {
+            text.extend(names.next());
+            continue;
+        }
+        match likeness(&word, words, &used) {
+            Some((n, like)) => {
+                used[n] = true;
+                // The first word of a phrase says what is asked for.
+                score += if text.is_empty() { 1.5 * like } else { like };
+            }
+            None if text.is_empty() => score -= 3.0,
+            None => score -= 0.3,
+        }
+        text.push(word);
+    }
+    let left: Vec<String> = words
+        .iter()
+        .zip(&used)
+        .filter(|(w, used)| !**used && *w != "," && *w != "the")
+        .map(|(w, _)| w.clone())
+        .collect();
+    score -= 0.25 * left.len() as f64;
+    Some(Candidate { text: text.join(" "), left, score })
+}

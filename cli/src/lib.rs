@@ -1,6 +1,7 @@
-//! The command line, and what serves editors.
+//! The command line, and what serves editors and assistants.
 
 pub mod commands;
 pub mod findings;
 pub mod layout;
 pub mod lsp;
+mod mcp;

@@ -13,6 +13,7 @@ mod household;
 mod kills;
 mod live;
 mod lsp;
+mod mcp;
 mod own_domain;
 mod page;
 mod programs;

@@ -16,6 +16,7 @@ pub mod line;
 mod live;
 mod lsp;
 mod manual;
+mod mcp;
 mod memory;
 #[doc(hidden)]
 pub mod name;
@@ -59,6 +60,8 @@ pub enum Command {
     Fmt(fmt::Arguments),
     /// Serve editors: findings, hover, definitions, completion and layout of PDDL, plans and domain.toml (LSP, standard input and output)
     Lsp(lsp::Arguments),
+    /// Serve assistants that call tools: check, plan, validate, run in simulation, explain and more (MCP, standard input and output)
+    Mcp(mcp::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
@@ -109,6 +112,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Check(arguments) => check::run(arguments),
         Command::Fmt(arguments) => fmt::run(arguments),
         Command::Lsp(arguments) => lsp::run(arguments),
+        Command::Mcp(arguments) => mcp::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),

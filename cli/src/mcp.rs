@@ -1,0 +1,168 @@
+//! The Model Context Protocol over standard input and output: JSON-RPC 2.0, a message a line.
+//!
+//! Each tool is a command of descry, carried out by a process of its own: what a call does cannot hurt the server, and a call is
+//! cancelled as a person stops a command.
+
+mod call;
+mod tools;
+
+use std::collections::BTreeMap;
+use std::io::{self, BufRead, Write};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+
+use serde_json::{Value, json};
+
+use call::Call;
+
+/// Versions of the protocol that are spoken, the newest first.
+const VERSIONS: [&str; 4] = ["2025-11-25", "2025-06-18", "2025-03-26", "2024-11-05"];
+/// Bytes of a message at most.
+const MESSAGE_BYTES: usize = 16 << 20;
+
+/// JSON-RPC: the text is no JSON.
+const PARSE_ERROR: i64 = -32700;
+/// JSON-RPC: the message is no request.
+const INVALID_REQUEST: i64 = -32600;
+/// JSON-RPC: there is no such method.
+const METHOD_NOT_FOUND: i64 = -32601;
+/// JSON-RPC: the parameters are not as the method or tool needs them.
+const INVALID_PARAMS: i64 = -32602;
+
+const INSTRUCTIONS: &str = "descry plans in PDDL and has a robot look for things. Check a domain and mend it by its findings before \
+you plan; each finding has a place and most have a mend. `goals` lists what may be said to `run`. A run answers achieved, not_found \
+(all was seen), cannot_tell (something was not, and it says what), impossible or failed; `explain` tells why.";
+
+/// What a server may do.
+pub(crate) struct Served {
+    /// Where runs are written, and below which files may be named.
+    pub(crate) folder: PathBuf,
+    /// The body that callers may have besides the simulated one.
+    pub(crate) robot: Option<String>,
+}
+
+/// Serves until the input ends.
+///
+/// # Errors
+/// The input cannot be read.
+pub(crate) fn serve(served: Served) -> io::Result<()> {
+    let mut server = Server { served: Arc::new(served), calls: BTreeMap::new(), threads: Vec::new() };
+    let mut input = io::stdin().lock();
+    loop {
+        let mut line = Vec::new();
+        let read = io::Read::take(&mut input, MESSAGE_BYTES as u64).read_until(b'\n', &mut line)?;
+        if read == 0 || (read == MESSAGE_BYTES && line.last() != Some(&b'\n')) {
+            break;
+        }
+        if line.iter().all(u8::is_ascii_whitespace) {
+            continue;
+        }
+        match serde_json::from_slice::<Value>(&line) {
+            Ok(message) => server.hear(&message),
+            Err(e) => refuse(&Value::Null, PARSE_ERROR, &format!("the message is no JSON: {e}")),
+        }
+    }
+    server.calls.values().for_each(|call| call.cancel());
+    for thread in server.threads {
+        let _ = thread.join();
+    }
+    Ok(())
+}
+
+struct Server {
+    served: Arc<Served>,
+    /// Calls by the text of their id.
+    calls: BTreeMap<String, Arc<Call>>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Server {
+    fn hear(&mut self, message: &Value) {
+        let parameters = &message["params"];
+        let Some(method) = message["method"].as_str() else {
+            // Nothing is asked of clients, so there is no answer to wait for.
+            if message.get("result").is_none() && message.get("error").is_none() {
+                refuse(&message["id"], INVALID_REQUEST, "a message needs a `method`");
+            }
+            return;
+        };
+        let Some(id) = message.get("id").filter(|id| !id.is_null()) else {
+            if method == "notifications/cancelled"
+                && let Some(call) = self.calls.get(&parameters["requestId"].to_string())
+            {
+                call.cancel();
+            }
+            return;
+        };
+        match method {
+            "initialize" => answer(id, greeting(parameters)),
+            "ping" => answer(id, json!({})),
+            "tools/list" => answer(id, json!({ "tools": tools::listed(self.served.robot.is_some()) })),
+            "tools/call" => self.call(id, parameters),
+            _ => refuse(id, METHOD_NOT_FOUND, &format!("there is no method `{method}` here")),
+        }
+    }
+
+    fn call(&mut self, id: &Value, parameters: &Value) {
+        let name = parameters["name"].as_str().unwrap_or_default();
+        let Some(tool) = tools::named(name) else {
+            let known: Vec<&str> = tools::TOOLS.iter().map(|tool| tool.name).collect();
+            let text = format!("there is no tool `{name}`; there are {}", known.join(", "));
+            return refuse(id, INVALID_PARAMS, &text);
+        };
+        let task = match tool.task(&parameters["arguments"], &self.served) {
+            Ok(task) => task,
+            Err(because) => return refuse(id, INVALID_PARAMS, &because),
+        };
+        let progress = parameters["_meta"].get("progressToken").cloned();
+        self.calls.retain(|_, call| !call.has_ended());
+        self.threads.retain(|thread| !thread.is_finished());
+        let call = Arc::new(Call::default());
+        self.calls.insert(id.to_string(), Arc::clone(&call));
+        let (id, served) = (id.clone(), Arc::clone(&self.served));
+        self.threads.push(std::thread::spawn(move || {
+            let mut steps = 0_u64;
+            let mut tell = |line: &str| {
+                let Some(token) = &progress else { return };
+                steps += 1;
+                let said = json!({ "progressToken": token, "progress": steps, "message": line });
+                say(&json!({ "jsonrpc": "2.0", "method": "notifications/progress", "params": said }));
+            };
+            let result = call.carry_out(&task, &served, &mut tell);
+            // Who cancelled a call waits for no answer.
+            if let Some(result) = result {
+                answer(&id, result);
+            }
+        }));
+    }
+}
+
+fn greeting(parameters: &Value) -> Value {
+    let wanted = parameters["protocolVersion"].as_str().unwrap_or_default();
+    let version = VERSIONS.iter().find(|known| **known == wanted).unwrap_or(&VERSIONS[0]);
+    json!({
+        "protocolVersion": version,
+        "capabilities": { "tools": {} },
+        "serverInfo": { "name": "descry", "version": env!("CARGO_PKG_VERSION") },
+        "instructions": INSTRUCTIONS,
+    })
+}
+
+fn answer(id: &Value, result: Value) {
+    say(&json!({ "jsonrpc": "2.0", "id": id, "result": result }));
+}
+
+fn refuse(id: &Value, code: i64, message: &str) {
+    say(&json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code, "message": message } }));
+}
+
+/// Lines of several threads do not mix.
+static OUT: Mutex<()> = Mutex::new(());
+
+fn say(message: &Value) {
+    let _one = OUT.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut out = io::stdout().lock();
+    // A client that has gone closes the input, too.
+    let _ = writeln!(out, "{message}").and_then(|()| out.flush());
+}

@@ -146,6 +146,20 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// The answer as its kind has it: names and values are both lists of texts where they come as JSON.
+    fn of_kind(self, kind: CallKind) -> Answer {
+        let name = |value: &FactValue| match value {
+            FactValue::Object(name) => Some(name.clone()),
+            _ => None,
+        };
+        match (kind, &self) {
+            (CallKind::Grounding, Answer::Writes(values)) => {
+                values.iter().map(name).collect::<Option<_>>().map_or(self, Answer::Proposals)
+            }
+            _ => self,
+        }
+    }
+
     fn fits(&self, kind: CallKind) -> bool {
         match (kind, self) {
             (CallKind::Cost, Answer::Number(cost)) => *cost >= 0.0,
@@ -255,6 +269,7 @@ where
         self(call)
     }
 }
+
 fn term_text(symbol: &str, arguments: &[&str]) -> String {
     let mut text = format!("({symbol}");
     for argument in arguments {

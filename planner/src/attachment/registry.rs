@@ -288,7 +288,7 @@ impl Registered {
 }
 
 fn checked(answer: Result<Answer, CallError>, call: &Call) -> Result<Answer, CallError> {
-    let answer = answer?;
+    let answer = answer?.of_kind(call.kind);
     if answer.fits(call.kind) {
         return Ok(answer);
     }

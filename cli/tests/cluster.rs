@@ -97,3 +97,31 @@ fn what_cannot_be_divided_is_refused() {
     check_refused(folder, &["experiment", "batch.toml", "--shards", "2"], 2, &["--slurm"]);
     assert!(!folder.join("batch.sh").exists());
 }
+
+#[test]
+fn a_value_of_the_file_may_be_given_on_the_command_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("batch.toml"), BATCH).expect("it can be written");
+    let of = |set: &[&str]| {
+        let mut arguments = vec!["experiment", "batch.toml", "--shards", "1", "--kubernetes", "job.yaml"];
+        arguments.extend(set);
+        let made = outcome(folder.path(), &arguments);
+        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        std::fs::read_to_string(folder.path().join("job.yaml")).expect("it is written")
+    };
+    let plain = of(&[]);
+    let set = of(&["--set", "runs=5", "--set", "goal.0.targets=[\"cup B\"]"]);
+    let changed = plain.replace("runs = 2", "runs = 5").replace("[\\\"cup A\\\"]", "[\\\"cup B\\\"]");
+    assert_ne!(plain, set);
+    assert_eq!(set, changed, "nothing else differs");
+    for (wrong, words) in [
+        ("goal.1.say=\"x\"", "has: 0"),
+        ("rums=5", "has: name, kind, about, domain, scene, runs"),
+        ("goal=5", "no such key"),
+        ("runs", "expected KEY=VALUE"),
+        ("runs=five of them", "no TOML value"),
+        ("runs=5\nfirst_seed=2", "no TOML value"),
+    ] {
+        check_refused(folder.path(), &["experiment", "batch.toml", "--set", wrong], 2, &[words]);
+    }
+}

@@ -1,11 +1,11 @@
-//! Batches of runs: a file says what is varied, every combination is a job, and the jobs become tables with intervals, plots
-//! and one page. A batch goes on where it was cut off, and its shards may be done on many machines.
+#![doc = include_str!("../README.md")]
 
 pub mod cluster;
 pub mod hash;
 pub mod journal;
 pub mod kinds;
 mod live;
+mod overrides;
 pub mod page;
 pub mod plot;
 mod runner;
@@ -112,6 +112,29 @@ impl Source {
             )
         })?;
         Ok(Self { path: path.to_path_buf(), text })
+    }
+
+    /// Replaces one value of the file by that of an assignment `KEY=VALUE`: a path of keys and numbers, and a TOML value.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Input`] if the file has no such key, or the text is no assignment.
+    pub fn set(&mut self, assignment: &str) -> Result<(), ExperimentError> {
+        let refused = |problem: &str, mend: String| {
+            ExperimentError::Input(format!("--set {assignment}: {problem}\n  {mend}"))
+        };
+        let expected = || "expected KEY=VALUE, such as first_seed=7 or set.1.arrangements=10".to_owned();
+        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("no value", expected()))?;
+        if toml::from_str::<toml::Table>(&format!("value = {value}")).map_or(true, |one| one.len() != 1) {
+            return Err(refused("this is no TOML value", expected()));
+        }
+        match overrides::value_at(&self.text, key.trim()) {
+            Ok(span) => self.text.replace_range(span, value.trim()),
+            Err(known) => {
+                let mend = format!("{} has: {}", self.path.display(), known.join(", "));
+                return Err(refused("the file has no such key", mend));
+            }
+        }
+        Ok(())
     }
 }
 

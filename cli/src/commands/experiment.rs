@@ -18,6 +18,9 @@ const LEAST_FREE_BYTES: u64 = 64 << 20;
 pub struct Arguments {
     /// Experiment file (TOML): what is varied and measured
     file: PathBuf,
+    /// Replace a value of the file, such as first_seed=7 or set.1.arrangements=10; may be given several times
+    #[arg(long, value_name = "KEY=VALUE", conflicts_with = "slurm")]
+    set: Vec<String>,
     /// Folder of the results; what it holds of this experiment is not done again [default: results/ and the file's name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -47,7 +50,10 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandError> {
-    let source = Source::read(&arguments.file).map_err(CommandError::bad_input)?;
+    let mut source = Source::read(&arguments.file).map_err(CommandError::bad_input)?;
+    for assignment in &arguments.set {
+        source.set(assignment).map_err(CommandError::bad_input)?;
+    }
     let stem = arguments.file.file_stem().map_or_else(|| "experiment".into(), |stem| stem.to_os_string());
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let options = Options {

@@ -1,19 +1,4 @@
-//! Words and meanings: PDDL text, what may be said, and the Rust that grounds the symbols.
-//!
-//! ```
-//! use descry_domains::goal;
-//! use descry_domains::lexicon::{Lexicon, Places};
-//! use descry_domains::load::Domain;
-//!
-//! let domain = Domain::load("tabletop")?; // built in; or the path of a folder
-//! let lexicon = Lexicon::new(&domain, &Places::default());
-//! let goal = goal::read("find cup A with confidence 0.9", &domain, &lexicon)?;
-//! assert_eq!(goal.pddl, "(>= (confidence cup-a) 0.9)");
-//!
-//! let refused = goal::read("find cap A", &domain, &lexicon).unwrap_err().to_string();
-//! assert!(refused.contains("cup A"), "{refused}");
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+#![doc = include_str!("../README.md")]
 
 pub mod abilities;
 pub mod actions;

@@ -1,23 +1,4 @@
-//! What was seen and what is believed.
-//!
-//! ```
-//! use descry_memory::{Options, Query, Record};
-//! use serde_json::json;
-//!
-//! let folder = tempfile::tempdir()?;
-//! let record = Record::create(folder.path(), Options::default())?;
-//! record.put_document("note", 1_000_000_000, json!({ "said": "a cup" }), vec![])?;
-//! record.put_document("note", 3_000_000_000, json!({ "said": "no cup" }), vec![])?;
-//! record.sync()?;
-//!
-//! // Whoever reads locks nothing, and changes nothing.
-//! let reader = Record::open_shared(folder.path())?;
-//! let near = reader.nearest("note", 1_400_000_000, 500_000_000)?;
-//! assert_eq!(near.body["said"], "a cup");
-//! assert_eq!(reader.find(&Query::of_kind("note"))?.len(), 2);
-//! assert!(reader.verify()?.faults.is_empty());
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+#![doc = include_str!("../README.md")]
 
 pub mod belief;
 #[doc(hidden)]

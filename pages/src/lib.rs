@@ -1,4 +1,4 @@
-//! Runs, plans and clouds to look at: pages that need nothing else, also while they go on, and drawings.
+#![doc = include_str!("../README.md")]
 
 pub mod gantt;
 pub mod live;

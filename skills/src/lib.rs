@@ -1,32 +1,4 @@
-//! From what an action means to motion and looking: one file per skill.
-//!
-//! ```
-//! use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
-//! use descry_robots::{CancellationToken, nalgebra::Point3};
-//! use descry_skills::{Context, Observe, Outcome, Skill};
-//!
-//! let text = "
-//! [[surface]]
-//! name = 'table'
-//! size_m = [1.2, 0.8]
-//! height_m = 0.72
-//! [start]
-//! position_m = [-2.0, 0.3]
-//! [[object]]
-//! name = 'cup'
-//! shape.cup = { diameter_m = 0.07, height_m = 0.1 }
-//! ";
-//! let scene = arrange(&SceneSpec::parse("table.toml", text)?, 1)?;
-//! let robot = SimRobot::new(scene, SimOptions::default());
-//! let context =
-//!     Context { robot: &robot, cancel: CancellationToken::new(), time_limit_s: 10.0, progress: &|_| {} };
-//! let look = Observe { at: Some(Point3::new(0.0, 0.0, 0.75)) };
-//! # let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-//! let outcome = runtime.block_on(look.perform(&context))?;
-//! let Outcome::Seen(sensed) = outcome else { panic!("{outcome:?}") };
-//! assert!(sensed.cloud.points.iter().any(|point| point.z.is_finite()));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+#![doc = include_str!("../README.md")]
 
 mod align;
 mod circle;

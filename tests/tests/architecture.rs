@@ -279,3 +279,25 @@ fn versions_are_written_once() {
         }
     }
 }
+
+/// ARCHITECTURE.md names the test that holds each invariant.
+#[test]
+fn every_test_that_the_architecture_names_is_there() {
+    let page = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("it is there");
+    let tests: String = fs::read_dir(root())
+        .expect("the workspace is a folder")
+        .flatten()
+        .flat_map(|entry| sources(&entry.path().join("tests")))
+        .map(|file| code(&file))
+        .collect();
+    let named: Vec<&str> = page
+        .split('`')
+        .skip(1)
+        .step_by(2)
+        .filter(|word| word.matches('_').count() > 2 && !word.contains('/'))
+        .collect();
+    assert!(named.len() > 25, "{named:?}");
+    for test in named {
+        assert!(tests.contains(&format!("fn {test}(")), "no test is called {test}");
+    }
+}

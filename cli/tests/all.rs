@@ -5,6 +5,7 @@ mod binary;
 mod body;
 mod cluster;
 mod command_line;
+mod cookbook;
 mod damage;
 mod denied;
 mod explain;

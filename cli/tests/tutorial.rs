@@ -85,8 +85,8 @@ fn edit(folder: &Path, sentence: &str, text: &str) {
     std::fs::write(&path, after).unwrap_or_else(|e| panic!("{sentence}: {e}"));
 }
 
-/// Runs a command as typed, with descry on the path; both streams in the order in which they came.
-fn run(folder: &Path, command: &str) -> String {
+/// Runs a command as typed, with descry on the path: both streams in the order in which they came, and whether it ended well.
+fn run(folder: &Path, command: &str) -> (String, bool) {
     let descry = Path::new(env!("CARGO_BIN_EXE_descry")).parent().expect("a folder");
     let path = format!("{}:{}", descry.display(), std::env::var("PATH").unwrap_or_default());
     let output = Command::new("sh")
@@ -95,7 +95,7 @@ fn run(folder: &Path, command: &str) -> String {
         .env("PATH", path)
         .output()
         .expect("sh runs");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    (String::from_utf8_lossy(&output.stdout).into_owned(), output.status.success())
 }
 
 /// Whether lines are as expected; `…` stands for any part of a line, or alone for any lines.
@@ -120,18 +120,29 @@ fn the_tutorial_holds_word_for_word() {
         eprintln!("skipped: there is no python3");
         return;
     }
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/tutorial.md"))
-        .expect("the tutorial is there");
     let folder = TempDir::new().expect("a folder can be made");
-    for task in tasks(&text) {
+    follow(&page("docs/tutorial.md"), folder.path());
+}
+
+/// The text of a page of the repository.
+pub fn page(path: &str) -> String {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+    std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// Does in a folder what a text asks a reader to do, and compares what is printed with what the text shows.
+pub fn follow(text: &str, folder: &Path) {
+    for task in tasks(text) {
         match task {
-            Task::Edit { sentence, text } => edit(folder.path(), &sentence, &text),
+            Task::Edit { sentence, text } => edit(folder, &sentence, &text),
             Task::Run { lines } => {
                 let mut rest = lines.as_slice();
                 while let Some((first, behind)) = rest.split_first() {
                     let command = first.strip_prefix("$ ").expect("a command is typed");
                     let end = behind.iter().position(|l| l.starts_with("$ ")).unwrap_or(behind.len());
-                    let said = run(folder.path(), command);
+                    let (said, well) = run(folder, command);
+                    // Where nothing of the output is shown, the command must at least end well.
+                    assert!(well || behind[..end] != ["…"], "$ {command}\nfails:\n{said}");
                     let found: Vec<&str> = said.trim_end().lines().collect();
                     assert!(fits(&behind[..end], &found), "$ {command}\nthe output is not as shown:\n{said}");
                     rest = &behind[end..];

@@ -1,6 +1,7 @@
 //! The reference of file formats: its tables of keys are those of the types that read the files.
 //!
-//! Between `<!-- keys FILE TYPE -->` and `<!-- end -->` a page has the table of a type. `UPDATE_DOCS=1 cargo test -p descry-tests
+//! Between `<!-- keys FILE TYPE -->` and `<!-- end -->` a page has the table of a type, after `<!-- ability NAME -->` the words of an
+//! ability. `UPDATE_DOCS=1 cargo test -p descry-tests
 //! --test reference` writes the tables anew.
 
 use std::collections::BTreeSet;
@@ -333,6 +334,46 @@ fn renewed(page: &str) -> (String, BTreeSet<(String, String)>) {
     (text + rest, named)
 }
 
+const BEGIN_ABILITY: &str = "<!-- ability ";
+
+/// Tables of the facts, calls and skills of an ability.
+fn words_of(name: &str) -> String {
+    let ability = descry_domains::abilities::ALL.iter().find(|ability| ability.name == name);
+    let ability = ability.unwrap_or_else(|| panic!("there is no ability {name}"));
+    let with = |name: &str, types: &[&str]| {
+        let types: String = types.iter().map(|of| format!(" {of}")).collect();
+        format!("({name}{types})")
+    };
+    let facts = ability.facts.iter().map(|fact| ("fact", with(fact.name, fact.types), fact.about));
+    let calls = ability.calls.iter().map(|call| ("call", format!("[{}]", call.name), call.about));
+    let skills = ability.skills.iter().map(|skill| ("skill", with(skill.name, skill.types), skill.about));
+    let mut text = String::from("| | word | meaning |\n|---|---|---|\n");
+    for (what, word, about) in facts.chain(calls).chain(skills) {
+        text += &format!("| {what} | `{word}` | {about} |\n");
+    }
+    text
+}
+
+/// A page with the tables of its abilities made anew.
+fn with_abilities(page: &str) -> String {
+    let (mut text, mut rest) = (String::new(), page);
+    while let Some((before, after)) = rest.split_once(BEGIN_ABILITY) {
+        let (name, after) = after.split_once(" -->\n").expect("a table begins with a line of its own");
+        let (_, after) = after.split_once(END).unwrap_or_else(|| panic!("the table of {name} does not end"));
+        text += &format!("{before}{BEGIN_ABILITY}{name} -->\n\n{}\n{END}", words_of(name));
+        rest = after;
+    }
+    text + rest
+}
+
+#[test]
+fn every_ability_is_on_its_page() {
+    let page = fs::read_to_string(root().join("docs/reference/abilities.md")).expect("it is there");
+    for ability in descry_domains::abilities::ALL {
+        assert!(page.contains(&format!("{BEGIN_ABILITY}{} -->", ability.name)), "{}", ability.name);
+    }
+}
+
 fn pages() -> Vec<PathBuf> {
     let folder = fs::read_dir(root().join("docs/reference")).expect("there is a reference");
     let mut pages: Vec<PathBuf> = folder.flatten().map(|entry| entry.path()).collect();
@@ -343,7 +384,7 @@ fn pages() -> Vec<PathBuf> {
 /// Holds a page to its types, or writes it anew; the types that it shows.
 fn check(page: &Path) -> BTreeSet<(String, String)> {
     let text = fs::read_to_string(page).expect("a page is text");
-    let (renewed, shown) = renewed(&text);
+    let (renewed, shown) = renewed(&with_abilities(&text));
     if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(page, renewed).expect("the page can be written");
     } else {

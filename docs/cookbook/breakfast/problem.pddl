@@ -1,0 +1,5 @@
+(define (problem for-two) (:domain breakfast)
+  (:objects rye - bread assam - tea)
+  (:init (hands-free))
+  (:goal (and (ready rye) (ready assam)))
+  (:metric minimize (total-time)))

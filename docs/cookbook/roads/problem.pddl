@@ -1,0 +1,5 @@
+(define (problem to-town) (:domain roads)
+  (:objects farm bridge ford town - place)
+  (:init (at farm))
+  (:goal (at town))
+  (:metric minimize (total-time)))

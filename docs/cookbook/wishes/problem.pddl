@@ -1,0 +1,7 @@
+(define (problem dinner) (:domain wishes)
+  (:objects ada ben - guest window wall - seat)
+  (:init (free window) (free wall))
+  (:goal (and (seated ada) (seated ben)
+    (preference ada-looks-out (sits ada window))
+    (preference ben-looks-out (sits ben window))))
+  (:metric minimize (+ (* 1 (is-violated ada-looks-out)) (* 3 (is-violated ben-looks-out)))))

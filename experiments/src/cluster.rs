@@ -7,7 +7,7 @@ use descry_agent::shell;
 
 use super::{ExperimentError, Kind, Source, kinds};
 
-/// What is to be run on a cluster.
+/// Experiment to run on a cluster: number of shards, threads and folder of results.
 #[derive(Debug, Clone)]
 pub struct Cluster {
     /// Into how many shards the jobs are divided.

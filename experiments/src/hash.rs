@@ -1,4 +1,4 @@
-//! What an experiment is known by.
+//! Hash that identifies an experiment (FNV-1a over its texts).
 
 /// 64-bit FNV-1a (Fowler, Noll, Vo) over texts one after another, each with its length, as `fnv1a:` and 16 hexadecimal digits.
 /// It tells files apart that differ by accident; it is no protection against intent.

@@ -24,7 +24,7 @@ pub struct Header {
     pub hash: String,
     /// Version of descry.
     pub version: String,
-    /// How many jobs there are, in all shards.
+    /// Number of jobs in all shards.
     pub jobs: usize,
 }
 
@@ -82,7 +82,7 @@ impl Journal {
     }
 }
 
-/// What a folder's journal holds, without opening it for writing; nothing if there is none.
+/// Reads the journal of a folder without opening it for writing; an empty one if there is none.
 ///
 /// # Errors
 /// [`ExperimentError`] if it belongs to another experiment or cannot be read.

@@ -34,7 +34,7 @@ pub type Row = Map<String, Value>;
 pub struct Job {
     /// Unique in the experiment, the same on every machine, such as `scene=0012 poses=8 policy=plan`.
     pub id: String,
-    /// What is varied, and its value here.
+    /// Factors of the experiment, with their values in this job.
     pub factors: Row,
 }
 
@@ -51,7 +51,7 @@ impl Job {
     }
 }
 
-/// What a job gave: rows of measurements, the same whenever and wherever it is done, and what the clock on the wall said.
+/// Result of a job: rows of measurements, the same on every machine, and times on the wall.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
     /// Measurements; usually one row.
@@ -67,10 +67,10 @@ pub struct Finished {
     pub job: String,
     /// Its factors with its measurements.
     pub rows: Vec<Row>,
-    /// What the clock on the wall said.
+    /// Times on the wall.
     #[serde(default)]
     pub clock: Row,
-    /// Why there are no measurements.
+    /// Error, if there are no measurements.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
 }
@@ -141,9 +141,9 @@ impl Source {
 /// A part of the jobs: of every `of` jobs one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// Which, below `of`.
+    /// Index of the shard, below `of`.
     pub index: usize,
-    /// How many shards there are.
+    /// Number of shards.
     pub of: usize,
 }
 
@@ -160,7 +160,7 @@ impl std::str::FromStr for Shard {
     }
 }
 
-/// How to carry an experiment out.
+/// Options for carrying out an experiment.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// Folder of the results.
@@ -169,7 +169,7 @@ pub struct Options {
     pub shard: Option<Shard>,
     /// Do nothing; put these folders together.
     pub merge: Vec<PathBuf>,
-    /// How many jobs at a time.
+    /// Number of jobs at a time.
     pub threads: usize,
     /// A job that fails while less room is left on the disk does not count, and none is begun after it.
     pub least_free_bytes: u64,
@@ -179,7 +179,7 @@ pub struct Options {
     pub tell: fn(&str),
 }
 
-/// How far it came.
+/// Progress of the experiment at the end of a call.
 #[derive(Debug)]
 pub enum Ended {
     /// All jobs are done; the results are written.
@@ -195,7 +195,7 @@ pub enum Ended {
     },
 }
 
-/// Why an experiment cannot be carried out.
+/// Error that keeps an experiment from being carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// The experiment file says what cannot be understood or done; the text points at the place and offers a mend.
@@ -204,9 +204,9 @@ pub enum ExperimentError {
     /// A file or folder cannot be read or written.
     #[error("{path}: {because}")]
     File {
-        /// Which.
+        /// Path of the file.
         path: String,
-        /// What the system said.
+        /// Message of the system.
         because: String,
     },
     /// The folder holds another experiment.
@@ -217,9 +217,9 @@ pub enum ExperimentError {
     Another {
         /// The journal.
         path: String,
-        /// What its first line says.
+        /// First line of the journal.
         found: Box<Header>,
-        /// What it would have to say.
+        /// Expected first line.
         expected: Box<Header>,
     },
     /// A file that is called like a journal and is none.
@@ -247,9 +247,9 @@ pub enum ExperimentError {
         "{missing} of {all} jobs are in none of the folders, the first of them \"{first}\"\n  do the missing shards, or leave --merge out to do them here"
     )]
     Missing {
-        /// How many.
+        /// Number of missing jobs.
         missing: usize,
-        /// Of how many.
+        /// Number of all jobs.
         all: usize,
         /// The first of them.
         first: String,
@@ -263,21 +263,21 @@ pub enum ExperimentError {
         folder: String,
         /// The job that does not count.
         job: String,
-        /// Why it failed.
+        /// Error of the job.
         because: String,
     },
     /// More shards than jobs, or none.
     #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
     Shards {
-        /// How many shards were asked for.
+        /// Number of shards that were asked for.
         shards: usize,
-        /// How many jobs there are.
+        /// Number of jobs.
         jobs: usize,
     },
     /// The system gives no thread.
     #[error("no thread could be started: {because}\n  try a smaller --jobs")]
     Threads {
-        /// What the system said.
+        /// Message of the system.
         because: String,
     },
 }
@@ -339,7 +339,7 @@ fn header(source: &Source, kind: &dyn Kind, jobs: usize) -> Header {
     Header { experiment: kind.head().name.clone(), hash: hash::fnv1a(texts), version, jobs }
 }
 
-/// Where this process writes.
+/// Folder into which this process writes.
 fn own_folder(options: &Options) -> PathBuf {
     match options.shard {
         Some(Shard { index, of }) => options.out.join(format!("shard-{index}-of-{of}")),

@@ -60,7 +60,7 @@ impl Batch {
         Ok(html((&head.name, &head.about), &facts, &sections, &self.source.text, Some(progress)))
     }
 
-    /// What it took since the page is there, and what is left at this rate.
+    /// Time since the page was opened, and time left at this rate.
     fn time(&self, Progress { done, all }: Progress) -> String {
         let since_s = self.begun.elapsed().as_secs_f64();
         match done.saturating_sub(self.before) {

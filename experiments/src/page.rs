@@ -38,7 +38,7 @@ dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace
 @media (max-width: 600px) { body { padding: 0 .8rem; } th, td { padding: .2rem .45rem; } }
 ";
 
-/// How far a batch has come that goes on, for a page that follows it.
+/// Progress of a batch, for a page that follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// Jobs that are done.

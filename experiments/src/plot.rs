@@ -27,7 +27,7 @@ const LETTER: f64 = 6.6;
 pub struct Point {
     /// Along the numeric axis of [`Plot::Lines`], or the number of the category in [`Plot::Dots`].
     pub at: f64,
-    /// What was measured.
+    /// Measured value.
     pub value: f64,
     /// Its interval of 95 %.
     pub interval: Option<[f64; 2]>,
@@ -47,7 +47,7 @@ pub struct Series {
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What it shows, with its unit.
+    /// Label of the axis, with its unit.
     pub label: String,
     /// Fixed ends; from the data if none.
     pub range: Option<[f64; 2]>,
@@ -70,7 +70,7 @@ impl Axis {
 pub enum Plot {
     /// Lines over a numeric axis.
     Lines {
-        /// Of the file, without its ending.
+        /// File name without its extension.
         name: String,
         /// Heading.
         title: String,
@@ -87,7 +87,7 @@ pub enum Plot {
     },
     /// A dot with its interval for each category, the series beside each other.
     Dots {
-        /// Of the file, without its ending.
+        /// File name without its extension.
         name: String,
         /// Heading.
         title: String,

@@ -16,7 +16,7 @@ use super::{ExperimentError, Finished, Job, Kind};
 
 /// Runs plan by recursion and render: more than a thread's usual stack.
 const STACK_BYTES: usize = 16 << 20;
-/// How often a line is written where there is no terminal.
+/// Interval between lines of progress where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(15);
 
 /// Does the jobs of these numbers and writes each into the journal. Runs keep what they record under `scratch`, which is

@@ -22,7 +22,7 @@ pub struct Estimate {
     pub value: f64,
     /// Interval of 95 %; none where the sample is too small to say.
     pub interval: Option<[f64; 2]>,
-    /// How many observations it rests on.
+    /// Number of observations.
     pub n: usize,
 }
 
@@ -31,7 +31,7 @@ pub struct Estimate {
 pub struct Observation {
     /// Observations of one group may depend on each other.
     pub group: u64,
-    /// What was observed.
+    /// Observed value.
     pub value: f64,
 }
 

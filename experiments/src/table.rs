@@ -9,7 +9,7 @@ use super::statistics::Estimate;
 pub struct Table {
     /// Heading.
     pub title: String,
-    /// What its numbers are and how their intervals were made.
+    /// Note below the table: meaning of its numbers and of their intervals.
     pub note: String,
     /// Names of the columns, with units.
     pub head: Vec<String>,

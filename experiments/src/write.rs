@@ -1,4 +1,4 @@
-//! What an experiment leaves in its folder.
+//! Writes the results of an experiment into its folder.
 //!
 //! `jobs.csv`, `summary.json`, `tables.md`, `plots/*.svg` and `index.html` are the same whatever the number of threads and
 //! shards; times on the wall, which are not, stand in `clock.csv` and `clock.md`.
@@ -143,7 +143,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// What the clock on the wall said, over all jobs.
+/// Times on the wall over all jobs, as a table.
 fn clock_table(finished: &[Finished]) -> Option<Table> {
     let mut seen = BTreeSet::new();
     let names: Vec<&String> =

@@ -11,7 +11,7 @@ pub struct Align {
     pub scans: Vec<PosedScan>,
     /// Beyond an error so long the scans contradict each other, metres.
     pub longest_m: f64,
-    /// How it is done.
+    /// Options of the solver.
     pub options: SolverOptions,
 }
 

@@ -19,14 +19,14 @@ pub struct Model {
     pub up: Option<Unit<Vector3<f64>>>,
     /// Returns farther than this are not used, metres.
     pub range_m: f64,
-    /// How it is done.
+    /// Options of learning.
     pub options: LearnOptions,
 }
 
-/// What came of it.
+/// Result of learning a model.
 #[derive(Debug)]
 pub struct Modelled {
-    /// Where each look was taken from, by what it shows; one that does not fit the others is left out.
+    /// Pose and contents of each look; those that do not fit the others are left out.
     pub keyframes: Vec<Keyframe>,
     /// The model, or why there is none.
     pub model: Result<LearnedModel, String>,

@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Drives somewhere.
 pub struct Move {
-    /// Where to.
+    /// Destination.
     pub to: Place,
 }
 

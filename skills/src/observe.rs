@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Takes a view from where the body stands.
 pub struct Observe {
-    /// What the head turns to, in the map; none: nowhere in particular.
+    /// Point in the map that the head turns to; none: no head motion.
     pub at: Option<Point3<f64>>,
 }
 

@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Takes an object into the hand.
 pub struct PickUp {
-    /// How.
+    /// Grasp.
     pub grasp: Grasp,
 }
 

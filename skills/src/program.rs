@@ -7,16 +7,17 @@ use descry_robots::Failure;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// What a program said: that it is done, with a word about it; or that it could not, why, and whether a second try may help.
+/// Answer of a program: done, with a word about it, or failed, with the reason and with a hint on
+/// retrying.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Asked {
     /// It is done.
     Done(String),
     /// It could not.
     Failed {
-        /// Why.
+        /// Reason of the failure.
         because: String,
-        /// Whether the same may work when it is tried again.
+        /// May a retry succeed?
         passing: bool,
     },
 }

@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Pushes an object aside.
 pub struct PushAside {
-    /// How.
+    /// Push.
     pub push: Push,
 }
 

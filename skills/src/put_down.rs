@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Puts down what the hand holds.
 pub struct PutDown {
-    /// Where.
+    /// Placing.
     pub placing: Placing,
 }
 

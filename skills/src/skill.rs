@@ -1,4 +1,4 @@
-//! What every skill is: it has its arguments in the units of the body, can be stopped, and ends in time.
+//! Trait of all skills: arguments in the units of the body, cancellation, a time limit.
 
 use async_trait::async_trait;
 use descry_robots::perception::laser::Alignment;
@@ -28,7 +28,7 @@ impl std::fmt::Display for Call {
     }
 }
 
-/// What a skill works with.
+/// Surroundings of a skill: robot, cancellation, time limit, progress.
 pub struct Context<'a> {
     /// The body.
     pub robot: &'a dyn Robot,
@@ -47,7 +47,7 @@ impl Context<'_> {
     }
 }
 
-/// What a skill brought about.
+/// Result of a skill.
 #[derive(Debug)]
 pub enum Outcome {
     /// The body stands somewhere else.
@@ -74,7 +74,7 @@ pub enum Outcome {
     Told(String),
 }
 
-/// Why a skill did not do what its action promises.
+/// Failure of a skill.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SkillFailure {
     /// The body could not.
@@ -85,13 +85,13 @@ pub enum SkillFailure {
     Program {
         /// In its words.
         because: String,
-        /// Whether the same may work when it is tried again.
+        /// May a retry succeed?
         passing: bool,
     },
-    /// What is to be done has no meaning for the body as things stand.
+    /// The job has no meaning for the body in the present situation.
     #[error("{because}")]
     Meaningless {
-        /// Why.
+        /// Reason.
         because: String,
     },
     /// It was carried out, and what it should bring about did not come about.
@@ -103,7 +103,7 @@ pub enum SkillFailure {
 }
 
 impl SkillFailure {
-    /// Whether the same may work when it is tried again.
+    /// May a retry succeed?
     pub fn is_passing(&self) -> bool {
         match self {
             SkillFailure::Body(failure) => failure.is_passing(),

@@ -20,7 +20,7 @@ use crate::{ExperimentError, Job, Numbered, Outcome, Source};
 use descry_agent::body;
 use descry_domains::abilities::searching::policies;
 
-/// What a file of this kind says.
+/// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -28,7 +28,7 @@ struct Text {
     name: String,
     /// `faults`.
     kind: String,
-    /// What it is to show, in a line.
+    /// Purpose of the experiment, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -36,7 +36,7 @@ struct Text {
     domain: String,
     /// Scene of the domain, or a file.
     scene: String,
-    /// What is asked for, in the words of the domain.
+    /// Goal, in the words of the domain.
     goal: String,
     /// The object of the scene that is looked for, by name or kind.
     target: String,
@@ -54,7 +54,7 @@ struct Text {
     /// A thing is found where it is if it stands no farther from there.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
-    /// What goes wrong.
+    /// Cases: the mishaps that are injected.
     #[serde(rename = "case")]
     cases: Vec<Case>,
 }
@@ -65,7 +65,7 @@ struct Text {
 struct Case {
     /// For tables and plots.
     name: String,
-    /// What goes wrong in it; nothing if there is none.
+    /// Injected mishaps; empty for a run without any.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }

@@ -24,7 +24,7 @@ mod score;
 mod summary;
 mod views;
 
-/// What a file of this kind says.
+/// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -32,7 +32,7 @@ struct Text {
     name: String,
     /// `figure-4`.
     kind: String,
-    /// What it is to show, in a line.
+    /// Purpose of the experiment, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -67,7 +67,7 @@ struct Set {
     name: String,
     /// Seed of the first arrangement; each further one has the next.
     first_seed: u64,
-    /// How many arrangements.
+    /// Number of arrangements.
     arrangements: u64,
     /// Instead of our simulator: `program:COMMAND`, in a world of its own that has things of the same kinds.
     #[serde(default)]
@@ -214,7 +214,7 @@ struct Cell {
     handled: [(usize, usize); 2],
 }
 
-/// What a row of one cell says.
+/// Rows of one cell of the table: recogniser, number of views, single or merged.
 fn cells(finished: &[Numbered<'_>]) -> BTreeMap<(String, String, String, u64), Cell> {
     let mut cells = BTreeMap::<_, Cell>::new();
     for &(number, job) in finished {

@@ -1,4 +1,4 @@
-//! What can be varied and measured: one file each, and the list of them.
+//! Kinds of experiments: one file each, and their list.
 
 mod faults;
 mod figure_4;
@@ -19,7 +19,7 @@ use super::page::Section;
 use super::{ExperimentError, Job, Numbered, Outcome, Row, Source};
 use descry_agent::body::program;
 
-/// Where a job's run goes on.
+/// Runtime on which the run of a job goes on.
 fn runtime() -> Result<tokio::runtime::Runtime, String> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     runtime.map_err(|e| format!("the runtime could not be started: {e}"))
@@ -27,7 +27,7 @@ fn runtime() -> Result<tokio::runtime::Runtime, String> {
 
 /// A kind of experiment, bound to what a file says of it.
 pub trait Kind: Send + Sync {
-    /// What every experiment file says.
+    /// Keys that every experiment file has.
     fn head(&self) -> &Head;
 
     /// Other texts that the results depend on, by name: scenes, domain, programs. They count in the experiment's hash.
@@ -43,18 +43,18 @@ pub trait Kind: Send + Sync {
     /// A text for people; it becomes a row.
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
-    /// What finished jobs, in the order of [`Kind::jobs`], say: all of them, or those that are done so far.
+    /// Summarises finished jobs, all or those done so far, in the order of [`Kind::jobs`].
     fn summarise(&self, finished: &[Numbered<'_>]) -> Summary;
 }
 
-/// What every experiment file says.
+/// Keys that every experiment file has.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Head {
     /// The experiment's name.
     pub name: String,
     /// One of the kinds.
     pub kind: String,
-    /// What it is to show, in a line.
+    /// Purpose of the experiment, in a line.
     #[serde(default)]
     pub about: String,
 }
@@ -84,7 +84,7 @@ impl OtherBody {
         &self.0
     }
 
-    /// What the program is made of.
+    /// Texts that the robot's program is made of, by path.
     fn texts(&self) -> BTreeMap<PathBuf, String> {
         program_texts(self.0.split_whitespace(), Path::new("."))
     }
@@ -104,7 +104,7 @@ impl TryFrom<String> for OtherBody {
     }
 }
 
-/// What the jobs together say.
+/// Summary of all jobs.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
     /// For scripts: `summary.json`.

@@ -22,7 +22,7 @@ mod summary;
 
 use score::Truly;
 
-/// What a file of this kind says.
+/// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -30,7 +30,7 @@ struct Text {
     name: String,
     /// `tasks`.
     kind: String,
-    /// What it is to show, in a line.
+    /// Purpose of the experiment, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -47,15 +47,15 @@ struct Text {
     /// A thing is found where it is if it stands no farther from there, along the floor.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
-    /// What is asked for; each with each policy and case.
+    /// Goals; each is pursued with each policy and case.
     #[serde(rename = "goal")]
     goals: Vec<GoalText>,
-    /// What goes wrong; nothing if there is none.
+    /// Cases: the mishaps that are injected; a single case without any if left out.
     #[serde(default = "nothing_goes_wrong", rename = "case")]
     cases: Vec<Case>,
 }
 
-/// What is asked for, and when it is truly so.
+/// Goal, and the condition under which it is truly achieved.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GoalText {
@@ -88,7 +88,7 @@ struct Case {
     /// Instead of our simulator: `program:COMMAND`, whose world has the places and things of the scene.
     #[serde(default)]
     robot: Option<OtherBody>,
-    /// What goes wrong in it; nothing if there is none.
+    /// Injected mishaps; empty for a run without any.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }
@@ -143,7 +143,7 @@ pub(super) fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     Ok(Box::new(Tasks { head, text, domain, spec, goals }))
 }
 
-/// What the format allows and the meaning does not.
+/// Checks the meaning of values that the format allows.
 fn check(source: &Source, text: &Text) -> Result<(), ExperimentError> {
     let known = policies::names();
     if let Some(absent) = text.policies.iter().find(|p| !known.contains(&p.as_str())) {
@@ -212,7 +212,7 @@ fn check_goal(source: &Source, goal: &GoalText, spec: &SceneSpec) -> Result<(), 
     }
 }
 
-/// What a goal is held against is what its words are about.
+/// Checks that the words of a goal are about the objects and surfaces that its truth is judged by.
 fn check_words(
     source: &Source,
     text: &GoalText,

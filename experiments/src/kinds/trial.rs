@@ -28,27 +28,27 @@ const ARRANGEMENTS: u64 = 20;
 /// Between the seeds that are tried, so that scenes do not share them.
 const NEXT_ARRANGEMENT: u64 = 1_000_003;
 
-/// What a run is made of.
+/// Settings of one run.
 pub(super) struct Trial<'a> {
-    /// What may be said and what it means.
+    /// Domain.
     pub domain: &'a Domain,
-    /// What is pursued.
+    /// Goal.
     pub goal: &'a Goal,
     /// The scene; its places and things have the same names in a program's world.
     pub spec: &'a SceneSpec,
     /// The command line of a program with a world of its own; none: our simulator.
     pub program: Option<&'a str>,
-    /// What is looked for: names or kinds in the scene.
+    /// Targets of the search: names or kinds in the scene.
     pub targets: &'a [String],
-    /// Whether they are there.
+    /// Are the targets in the scene?
     pub present: bool,
     /// Fixes arrangement, noise, mishaps and random choices.
     pub seed: u64,
-    /// What goes wrong on purpose.
+    /// Injected mishaps.
     pub faults: FaultPlan,
     /// Who chooses.
     pub policy: &'a str,
-    /// Whether the first look is taken from the start, whoever chooses.
+    /// Is the first look taken from the start, whatever the policy?
     pub first_look_here: bool,
     /// A thing is found where it is if it stands no farther from there, metres.
     pub tolerance_m: f64,
@@ -63,13 +63,13 @@ pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Resul
     Ok(Outcome { rows: vec![row], clock })
 }
 
-/// What came of a run.
+/// Result of one run.
 pub(super) struct Lived {
-    /// What it says.
+    /// Report of the run.
     pub report: Report,
-    /// How everything stands in the end.
+    /// True scene at the end.
     pub truth: Truth,
-    /// How often each action was carried out to its end, by name.
+    /// Number of completed executions of each action, by name.
     pub carried: BTreeMap<String, usize>,
     /// The share of the target that was seen from the start.
     pub share: Option<f64>,
@@ -169,12 +169,12 @@ fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
     Err(last)
 }
 
-/// Whether an object is there and one of those that are named, by name or kind.
+/// Is the object there, and is it one of the targets, by name or kind?
 pub(super) fn is_among(object: &TrueObject, targets: &[String]) -> bool {
     object.present && targets.iter().any(|target| object.name == *target || object.kind == *target)
 }
 
-/// What a look would truly show of the target, for the oracle, as things stand when it asks.
+/// True visibility of the target from each pose at the time of the question, for the oracle.
 fn foresight(robot: &Arc<SimRobot>, targets: &[String]) -> Foresight {
     let (robot, targets) = (Arc::clone(robot), targets.to_vec());
     Box::new(move |place: &Place, on: &str| {
@@ -185,7 +185,7 @@ fn foresight(robot: &Arc<SimRobot>, targets: &[String]) -> Foresight {
     })
 }
 
-/// What a report says, held against how everything stands in the end.
+/// Measures a report against the true scene at the end.
 fn measured(trial: &Trial<'_>, report: &Report) -> Row {
     let believed = report.position_m.filter(|_| report.verdict == Verdict::Achieved);
     let error_m = believed.zip(report.true_position_m).map(|(believed, truth)| {
@@ -220,11 +220,11 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
 pub struct Measured {
     /// Runs in one scene belong together.
     pub group: u64,
-    /// Whether the target was there in the end.
+    /// Was the target there at the end?
     pub present: bool,
-    /// Whether the verdict was right.
+    /// Was the verdict right?
     pub right: bool,
-    /// Whether it said to have found what is not there.
+    /// Did the run claim to have found an absent target?
     pub false_declaration: bool,
     /// Looks.
     pub views: f64,

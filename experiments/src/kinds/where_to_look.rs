@@ -19,7 +19,7 @@ use descry_domains::abilities::searching::policies;
 
 mod summary;
 
-/// What a file of this kind says.
+/// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Text {
@@ -27,7 +27,7 @@ struct Text {
     name: String,
     /// `where-to-look`.
     kind: String,
-    /// What it is to show, in a line.
+    /// Purpose of the experiment, in a line.
     #[serde(default)]
     about: String,
     /// Built-in domain or a domain's folder.
@@ -35,7 +35,7 @@ struct Text {
     domain: String,
     /// Scene of the domain, or a file.
     scene: String,
-    /// What is asked for, in the words of the domain.
+    /// Goal, in the words of the domain.
     goal: String,
     /// The object of the scene that is looked for, by name or kind.
     target: String,
@@ -47,7 +47,8 @@ struct Text {
     /// Share of the scenes of each level from which the target is removed.
     #[serde(default)]
     absent_share: f64,
-    /// Whether every policy, the oracle too, has its first look from the start, by which the levels of occlusion are defined.
+    /// Does every policy, the oracle too, take its first look from the start, by which the levels
+    /// of occlusion are defined?
     #[serde(default)]
     first_look_from_start: bool,
     /// Numbers of poses around the surface.
@@ -67,7 +68,7 @@ struct Text {
     occlusions: Vec<Occlusion>,
 }
 
-/// How much of the target can be seen from the start.
+/// Level of occlusion: share of the target that is visible from the start.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Occlusion {

@@ -1,6 +1,6 @@
 //! From values to places on the picture, with round ticks.
 
-/// How many ticks an axis has, about.
+/// Approximate number of ticks of an axis.
 const TICKS: f64 = 6.0;
 
 /// A linear scale.

@@ -1,4 +1,4 @@
-//! What each recogniser makes of the views, held against the truth.
+//! Scores of each recogniser on the views, against the true scene.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +17,7 @@ use crate::Row;
 /// A percept is where a thing is if it stands no farther from it, metres: less than the radius of the smallest cup with the
 /// gap beside it.
 const SAME_PLACE_M: f64 = 0.05;
-/// So many pixels of a handle are enough to tell that there is one: 2 by 2 cm at 1.4 m with a Kinect.
+/// Minimum number of pixels on a handle for it to count as seen: 2 by 2 cm at 1.4 m with a Kinect.
 const HANDLE_PIXELS: usize = 60;
 
 /// A row for each mode, number of views and recogniser.
@@ -113,7 +113,7 @@ fn score(
     }))
 }
 
-/// Which object each percept is, the nearest pairs first, each object once.
+/// Assigns each percept to a true object, nearest pairs first, each object once.
 fn owners(
     percepts: &[Percept],
     objects: &[TrueObject],

@@ -21,18 +21,18 @@ const OUTWARDS_M: [f64; 6] = [0.0, 0.1, 0.2, -0.1, 0.3, 0.4];
 /// A point so far beyond the wall of a vessel is its handle.
 const BEYOND_WALL_M: f64 = 0.003;
 
-/// What was seen of an arrangement, with the truth.
+/// Views of one arrangement, with the true scene.
 pub(super) struct Taken {
     /// In the order in which they were taken.
     pub views: Vec<View>,
-    /// Where the camera was in truth for each view.
+    /// True pose of the camera for each view.
     pub map_from_camera: Vec<Isometry3<f64>>,
     /// Pixels of the handle of each object in each view, as an ideal camera sees them; no entry for what has no handle,
     /// nor for a body other than our simulator.
     pub handles: BTreeMap<String, Vec<usize>>,
-    /// How everything stands.
+    /// True scene.
     pub truth: Truth,
-    /// How the views are merged and looked through, as the agent does it.
+    /// Options of merging and of segmentation, as the agent uses them.
     pub options: (MergeOptions, SceneOptions),
 }
 

@@ -1,4 +1,4 @@
-//! Whether a goal is truly so, whatever was said, and whether what was said is so.
+//! Judges runs: is the goal truly achieved, and is the answer true?
 
 use descry_domains::answer::Verdict;
 use descry_robots::truth::{TrueObject, Truth};
@@ -29,13 +29,13 @@ pub(super) enum Truly {
 }
 
 impl Truly {
-    /// Whether it is about a surface.
+    /// Is the judgement about a surface?
     pub fn needs_surface(self) -> bool {
         matches!(self, Self::Answered | Self::Stands | Self::AllStand)
     }
 }
 
-/// What a run gave.
+/// Measurements of one run.
 pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Lived) -> Row {
     let Lived { report, truth, carried, .. } = lived;
     let scored = Scored::of(goal, tolerance_m, report, truth);
@@ -66,13 +66,14 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
 /// A verdict held against the truth.
 #[derive(Debug, PartialEq)]
 pub(super) struct Scored {
-    /// What was asked for is so, and was said; or it cannot be so, and that was said.
+    /// Is the verdict right: achieved and said so, or impossible and said so?
     pub right: bool,
     /// It was said that it is so, and it is not.
     pub false_yes: bool,
     /// It was said that it is not there (or not so), and it is.
     pub false_not_there: bool,
-    /// How far from where they are said to stand things stand, the greatest; none unless all stand within the tolerance.
+    /// Greatest distance of the things from their stated places; none unless all are within the
+    /// tolerance.
     pub error_m: Option<f64>,
 }
 
@@ -109,10 +110,10 @@ impl Scored {
     }
 }
 
-/// Where something is said to stand: the middle of its body in the map, metres, and the surface by its name.
+/// Stated place of a thing: middle of its body in the map, metres, and name of its surface.
 type Place = ([f64; 3], Option<String>);
 
-/// Where the report says that what was asked for stands.
+/// Places that the report states for the targets.
 fn named(report: &Report) -> Vec<Place> {
     match report.object {
         Some(_) => report.position_m.map(|at| (at, report.on.clone())).into_iter().collect(),
@@ -123,7 +124,8 @@ fn named(report: &Report) -> Vec<Place> {
     }
 }
 
-/// How far along the floor an object stands from a place, metres; none if it stands on another surface.
+/// Distance of an object from a place along the floor, metres; none if it stands on another
+/// surface.
 fn distance_m((at, on): &Place, object: &TrueObject) -> Option<f64> {
     (object.surface == *on).then(|| (object.centre_m.x - at[0]).hypot(object.centre_m.y - at[1]))
 }

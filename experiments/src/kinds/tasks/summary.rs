@@ -1,4 +1,5 @@
-//! What the runs say by goal, policy and case: shares of what is right and what is falsely said, means of what it took.
+//! Summary of the runs by goal, policy and case: shares of right and false answers, means of looks,
+//! metres and seconds.
 
 use serde_json::{Map, Value, json};
 
@@ -143,7 +144,7 @@ pub(super) fn summarise(experiment: &Tasks, finished: &[Numbered<'_>]) -> Summar
     Summary { values: values.as_object().cloned().unwrap_or_default(), sections }
 }
 
-/// How far the runs came: the share in which each action was carried out; none if no goal names any.
+/// Share of runs in which each action was carried out; none if no goal names stages.
 fn stages(experiment: &Tasks, runs: &[Run<'_>]) -> Option<Table> {
     let text = &experiment.text;
     let head = ["goal", "policy", "stage", "runs", "carried out"];
@@ -172,7 +173,7 @@ fn stages(experiment: &Tasks, runs: &[Run<'_>]) -> Option<Table> {
     (!table.rows.is_empty()).then_some(table)
 }
 
-/// What is right and what it took, by goal.
+/// Plots of right answers and of their cost, by goal.
 fn plots(policies: &[String], parts: &[(String, Vec<&Run<'_>>)]) -> [Plot; 2] {
     let series = |measure: fn(&Figures) -> Option<Estimate>| -> Vec<Series> {
         let of = |policy: &String| {

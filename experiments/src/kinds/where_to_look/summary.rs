@@ -1,4 +1,4 @@
-//! What the runs of all policies say: rates, means, savings, calibration.
+//! Summary of the runs of all policies: rates, means, savings, calibration.
 
 use serde_json::{Map, Value, json};
 

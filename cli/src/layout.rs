@@ -10,7 +10,7 @@ pub fn laid_out(source: &Source) -> Result<String, Findings> {
     if is_plan(&source.text) { Plan::format(source) } else { pddl::format(source) }
 }
 
-/// Whether a text is a plan: it does not define anything.
+/// True if a text is a plan: a text without a definition.
 fn is_plan(text: &str) -> bool {
     words(text).next().is_some_and(|word| !word.eq_ignore_ascii_case("define"))
 }

@@ -17,7 +17,7 @@ pub enum Asked {
     Failed {
         /// Reason of the failure.
         because: String,
-        /// May a retry succeed?
+        /// True if a retry may succeed.
         passing: bool,
     },
 }

@@ -85,7 +85,7 @@ pub enum SkillFailure {
     Program {
         /// In its words.
         because: String,
-        /// May a retry succeed?
+        /// True if a retry may succeed.
         passing: bool,
     },
     /// The job has no meaning for the body in the present situation.
@@ -103,7 +103,7 @@ pub enum SkillFailure {
 }
 
 impl SkillFailure {
-    /// May a retry succeed?
+    /// True if a retry may succeed.
     pub fn is_passing(&self) -> bool {
         match self {
             SkillFailure::Body(failure) => failure.is_passing(),

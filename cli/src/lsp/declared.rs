@@ -1,4 +1,4 @@
-//! What a text in PDDL declares, and the words in it.
+//! Declarations of a PDDL text, and the words in it.
 
 use descry_planner::Span;
 use descry_planner::pddl::ast::{Name, Signature, Typed};
@@ -6,7 +6,7 @@ use descry_planner::pddl::lex::Symbols;
 use descry_planner::pddl::parse;
 use lsp_types::{CompletionItemKind, SymbolKind};
 
-/// What is declared.
+/// Kind of a declaration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// A predicate.
@@ -66,15 +66,15 @@ impl Kind {
 pub struct Declared {
     /// The name, in lower case.
     pub name: String,
-    /// What it is.
+    /// Kind.
     pub kind: Kind,
-    /// Where its name stands.
+    /// Span of the name.
     pub span: Span,
-    /// Where all of it stands.
+    /// Span of the whole declaration.
     pub whole: Span,
 }
 
-/// What a domain or a problem declares, in the order of the kinds.
+/// Declarations of a domain or a problem, in the order of the kinds.
 pub fn of(text: &str, is_problem: bool) -> Vec<Declared> {
     let mut symbols = Symbols::default();
     let mut all: Vec<(Kind, Name, Span)> = Vec::new();

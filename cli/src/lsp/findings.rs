@@ -1,4 +1,4 @@
-//! What is to be said about texts, as an editor shows it.
+//! Findings about texts, as an editor shows them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -20,12 +20,12 @@ use super::units::{self, Unit};
 #[derive(Default)]
 pub struct Told {
     files: BTreeSet<PathBuf>,
-    /// How the words of a domain's folder were grounded when it could be read last.
+    /// Grounding of the words of each domain's folder, as of the last time that it could be read.
     grounded: BTreeMap<PathBuf, Vec<String>>,
 }
 
 impl Told {
-    /// What is to be said after a text has changed: about it, and about all that depends on it.
+    /// Findings after a change of a text: its own, and those of all texts that depend on it.
     pub fn after(&mut self, texts: &Texts, uri: &Uri) -> Vec<PublishDiagnosticsParams> {
         let path = path_of(uri);
         let text = texts.text(&path).unwrap_or_default();
@@ -60,8 +60,8 @@ impl Told {
         said.into_iter().filter_map(publish).collect()
     }
 
-    /// What is to be said about a domain's folder; keeps how its words are grounded, of a text that is not finished as far as that can
-    /// be read once what is open is closed.
+    /// Findings of a domain's folder; also keeps the grounding of its words, for unfinished texts
+    /// as far as they can be read once open lists are closed.
     fn of_folder(&mut self, texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
         let (said, grounding) = of_folder(texts, folder);
         let is_known = self.grounded.contains_key(folder);
@@ -71,7 +71,7 @@ impl Told {
         said
     }
 
-    /// How the words of a folder are grounded, or were when it could be read last; that may be as long as an author types.
+    /// Grounding of the words of a folder, as of the last time that it could be read.
     pub fn grounding(&self, folder: &Path) -> &[String] {
         self.grounded.get(folder).map_or(&[], Vec::as_slice)
     }
@@ -83,7 +83,7 @@ impl Told {
     }
 }
 
-/// What is to be said about a text and what it is a part of, by file.
+/// Findings of a text and of the unit that it belongs to, by file.
 fn of_text(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Shown>> {
     match units::of(texts, path, text) {
         Unit::Folder(folder) => of_folder(texts, &folder).0,
@@ -119,7 +119,7 @@ fn of_problem(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<S
     by_file(&descry_planner::check(&domain, Some(&source)))
 }
 
-/// How the words of a folder are grounded once the lists that are open in its PDDL are closed.
+/// Grounding of the words of a folder once the open lists in its PDDL are closed.
 fn grounding_once_closed(texts: &Texts, folder: &Path) -> Option<Vec<String>> {
     let mut files = units::files(texts, folder);
     let (_, text) = files.get_mut("domain.pddl")?;
@@ -164,7 +164,7 @@ fn of_folder(texts: &Texts, folder: &Path) -> (BTreeMap<PathBuf, Vec<Shown>>, Op
     (all, known)
 }
 
-/// Where an error is that is no finding: its file, the place in it, and what is said.
+/// Place and message of an error that is no finding.
 fn of_error(
     folder: &Path,
     files: &descry_domains::load::Files,

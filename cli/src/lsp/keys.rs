@@ -1,4 +1,5 @@
-//! What the headings and keys of a domain's TOML files mean: the tables of the reference, which are made from the types that read them.
+//! Meanings of the headings and keys of a domain's TOML files: tables of the reference, which are
+//! made from the types that read them.
 
 /// The page of the reference that tells of a file, by the folder that it stands in; none: `domain.toml`.
 const PAGES: [(&str, &str); 3] = [
@@ -24,15 +25,16 @@ fn heading(text: &str, at: usize) -> Option<(usize, Vec<&str>)> {
     found
 }
 
-/// What stands at a byte of a TOML file: the name of a heading that is pointed at, and what is said of it.
+/// Name of a heading or key at a byte of a TOML file, with its meaning.
 pub struct Here<'t> {
-    /// Where the name begins, and the name.
+    /// First byte of the name, and the name.
     pub name: (usize, &'t str),
-    /// What the reference says; empty of a name that a domain gives.
+    /// Entry of the reference; empty for a name that a domain gives.
     pub meaning: String,
 }
 
-/// What the name at a byte is, in a heading or in front of an equals sign; `part` is the file or folder that the text is.
+/// Finds the name at a byte, in a heading or before an equals sign; `part` is the file or folder of
+/// the text.
 pub fn here<'t>(part: &str, text: &'t str, at: usize) -> Option<Here<'t>> {
     let page = PAGES.iter().find(|(of, _)| *of == part)?.1;
     let line = text[..at].rfind('\n').map_or(0, |n| n + 1);
@@ -69,7 +71,7 @@ fn section<'p>(page: &'p str, table: Option<&str>) -> Option<&'p str> {
     parts.skip(1).find(of)
 }
 
-/// What the first table of a part says of a key.
+/// Entry for a key in the first table of a part.
 fn row(part: &str, key: &str) -> Option<String> {
     let rows = part.lines().filter(|line| line.starts_with('|'));
     let mut cells = rows.map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect::<Vec<_>>());

@@ -12,9 +12,9 @@ use super::texts::Lines;
 /// A mend, as it goes to the editor with a finding and comes back with a question about it.
 #[derive(Debug, Serialize, Deserialize)]
 struct Mend {
-    /// What it does.
+    /// Title of the mend.
     title: String,
-    /// What is put in the place of what.
+    /// Replacements.
     edits: Vec<TextEdit>,
 }
 
@@ -60,7 +60,7 @@ pub fn all_closed(text: &str) -> Option<String> {
     (!missing.is_empty()).then_some(closed)
 }
 
-/// Where signs are missing, and which.
+/// Place and text of missing signs.
 fn missing(finding: &Diagnostic, text: &str) -> Option<(usize, String)> {
     let (_, rest) = finding.help.as_ref()?.split_once("add `")?;
     let sign = rest.split('`').next().filter(|sign| matches!(*sign, ")" | "]"))?;
@@ -70,7 +70,7 @@ fn missing(finding: &Diagnostic, text: &str) -> Option<(usize, String)> {
     Some((end, sign.repeat(many)))
 }
 
-/// Where the last line of a text that is more than blanks and a comment ends.
+/// End of the last line of code: the last line that has more than blanks and a comment.
 fn end_of_code(text: &str) -> usize {
     let mut end = 0;
     let mut start = 0;
@@ -86,7 +86,7 @@ fn end_of_code(text: &str) -> usize {
     end
 }
 
-/// What an editor may do about the findings that it asks about.
+/// Code actions for the findings that an editor asks about.
 pub fn actions(params: &CodeActionParams) -> CodeActionResponse {
     let action = |shown: &lsp_types::Diagnostic| {
         let mend: Mend = serde_json::from_value(shown.data.clone()?).ok()?;

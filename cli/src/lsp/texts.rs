@@ -10,7 +10,7 @@ use lsp_types::{Position, Range, TextDocumentContentChangeEvent, Uri};
 /// Files longer than this are not looked into, bytes.
 const MOST_BYTES: u64 = 16 << 20;
 
-/// What is open; everything else is read from the disk.
+/// Open texts; all others are read from the disk.
 #[derive(Default)]
 pub struct Texts {
     open: HashMap<PathBuf, String>,
@@ -48,7 +48,7 @@ impl Texts {
         is_small.then(|| std::fs::read_to_string(path).ok()).flatten()
     }
 
-    /// Whether there is such a file.
+    /// True if there is such a file.
     pub fn has(&self, path: &Path) -> bool {
         self.open.contains_key(path) || path.is_file()
     }
@@ -135,7 +135,7 @@ pub struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// Of a text.
+    /// Index of the lines of a text.
     pub fn of(text: &'a str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         Lines { text, starts }

@@ -1,4 +1,4 @@
-//! What a text belongs to: the folder of a domain, or a domain, problem or plan by itself.
+//! Unit that a text belongs to: a domain's folder, or a domain, problem or plan by itself.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use descry_planner::pddl::parse;
 
 use super::texts::Texts;
 
-/// What a text is.
+/// Kind of unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unit {
     /// One of the files of a domain's folder.
@@ -29,7 +29,7 @@ const PARTS: [&str; 3] = ["objects", "scenes", "shapes"];
 /// More files than this are not looked into for the domain of a problem.
 const MOST_FILES: usize = 200;
 
-/// What the text at a path is.
+/// Finds the unit of the text at a path.
 pub fn of(texts: &Texts, path: &Path, text: &str) -> Unit {
     if let Some(folder) = folder_of(texts, path) {
         return Unit::Folder(folder);
@@ -105,7 +105,7 @@ pub fn domain_of(texts: &Texts, path: &Path, problem: &str) -> Option<PathBuf> {
     beside(texts, path).into_iter().find(is_it)
 }
 
-/// Whether a text defines a domain of a name.
+/// True if a text defines a domain of the given name.
 fn named_so(text: &str, wanted: &str) -> bool {
     let mut symbols = Symbols::default();
     let name = parse::domain(text, 0, &mut symbols, &mut Vec::new()).name;

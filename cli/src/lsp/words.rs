@@ -1,4 +1,4 @@
-//! What is answered about a word: what it is and how it is grounded, where it is declared, what may stand here.
+//! Answers about a word: meaning, grounding, declaration, and completions.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ const JOINING: [&str; 13] = [
     "decrease", "assign",
 ];
 
-/// What is declared where a text can name it: in itself, in its domain, in the problem.
+/// Declarations that a text can name: its own, those of its domain and of the problem.
 fn in_scope(texts: &Texts, path: &Path, text: &str) -> Vec<(PathBuf, String, Vec<Declared>)> {
     let unit = units::of(texts, path, text);
     let mut files: Vec<(PathBuf, bool)> = Vec::new();
@@ -57,8 +57,8 @@ fn here(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Here> {
     Some(Here { path, text, at })
 }
 
-/// What a word is: its declaration with what is written about it, in a domain's folder how it is grounded, and what a heading or a
-/// key of TOML means.
+/// Hover text of a word: its declaration with comments, its grounding in a domain's folder, the
+/// meaning of a TOML heading or key.
 pub fn hover(texts: &Texts, told: &Told, at: &TextDocumentPositionParams) -> Option<Hover> {
     let Here { path, text, at } = here(texts, at)?;
     let key = units::part_of(&path).and_then(|part| keys::here(part, &text, at));
@@ -77,7 +77,7 @@ pub fn hover(texts: &Texts, told: &Told, at: &TextDocumentPositionParams) -> Opt
     Some(Hover { contents: HoverContents::Markup(contents), range: Some(range) })
 }
 
-/// What a name is where a text can name it.
+/// Text about a name that is in scope.
 fn about(texts: &Texts, told: &Told, (path, text): (&Path, &str), name: &str) -> Vec<String> {
     const LONGEST: usize = 2_000;
     let mut parts: Vec<String> = Vec::new();
@@ -109,7 +109,7 @@ fn span(start: usize, end: usize) -> Span {
     Span { source: 0, start: start as u32, end: end as u32 }
 }
 
-/// Where a word is declared.
+/// Place of the declaration of a word.
 pub fn definition(texts: &Texts, at: &TextDocumentPositionParams) -> Option<GotoDefinitionResponse> {
     let Here { path, text, at } = here(texts, at)?;
     let (start, word) = word_at(&text, at);
@@ -149,7 +149,7 @@ fn variables(text: &str, part: std::ops::Range<usize>) -> Vec<(usize, &str)> {
     found
 }
 
-/// What may stand at a place.
+/// Completions at a place.
 pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<CompletionResponse> {
     let Here { path, text, at } = here(texts, at)?;
     let (start, _) = word_at(&text, at);
@@ -228,7 +228,7 @@ pub fn formatting(texts: &Texts, uri: &Uri) -> Option<Vec<TextEdit>> {
     Some(vec![TextEdit { range, new_text: laid_out }])
 }
 
-/// What a text declares, or the tables of a TOML file.
+/// Outline: the declarations of a text, or the tables of a TOML file.
 pub fn symbols(texts: &Texts, uri: &Uri) -> Option<DocumentSymbolResponse> {
     let path = path_of(uri);
     let text = texts.text(&path)?;

@@ -27,7 +27,7 @@ const TARGET: &str = "cup A";
 /// A cup that is farther than this from where it is said to stand is not found, metres.
 const FOUND_M: f64 = 0.05;
 
-/// What is said after one look.
+/// Statement after one look.
 #[derive(Clone, Copy, Default)]
 struct Said {
     there: f64,
@@ -100,13 +100,13 @@ fn run(count: u64, first_seed: u64, holes: f64, plot: Option<&String>) -> Result
     }
 }
 
-/// What is there counted so often that it is as often there as is expected before the first look.
+/// Statements reweighted so that the target is present as often as the prior says.
 fn as_often_as(prior: f64, said: &[(bool, Said)]) -> Vec<(bool, Said)> {
     let times = (prior / (1.0 - prior)).round() as usize;
     said.iter().flat_map(|s| std::iter::repeat_n(*s, if s.0 { times } else { 1 })).collect()
 }
 
-/// What was said wrongly of an arrangement.
+/// Prints the false statements about an arrangement.
 fn tell_wrong(seed: u64, present: bool, each: &[Said]) {
     for (n, s) in each.iter().enumerate() {
         let what = match (s.not_there && present, s.yes && !s.yes_is_right) {
@@ -136,7 +136,7 @@ fn row(name: &str, said: Vec<(bool, Said)>) -> Reliability {
     told
 }
 
-/// What is said after each look at one arrangement.
+/// Statements after each look at one arrangement.
 async fn one(
     domain: &Domain,
     spec: &SceneSpec,

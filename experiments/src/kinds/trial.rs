@@ -40,7 +40,7 @@ pub(super) struct Trial<'a> {
     pub program: Option<&'a str>,
     /// Targets of the search: names or kinds in the scene.
     pub targets: &'a [String],
-    /// Are the targets in the scene?
+    /// True if the targets are in the scene.
     pub present: bool,
     /// Fixes arrangement, noise, mishaps and random choices.
     pub seed: u64,
@@ -48,7 +48,7 @@ pub(super) struct Trial<'a> {
     pub faults: FaultPlan,
     /// Who chooses.
     pub policy: &'a str,
-    /// Is the first look taken from the start, whatever the policy?
+    /// True if the first look is taken from the start, whatever the policy.
     pub first_look_here: bool,
     /// A thing is found where it is if it stands no farther from there, metres.
     pub tolerance_m: f64,
@@ -169,7 +169,7 @@ fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
     Err(last)
 }
 
-/// Is the object there, and is it one of the targets, by name or kind?
+/// Tests if the object is there and is one of the targets, by name or kind.
 pub(super) fn is_among(object: &TrueObject, targets: &[String]) -> bool {
     object.present && targets.iter().any(|target| object.name == *target || object.kind == *target)
 }
@@ -220,11 +220,11 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
 pub struct Measured {
     /// Runs in one scene belong together.
     pub group: u64,
-    /// Was the target there at the end?
+    /// True if the target was there at the end.
     pub present: bool,
-    /// Was the verdict right?
+    /// True if the verdict was right.
     pub right: bool,
-    /// Did the run claim to have found an absent target?
+    /// True if the run claimed to have found an absent target.
     pub false_declaration: bool,
     /// Looks.
     pub views: f64,

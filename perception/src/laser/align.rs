@@ -16,7 +16,8 @@ pub struct Alignment {
     pub before: Violation,
     /// Violation after.
     pub after: Violation,
-    /// What was minimised, after: the violation, and what chooses among poses that violate nothing; square metres.
+    /// Minimised objective, after: the violation, and the tie-breaker among poses that violate
+    /// nothing; square metres.
     pub objective_m2: f64,
     /// True if the solver settled; false if it was cut short.
     pub converged: bool,
@@ -24,7 +25,7 @@ pub struct Alignment {
     pub iterations: usize,
     /// Times that the violation was computed.
     pub evaluations: usize,
-    /// How far the pose of each scan of the model was moved: metres, and radians anticlockwise.
+    /// Motion of each scan of the model: metres, and radians anticlockwise.
     pub moved: Vec<(f64, f64)>,
     /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
     pub left_out: Vec<usize>,
@@ -38,7 +39,8 @@ impl Alignment {
         self.after.exterior_m.max(self.after.interior_m)
     }
 
-    /// Whether a scan ended too far from where it was said to be taken for that to be so; never, if nothing is known of how well poses are stated.
+    /// True if a scan ended too far from its stated pose; never, if the accuracy of stated poses is
+    /// unknown.
     fn strays(&self, options: &SolverOptions) -> bool {
         let Objective::Centred { pose_sigma_m, pose_sigma_rad } = options.objective else { return false };
         self.moved.iter().any(|(m, rad)| *m > FAR * pose_sigma_m || rad.abs() > FAR * pose_sigma_rad)
@@ -86,7 +88,8 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
 const FEWEST: usize = 3;
 /// A scan that was moved by more spreads of its stated pose is not where it was taken.
 const FAR: f64 = 4.0;
-/// By how much an end is opened, radians: then the bound lies far beside the thing, and tells nothing.
+/// Angle by which an end is opened, radians: the bound then lies far beside the thing and
+/// constrains nothing.
 const OPEN_RAD: f64 = 0.5;
 
 /// Aligns scans of which some may be wrong: where an end of the thing was taken for background, the bound lies on the thing and contradicts other scans.
@@ -149,7 +152,7 @@ fn open(posed: &mut PosedScan, side: Side) {
     }
 }
 
-/// What of some scans contradicts the others, by their place in the list.
+/// Scans that contradict others, by their index in the list.
 #[derive(Default)]
 struct Contradictions {
     ends: BTreeSet<(usize, Side)>,

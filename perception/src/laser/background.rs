@@ -7,7 +7,7 @@ use nalgebra::{Point2, Point3, Vector2};
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
-/// How readings of a thing are told from others.
+/// Options for separating readings of a thing from the background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserveOptions {
     /// Readings of one thing lie no farther apart, metres: more than the gap between a chair's legs.
@@ -26,7 +26,7 @@ impl Default for ObserveOptions {
     }
 }
 
-/// Why a scan says nothing of the thing.
+/// Reason for which a scan contributes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ignored {
     /// No cluster of readings near where it was looked for.
@@ -56,7 +56,7 @@ impl std::fmt::Display for Ignored {
     }
 }
 
-/// What scans say of a thing.
+/// Observation of a thing by several scans.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Scans in which it is bounded on both sides, posed in the map.
@@ -71,9 +71,9 @@ pub enum ObserveError {
     /// A scan is unsound.
     #[error("scan {index}: {why}")]
     Scan {
-        /// Which.
+        /// Index of the scan.
         index: usize,
-        /// What is wrong with it.
+        /// Fault of the scan.
         why: ScanError,
     },
     /// Readings cannot be clustered.
@@ -210,7 +210,8 @@ fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<
     })
 }
 
-/// Whether a reading beside the thing went past it (greater), ended before it (less), or at it; `None` if it is no reading.
+/// Compares a neighbouring reading with the thing's own: beyond (greater), before (less), or level;
+/// `None` without a reading.
 fn past(own_m: f64, reading_m: f64, clear_m: f64) -> Option<Ordering> {
     if reading_m.is_nan() || reading_m <= 0.0 {
         return None;

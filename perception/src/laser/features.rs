@@ -25,7 +25,7 @@ impl Features {
 /// Standard deviations of area (square metres) and perimeter (metres) between models of one thing that seven scans leave: the middle of the paper's Fig. 7.
 pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
 
-/// What instances of a class have in common.
+/// Feature distribution of a class of shapes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureClass {
     /// Its name.
@@ -39,7 +39,7 @@ pub struct FeatureClass {
 }
 
 impl FeatureClass {
-    /// How many spreads of the class features lie from its mean (Mahalanobis' distance).
+    /// Mahalanobis distance of features from the class mean.
     pub fn distance(&self, features: &Features) -> f64 {
         let off = features.vector() - self.mean;
         let inverse = self.covariance.try_inverse().unwrap_or_else(Matrix2::zeros);

@@ -7,16 +7,18 @@ use super::violation::{Assembly, Violation};
 use nalgebra::{Isometry2, Vector2};
 use std::f64::consts::TAU;
 
-/// How models are brought onto each other.
+/// Options for aligning two models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
     /// The solver.
     pub solver: SolverOptions,
     /// Angles to start from, evenly around.
     pub starts: usize,
-    /// Of the starts that violate less than their neighbours, so many are followed to the end.
+    /// Number of starts, among those with less violation than their neighbours, that are followed
+    /// to the end.
     pub followed: usize,
-    /// Where the best of these, roughly settled, violates by more, metres as [`Violation::per_pair_m`], it is left at that.
+    /// Violation above which the best roughly settled start is given up, metres as
+    /// [`Violation::per_pair_m`].
     pub hopeless_m: f64,
 }
 
@@ -26,16 +28,16 @@ impl Default for FitOptions {
     }
 }
 
-/// Where a search for a pose starts.
+/// Start of a search for a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// From what is known already.
+    /// Near a known pose.
     Near(Isometry2<f64>),
     /// From every angle, the middles together.
     AllAngles,
 }
 
-/// How one model, or one scan, lies on a model.
+/// Pose of a model, or of one scan, on a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFit {
     /// The pose found: of the other model's frame, or of the laser.
@@ -50,7 +52,8 @@ pub struct ModelFit {
     pub iterations: usize,
     /// Times that the violation was computed, starts included.
     pub evaluations: usize,
-    /// Where the other starts ended that turned out elsewhere, best first: pose, and BV between the two, square metres. What is symmetric has good ones.
+    /// Rival minima, best first: pose, and violation between the two, square metres. Symmetric
+    /// shapes have good ones.
     pub rivals: Vec<(Isometry2<f64>, f64)>,
 }
 
@@ -67,7 +70,8 @@ pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> Mode
     follow(model, other.scans(), &starts, options)
 }
 
-/// Where a scan was taken, by the model of the thing that it shows: the pose of the laser in the model's frame.
+/// Localises a scan by the model of the thing that it shows: pose of the laser in the model's
+/// frame.
 ///
 /// Without a start every angle is tried, the scan's nearest reading put on the side of the hull that faces it.
 pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &FitOptions) -> ModelFit {
@@ -113,7 +117,7 @@ fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<
         .collect()
 }
 
-/// Of the ends that are roughly settled, so many are settled in full.
+/// Number of roughly settled minima that are settled in full.
 const SETTLED: usize = 2;
 
 /// Follows the most promising starts to the end.

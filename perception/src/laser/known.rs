@@ -51,7 +51,7 @@ impl KnownShape {
     }
 }
 
-/// How to recognise.
+/// Options of recognition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecogniseOptions {
     /// Shapes whose features, or width, are off by more spreads are not aligned: measured at most 5.8 for the same thing, scanned from three to nine
@@ -66,7 +66,7 @@ pub struct RecogniseOptions {
     /// It is ruled out if that is more than this, metres, the precision of the paper's laser: measured at most 5.5 mm for the same thing, at least 8.9 mm
     /// for another of the paper's. Between the two it may be it.
     pub other_m: f64,
-    /// How models are brought onto each other.
+    /// Options for aligning models.
     pub fit: FitOptions,
 }
 
@@ -84,7 +84,7 @@ impl Default for RecogniseOptions {
 }
 
 impl RecogniseOptions {
-    /// How models are brought onto each other, and no farther than tells that they do not fit.
+    /// Options for aligning models, stopped as soon as a misfit is certain.
     fn fits(&self) -> FitOptions {
         FitOptions { hopeless_m: self.fit.hopeless_m.min(HOPELESS * self.other_m), ..self.fit }
     }
@@ -95,13 +95,13 @@ impl RecogniseOptions {
 pub struct Candidate {
     /// Its place in the list of known shapes.
     pub index: usize,
-    /// How far its features, or its width, are off, in spreads.
+    /// Distance of its features or its width from the class, in standard deviations.
     pub distance: f64,
-    /// How the instance lies on it.
+    /// Fit of the instance on the model.
     pub fit: ModelFit,
 }
 
-/// What was recognised.
+/// Result of recognition.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// One name fits.
@@ -112,10 +112,10 @@ pub enum Verdict {
     Unknown,
 }
 
-/// What a shape was taken for, and what else it was held against.
+/// Verdict on a shape, with the classes that it was compared with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recognition {
-    /// What it is.
+    /// Verdict.
     pub verdict: Verdict,
     /// Those that were aligned, the best fit first.
     pub candidates: Vec<Candidate>,
@@ -181,7 +181,7 @@ pub fn recognise_scans(
     decide(candidates, known, options)
 }
 
-/// How the scan lies on a model that lies on it worst, each by itself.
+/// Fit of the scan that fits worst on a model, each scan by itself.
 fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
     let each = scans.scans().iter().map(|posed| {
         let fit = localise(model, &posed.scan, Start::AllAngles, options);
@@ -191,7 +191,8 @@ fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> Mo
     worst.unwrap_or_else(|| fit_scans(model, scans, options))
 }
 
-/// By how much a shape is too wide, from every side, for the bounds of a scan, or too narrow for its readings, metres.
+/// Width by which a shape exceeds the bounds of a scan, or falls short of its readings, from every
+/// side, metres.
 fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     let corners = model.hull().corners;
     let widths = (0..WIDTHS).map(|i| {
@@ -234,7 +235,8 @@ fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &Recogn
     Recognition { verdict, candidates, ruled_out, may_be }
 }
 
-/// How far features of two models are apart, in spreads of such a difference: the larger of area's and perimeter's.
+/// Distance between features of two models in standard deviations of such a difference: the larger
+/// of area's and perimeter's.
 fn apart(a: &Features, b: &Features) -> f64 {
     let area = (a.area_m2 - b.area_m2) / USUAL_SPREAD.0;
     let perimeter = (a.perimeter_m - b.perimeter_m) / USUAL_SPREAD.1;

@@ -1,4 +1,5 @@
-//! Where to scan from next: the pose from which a scan is expected to settle most of what the scans so far leave open.
+//! Next-best scan: the pose from which a scan is expected to settle most of the undetermined
+//! outline.
 //!
 //! A place may belong to the thing if no scan looked past it on either side and none looked through it. What of these places lies outside the hull of the
 //! readings is undetermined: constraints that the thing may still violate. A scan from elsewhere, if the thing is as its hull, looks past or through some of them.
@@ -8,7 +9,7 @@ use super::shape::ShapeModel;
 use crate::hull::Hull;
 use nalgebra::{Isometry2, Point2, Point3};
 
-/// How the undetermined places are counted.
+/// Options for counting undetermined places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextOptions {
     /// Edge of the square around the hull's centre that the thing is believed to lie in, metres.
@@ -30,10 +31,10 @@ impl Default for NextOptions {
 /// Cells along the square's edge, at the most.
 const MOST_ACROSS: f64 = 2000.0;
 
-/// What a scan from a pose is expected to bring.
+/// Expected gain of a scan from a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextScan {
-    /// Which of the poses.
+    /// Index of the pose.
     pub index: usize,
     /// Undetermined area that it is expected to settle, square metres.
     pub settles_m2: f64,
@@ -46,7 +47,7 @@ pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
     undetermined(model, &model.hull(), options).len() as f64 * options.cell_m * options.cell_m
 }
 
-/// What scans from poses are expected to settle of what is undetermined, together and each by itself.
+/// Expected gain of scans from several poses, together and each by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
     /// Round the hull of what was met, metres.
@@ -58,7 +59,8 @@ pub struct Outlook {
 }
 
 impl Outlook {
-    /// What is undetermined of a model, and which of it scans from these poses of the laser in the model's frame would settle.
+    /// Undetermined places of a model, and those that scans from the given poses of the laser, in
+    /// the model's frame, would settle.
     pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Outlook {
         let _span = tracing::debug_span!("outlook", poses = poses.len()).entered();
         let hull = model.hull();
@@ -85,7 +87,8 @@ impl Outlook {
         settled.iter().filter(|is| !**is).count() as f64 * self.cell_m2
     }
 
-    /// How far on average the thing may reach beyond what was met of it, after scans from some of the poses, metres.
+    /// Mean distance by which the thing may exceed its measured outline after scans from the given
+    /// poses, metres.
     pub fn looseness_m(&self, poses: &[usize]) -> f64 {
         self.leaves_m2(poses) / self.perimeter_m
     }

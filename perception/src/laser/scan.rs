@@ -13,7 +13,7 @@ pub struct Scan {
     /// as 0 where there is no reading.
     #[serde(with = "ranges")]
     pub ranges_m: Vec<f64>,
-    /// Where localisation says that the laser was.
+    /// Stated pose of the laser.
     pub map_from_laser: Isometry2<f64>,
 }
 
@@ -33,7 +33,7 @@ pub enum ScanError {
         "angle {index} is {angle_rad} rad: give finite angles that ascend, over no more than a full turn (6.283 rad)"
     )]
     Angle {
-        /// Which.
+        /// Index of the reading.
         index: usize,
         /// Its value.
         angle_rad: f64,
@@ -44,7 +44,7 @@ pub enum ScanError {
 }
 
 impl Scan {
-    /// That angles, ranges and pose go together.
+    /// Checks that angles, ranges and pose are consistent.
     ///
     /// # Errors
     /// Names the first fault.
@@ -68,7 +68,7 @@ impl Scan {
         Ok(())
     }
 
-    /// Where a reading ended, in the laser's frame; `None` if nothing returned it.
+    /// End point of a reading in the laser's frame; `None` without a return.
     pub fn endpoint(&self, index: usize) -> Option<Point2<f64>> {
         let (angle, range) = (*self.angles_rad.get(index)?, *self.ranges_m.get(index)?);
         (range > 0.0 && range.is_finite()).then(|| Point2::from(direction(angle) * range))
@@ -105,7 +105,7 @@ pub(super) fn direction(angle_rad: f64) -> Vector2<f64> {
     Vector2::new(angle_rad.cos(), angle_rad.sin())
 }
 
-/// Where a laser stands.
+/// Position of a laser.
 pub(super) fn origin(pose: &Isometry2<f64>) -> Point2<f64> {
     pose.translation.vector.into()
 }

@@ -1,4 +1,4 @@
-//! What one scan says of a thing, and what many say together: the shape model.
+//! Shape model: constraints on a thing's outline from one scan and from many.
 
 use super::features::Features;
 use super::scan::is_pose;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectScan {
-    /// Where readings ended on the thing, in the laser's frame, metres.
+    /// End points of readings on the thing, in the laser's frame, metres.
     pub points: Vec<Point2<f64>>,
     /// RightBound: the nearest angle to the right of the thing at which the laser looked past it.
     pub right_bound_rad: f64,
@@ -29,7 +29,7 @@ pub struct ObjectScan {
 pub struct PosedScan {
     /// The readings.
     pub scan: ObjectScan,
-    /// Where the laser was: in the map before scans are aligned, in the model's own frame after.
+    /// Pose of the laser: in the map before scans are aligned, in the model's own frame after.
     pub model_from_laser: Isometry2<f64>,
 }
 
@@ -66,7 +66,7 @@ pub enum ShapeError {
         "scan {index} has no point, or one that is not finite: give the places where readings met the thing"
     )]
     Points {
-        /// Which scan.
+        /// Index of the scan.
         index: usize,
     },
     /// The angles bound nothing.
@@ -74,7 +74,7 @@ pub enum ShapeError {
         "the angles of scan {index} are {angles_rad:?} rad: expected right bound < right object <= left object < left bound, over less than half a turn"
     )]
     Angles {
-        /// Which scan.
+        /// Index of the scan.
         index: usize,
         /// From right to left.
         angles_rad: [f64; 4],
@@ -82,7 +82,7 @@ pub enum ShapeError {
     /// The pose is no pose.
     #[error("the pose of scan {index} is not finite, or its rotation is no unit complex number")]
     Pose {
-        /// Which scan.
+        /// Index of the scan.
         index: usize,
     },
 }
@@ -110,7 +110,7 @@ impl ShapeModel {
         &self.scans
     }
 
-    /// Where readings ended on the thing, in the model's frame, metres.
+    /// End points of readings on the thing, in the model's frame, metres.
     pub fn points(&self) -> impl Iterator<Item = Point2<f64>> {
         self.scans.iter().flat_map(|s| s.scan.points.iter().map(|p| s.model_from_laser * p))
     }

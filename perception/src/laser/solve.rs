@@ -5,7 +5,7 @@ use super::simplex::simplex;
 use super::violation::{Assembly, Kind, Residual};
 use nalgebra::{Isometry2, Rotation2, Translation2, UnitComplex, Vector2};
 
-/// How the objective is minimised.
+/// Minimiser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
     /// Levenberg's and Marquardt's method on the errors, whose derivatives are known.
@@ -15,7 +15,7 @@ pub enum Solver {
     Simplex,
 }
 
-/// What is minimised.
+/// Objective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Objective {
     /// The boundary violation alone (Eq. 3). Many poses violate nothing, for a reading a degree bounds a thing loosely; which of them is found is left to
@@ -42,12 +42,12 @@ const CENTRED: f64 = 0.1;
 /// Spread of a silhouette between two rays that are a degree apart, 1.5 m away, metres: their distance over the square root of twelve.
 const GAP_SIGMA_M: f64 = 0.0075;
 
-/// What is minimised, how, and how long to go on.
+/// Options of the solver: objective, minimiser, limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverOptions {
-    /// Which solver.
+    /// Minimiser.
     pub solver: Solver,
-    /// What it minimises.
+    /// Objective.
     pub objective: Objective,
     /// Most iterations of least squares in each of its rounds.
     pub most_iterations: usize,
@@ -76,11 +76,11 @@ impl Default for SolverOptions {
     }
 }
 
-/// Where a solver ended.
+/// Result of a solver.
 #[derive(Clone, Debug)]
 pub struct Solved {
     pub poses: Vec<Isometry2<f64>>,
-    /// What was minimised, at these poses.
+    /// Value of the objective at these poses.
     pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
@@ -133,14 +133,15 @@ impl<'a> Problem<'a> {
         &self.movable
     }
 
-    /// What an error costs, square metres, and the weight of its square that makes the cost fall as fast; outliers are `wider` times as long as at the end.
+    /// Cost of an error, square metres, and the weight of its square with the same slope; outliers
+    /// are `wider` times as long as at the end.
     pub fn costs(&self, r: &Residual, wider: f64) -> (f64, f64) {
         let weight = if r.kind == Kind::Slack { self.slack } else { 1.0 };
         let share = 1.0 / (1.0 + (r.value_m / (wider * self.outlier_m)).powi(2));
         (weight * share * r.value_m * r.value_m, weight * share * share)
     }
 
-    /// How far a group is from its start, shift and turn, each with the weight of its square.
+    /// Shift and turn of a group from its start, each with the weight of its square.
     pub fn strayed(&self, poses: &[Isometry2<f64>], group: usize) -> impl Iterator<Item = (f64, f64)> {
         let pivot = self.assembly.pivot(group);
         let (from, to) = (&self.start[group], &poses[group]);
@@ -162,7 +163,7 @@ impl<'a> Problem<'a> {
         moved
     }
 
-    /// What is minimised, square metres.
+    /// Value of the objective, square metres.
     pub fn cost(&self, poses: &[Isometry2<f64>]) -> f64 {
         let mut sum = 0.0;
         let placed = self.assembly.placed(poses);

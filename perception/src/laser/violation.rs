@@ -8,7 +8,7 @@ use crate::hull::convex;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::Serialize;
 
-/// How far poses violate the angular constraints.
+/// Violation of the angular constraints by poses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Violation {
     /// BV: the sum of the squared errors over ordered pairs of scans (Eq. 3), square metres.
@@ -31,7 +31,7 @@ impl Violation {
 /// One scan, ready to be held against others.
 #[derive(Clone, Debug)]
 struct Part {
-    /// Which scans move together.
+    /// Index of the group of scans that move together.
     group: usize,
     /// Its corners in `Assembly::corners`.
     begin: usize,
@@ -53,7 +53,7 @@ pub enum Side {
     Right,
 }
 
-/// Where a scan was taken from and its lines: unit normals that point away from the thing.
+/// Origin of a scan and its lines: unit normals that point away from the thing.
 #[derive(Clone, Copy, Debug)]
 struct Rays {
     laser: Point2<f64>,
@@ -113,8 +113,8 @@ pub struct Placed {
     rays: Vec<Rays>,
 }
 
-/// Which error: exterior (Eq. 1), interior (Eq. 2), or how far an end of the thing is from the middle between the last ray that met it and the first that
-/// went past, which may have either sign.
+/// Kind of error: exterior (Eq. 1), interior (Eq. 2), or signed distance of an end of the thing
+/// from the middle between the last ray that met it and the first that passed it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Exterior,
@@ -126,7 +126,7 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     pub kind: Kind,
-    /// Of the scan whose line it is.
+    /// Side of the scan whose line it is.
     pub side: Side,
     pub value_m: f64,
     pub normal: Vector2<f64>,

@@ -29,7 +29,7 @@ pub(super) enum Truly {
 }
 
 impl Truly {
-    /// Is the judgement about a surface?
+    /// True if the judgement needs a surface.
     pub fn needs_surface(self) -> bool {
         matches!(self, Self::Answered | Self::Stands | Self::AllStand)
     }
@@ -66,7 +66,7 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
 /// A verdict held against the truth.
 #[derive(Debug, PartialEq)]
 pub(super) struct Scored {
-    /// Is the verdict right: achieved and said so, or impossible and said so?
+    /// True if the verdict is right: achieved and said so, or impossible and said so.
     pub right: bool,
     /// It was said that it is so, and it is not.
     pub false_yes: bool,

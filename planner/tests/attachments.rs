@@ -179,7 +179,8 @@ fn missing_and_failing_attachments_are_errors_at_their_place() {
 
 #[test]
 fn names_that_came_as_a_list_of_texts_are_proposals() {
-    let domain = "(define (domain shelf) (:requirements :typing :negative-preconditions :modules :grounding-modules)
+    let domain =
+        "(define (domain shelf) (:requirements :typing :negative-preconditions :modules :grounding-modules)
       (:types book) (:modules (free-slot ?b - book grounding free_slot@x)) (:predicates (placed ?b - book))
       (:action place :parameters (?b - book) :grounding ([free-slot ?b])
         :precondition (not (placed ?b)) :effect (placed ?b)))";

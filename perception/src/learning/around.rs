@@ -1,4 +1,4 @@
-//! Where to stand around an object, and in which order (section IV-A).
+//! Stands around an object and their order (section IV-A).
 
 use super::LearningError;
 use crate::cloud::is_finite;
@@ -6,7 +6,7 @@ use crate::neighbours::Neighbours;
 use nalgebra::{Point2, Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// How stands are looked for.
+/// Options for choosing stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AroundOptions {

@@ -1,4 +1,4 @@
-//! What cannot be learned from.
+//! Errors of learning.
 
 use crate::cloud::CloudError;
 use crate::cluster::ClusterError;
@@ -31,7 +31,7 @@ pub enum LearningError {
         "the first view was left out ({why}): what it shows of the object cannot be carried over to the others"
     )]
     FirstLeftOut {
-        /// Why.
+        /// Reason.
         why: String,
     },
     /// Nothing of the object is left after cleaning.
@@ -39,7 +39,7 @@ pub enum LearningError {
         "{points} points of the object are left in the first view after its edge, outliers and planes were removed: go nearer"
     )]
     NothingLeft {
-        /// How many points.
+        /// Number of points.
         points: usize,
     },
     /// Two models of what should be one object.
@@ -52,7 +52,7 @@ pub enum LearningError {
         shared: f64,
         /// Root mean square by which it is off there, metres.
         off_m: f64,
-        /// How far one was moved to fit, metres.
+        /// Motion that was needed to fit, metres.
         moved_m: f64,
     },
     /// Options that mean nothing.
@@ -60,9 +60,9 @@ pub enum LearningError {
     Option {
         /// The option.
         field: &'static str,
-        /// What was given.
+        /// Given value.
         value: f64,
-        /// What was expected.
+        /// Expected values.
         expected: &'static str,
     },
     /// The views could not be brought together.

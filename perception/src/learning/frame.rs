@@ -28,7 +28,8 @@ const WIDE: OrganisedOptions =
 const WIDEST_PX: f64 = 32.0;
 
 impl Frame {
-    /// What a view shows within `reach_m` of `centre` (world, metres). `None` if it is no depth image.
+    /// Pixels of a view within `reach_m` of `centre` (world, metres). `None` if the view is no
+    /// depth image.
     pub fn new(
         view: &View,
         world_from_camera: &Isometry3<f64>,

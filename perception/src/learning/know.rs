@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 use skin::Skin;
 pub use skin::outward;
 
-/// How learned objects are recognised.
+/// Options for recognising learned objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KnowOptions {
@@ -40,9 +40,10 @@ pub struct KnowOptions {
     pub keypoint_m: f32,
     /// Less confidence is not told.
     pub least_confidence: f64,
-    /// What is less sure at best, by a few points of the model, is not looked at closer: far less than anything told, so that nothing is lost but time.
+    /// Upper bound of the probability, from a few points of the model, below which a candidate is
+    /// not examined closer: far below any that is reported, so nothing but time is saved.
     pub hopeless: f64,
-    /// What evidence is worth.
+    /// Judge that turns evidence into a probability.
     pub judge: Judge,
     /// Up in the frames of the models and in the world of the views, if it is the same in all of them: things mostly stand as they stood when they were
     /// learned.
@@ -67,11 +68,11 @@ impl Default for KnowOptions {
 pub struct Recognised {
     /// Number of the model in the library, in the order in which they were added.
     pub model: usize,
-    /// Where it is, by the pose that the view states.
+    /// Pose, by the stated pose of the view.
     pub world_from_model: Isometry3<f64>,
     /// Probability that it is that object at that place.
     pub confidence: f64,
-    /// What speaks for it.
+    /// Evidence for it.
     pub evidence: Evidence,
 }
 
@@ -81,7 +82,7 @@ pub enum KnowError {
     /// A model without normals or with next to no points.
     #[error("the model has {points} points with a normal: learn it, or estimate normals that point outwards")]
     Model {
-        /// How many there are.
+        /// Number of points.
         points: usize,
     },
     /// A view whose pixels are not known.
@@ -126,7 +127,8 @@ const REFINED: usize = 6;
 /// Poses nearer to each other than this are one, metres and radians; and poses that were brought onto the scene by a few points.
 const SAME: (f64, f64) = (0.02, 0.26);
 const SETTLED: (f64, f64) = (0.005, 0.07);
-/// How near the scene is looked for when a pose is brought onto it, from far to near, metres; and where a few points have brought it there.
+/// Correspondence distances of the two rounds that align a pose with the scene, metres: the first
+/// from votes, the second after a few points are aligned.
 const WITHIN_M: [f32; 2] = [0.025, 0.01];
 const SETTLED_WITHIN_M: [f32; 1] = [0.01];
 /// Odds that a thing lies or hangs, to standing as it stood when it was learned. An assumption: nine in ten stand.
@@ -179,7 +181,7 @@ impl Library {
         self.models.is_empty()
     }
 
-    /// Which models are in a view, and where, the surest first.
+    /// Recognises models in a view, the surest first.
     ///
     /// # Errors
     /// If the view is no depth image.
@@ -222,7 +224,7 @@ impl Library {
 /// A model at a pose, judged by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// What it would be.
+    /// Candidate.
     pub recognised: Recognised,
     /// Points of the view's surface that it explains, ascending.
     explained: Vec<u32>,
@@ -235,7 +237,7 @@ impl Candidate {
         shared as f64 > SHARED * self.explained.len().min(other.explained.len()) as f64
     }
 
-    /// What it adds to an explanation of the scene.
+    /// Gain of an explanation of the scene by this candidate.
     fn worth(&self) -> f64 {
         self.explained.len() as f64 * (self.recognised.confidence - 0.5)
     }

@@ -17,7 +17,7 @@ use crate::voxel;
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde::{Deserialize, Serialize};
 
-/// How an object is modelled. Parameters of the paper where it gives any.
+/// Options of modelling. Parameters of the paper where it gives any.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearnOptions {
@@ -33,7 +33,7 @@ pub struct LearnOptions {
     pub plane_hidden_share: f64,
     /// Points within this of the object are of it, metres (paper: 1 cm).
     pub radius_m: f32,
-    /// Where the surface turns by less, radians (paper: 20 degrees).
+    /// Greatest angle between normals of one surface, radians (paper: 20 degrees).
     pub angle_rad: f64,
     /// Side of the cubes of the model, metres (paper: 2 mm).
     pub cube_m: f32,
@@ -60,12 +60,12 @@ impl Default for LearnOptions {
     }
 }
 
-/// What one look gave to a model.
+/// Contribution of one look to a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Used {
     /// Pixels of the object; 0 if it was left out.
     pub pixels: usize,
-    /// Why it was left out.
+    /// Reason for which the look was left out.
     pub left_out: Option<String>,
 }
 
@@ -74,9 +74,9 @@ pub struct Used {
 pub struct LearnedModel {
     /// Points with normals, and colours where the views had them, about the middle of the object, metres.
     pub cloud: Cloud,
-    /// Where that middle was when it was learned; axes as the world's.
+    /// Pose of the model's middle when it was learned; axes as the world's.
     pub world_from_model: Isometry3<f64>,
-    /// What each look gave.
+    /// Contribution of each look.
     pub looks: Vec<Used>,
 }
 
@@ -143,7 +143,8 @@ struct Growing<'a> {
     measured: Measured,
 }
 
-/// What the look that noticed the object shows: what lies beside the object there is not of it, however smoothly it carries it on.
+/// First look, which noticed the object: its surroundings there are no part of the object, however
+/// smoothly they continue its surface.
 struct First {
     map: DepthMap,
     /// Pixels of the object, and those so near that noise may put it there.
@@ -163,14 +164,14 @@ impl First {
     }
 }
 
-/// How far a measurement may lie from what another look measured there, metres.
+/// Greatest distance between measurements of one place by two looks, metres.
 fn tolerance_m(q: &Point3<f64>) -> f64 {
     0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)))
 }
 
 /// Fewest pixels that an object is learned from.
 const LEAST_PIXELS: usize = 50;
-/// What is carried from look to look is thinned to this, metres.
+/// Spacing to which points carried from look to look are thinned, metres.
 const CARRIED_M: f32 = 0.004;
 
 impl<'a> Growing<'a> {
@@ -226,7 +227,7 @@ impl<'a> Growing<'a> {
         Ok(Used { pixels, left_out: None })
     }
 
-    /// Why a look cannot be of the object as it is known so far: it sees through it.
+    /// Contradiction between a look and the object as known so far: the look sees through it.
     fn contradiction(&self, frame: &Frame) -> Option<String> {
         let (mut through, mut seen) = (0, 0);
         for p in &self.object.points {

@@ -1,4 +1,5 @@
-//! What differs from the static structure of a place (section III; Ambruş et al., *Meta-Rooms*, 2014).
+//! Change detection against the static structure of a place (section III; Ambruş et al.,
+//! *Meta-Rooms*, 2014).
 
 use super::LearningError;
 use super::mask::Mask;
@@ -14,7 +15,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// How differences are told.
+/// Options of change detection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoticeOptions {
@@ -29,7 +30,7 @@ pub struct NoticeOptions {
     pub cluster_step_m: f32,
     /// Fewest pixels of a dynamic cluster in the view that shows it best.
     pub least_pixels: usize,
-    /// How far localisation may be off between two visits, metres.
+    /// Greatest error of localisation between two visits, metres.
     pub search_m: f32,
 }
 
@@ -53,7 +54,7 @@ pub struct MetaRoom {
     pub cloud: Cloud,
     /// Visits that it was made from.
     pub visits: usize,
-    /// How differences are told.
+    /// Options of change detection.
     pub options: NoticeOptions,
 }
 
@@ -78,14 +79,14 @@ impl Appeared {
     }
 }
 
-/// What a visit taught.
+/// Result of a visit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visit {
-    /// What came, the largest first.
+    /// Objects that appeared, the largest first.
     pub appeared: Vec<Appeared>,
-    /// What went, the largest first, world frame.
+    /// Objects that disappeared, the largest first, world frame.
     pub gone: Vec<Cloud>,
-    /// Where the cameras stood, the views of a visit moved together onto the static structure.
+    /// Camera poses, after the views of the visit were aligned together with the static structure.
     pub poses: Vec<Isometry3<f64>>,
     /// Points that the static structure gained: they had been hidden or never seen …
     pub added: usize,
@@ -204,7 +205,7 @@ impl MetaRoom {
         depths_m
     }
 
-    /// What a view sees that is not of the static structure, and how it lies to it.
+    /// Part of a view that is not of the static structure, and the view's alignment with it.
     fn compare(&self, view: &View, map: &DepthMap, tree: &Neighbours) -> Change {
         let known = self.seen_by(map);
         let grid = Grid { width: map.intrinsics.width, height: map.intrinsics.height };
@@ -248,7 +249,7 @@ impl MetaRoom {
         (self.options.delta_m as f32).max(3.0 * frontal_sigma_m(z_m))
     }
 
-    /// What came, by what hangs together, with the view that shows it best.
+    /// Connected parts of what appeared, each with the view that shows it best.
     fn clusters(
         &self,
         views: &[View],
@@ -344,7 +345,7 @@ impl MetaRoom {
     }
 }
 
-/// How a view differs from the static structure.
+/// Differences of a view from the static structure.
 struct Change {
     /// Pixels before it.
     before: Mask,
@@ -375,7 +376,7 @@ fn every(cloud: &Cloud, step: usize) -> Cloud {
     cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 
-/// What is no farther from the camera than `range_m`.
+/// Points no farther from the camera than `range_m`.
 fn near(cloud: &Cloud, range_m: f64) -> Cloud {
     cloud.filter(|p| is_finite(p) && f64::from(p.z) <= range_m)
 }

@@ -8,7 +8,7 @@ use crate::plane::{self, Plane, PlaneOptions};
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Point3;
 
-/// What decides about planes.
+/// Rules for planes.
 #[derive(Clone, Debug)]
 pub(super) struct PlaneRules {
     /// Least share of a plane that is of the object, for it to stay (ϑ_obj).
@@ -123,7 +123,8 @@ fn find(frame: &Frame, open: &Mask, draws: &mut Draws) -> Option<Found> {
     Some(Found { plane, middle, pixels })
 }
 
-/// How far a pixel may lie from its plane: three spreads of the camera at the middle depth, metres.
+/// Greatest distance of a pixel from its plane: three standard deviations of the camera at the
+/// middle depth, metres.
 fn tolerance_m(frame: &Frame, pixels: &[usize]) -> f64 {
     let depth_m = frame.depth_m(pixels[pixels.len() / 2]);
     (2.5 * f64::from(frontal_sigma_m(depth_m as f32))).max(0.006)

@@ -17,7 +17,7 @@ pub struct Keyframe {
     pub world_from_camera: Isometry3<f64>,
     /// False if the look does not fit the others.
     pub used: bool,
-    /// Why it settled, or was left out.
+    /// Reason for which it settled, or was left out.
     pub why: String,
 }
 

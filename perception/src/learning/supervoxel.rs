@@ -9,9 +9,9 @@ use super::mask::Mask;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
 
-/// Which piece each pixel belongs to.
+/// Supervoxel of each pixel.
 pub(super) struct Supervoxels {
-    /// By pixel; [`voxel::NONE`] where there is none.
+    /// Index by pixel; [`voxel::NONE`] where there is none.
     of: Vec<u32>,
     count: usize,
 }

@@ -190,7 +190,8 @@ fn sampled(image: &[f32], width: usize, u: f32, v: f32) -> (f32, f32, f32) {
     (value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q))
 }
 
-/// What the marks and surfaces of one look ask of its place in another, as motions of the first in the frame of the second.
+/// Constraints by the marks and surfaces of one look on its pose in another, as motions of the
+/// first in the frame of the second.
 fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isometry3<f64>) -> Sums {
     let (turn, shift) =
         (b_from_a.rotation.to_rotation_matrix().cast::<f32>(), b_from_a.translation.vector.cast::<f32>());

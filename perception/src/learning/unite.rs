@@ -11,7 +11,7 @@ use nalgebra::Isometry3;
 const NEIGHBOURS: usize = 20;
 /// From far to near, metres.
 const WITHIN_M: [f32; 2] = [0.02, 0.006];
-/// What was found to lie there is moved no farther to fit, metres and radians: beyond that it was found wrongly.
+/// Greatest correction of a found pose, metres and radians: beyond that it was found wrongly.
 const MOST_MOVED: (f64, f64) = (0.03, 0.3);
 /// Least share of the smaller one that lies on the other, and how far that is off at most, metres: a model is good to two millimetres.
 const LEAST_SHARED: f64 = 0.35;
@@ -22,7 +22,7 @@ const MOST_OFF_M: f64 = 0.003;
 pub struct United {
     /// Points with normals, and colours where both had them, in the frame of what was known, metres.
     pub cloud: Cloud,
-    /// How what came lies there.
+    /// Pose of the new model in the known one.
     pub known_from_more: Isometry3<f64>,
     /// Share of the smaller of both that lies on the other.
     pub shared: f64,

@@ -23,9 +23,9 @@ struct Sums {
     /// Whole coordinates.
     cube: [i32; 3],
     count: u32,
-    /// Of the points, from the cube's corner, metres.
+    /// Sum of the points, from the cube's corner, metres.
     sum: [f32; 3],
-    /// Of unit vectors towards the camera.
+    /// Sum of unit vectors towards the camera.
     towards: [f32; 3],
 }
 
@@ -43,7 +43,7 @@ pub enum CellsError {
     /// The edge is no positive length.
     #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
     Edge {
-        /// What was given.
+        /// Given edge.
         edge_m: f64,
     },
     /// A stored cell holds what no cell can.
@@ -51,7 +51,7 @@ pub enum CellsError {
         "cell {index} of the stored ones is damaged (its count is {count}, or a sum is no number, or it occurs twice): store the map anew"
     )]
     Damaged {
-        /// Which.
+        /// Index of the station.
         index: usize,
         /// Its points.
         count: u32,
@@ -99,7 +99,7 @@ pub struct Facet {
     pub points: u32,
 }
 
-/// What a cube holds, whether or not its normal is known.
+/// Contents of a cube, with or without a known normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Region {
     /// Centroid, in the map, metres.
@@ -118,7 +118,7 @@ impl Region {
     }
 }
 
-/// How normals are found.
+/// Options for normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalOptions {
     /// A cube with fewer points is noise, and no region …
@@ -213,7 +213,7 @@ impl Cells {
         self.regions(options).iter().filter_map(Region::facet).collect()
     }
 
-    /// What is in each cell that is no noise, in the order of the cells.
+    /// Regions of all cells that are no noise, in the order of the cells.
     pub(super) fn regions(&self, options: &NormalOptions) -> Vec<Region> {
         let _span = tracing::debug_span!("normals by regions", cells = self.len()).entered();
         let region = |sums: &Sums| {

@@ -1,4 +1,4 @@
-//! Where the drive came by again, and all its poses together: the global correction that the paper leaves open (its Fig. 9).
+//! Loop closure and pose graph: the global correction that the paper leaves open (its Fig. 9).
 
 use super::error::{MappingError, check, check_pose};
 use super::field::Field;
@@ -8,7 +8,7 @@ use super::station::{FieldOfView, Spot, Station, thinned};
 use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
 use rayon::prelude::*;
 
-/// Where to look for places come by again.
+/// Options for finding places that were passed before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosureOptions {
     /// Stations on a shorter way are neighbours anyhow, metres.
@@ -23,7 +23,7 @@ pub struct ClosureOptions {
     pub heading_drift_rad: f64,
     /// Least share of what both fields of view see that must lie on each other.
     pub explained: f64,
-    /// What is seen on so long a stretch of the drive is held against another, metres.
+    /// Length of the stretches of the drive that are compared, metres.
     pub stretch_m: f64,
     /// From one stretch to the next, metres.
     pub every_m: f64,
@@ -64,7 +64,7 @@ pub struct Closure {
     pub from: usize,
     /// The later.
     pub to: usize,
-    /// How they lie to each other.
+    /// Relative pose of the two.
     pub fit: PairFit,
 }
 
@@ -126,7 +126,7 @@ fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
         .collect()
 }
 
-/// What was seen on some metres of the drive, in the frame of the station in the middle.
+/// Plan of some metres of the drive, in the frame of the station in the middle.
 struct Stretch {
     spots: Vec<Spot>,
     /// The stations.
@@ -170,8 +170,9 @@ impl Stretch {
     }
 }
 
-/// Where what was seen on one drive lies in what was seen on another, from a rough pose: within `options.most_m` and `options.heading_drift_rad` of it.
-/// Stations come with their poses in the frame of their drive. `None` if too little fits, or several places do.
+/// Locates one drive in another from a rough pose: within `options.most_m` and
+/// `options.heading_drift_rad` of it. Stations come with their poses in the frame of their drive.
+/// `None` if too little fits, or several places do.
 ///
 /// # Errors
 /// If an option or a pose cannot be used.
@@ -275,7 +276,7 @@ fn searched(
     Some(found)
 }
 
-/// How well two stretches fit, what both could see of them, at all starts within reach.
+/// Scores of all starts within reach: agreement of two stretches in what both could see.
 fn scores(
     before: &Stretch,
     after: &Stretch,

@@ -15,7 +15,7 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UprightCylinder {
-    /// Where its axis stands, metres.
+    /// Position of the axis, metres.
     pub middle: Point2<f64>,
     /// Radius, metres.
     pub radius_m: f64,
@@ -32,7 +32,7 @@ pub struct UprightCylinder {
 }
 
 impl UprightCylinder {
-    /// How much of the circle was seen, radians.
+    /// Seen part of the circle, radians.
     pub fn arc_rad(&self) -> f64 {
         self.arcs_rad.iter().map(|(from, to)| to - from).sum()
     }
@@ -53,14 +53,14 @@ impl UprightCylinder {
     }
 }
 
-/// How cylinders are found.
+/// Options for cylinders.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CylinderOptions {
     /// Radii of pillars, metres.
     pub pillar_m: RangeInclusive<f64>,
     /// Radii of round walls, metres.
     pub round_wall_m: RangeInclusive<f64>,
-    /// What lies no farther from the surface is of it, metres.
+    /// Greatest distance of a point from the surface it belongs to, metres.
     pub tolerance_m: f64,
     /// At least so much of the circle of a pillar is seen in one piece, radians: less may be a bend …
     pub least_arc_rad: f64,
@@ -90,9 +90,9 @@ const PART_RAD: f64 = TAU / PARTS as f64;
 const LEVELS: u32 = 3;
 /// A narrower wall may be a side of a pillar, in diameters of the largest.
 const NARROW: f64 = 1.0;
-/// What lies nearer to a wider wall is of it, in edges of cells.
+/// Distance below which points belong to a wider wall, in edges of cells.
 const OF_WALL: f64 = 1.5;
-/// What is measured of a surface is blurred to each side, in tolerances.
+/// Blur of a measured surface to each side, in tolerances.
 const BLURRED: f64 = 3.0;
 /// A round wall stands for so many planes at least.
 const PLANES: usize = 3;

@@ -1,4 +1,4 @@
-//! What cannot be mapped.
+//! Errors of mapping.
 
 use nalgebra::Isometry2;
 
@@ -8,9 +8,9 @@ pub enum MappingError {
     /// An option that is no positive length, or none that can be.
     #[error("{name} is {value}: give a number from {least} to {most}")]
     Option {
-        /// Which.
+        /// Name of the option.
         name: &'static str,
-        /// What was given.
+        /// Given value.
         value: f64,
         /// The least that can be.
         least: f64,
@@ -24,7 +24,7 @@ pub enum MappingError {
     Pose {
         /// `station`.
         what: &'static str,
-        /// Which.
+        /// Index of the station.
         index: usize,
     },
 }
@@ -32,7 +32,7 @@ pub enum MappingError {
 /// Farthest that a station may be from the origin, metres.
 pub(super) const FARTHEST_M: f64 = 1e5;
 
-/// That numbers lie within bounds.
+/// Checks that numbers lie within bounds.
 pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), MappingError> {
     for &(name, value, least, most) in options {
         if !(value >= least && value <= most) {
@@ -42,7 +42,7 @@ pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), Map
     Ok(())
 }
 
-/// That a pose is one.
+/// Checks that a pose is finite.
 pub(super) fn check_pose(
     what: &'static str,
     index: usize,

@@ -1,9 +1,9 @@
-//! How likely each place of a plan is to hold a point, as a picture: the mixture of Gaussians around the spots of another plan.
+//! Likelihood field: the mixture of Gaussians around the spots of a plan, as a picture.
 
 use super::station::Spot;
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// How far from its spot a point that belongs to it lies, in spreads: farther out it is an outlier.
+/// Greatest distance of an inlier from its spot, in standard deviations.
 pub(super) const REACH: f64 = 3.0;
 /// Density of outliers against that of a spot of usual weight: that of a Gaussian at `REACH` spreads.
 pub(super) const OUTLIERS: f64 = 0.011;
@@ -15,9 +15,9 @@ pub(super) struct Field {
     width: usize,
     height: usize,
     logs: Vec<f32>,
-    /// Which of them were looked at; empty if that was not asked.
+    /// Cells that were asked for; empty if that was not recorded.
     seen: Vec<bool>,
-    /// Where there is no spot near.
+    /// Value where no spot is near.
     nothing: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Where to go next to see more of a building: frontiers between open and unknown floor (Yamauchi 1997), and for poses around, what each is expected to
-//! show and what the way there costs.
+//! Frontier exploration: frontiers between open and unknown floor (Yamauchi 1997), and for poses
+//! around, the expected view and the cost of the way.
 
 use super::station::FieldOfView;
 use crate::occupancy::{Occupancy, Space};
@@ -9,10 +9,10 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::{PI, TAU};
 
-/// How the next pose is chosen.
+/// Options for choosing the next pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExploreOptions {
-    /// What the camera sees of the plan.
+    /// Field of view of the camera in the plan.
     pub field: FieldOfView,
     /// The body keeps so far from what is occupied, metres.
     pub radius_m: f64,
@@ -20,9 +20,10 @@ pub struct ExploreOptions {
     pub least_squares: usize,
     /// Seconds a metre of the way takes, and a radian of the turn at its end, and a look.
     pub seconds: (f64, f64, f64),
-    /// How likely an unknown square is occupied: what lies behind many of them is seldom seen.
+    /// Probability that an unknown square is occupied: squares behind many of them are seldom seen.
     pub occupied: f64,
-    /// How likely a square that a look should have shown, and that is still unknown, is shown by the next: bare walls never are.
+    /// Probability that the next look shows a square that an earlier one should have shown but did
+    /// not: bare walls never are.
     pub again: f64,
 }
 
@@ -51,18 +52,18 @@ pub struct Frontier {
 /// A pose that may be next.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NextPose {
-    /// Where, in the map.
+    /// Pose in the map.
     pub pose: Isometry2<f64>,
     /// Floor that is unknown now and expected to be seen, square metres.
     pub gain_m2: f64,
     /// Length of the way there, metres.
     pub way_m: f64,
-    /// What going there and looking takes, seconds.
+    /// Cost of the way and the look, seconds.
     pub cost_s: f64,
 }
 
 impl NextPose {
-    /// What is expected to be seen for a second.
+    /// Expected newly seen area per second.
     pub fn rate(&self) -> f64 {
         self.gain_m2 / self.cost_s
     }
@@ -261,10 +262,10 @@ pub fn standable(grid: &Occupancy, radius_m: f64) -> Vec<bool> {
     Floor::of(grid, 0.0).standable(radius_m)
 }
 
-/// Where a body stands, and what of the floor it can get to.
+/// Floor that a body can reach from its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reach {
-    /// Where it stands.
+    /// Pose of the body.
     pub from: Isometry2<f64>,
     /// Length of the shortest way to each square of the grid, metres; infinite where there is none.
     pub ways_m: Vec<f64>,
@@ -366,7 +367,7 @@ pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) 
     })
 }
 
-/// Where the body stands, and places around frontiers that it can reach.
+/// Reachable places around frontiers, and the pose of the body.
 fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOptions) -> Vec<Point2<f64>> {
     let stride = (PLACES_M / floor.grid.cell_m).ceil().max(1.0) as i64;
     let around = (AROUND_M / floor.grid.cell_m).ceil() as i64;

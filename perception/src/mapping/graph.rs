@@ -4,14 +4,14 @@
 use nalgebra::{Isometry2, Matrix2x3, Matrix3, UnitComplex, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What is known of how two stations lie to each other.
+/// Relative pose of two stations, with its weight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Edge {
     /// Number of a station.
     pub from: usize,
     /// Number of the other.
     pub to: usize,
-    /// Where the other is in its frame.
+    /// Pose of the second in the frame of the first.
     pub from_from_to: Isometry2<f64>,
     /// Inverse covariance of that pose: shift in the frame of `from` (metres), and turn (radians).
     pub information: Matrix3<f64>,
@@ -24,11 +24,11 @@ pub struct Edge {
 pub struct PoseGraph {
     /// Poses to start from; the first stays where it is.
     pub poses: Vec<Isometry2<f64>>,
-    /// What is known.
+    /// Edges.
     pub edges: Vec<Edge>,
 }
 
-/// Where the poses came to rest.
+/// Result of the optimisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settled {
     /// The poses.
@@ -51,13 +51,13 @@ pub enum GraphError {
         "edge {edge} goes from station {from} to {to}, of {stations}: name two different stations, counted from 0"
     )]
     Station {
-        /// Which edge.
+        /// Index of the edge.
         edge: usize,
         /// Its first end.
         from: usize,
         /// Its second end.
         to: usize,
-        /// How many stations there are.
+        /// Number of stations.
         stations: usize,
     },
     /// Poses or edges hold numbers that are no numbers.
@@ -65,13 +65,13 @@ pub enum GraphError {
     NotFinite {
         /// `pose` or `edge`.
         what: &'static str,
-        /// Which.
+        /// Index of the edge.
         index: usize,
     },
     /// Some station hangs on nothing.
     #[error("station {station} is held by no edge: give each the step from the one before it")]
     Loose {
-        /// Which.
+        /// Index of the station.
         station: usize,
     },
 }
@@ -184,7 +184,7 @@ impl Edge {
         shift.push(self.from_from_to.rotation.angle_to(&seen.rotation))
     }
 
-    /// How the error grows with the poses of both ends.
+    /// Jacobians of the error with respect to the poses of both ends.
     fn slopes(&self, poses: &[Isometry2<f64>]) -> [(usize, Matrix3<f64>); 2] {
         let (from, to) = (&poses[self.from], &poses[self.to]);
         let back = from.rotation.inverse().to_rotation_matrix().into_inner();

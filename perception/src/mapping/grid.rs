@@ -1,4 +1,4 @@
-//! What is open and what is not, seen from above: lines of sight that went through squares, and ended in them.
+//! Occupancy grid seen from above: lines of sight through squares, and ends in them.
 
 use super::station::Station;
 use crate::cloud::is_finite;

@@ -3,12 +3,12 @@
 use nalgebra::Vector2;
 use std::f64::consts::{PI, TAU};
 
-/// How orientations are found.
+/// Options for orientations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientationOptions {
-    /// How many there are (the paper: two); `None`: as many as stand out.
+    /// Number of orientations (the paper: two); `None`: as many as stand out.
     pub count: Option<usize>,
-    /// What is turned farther from every orientation has none, radians.
+    /// Angle from every orientation above which a direction has none, radians.
     pub within_rad: f64,
     /// An orientation holds at least this share of all.
     pub least_share: f64,

@@ -1,5 +1,5 @@
-//! What several poses would show together, so that a plan can weigh them against each other: a few poses from which all that can be seen of the unknown
-//! floor would be seen. And what explorers usually do instead: go to the nearest frontier.
+//! Joint gain of several poses, for a plan to weigh: a few poses from which all visible unknown
+//! floor would be seen. And the usual alternative: the nearest frontier.
 
 use super::frontier::{
     ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, Reach, bearing_rad, frontiers, is_ahead, next_within,
@@ -12,7 +12,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 /// A pose, and what a look from there is expected to show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Where, in the map.
+    /// Pose in the map.
     pub pose: Isometry2<f64>,
     /// Length of the way there from where the body stands, metres.
     pub way_m: f64,
@@ -25,7 +25,7 @@ pub struct Outlook {
 /// The floor that some looks have left unknown, as far as it can be told before they are taken.
 #[derive(Clone, Debug, Default)]
 pub struct Unseen {
-    /// How likely a square is still unknown; those that are not named surely are.
+    /// Probability that a square is still unknown; squares without an entry surely are.
     left: FxHashMap<usize, f64>,
 }
 
@@ -44,7 +44,7 @@ impl Unseen {
     }
 }
 
-/// Of the poses that promise most for their cost, so many are held against each other.
+/// Number of poses, those with the best gain for their cost, that are compared.
 const COMPARED: usize = 240;
 
 /// Poses, no more than `most`, that together show most of what can be seen of the unknown floor: first those to keep as far as they still promise
@@ -177,7 +177,8 @@ impl Floor<'_> {
         unknown.filter_map(|s| self.index_beyond(s)).collect()
     }
 
-    /// Where on the way to a place, and after how much of it, the place is in range first with nothing before it.
+    /// Pose on the way to a place from which the place is first in range and unoccluded, with the
+    /// share of the way.
     fn seen_from(
         &self,
         goal: &Point2<f64>,

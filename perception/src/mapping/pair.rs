@@ -1,4 +1,4 @@
-//! How two stops in a row lie to each other (section 3).
+//! Registration of two stops in a row (section 3).
 //!
 //! Both plans are cut to what both fields of view see and share one centroid, about which the rotation is found by ICP-EM: every spot of one plan is
 //! expected to be each of the other's with a probability (Eq. 3), computed anew after each turn. The translation is where, around odometry, the
@@ -16,7 +16,7 @@ use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Point3, Rotation2, UnitCom
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
-/// How two plans are matched.
+/// Method for matching two plans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Matcher {
     /// Odometry as it is.
@@ -32,10 +32,10 @@ pub enum Matcher {
     IcpEm,
 }
 
-/// How a drive is rectified.
+/// Options for rectifying a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RectifyOptions {
-    /// What matches.
+    /// Matcher.
     pub matcher: Matcher,
     /// Heights between floor and ceiling that are kept, metres.
     pub band_m: RangeInclusive<f64>,
@@ -72,7 +72,7 @@ impl Default for RectifyOptions {
 }
 
 impl RectifyOptions {
-    /// That all can be used.
+    /// Checks that all options are usable.
     ///
     /// # Errors
     /// Names the first that cannot.
@@ -91,7 +91,7 @@ impl RectifyOptions {
     }
 }
 
-/// Where the second of two stations is in the frame of the first, and how far to trust it.
+/// Pose of the second of two stations in the frame of the first, with its certainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairFit {
     /// The pose found.
@@ -211,7 +211,7 @@ pub(super) fn fit_cut(
     PairFit { before_from_after: pose, explained, shared, information: problem.information(&pose) }
 }
 
-/// What odometry says of a step.
+/// Prior of a step by odometry.
 pub(super) struct Prior {
     pose: Isometry2<f64>,
     way_sigma_m: f64,
@@ -326,7 +326,8 @@ impl<'a> Problem<'a> {
         headings.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(start, |best| best.1)
     }
 
-    /// Where a spot of the second plan is expected to belong: calls `found` with each partner and its probability (z of Eq. 3).
+    /// Calls `found` with each partner of a spot of the second plan and its probability (z of Eq.
+    /// 3).
     fn expected(&self, at: &Point2<f64>, sigma_m: f64, mut found: impl FnMut(f64, &Point2<f64>)) {
         let (reach_m, per) = (REACH * sigma_m, 0.5 / (sigma_m * sigma_m));
         let from = self.before.partition_point(|b| b.at.x < at.x - reach_m);
@@ -344,7 +345,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// What one unit of weight of the second plan is worth: the plan as a whole so many looks.
+    /// Weight of one unit of the second plan, so that the whole plan counts as a given number of
+    /// looks.
     fn worth(&self, sigma_m: f64) -> f64 {
         let all: f64 = self.after.iter().map(|s| s.weight).sum();
         self.options.looks / (all * sigma_m * sigma_m)

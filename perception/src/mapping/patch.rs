@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::f64::consts::FRAC_PI_2;
 
-/// How a plane is put through a patch, and planes are joined.
+/// Method for fitting planes to patches and joining them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fit {
     /// The paper's: the median of the normals and the centroid; where planes are joined, their means weighted by area.
@@ -16,14 +16,15 @@ pub enum Fit {
     LeastSquares,
 }
 
-/// What is known of a building beforehand (section 4.4), checked where planes are fitted and where they are joined.
+/// Prior knowledge of a building (section 4.4), checked where planes are fitted and where they are
+/// joined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraints {
     /// Walls are upright.
     pub upright: bool,
     /// Direction of the normals of most walls, modulo a quarter turn, radians: walls that are nearly so are so.
     pub main_rad: Option<f64>,
-    /// How nearly, radians.
+    /// Tolerance, radians.
     pub within_rad: f64,
 }
 
@@ -42,7 +43,7 @@ pub(super) struct Patch {
     pub facets: Vec<u32>,
 }
 
-/// What makes two facets one patch.
+/// Conditions under which two facets are one patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
     /// They are no farther apart, metres (λ).

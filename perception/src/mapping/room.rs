@@ -29,24 +29,24 @@ pub struct Survey {
 const LEAST_KNOWN: u32 = 4;
 const NEAR_M: f64 = 0.3;
 
-/// How a map is made of a survey.
+/// Options for making a map of a survey.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
-    /// How normals are found.
+    /// Options for normals.
     pub normals: NormalOptions,
-    /// How orientations are found.
+    /// Options for orientations.
     pub orientations: OrientationOptions,
     /// Facets of one patch are no farther apart (λ), metres.
     pub grow_m: f64,
     /// Normals of walls are tilted by no more, those of level surfaces from the plumb line, radians.
     pub tilt_rad: f64,
-    /// How planes are fitted.
+    /// Method for fitting planes.
     pub fit: Fit,
     /// True: walls are upright, and parallel or square to most others where they nearly are.
     pub constrained: bool,
-    /// How patches are joined; `None`: not at all.
+    /// Options for joining patches; `None`: no joining.
     pub fuse: Option<FuseOptions>,
-    /// How pillars and round walls are found; `None`: not at all.
+    /// Options for pillars and round walls; `None`: none are looked for.
     pub cylinders: Option<CylinderOptions>,
     /// Smaller walls are left out, square metres …
     pub least_area_m2: f64,
@@ -94,7 +94,7 @@ pub struct Wall {
     pub heights_m: (f64, f64),
     /// Area that was seen, square metres.
     pub area_m2: f64,
-    /// Where it stands, from one end to the other, metres from `from`; between them it is open.
+    /// Stretches of wall from one end to the other, metres from `from`; between them it is open.
     pub stretches_m: Vec<(f64, f64)>,
 }
 
@@ -137,7 +137,7 @@ pub struct RoomMap {
     pub levels: Vec<Level>,
     /// Direction of the normals of most walls, modulo a quarter turn, radians.
     pub main_rad: Option<f64>,
-    /// What is open; walls are drawn into what no line of sight has settled.
+    /// Open floor; walls are drawn into squares that no line of sight has settled.
     pub grid: Option<Occupancy>,
 }
 
@@ -177,7 +177,7 @@ fn holds(outline: &[Point2<f64>], place: &Point2<f64>) -> bool {
     n >= 3 && (0..n).all(|i| (outline[(i + 1) % n] - outline[i]).perp(&(place - outline[i])) >= 0.0)
 }
 
-/// What lies no higher is floor, metres.
+/// Greatest height of the floor, metres.
 const STEP_M: f64 = 0.1;
 
 impl Survey {
@@ -189,7 +189,7 @@ impl Survey {
         Ok(Survey { cells: Cells::new(edge_m)?, lines: Sightlines::default() })
     }
 
-    /// What was seen, by cubes.
+    /// Cells of the survey.
     pub fn cells(&self) -> &Cells {
         &self.cells
     }
@@ -214,12 +214,14 @@ impl Survey {
         Ok(())
     }
 
-    /// What is open by lines of sight alone, without the walls; `None` if nothing was seen, or what was lies too far apart for one grid.
+    /// Open floor by lines of sight alone, without the walls; `None` if nothing was seen, or the
+    /// extent is too large for one grid.
     pub fn grid(&self) -> Option<Occupancy> {
         self.lines.occupancy(self.cells.edge_m())
     }
 
-    /// Where a station stands, by what it shows of what was seen before, from where the body believes to be. It stays there as far as nothing says more.
+    /// Locates a station by what was seen before, from the stated pose, which stays unless the
+    /// station says more.
     ///
     /// # Errors
     /// If an option or the pose cannot be used.

@@ -1,4 +1,4 @@
-//! What a camera saw at a stop of the drive, and its plan: floor and ceiling removed, heights dropped.
+//! Stop of a drive and its plan: floor and ceiling removed, heights dropped.
 
 use crate::cloud::is_finite;
 use crate::view::View;
@@ -10,9 +10,9 @@ use std::ops::RangeInclusive;
 /// A stop of the drive. The *level* frame has its origin on the floor under the camera, x ahead, y to the left, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
-    /// What the camera saw, in the level frame, metres. Points that are not finite are passed over.
+    /// Points in the level frame, metres. Points that are not finite are ignored.
     pub points: Vec<Point3<f32>>,
-    /// Where odometry has the station; only the step from one station to the next is used.
+    /// Pose by odometry; only the step from one station to the next is used.
     pub odom_from_level: Isometry2<f64>,
 }
 
@@ -92,11 +92,11 @@ const MOST: f64 = 8.0;
 pub(super) struct Spot {
     /// Their centroid, metres.
     pub at: Point2<f64>,
-    /// How much it counts.
+    /// Weight.
     pub weight: f64,
 }
 
-/// What a camera sees of the plan: a sector around the direction ahead.
+/// Field of view in the plan: a sector around the direction ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
     /// Its right end, anticlockwise from ahead: negative, radians.

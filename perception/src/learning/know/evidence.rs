@@ -1,4 +1,5 @@
-//! What speaks for a model at a pose: each of its points is a ray of the camera that ends there, before it or behind it.
+//! Evidence for a model at a pose: each of its points is a ray of the camera that ends there,
+//! before it or behind it.
 
 use super::scene::Seen;
 use super::skin::{Skin, across};
@@ -6,20 +7,21 @@ use crate::noise::frontal_sigma_m;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What rays say of a model at a pose.
+/// Evidence for a model at a pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Evidence {
     /// Points of the model that face the camera, and those that face away where nothing of it is before them: of the side that would be seen there
     /// nothing was learned.
     pub facing: usize,
-    /// Of those, points where the camera measured a surface that is turned as the model's …
+    /// Number of these points at which the camera measured a surface with the model's normal …
     pub explained: usize,
     /// … points that it saw through …
     pub through: usize,
     /// … and points of which nothing is known: something nearer hides them, nothing came back from there, they lie beyond the image, or face away.
     pub hidden: usize,
-    /// How alike colours are where it is explained: 1 the same, 0 altogether different; `None` if model or scene has none.
+    /// Similarity of colours where explained: 1 the same, 0 altogether different; `None` if model
+    /// or scene has no colour.
     pub colour: Option<f64>,
     /// Mean distance along the ray where it is explained, in standard deviations of the camera.
     pub off_sigmas: f64,
@@ -34,7 +36,7 @@ pub struct Evidence {
 /// Weights of what a [`Judge`] looks at.
 pub const WEIGHTS: usize = 9;
 
-/// How evidence becomes a probability: logistic regression.
+/// Judge: logistic regression from evidence to probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Judge {
     /// The last is the constant.
@@ -141,7 +143,7 @@ pub(super) fn unbounded(
     Evidence { votes, ..rays(model, camera_from_model, scene).evidence }
 }
 
-/// How well a pose does at first sight: share of what could be seen that is explained, and likeness of colour.
+/// First score of a pose: share of the visible points that are explained, and similarity of colour.
 pub(super) fn first_sight(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> f64 {
     let evidence = rays(model, camera_from_model, scene).evidence;
     evidence.explained_share() * (0.5 + evidence.colour.unwrap_or(0.5))
@@ -154,7 +156,8 @@ struct Rays {
     seen: Vec<u32>,
 }
 
-/// How far a measurement may lie from a surface at a depth and be of it, metres.
+/// Greatest distance along a ray at which a measurement is still of a surface at that depth,
+/// metres.
 pub(super) fn tolerance_m(z_m: f32) -> f32 {
     (3.0 * frontal_sigma_m(z_m)).max(0.006)
 }
@@ -259,7 +262,7 @@ pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, cl
     carried as f64 / (asked + LEAST_BORDER) as f64
 }
 
-/// Whether a surface of that normal is measured at a place; `None` if the place cannot be seen.
+/// Tests if a surface with that normal is measured at a place; `None` if the place cannot be seen.
 fn carries_on(scene: &Seen, q: &Point3<f64>, normal: &Vector3<f32>) -> Option<bool> {
     let off = scene.around(q)?.0 - q.z as f32;
     let tolerance = tolerance_m(q.z as f32);

@@ -14,7 +14,7 @@ pub struct Feature {
 /// Bytes that are compared in one go: of descriptors, and of codes.
 const BLOCK: usize = 32;
 const CODE: usize = 16;
-/// So many units of the sums that codes are made of are one of a code.
+/// Number of units of the descriptor's sums in one unit of its code.
 const COARSE: u16 = 4;
 
 /// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
@@ -35,7 +35,7 @@ pub struct Alike {
     pub off: u32,
 }
 
-/// What is described.
+/// Kind of descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// How normals are spread around a place.
@@ -311,7 +311,7 @@ fn pattern(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
     described(&cells)
 }
 
-/// How lightness changes along both axes, per metre, by least squares.
+/// Gradient of lightness along both axes, per metre, by least squares.
 fn slope<'a>(points: impl Iterator<Item = &'a (f32, f32, [f32; 3])>) -> Option<(f32, f32)> {
     let mut normal = Matrix3::<f32>::zeros();
     let mut right = Vector3::zeros();

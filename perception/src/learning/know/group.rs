@@ -23,7 +23,7 @@ const AGREE_COS: f32 = 0.25;
 const APART_M: f32 = 0.012;
 /// Fewest matches of a group.
 const FEWEST: usize = 3;
-/// How far out along its normal a second point of each match lies when the pose is found, metres.
+/// Distance along the normal of the second point that each match contributes to the pose, metres.
 const OUT_M: f64 = 0.02;
 
 /// Features of the scene with the most alike of the model's, best first.

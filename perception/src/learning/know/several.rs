@@ -1,4 +1,4 @@
-//! What several looks say together: what one suggests is held against all others.
+//! Recognition from several looks: candidates of each look are tested against all others.
 
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
@@ -24,7 +24,7 @@ pub struct Glance {
 pub struct Guess {
     /// Its number in the library.
     pub model: usize,
-    /// Where.
+    /// Pose in the look.
     pub camera_from_model: Isometry3<f64>,
     /// Probability, by this look alone.
     pub confidence: f64,
@@ -35,13 +35,13 @@ pub struct Guess {
 /// A model at a place as several looks have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// Where, as the look has it that shows most of it.
+    /// Pose in the world, by the look that shows most of it.
     pub world_from_model: Isometry3<f64>,
-    /// What speaks for it in all of them.
+    /// Evidence of all looks.
     pub evidence: Evidence,
     /// Probability that it is that object at that place.
     pub confidence: f64,
-    /// How many looks could have shown it.
+    /// Number of looks that could have shown it.
     pub looks: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Whether a model at a pose stands as it stood when it was learned: upright, and on something.
+//! Resting-pose prior: an object stands as it stood when it was learned, upright and on something.
 
 use super::evidence::tolerance_m;
 use super::scene::Seen;
@@ -6,7 +6,7 @@ use super::skin::{Skin, across};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;
 
-/// What is turned from up by more lies, radians.
+/// Tilt from the vertical above which an object lies, radians.
 const TILTED_RAD: f64 = 0.35;
 /// Points no higher above the lowest are of the foot, metres.
 const FOOT_M: f32 = 0.015;

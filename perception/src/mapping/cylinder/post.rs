@@ -1,4 +1,4 @@
-//! What a pillar is held against: a post with four sides.
+//! Alternative to a pillar: a post with four sides.
 
 use super::{Column, mean_m2};
 use nalgebra::{Point2, Rotation2, Vector2};

@@ -1,5 +1,5 @@
-//! What is believed of the objects: which there are, where, what they may be, and from where that was seen. Identity
-//! begins here: percepts of later merges are taken for the objects of earlier ones.
+//! Belief about objects: number, places, classes, and the viewpoints behind them. Tracks keep
+//! identity: percepts of later merges are associated with earlier objects.
 
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Evidence, Percept};
@@ -10,7 +10,8 @@ use crate::document::RecordId;
 
 /// A percept farther from an object than this is another object.
 const GATE_M: f64 = 0.10;
-/// What is found again stands at most this far from where it was touched, metres: it may have slid, and the hand may have pushed it.
+/// Greatest distance at which an object that was touched is still the same, metres: it may have
+/// slid, and the hand may have pushed it.
 pub const MISLAID_M: f64 = 0.25;
 /// An unknown thing of this many times the volume of a known object is not that object.
 const MUCH_LARGER: f64 = 3.0;
@@ -23,7 +24,7 @@ pub struct Track {
     /// The symbol of the surface that it stands on; empty: in the hand.
     #[serde(default)]
     pub on: String,
-    /// Where it stands: the centre of its body's footprint, world frame, metres.
+    /// Position: centre of its body's footprint, world frame, metres.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate, metres.
     pub position_sigma_m: f64,
@@ -40,9 +41,9 @@ pub struct Track {
     pub unknown: f64,
     /// Share of its visible hull that some view saw or looked past.
     pub seen_fraction: f64,
-    /// Where the cameras stood that saw it.
+    /// Viewpoints from which it was seen.
     pub viewpoints_m: Vec<Point3<f64>>,
-    /// What speaks for and against, as of the last merge.
+    /// Evidence for and against, as of the last merge.
     pub evidence: Evidence,
     /// The records that the belief rests on.
     pub cites: Vec<RecordId>,
@@ -55,7 +56,7 @@ pub struct Track {
 /// A percept with where it was seen from.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighted<'a> {
-    /// What was recognised.
+    /// Percept.
     pub percept: &'a Percept,
     /// Cameras that saw it.
     pub viewpoints_m: &'a [Point3<f64>],
@@ -95,14 +96,15 @@ impl Track {
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
-    /// Whether a view may have blurred the object into another over its place: it is a known one, and that an unknown thing, much larger.
+    /// True if a view may have blurred the object into another over its place: the object is known,
+    /// the other an unknown and much larger thing.
     pub fn may_be_blurred_into(&self, label: Option<&str>, size_m: &[f64; 3]) -> bool {
         let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
         self.label().is_some() && label.is_none() && volume(size_m) > MUCH_LARGER * volume(&self.size_m)
     }
 
-    /// How sure it is what the object is, *none of the known* among the answers, 0 to 1. Which of a kind does not count:
-    /// the kind does.
+    /// Certainty of the object's class, *none of the known* included, 0 to 1. Members of a kind
+    /// count together.
     pub fn certainty(&self) -> f64 {
         self.kinds.iter().map(|&(_, p)| p).fold(self.unknown, f64::max)
     }
@@ -197,7 +199,7 @@ struct Association {
     new: Vec<usize>,
 }
 
-/// Whether a percept is an unknown thing, much larger than a known object, that stands over its place.
+/// True if a percept is an unknown thing, much larger than a known object, over its place.
 fn swallows(percept: &Percept, track: &Track) -> bool {
     let reach_m = percept.size_m[0].max(percept.size_m[1]) / 2.0;
     track.may_be_blurred_into(percept.label.as_deref(), &percept.size_m)

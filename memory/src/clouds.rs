@@ -24,7 +24,7 @@ pub struct Sensing {
     pub pose_sigma_rad: f64,
 }
 
-/// How the points of a cloud are packed.
+/// Memory layout of a cloud's points.
 #[derive(Serialize, Deserialize)]
 pub struct Layout {
     points: usize,

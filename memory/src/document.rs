@@ -1,4 +1,4 @@
-//! What a record consists of: a document of any shape, and blobs beside it.
+//! Documents: the JSON part of a record, with blobs beside it.
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};
@@ -41,10 +41,10 @@ pub struct Sighting {
     pub confidence: f64,
 }
 
-/// What can be said of any record beside its content: the handles by which it is found again.
+/// Metadata of a record beside its content, by which queries find it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meta {
-    /// Where the sensor stood, in the world frame, metres.
+    /// Position of the sensor, world frame, metres.
     pub seen_from_m: Option<[f64; 3]>,
     /// The part of the world that it shows or speaks of, metres.
     pub covers_m: Option<Bounds>,
@@ -74,13 +74,13 @@ pub enum Form {
     SceneUpdate,
     /// Cells of a map (`foxglove.Grid`).
     Grid,
-    /// How a camera projects (`foxglove.CameraCalibration`).
+    /// Projection of a camera (`foxglove.CameraCalibration`).
     CameraCalibration,
     /// Bytes without a form that viewers know (`descry.Blob`).
     Bytes,
 }
 
-/// What is known of a blob without its bytes.
+/// Description of a blob, without its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlobInfo {
     /// Its name within the record.
@@ -89,7 +89,7 @@ pub struct BlobInfo {
     pub form: Form,
     /// Its length, bytes.
     pub bytes: u64,
-    /// How to read it: fields and stride of a cloud, size and encoding of an image.
+    /// Layout: fields and stride of a cloud, size and encoding of an image.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub layout: Value,
 }
@@ -101,7 +101,7 @@ pub struct BlobInfo {
 pub struct Document {
     /// Its number.
     pub id: RecordId,
-    /// What it is: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
+    /// Kind: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
     /// When, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
@@ -114,7 +114,7 @@ pub struct Document {
     /// Who recorded it, where several write into one store.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub robot: String,
-    /// Where the sensor stood, in the world frame, metres.
+    /// Position of the sensor, world frame, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen_from_m: Option<[f64; 3]>,
     /// The part of the world that it shows or speaks of, metres.
@@ -123,7 +123,7 @@ pub struct Document {
     /// Objects that it speaks of.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Sighting>,
-    /// Whether it is never pruned: what the record cannot be understood without.
+    /// True if it is never pruned: the record cannot be understood without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kept: bool,
     /// Its content.
@@ -150,7 +150,7 @@ pub struct Blob<'a> {
 /// A record to be made.
 #[derive(Clone, Debug)]
 pub struct Draft<'a> {
-    /// What it is.
+    /// Kind.
     pub kind: String,
     /// When, nanoseconds; not negative.
     pub stamp_ns: i64,
@@ -158,9 +158,9 @@ pub struct Draft<'a> {
     pub end_ns: Option<i64>,
     /// The coordinate frame, or "".
     pub frame: String,
-    /// Whether it is never pruned.
+    /// True if it is never pruned.
     pub kept: bool,
-    /// By what it is found again, and its content.
+    /// Content, and the metadata by which queries find it.
     pub meta: Meta,
     /// Blobs, each with a name of its own.
     pub blobs: Vec<Blob<'a>>,
@@ -185,7 +185,8 @@ impl Draft<'_> {
         self.end_ns.unwrap_or(self.stamp_ns)
     }
 
-    /// Whether it says what is pinned: that is recorded however little room there is, since it may make room.
+    /// True if it says what is pinned: such a record is written however little room there is, since
+    /// it may make room.
     pub(crate) fn is_of_pins(&self) -> bool {
         [crate::stores::PIN, crate::stores::UNPIN].contains(&self.kind.as_str())
     }
@@ -274,14 +275,14 @@ pub enum Order {
     Newest,
 }
 
-/// What is looked for; every condition that is given must hold.
+/// Conditions of a query; all that are given must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Query {
-    /// Of this kind.
+    /// Kind of the records.
     pub kind: Option<String>,
     /// In this frame.
     pub frame: Option<String>,
-    /// By this robot.
+    /// Robot that recorded them.
     pub robot: Option<String>,
     /// At or after this stamp, nanoseconds; what lasts counts until its end.
     pub from_ns: Option<i64>,
@@ -295,11 +296,12 @@ pub struct Query {
     pub object: Option<String>,
     /// …or of any, with at least this confidence.
     pub min_confidence: Option<f64>,
-    /// Which come first.
+    /// Order of the results.
     pub order: Order,
     /// At most so many.
     pub limit: Option<usize>,
-    /// What comes behind this stamp and number in that order: the way to go through more than fits into memory.
+    /// Stamp and number after which results begin in that order: pages through more than fits into
+    /// memory.
     pub after: Option<(i64, RecordId)>,
 }
 

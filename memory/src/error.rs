@@ -1,4 +1,4 @@
-//! What can go wrong with a record, said with the place and a mend.
+//! Errors of records, with the place and a mend.
 
 use crate::stores::Fault;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,8 @@ pub enum Error {
         /// The file that was being written.
         place: PathBuf,
     },
-    /// What is to be recorded does not fit into the bound of the record: what is there cannot go. Nothing of it was recorded.
+    /// Refuses data that does not fit into the bound of the record, since too little can be pruned.
+    /// Nothing of the data was recorded.
     #[error(
         "{place} is bounded to {}, and {} more do not fit: {} are pinned{} or of this very moment; allow {} or more (`--max-bytes`), or pin less",
         megabytes(*bound), megabytes(*coming), megabytes(*staying), held_text(held), megabytes(staying + coming)
@@ -24,9 +25,9 @@ pub enum Error {
         place: String,
         /// The bound, bytes.
         bound: u64,
-        /// What was to be recorded, bytes.
+        /// Size of the refused data, bytes.
         coming: u64,
-        /// What cannot go, bytes.
+        /// Size of data that cannot be pruned, bytes.
         staying: u64,
         /// Who pins it: name, records, bytes.
         held: Vec<(String, u64, u64)>,
@@ -34,7 +35,7 @@ pub enum Error {
     /// The system refused a file.
     #[error("{what} {place}: {because}")]
     File {
-        /// What was being done, as "cannot read".
+        /// Failed operation, as "cannot read".
         what: &'static str,
         /// The file or folder.
         place: PathBuf,
@@ -46,7 +47,7 @@ pub enum Error {
     NoRecord {
         /// The folder.
         place: PathBuf,
-        /// What makes a folder a record.
+        /// Expected contents of a record's folder.
         expected: &'static str,
     },
     /// A record exists where a new one was to be made.
@@ -63,14 +64,14 @@ pub enum Error {
         /// The folder.
         place: PathBuf,
     },
-    /// What is on the disk is not what was written.
+    /// Reports bytes on the disk that differ from those that were written.
     #[error("{place}, byte {at}: {what}; `descry memory verify` lists what is whole")]
     Damaged {
         /// The file.
         place: PathBuf,
         /// Offset in it.
         at: u64,
-        /// What was found and expected.
+        /// Found and expected bytes.
         what: String,
     },
     /// A record of which something is lost must not be gone on with: what is left would be taken for all there was.
@@ -81,7 +82,7 @@ pub enum Error {
     Faulty {
         /// The folder.
         place: PathBuf,
-        /// What is lost.
+        /// Losses.
         faults: Vec<Fault>,
     },
     /// The index refused.
@@ -100,12 +101,12 @@ pub enum Error {
         /// Its reason.
         because: String,
     },
-    /// What was given cannot be recorded.
+    /// Refuses data that cannot be recorded.
     #[error("{what}: {mend}")]
     Input {
-        /// What is wrong with it.
+        /// Fault of the data.
         what: String,
-        /// What would do.
+        /// Mend.
         mend: String,
     },
     /// No such record, or one that was pruned.
@@ -129,11 +130,11 @@ pub enum Error {
     /// Nothing near enough in time.
     #[error("no {what} within {:.3} s of {stamp_ns} ns{}", *tolerance_ns as f64 * 1e-9, nearest_text(*nearest_ns, *stamp_ns))]
     NotNear {
-        /// What was looked for.
+        /// Subject of the search.
         what: String,
         /// The time asked for, nanoseconds.
         stamp_ns: i64,
-        /// How far off would have done, nanoseconds.
+        /// Tolerance, nanoseconds.
         tolerance_ns: i64,
         /// The stamp of the nearest there is, nanoseconds.
         nearest_ns: Option<i64>,
@@ -144,7 +145,7 @@ pub enum Error {
     /// A write in the background failed earlier; what it held was not acknowledged.
     #[error("an earlier write of transforms failed: {because}")]
     Earlier {
-        /// That failure.
+        /// Message of that failure.
         because: String,
     },
 }
@@ -200,7 +201,7 @@ impl Error {
         Error::Index { place: place.to_owned(), because }
     }
 
-    /// Whether this is a lack of room on the disk.
+    /// True for a lack of room on the disk.
     pub fn is_full(&self) -> bool {
         matches!(self, Error::Full { .. })
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 const CHUNK_RECORDS: usize = 256;
 const CHUNK_BYTES: usize = 4 << 20;
 
-/// What was exported.
+/// Counts of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Exported {
     /// Records.

@@ -43,7 +43,7 @@ impl Group {
     }
 }
 
-/// So many batches wait for the disk at most; who brings more waits, too. Bounds the memory.
+/// Number of batches that may wait for the disk; further writers wait. Bounds the memory.
 const WAITING: usize = 4;
 
 enum Job {
@@ -51,7 +51,7 @@ enum Job {
     Drain(SyncSender<()>),
 }
 
-/// What the thread could not write, and why. Nothing of it is dropped.
+/// Batches that the thread could not write, with the reason. Nothing of them is dropped.
 #[derive(Default)]
 struct Failed {
     groups: Vec<Group>,
@@ -95,7 +95,7 @@ impl Flusher {
         }
     }
 
-    /// Whether something could not be written.
+    /// True if a write has failed.
     pub fn has_failed(&self) -> bool {
         lock(&self.failed).because.is_some()
     }

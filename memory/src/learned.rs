@@ -1,4 +1,4 @@
-//! What learning leaves: how places looked that were visited, and the things that were learned.
+//! Results of learning: static structure of visited places, and learned objects.
 
 use descry_perception::Cloud;
 use descry_perception::learning::MetaRoom;
@@ -7,12 +7,12 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::packed;
 
-/// How a place looked, by all visits.
+/// Static structure of a place, from all visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Visited {
     /// The waypoint from which it was looked at.
     pub waypoint: String,
-    /// Where that is in the map: x and y, metres, and the heading, radians.
+    /// Pose of the place in the map: x and y, metres, and the heading, radians.
     pub at: [f64; 3],
     /// When it was visited last, seconds since 1970.
     pub last_unix_s: f64,
@@ -36,10 +36,10 @@ pub struct LearnedThing {
     /// Those directions: of 36 around it, counted from its own x anticlockwise, a bit each.
     #[serde(default)]
     pub directions: u64,
-    /// How often it was looked at from around: what each meeting showed is in the cloud.
+    /// Number of encounters with looks from all around; the cloud holds what each showed.
     #[serde(default = "once")]
     pub meetings: u32,
-    /// Where it was seen last.
+    /// Place of the last sighting.
     pub seen: Place,
 }
 
@@ -47,7 +47,7 @@ fn once() -> u32 {
     1
 }
 
-/// Where something was seen, and when.
+/// Place and time of a sighting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// When, seconds since 1970.

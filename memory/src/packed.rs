@@ -9,10 +9,10 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A tenth of a millimetre for what is small, a millimetre for what is not, metres.
 const UNITS_M: [f64; 2] = [1e-4, 1e-3];
-/// What stands for a part of a normal that is not known.
+/// Stands for an unknown component of a normal.
 const UNKNOWN: i8 = i8::MIN;
 
-/// How a cloud is written.
+/// Packed form of a cloud.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Packed {

@@ -1,4 +1,5 @@
-//! What was seen: the handle by which the rest of descry records and recalls.
+//! Record: the handle by which the rest of descry writes and reads what was sensed, done and
+//! believed.
 
 mod recall;
 
@@ -38,12 +39,12 @@ pub mod kind {
     pub const LOG: &str = "log";
 }
 
-/// How a record is kept and read.
+/// Options for writing and reading a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// When a record counts as acknowledged.
     pub durability: Durability,
-    /// What goes when it is too much.
+    /// Limits beyond which old data is pruned.
     pub retention: Retention,
     /// Length of a segment, bytes.
     pub segment_bytes: u64,
@@ -51,9 +52,9 @@ pub struct Options {
     pub robot: String,
     /// Transforms of a child frame are grouped over so long, nanoseconds (paper 004's recorder: 2 s).
     pub group_ns: i64,
-    /// How far transforms are carried from where they were measured.
+    /// Greatest distance in time over which transforms are extrapolated.
     pub reach: Reach,
-    /// How far a cloud may be off the time asked for to be a view of it, nanoseconds.
+    /// Greatest time between a cloud and the time asked for, nanoseconds.
     pub view_tolerance_ns: i64,
 }
 
@@ -115,7 +116,7 @@ pub struct Record {
     recovery: Recovery,
     options: Options,
     groups: Mutex<Groups>,
-    /// What goes to the store with what is put next.
+    /// Drafts that are written together with the next one.
     soon: Mutex<Vec<Draft<'static>>>,
     flusher: Flusher,
     retrace: Option<Retrace>,
@@ -125,7 +126,7 @@ pub struct Record {
 #[derive(Default)]
 struct Groups {
     open: BTreeMap<(String, String), Vec<Sample>>,
-    /// Which span of [`Options::group_ns`] the open groups belong to.
+    /// Span of [`Options::group_ns`] to which the open groups belong.
     span: i64,
 }
 
@@ -192,7 +193,7 @@ impl Record {
         }
     }
 
-    /// What opening found and mended.
+    /// Damage that opening found and mended.
     pub fn recovery(&self) -> &Recovery {
         &self.recovery
     }
@@ -298,7 +299,7 @@ impl Record {
         Ok(())
     }
 
-    /// Whether a measured transform is not in the record yet.
+    /// True if a measured transform is not in the record yet.
     ///
     /// # Errors
     /// If it is unsound, or contradicts what is there.
@@ -425,7 +426,7 @@ impl Record {
         self.store.sync()
     }
 
-    /// What meets a query.
+    /// Documents that meet a query.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -433,7 +434,8 @@ impl Record {
         self.store.find(query)
     }
 
-    /// What meets a query and is whole to the last byte of its blobs, and what of it is not.
+    /// Documents that meet a query and are whole to the last byte of their blobs, and the faults of
+    /// the others.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -463,7 +465,7 @@ impl Record {
         self.nearest_of(&self.own(kind), stamp_ns, tolerance_ns)
     }
 
-    /// Of what meets a query the record nearest in time, within a tolerance.
+    /// Document nearest in time among those that meet a query, within a tolerance.
     ///
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
@@ -575,7 +577,7 @@ impl Drop for Record {
 }
 
 impl Record {
-    /// What this robot recorded of a kind: all of it, where robots have no names.
+    /// Query for all documents of a kind by this robot; by any robot, if robots have no names.
     pub fn own(&self, kind: &str) -> Query {
         Query { robot: named(&self.options.robot), ..Query::of_kind(kind) }
     }

@@ -1,4 +1,5 @@
-//! What outlasts a run: where things were seen last, and when. A later run begins with it, as far as time has not worn it.
+//! Persistent belief between runs: the last sighting of each thing and its time. A later run begins
+//! with it, as far as age allows.
 
 #[doc(hidden)]
 pub mod joined;
@@ -27,7 +28,7 @@ pub const MOST_GONE: usize = 500;
 pub struct Recollection {
     /// When, seconds since 1970.
     pub seen_unix_s: f64,
-    /// What was believed of it then.
+    /// Belief about it at that time.
     pub track: Track,
 }
 
@@ -36,9 +37,9 @@ pub struct Recollection {
 pub struct Surveyed {
     /// All that was seen, by cubes: what a later run adds to.
     pub survey: Survey,
-    /// Where it was looked from, by what was seen.
+    /// Viewpoints, by the content of the views.
     pub stood: Vec<Isometry2<f64>>,
-    /// Where the body believed to stand then, in its own map.
+    /// Stated poses of the body, in its own map.
     pub believed: Vec<Isometry2<f64>>,
     /// Level surfaces to put things on, by the names that they were given.
     pub surfaces: Vec<(String, Level)>,
@@ -50,12 +51,12 @@ pub struct Surveyed {
     pub barred: Vec<Point2<f64>>,
 }
 
-/// What is remembered of all earlier runs.
+/// Memory of all earlier runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Remembered {
-    /// What stood where it was looked last.
+    /// Things as of the last look at their surface.
     pub present: Vec<Recollection>,
-    /// What stood somewhere and was not there when it was looked again, the oldest first.
+    /// Things that had vanished when their place was looked at again, the oldest first.
     pub gone: Vec<Recollection>,
     /// Surfaces that were looked at; of an older store, those since it is kept.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -66,7 +67,7 @@ pub struct Remembered {
     /// The map, if one was made.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surveyed: Option<Surveyed>,
-    /// How places looked that were visited.
+    /// Static structure of visited places.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visited: Vec<Visited>,
     /// Things that were learned, the oldest first.
@@ -75,7 +76,7 @@ pub struct Remembered {
 }
 
 impl Remembered {
-    /// What a store holds; nothing if it holds nothing yet.
+    /// Memory that a store holds; empty for a new store.
     ///
     /// # Errors
     /// [`Error`] if it cannot be read.
@@ -101,8 +102,8 @@ impl Remembered {
         store.sync()
     }
 
-    /// What there is to remember after a run: of the surfaces that it looked at what it believes, of all others what was
-    /// remembered before.
+    /// Memory after a run: its belief about the surfaces that it looked at, the earlier memory of
+    /// all others.
     pub fn after(self, belief: &Belief, looked_at: &[String], now_unix_s: f64) -> Self {
         let is_here = |r: &Recollection| looked_at.contains(&r.track.on);
         let (before, elsewhere): (Vec<_>, Vec<_>) = self.present.into_iter().partition(is_here);
@@ -122,7 +123,7 @@ impl Remembered {
         Self { present, gone, looked_at: all, ..self }
     }
 
-    /// Whether a surface is known to have been looked at: it is kept, or something was seen there.
+    /// True if a surface was looked at: it is kept, or something was seen there.
     pub fn has_looked_at(&self, surface: &str) -> bool {
         let mut seen = self.present.iter().chain(&self.gone);
         self.looked_at.iter().any(|s| s == surface) || seen.any(|r| r.track.on == surface)
@@ -147,8 +148,8 @@ impl Remembered {
         }
     }
 
-    /// What may be believed of it now: probabilities worn by time, and below `most`, so that nothing is taken for sure that was not
-    /// looked at again.
+    /// Present belief about it: probabilities decay with time and stay below `most`, so nothing is
+    /// certain without a new look.
     pub fn aged(&self, now_unix_s: f64, most: f64) -> Vec<Track> {
         let aged = |r: &Recollection| {
             let worn = 0.5_f64.powf((now_unix_s - r.seen_unix_s).max(0.0) / HALF_LIFE_S);
@@ -170,7 +171,8 @@ impl Remembered {
         self.present.iter().map(aged).collect()
     }
 
-    /// Where something of a name was seen last, and whether it was still there when it was looked again; none if never.
+    /// Last sighting of a name, and whether the thing was still there at the next look; none if
+    /// never seen.
     pub fn last_seen(&self, name: &str) -> Option<(&Recollection, bool)> {
         let is = |r: &&Recollection| r.track.probability_of(name) > 0.5;
         let newest = |list: &'_ [Recollection]| -> Option<usize> {

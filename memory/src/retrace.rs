@@ -7,7 +7,7 @@ use crate::stores::{PIN, Store};
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
-/// How far the maker has come, by kind.
+/// Progress of a retraced run, by kind of document.
 pub(crate) struct Retrace {
     /// Whose record it is; "" where robots have no names.
     robot: String,
@@ -36,7 +36,7 @@ impl Retrace {
         self.next_like(store, &draft.kind, same)
     }
 
-    /// Whether the next pins in the record are these.
+    /// True if the next pins in the record are these.
     pub fn next_pins(&self, store: &dyn Store, ids: &[RecordId], by: &str) -> Result<bool, Error> {
         let wanted = pinned(0, ids, by, true).meta.body;
         Ok(self.next_like(store, PIN, |found| Ok(found.body == wanted))?.is_some())

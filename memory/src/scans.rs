@@ -12,7 +12,7 @@ pub(crate) const SCAN: &str = "scan";
 /// Angles may be off from even steps by so much, radians.
 const EVEN_RAD: f64 = 1e-6;
 
-/// How a sweep is packed: a range after the other as f64, at even steps between two angles.
+/// Memory layout of a sweep: ranges as f64, at even steps between two angles.
 #[derive(Serialize, Deserialize)]
 struct Layout {
     first_rad: f64,

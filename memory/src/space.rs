@@ -1,4 +1,4 @@
-//! Which parts of the world have been seen free, seen occupied, or not seen at all: a sparse map of voxels.
+//! Free, occupied and unobserved space: a sparse voxel map.
 //!
 //! Paper 004's outlook asks for an octree (OctoMap); blocks of voxels behind one hash serve the same with flat access.
 //! Each view is compared with the voxels in its field of view, as a depth image is fused: what lies in front of the
@@ -18,12 +18,12 @@ const BRICK: i32 = 4;
 const SAME_PLACE_M: f64 = 0.1;
 /// A voxel of which nothing is known.
 const UNSEEN: i8 = i8::MIN;
-/// What one look adds to a voxel on a surface, what it takes from one before it, and how far either goes.
+/// Log-odds update of a voxel: increment on a surface, decrement before one, and bounds.
 const HIT: i8 = 3;
 const MISS: i8 = 1;
 const SURE: i8 = 12;
 
-/// What is known of a place.
+/// State of a voxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cell {
     /// No view has shown it.
@@ -45,7 +45,8 @@ pub struct Space {
     seen_from: Vec<Point3<f64>>,
 }
 
-/// Where nothing can be seen through, for lines of sight: the bricks with an occupied voxel, by block, over the box that holds them all.
+/// Occlusion index for lines of sight: bricks with an occupied voxel, by block, over their bounding
+/// box.
 #[derive(Debug, Clone, Default)]
 struct Opaque {
     low: [i32; 3],
@@ -103,7 +104,8 @@ impl Opaque {
     }
 }
 
-/// What is known of a cube of voxels, and which of its bricks hold an occupied one: lines of sight pass through the others at once.
+/// Voxels of a cube, and those of its bricks that hold an occupied one: lines of sight skip the
+/// others.
 #[derive(Debug, Clone)]
 struct Block {
     levels: [i8; BLOCK],
@@ -128,7 +130,7 @@ impl Block {
     }
 }
 
-/// How many voxels are known.
+/// Number of known voxels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Extent {
     /// Voxels seen free.
@@ -166,7 +168,7 @@ impl Space {
         self.voxel_m
     }
 
-    /// What is known of a point of the world.
+    /// State of a point of the world.
     pub fn cell(&self, point: &Point3<f64>) -> Cell {
         match self.level(self.voxel(point)) {
             UNSEEN => Cell::Unseen,
@@ -175,8 +177,8 @@ impl Space {
         }
     }
 
-    /// Whether nothing that was seen stands between two points, but where something is taken to be `gone`. The last two voxels
-    /// before `to` do not count, so that a surface does not hide itself.
+    /// True if nothing seen lies between two points, except in places that are taken to be `gone`.
+    /// The last two voxels before `to` do not count, so that a surface does not hide itself.
     pub fn line_of_sight(
         &self,
         from: &Point3<f64>,
@@ -215,7 +217,7 @@ impl Space {
         true
     }
 
-    /// How much of the last part of the way between two points no view has shown, metres. That part is `last_m` long at the most.
+    /// Unobserved length within the last `last_m` metres of the way between two points, metres.
     pub fn unseen_m(&self, from: &Point3<f64>, to: &Point3<f64>, last_m: f64) -> f64 {
         let way = to - from;
         let steps = (last_m.min(way.norm()) / self.voxel_m).floor();
@@ -270,7 +272,7 @@ impl Space {
         self.opaque = Opaque::of(&self.blocks);
     }
 
-    /// How many voxels are known.
+    /// Number of known voxels.
     pub fn extent(&self) -> Extent {
         let mut extent = Extent::default();
         for level in self.blocks.values().flat_map(|b| b.levels.iter()) {
@@ -425,7 +427,8 @@ fn floor(value: f64) -> i32 {
     toward_zero - i32::from(f64::from(toward_zero) > value)
 }
 
-/// How many steps back along a line of sight leave the cube of so many voxels around a voxel, of which all samples within are skipped.
+/// Number of steps back along a line of sight that leave the cube around a voxel; samples within
+/// are skipped.
 fn steps_out_of(
     side: i32,
     voxel: [i32; 3],
@@ -458,7 +461,7 @@ fn index(voxel: [i32; 3]) -> usize {
     (x * SIDE as usize + y) * SIDE as usize + z
 }
 
-/// Whether a ball may lie in the camera's field of view.
+/// True if a ball may lie in the camera's field of view.
 fn touches_view(map: &DepthMap, centre: &Point3<f64>, radius_m: f64, reach_m: f64) -> bool {
     let c = &map.intrinsics;
     let p = map.camera_from_world * centre;

@@ -1,4 +1,5 @@
-//! Where records are kept: one interface, the store on this machine's disk, and one in MongoDB (feature `mongodb`).
+//! Stores of records: one interface, the store on this machine's disk, and one in MongoDB (feature
+//! `mongodb`).
 
 pub mod local;
 #[cfg(feature = "mongodb")]
@@ -15,7 +16,8 @@ pub(crate) const UNPIN: &str = "unpin";
 /// In whose name a record is pinned that is never pruned.
 pub(crate) const KEPT: &str = "record";
 
-/// How much is kept; what is over goes oldest first, pinned records excepted. The default keeps everything.
+/// Limits of a store; data beyond them is pruned oldest first, pinned records excepted. The default
+/// keeps everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Retention {
     /// Greatest age against the newest record, nanoseconds of the recording's clock.
@@ -26,7 +28,7 @@ pub struct Retention {
     pub min_free_bytes: Option<u64>,
 }
 
-/// What is there.
+/// Counts and sizes of a store.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stats {
     /// Records.
@@ -61,7 +63,7 @@ pub struct Report {
     pub whole: u64,
     /// Bytes of documents and blobs read.
     pub bytes: u64,
-    /// What is not whole, one line each.
+    /// Faults, one line each.
     pub faults: Vec<Fault>,
 }
 
@@ -72,12 +74,12 @@ pub struct Fault {
     pub record: Option<RecordId>,
     /// The file or collection.
     pub place: String,
-    /// What is wrong.
+    /// Description.
     pub what: String,
 }
 
 impl Fault {
-    /// That a record is damaged.
+    /// Turns the error of a damaged record into a fault.
     ///
     /// # Errors
     /// Any other error as it is.
@@ -101,7 +103,7 @@ impl std::fmt::Display for Fault {
 }
 
 impl Report {
-    /// Whether everything is whole.
+    /// True if everything is whole.
     pub fn is_whole(&self) -> bool {
         self.faults.is_empty()
     }
@@ -129,7 +131,7 @@ impl Pages {
         (self.left > 0).then(|| Query { limit, ..self.query.clone() })
     }
 
-    /// So many records were found, the last of them of that stamp and number.
+    /// Counts the records that were found, and keeps the stamp and number of the last.
     pub fn was(&mut self, found: usize, last: Option<(i64, RecordId)>) {
         self.query.after = last;
         self.left = if last.is_some() { self.left - found } else { 0 };
@@ -158,7 +160,7 @@ pub trait Store: Send + Sync {
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
     fn blob(&self, id: RecordId, name: &str) -> Result<Vec<u8>, Error>;
 
-    /// What meets a query, in its order.
+    /// Documents that meet a query, in its order.
     ///
     /// # Errors
     /// [`Error::Damaged`] if any of it is not what was written; if the store cannot be read.
@@ -187,7 +189,8 @@ pub trait Store: Send + Sync {
         Ok(faults)
     }
 
-    /// Of what meets a query (its order and limit aside) the record whose stamp is nearest; the earlier of two as near, of one stamp the newest.
+    /// Document nearest in stamp among those that meet a query (order and limit aside); the earlier
+    /// of two as near, of one stamp the newest.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -218,7 +221,7 @@ pub trait Store: Send + Sync {
     /// If the store cannot be written.
     fn unpin(&self, by: &str) -> Result<(), Error>;
 
-    /// What is pinned, and by whom.
+    /// Pinned records, and who pins them.
     ///
     /// # Errors
     /// If the store cannot be read.

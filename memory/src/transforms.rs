@@ -25,9 +25,9 @@ pub enum TransformError {
         target: String,
         /// Frame to transform from.
         origin: String,
-        /// Where the chain of the first ends.
+        /// Root of the first chain.
         target_root: String,
-        /// Where the chain of the second ends.
+        /// Root of the second chain.
         origin_root: String,
         /// The time, nanoseconds.
         stamp_ns: i64,
@@ -67,7 +67,7 @@ pub enum TransformError {
         child: String,
         /// Its time, nanoseconds.
         stamp_ns: i64,
-        /// What is wrong with it.
+        /// Fault of the transform.
         what: &'static str,
     },
 }
@@ -92,12 +92,12 @@ fn gap_text(stamp_ns: i64, before_ns: Option<i64>, after_ns: Option<i64>, max_ga
     }
 }
 
-/// How far transforms are carried from where they were measured.
+/// Limits of extrapolating transforms in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
     /// Widest gap between two measurements that is bridged by interpolation, nanoseconds. Paper 004's recorder restores 4 s around a stamp.
     pub max_gap_ns: i64,
-    /// How long the first or last measurement holds beyond its stamp, nanoseconds.
+    /// Time for which the first or last measurement holds beyond its stamp, nanoseconds.
     pub hold_ns: i64,
 }
 
@@ -107,7 +107,7 @@ impl Default for Reach {
     }
 }
 
-/// Where a child stood in its parent at a time.
+/// Pose of a child in its parent at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// The time, nanoseconds.
@@ -122,7 +122,7 @@ struct Link {
     samples: BTreeMap<i64, Isometry3<f64>>,
 }
 
-/// What a link says about a time.
+/// State of a link at a time.
 enum At {
     Known(Isometry3<f64>),
     Gap { before_ns: Option<i64>, after_ns: Option<i64> },
@@ -174,7 +174,7 @@ pub fn interpolate(from: &Isometry3<f64>, to: &Isometry3<f64>, t: f64) -> Isomet
 /// Transforms in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Transforms {
-    /// By child, then parent: a child may change its parent through time.
+    /// Links by child, then parent: a child may change its parent over time.
     links: BTreeMap<String, BTreeMap<String, Link>>,
 }
 
@@ -217,7 +217,7 @@ impl Transforms {
         self.links.entry(child.into()).or_default().entry(parent.into()).or_default()
     }
 
-    /// Whether nothing was taken in.
+    /// True if there is no transform.
     pub fn is_empty(&self) -> bool {
         self.links.is_empty()
     }

@@ -1,5 +1,5 @@
-//! What robotics viewers show of a record beside what was sensed: labelled boxes, merged clouds, the map, how the camera projects, the plan, lines
-//! of a log. Each is a blob beside the record whose content it shows.
+//! Contents for robotics viewers beside the sensed data: labelled boxes, merged clouds, map, camera
+//! projection, plan, log. Each is a blob beside the record whose content it shows.
 
 use crate::clouds::{self, Sensing};
 use crate::document::{Blob, Form};
@@ -14,7 +14,7 @@ use serde_json::Value;
 pub struct Labelled {
     /// The same for the same object, from one set of boxes to the next.
     pub id: String,
-    /// What stands over it.
+    /// Label above the box.
     pub text: String,
     /// The middle of the box, in the frame of all.
     pub frame_from_box: Isometry3<f64>,
@@ -87,7 +87,7 @@ pub fn boxes(stamp_ns: i64, frame: &str, name: &str, boxes: &[Labelled]) -> Blob
     blob(name, Form::SceneUpdate, out.0)
 }
 
-/// How a camera without distortion projects.
+/// Projection of a camera without distortion.
 pub fn calibration(stamp_ns: i64, frame: &str, camera: &Intrinsics) -> Blob<'static> {
     let Intrinsics { width, height, fx, fy, cx, cy } = *camera;
     let mut out = Wire::default();

@@ -1,4 +1,4 @@
-//! What the messages are made of, as every MCAP file declares it (`descriptor.proto`).
+//! Schemas of the messages, as every MCAP file declares them (`descriptor.proto`).
 
 use super::wire::Wire;
 

@@ -44,7 +44,8 @@ impl Record {
         })
     }
 
-    /// What a camera saw nearest to a time, and where it stood in `world` at the stamp of that cloud (paper 004, section V, step 0).
+    /// View nearest to a time, with the camera's pose in `world` at the stamp of its cloud (paper
+    /// 004, section V, step 0).
     ///
     /// # Errors
     /// [`Error::NotNear`] without a cloud within [`view_tolerance_ns`](crate::Options::view_tolerance_ns); a missing link or gap of the transforms of that time.
@@ -90,7 +91,8 @@ impl Record {
         })
     }
 
-    /// Where the frame of a document stood in `world` at its time, by the transforms of the robot that recorded it.
+    /// Pose of a document's frame in `world` at its time, by the transforms of the robot that
+    /// recorded it.
     ///
     /// # Errors
     /// An error that names the missing link, or the gap.
@@ -203,7 +205,7 @@ impl Record {
         Ok((parent.to_owned(), samples))
     }
 
-    /// Whether a record that is retraced holds a transform already.
+    /// True if a record that is retraced holds a transform already.
     ///
     /// # Errors
     /// [`Error::Input`] if it holds another of that moment: what is placed by the one is not placed by the other.

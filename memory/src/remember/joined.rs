@@ -1,4 +1,5 @@
-//! What a run leaves, joined with what others have kept in the same store since it began.
+//! Joins the memory of a run with those that other runs have written into the same store since it
+//! began.
 
 use std::collections::BTreeMap;
 
@@ -26,9 +27,10 @@ fn changed<T: PartialEq>(before: &T, others: &T, after: &T) -> Changed {
 }
 
 impl Remembered {
-    /// What is to be kept in a store that holds this, where a run began with `before` at a time and leaves `after`: what other
-    /// runs have kept there meanwhile stays, and so do the names that were given; what the run has learned and seen is added. A
-    /// surface is remembered as it was looked at last. Of two maps made meanwhile that of more looks stays, with what was seen on it.
+    /// Joins this memory of a store with that of a run, which began with `before` at a time and leaves
+    /// `after`. Memory that other runs wrote meanwhile and given names stay; the run adds what it learned
+    /// and saw. A surface is remembered as of its last look; of two maps made meanwhile the one of more
+    /// looks stays, with what was seen on it.
     pub fn joined(&self, before: &Self, mut after: Self, began_unix_s: f64) -> Self {
         self.give_names(&mut after);
         let looks = |of: &Self| of.surveyed.as_ref().map_or(0, |map| map.stood.len());
@@ -69,7 +71,7 @@ impl Remembered {
         after.call(|name| names.get(name).cloned());
     }
 
-    /// What was learned here and there. What was learned of one thing here and there is that of the later meeting.
+    /// Learned things of both. Of two models of one thing the later encounter's stays.
     fn learned(&self, before: &Self, after: &Self) -> Vec<LearnedThing> {
         let (earlier, ours) = (marked(&before.things), marked(&after.things));
         let here = marked(&self.things);
@@ -93,7 +95,7 @@ impl Remembered {
         order.filter_map(|mark| all.remove(&mark)).collect()
     }
 
-    /// How places looked, each as it was visited last.
+    /// Visited places of both, each as of its last visit.
     fn visits(&self, before: &Self, after: &Self) -> Vec<Visited> {
         let of = |all: &Self, waypoint: &str| all.visited.iter().find(|v| v.waypoint == waypoint).cloned();
         let is_ours = |waypoint: &str| {
@@ -109,7 +111,7 @@ impl Remembered {
         theirs.chain(after.visited.iter().filter(|v| is_ours(&v.waypoint))).cloned().collect()
     }
 
-    /// What stands where, each surface as it was looked at last, and what is gone; all else as it is here.
+    /// Places of things: each surface as of its last look, vanished things; all else as it is here.
     fn places(&self, before: &Self, after: &Self, began_unix_s: f64) -> Self {
         let on = |all: &Self, surface: &str| -> Vec<Recollection> {
             all.present.iter().filter(|r| r.track.on == surface).cloned().collect()
@@ -148,7 +150,8 @@ impl Remembered {
     }
 }
 
-/// By what a thing is known whatever it is called: when it was learned, and which of those learned then it is.
+/// Identity of a learned thing whatever its name: time of learning, and index among those learned
+/// then.
 type Mark = (u64, usize);
 
 fn marks(things: &[LearnedThing]) -> Vec<Mark> {

@@ -44,7 +44,7 @@ pub struct MongoOptions {
     pub robot: String,
     /// When a record counts as acknowledged: in the journal of most of the servers, or in the memory of one.
     pub durability: Durability,
-    /// What goes when it is too much.
+    /// Limits beyond which old data is pruned.
     pub retention: Retention,
     /// Name and password, where the server asks for them.
     pub login: Option<(String, String)>,
@@ -164,7 +164,7 @@ impl MongoStore {
         self.said(self.records.create_indexes(indexes).run()).map(|_| ())
     }
 
-    /// What the driver says, in the words of this crate.
+    /// Translates errors of the driver into those of this crate.
     fn said<T>(&self, answer: mongodb::error::Result<T>) -> Result<T, Error> {
         /// `OutOfDiskSpace`.
         const NO_ROOM: i32 = 14031;
@@ -388,7 +388,7 @@ impl Store for MongoStore {
         })
     }
 
-    /// What was written before a write that has reached the journal has reached it, too.
+    /// Makes earlier writes durable: a write that has reached the journal implies all before it.
     fn sync(&self) -> Result<(), Error> {
         apart(|| {
             let touch = doc! { "$inc": { "synced": 1_i64 } };

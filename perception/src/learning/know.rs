@@ -127,8 +127,8 @@ const REFINED: usize = 6;
 /// Poses nearer to each other than this are one, metres and radians; and poses that were brought onto the scene by a few points.
 const SAME: (f64, f64) = (0.02, 0.26);
 const SETTLED: (f64, f64) = (0.005, 0.07);
-/// Correspondence distances of the two rounds that align a pose with the scene, metres: the first
-/// from votes, the second after a few points are aligned.
+/// Correspondence distances for aligning a pose from votes with the scene, coarse to fine, metres;
+/// and for one that a few points have aligned already.
 const WITHIN_M: [f32; 2] = [0.025, 0.01];
 const SETTLED_WITHIN_M: [f32; 1] = [0.01];
 /// Odds that a thing lies or hangs, to standing as it stood when it was learned. An assumption: nine in ten stand.

@@ -36,7 +36,8 @@ pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     doc! { "$and": all }
 }
 
-/// What reaches into the box around a ball: each coordinate of the greater corner above it, of the lesser below.
+/// Bounding-box condition around a ball: each coordinate of the greater corner above it, of the
+/// lesser below.
 fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<Item = Fields> + 'a {
     (0..3).map(move |i| {
         let (low, high) = (near.place_m[i] - near.radius_m, near.place_m[i] + near.radius_m);
@@ -45,12 +46,12 @@ fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<
     })
 }
 
-/// Whether a query asks for places: then what the server finds has to be looked at.
+/// True if a query asks for places: the server's results then have to be filtered.
 pub(super) fn is_of_places(query: &Query) -> bool {
     query.seen_from.is_some() || query.covers.is_some()
 }
 
-/// Whether a document lies where a query asks for.
+/// True if a document lies where a query asks for.
 pub(super) fn is_there(query: &Query, document: &Document) -> bool {
     let seen = |near: &Near| {
         document.seen_from_m.is_some_and(|p| {

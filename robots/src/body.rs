@@ -1,4 +1,5 @@
-//! What every body can be asked: where it is, to drive, to look, and what it would take. What it is made of stands in [`parts`](crate::parts).
+//! Robot trait: pose, drives, looks, grasps, and their predicted cost. The parts of a body are in
+//! [`parts`](crate::parts).
 //!
 //! Frames: `map` (the room; z up where [`Description::up`] says so), `base` (x forward), `camera` (optical: x right, y down, z forward).
 
@@ -50,18 +51,18 @@ pub struct Door {
     pub centre_m: Point2<f64>,
     /// Along the wall, counter-clockwise from the map's x, radians.
     pub along_rad: f64,
-    /// Of the opening, metres.
+    /// Width of the opening, metres.
     pub width_m: f64,
     /// The rooms on either side.
     pub between: [String; 2],
 }
 
-/// Where the body believes it is.
+/// Stated pose of the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseEstimate {
     /// When.
     pub stamp_ns: Stamp,
-    /// Where the base is, as localisation says.
+    /// Stated pose of the base.
     pub map_from_base: Isometry3<f64>,
     /// Standard deviation along each axis, metres.
     pub sigma_m: f64,
@@ -81,7 +82,7 @@ impl PoseEstimate {
     }
 }
 
-/// What going somewhere takes, predicted on the map.
+/// Predicted cost of a drive on the map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Travel {
     /// Length of the route, metres.
@@ -97,7 +98,7 @@ pub struct Driven {
     pub distance_m: f64,
     /// On the body's clock, seconds.
     pub duration_s: f64,
-    /// Where localisation says that the base is now.
+    /// Stated pose of the base after the drive.
     pub map_from_base: Isometry3<f64>,
 }
 
@@ -184,7 +185,7 @@ pub struct Scanned {
     pub pose_sigma_rad: f64,
 }
 
-/// What a sense said.
+/// Reading of a sense.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
     /// When.
@@ -198,16 +199,16 @@ pub struct Reading {
 pub struct Push {
     /// Centre of the object, in the map, metres.
     pub object: Point3<f64>,
-    /// Which way, in the map; its length does not matter.
+    /// Direction in the map; its length does not matter.
     pub direction: Vector2<f64>,
-    /// How far, metres.
+    /// Length of the push, metres.
     pub distance_m: f64,
 }
 
 /// A push that ended.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pushed {
-    /// How far the hand moved while it felt the object, metres.
+    /// Distance that the hand moved in contact with the object, metres.
     pub moved_m: f64,
     /// On the body's clock, seconds.
     pub duration_s: f64,
@@ -218,23 +219,23 @@ pub struct Pushed {
 pub struct Grasp {
     /// Middle of the object's body, in the map, metres.
     pub object: Point3<f64>,
-    /// How wide the hand must open, metres.
+    /// Required opening of the hand, metres.
     pub width_m: f64,
 }
 
 /// A grasp that ended with the object lifted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasped {
-    /// How wide the hand is closed around it, metres.
+    /// Opening of the hand around the object, metres.
     pub width_m: f64,
     /// On the body's clock, seconds.
     pub duration_s: f64,
 }
 
-/// Where what the hand holds is put down.
+/// Place for the object in the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placing {
-    /// Where the foot of the object comes to stand, in the map, metres.
+    /// Place of the object's foot, in the map, metres.
     pub foot: Point3<f64>,
 }
 
@@ -245,10 +246,10 @@ pub struct Placed {
     pub duration_s: f64,
 }
 
-/// What the hand feels.
+/// State of the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hand {
-    /// Whether there is something in it.
+    /// True if the hand holds something.
     pub holds: bool,
 }
 
@@ -259,7 +260,7 @@ pub struct Opened {
     pub duration_s: f64,
 }
 
-/// How far something that takes time has got.
+/// Progress of a request that takes time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// On the body's clock since the start, seconds.
@@ -296,7 +297,7 @@ impl Default for Watch<'_> {
 /// and can be asked again, unless it said [`Failure::Broken`].
 #[async_trait::async_trait]
 pub trait Robot: Send + Sync {
-    /// What it is and can do.
+    /// Parts and abilities of the body.
     fn description(&self) -> &Description;
 
     /// The body's clock. Simulated and recorded time advances by driving, looking and sensing, not by waiting.
@@ -327,15 +328,16 @@ pub trait Robot: Send + Sync {
         &[]
     }
 
-    /// What going from one place to each of the others takes, predicted on the map: nothing moves. Every door counts as open
-    /// but those named in `shut`.
+    /// Predicts the drives from one place to each of the others on the map: nothing moves. Every
+    /// door counts as open but those named in `shut`.
     ///
     /// # Errors
     /// Each entry by itself: [`Failure::Unreachable`] with the reason.
     fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>>;
 
-    /// Where the camera would be (`map_from_camera`) if the base stood at `place` and the head looked towards `look_at` (straight
-    /// ahead if `None`), within the head's limits. A body without a head looks where the place says.
+    /// Predicts the camera's pose (`map_from_camera`) with the base at `place` and the head turned
+    /// towards `look_at` (straight ahead if `None`), within the head's limits. A body without a
+    /// head looks where the place says.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] for an unknown station, or a pose where only
@@ -345,7 +347,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Camera))
     }
 
-    /// Where localisation says that the base is.
+    /// Stated pose of the base.
     ///
     /// # Errors
     /// [`Failure::Lost`], [`Failure::Broken`].
@@ -438,7 +440,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Hand))
     }
 
-    /// What the hand feels now.
+    /// State of the hand now.
     ///
     /// # Errors
     /// [`Failure::Unable`] without a hand; [`Failure::Broken`].

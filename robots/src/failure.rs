@@ -1,22 +1,22 @@
-//! How a body says that something did not work. A failure is news for the belief: each kind is another thing to learn.
+//! Failures of a body. Each kind teaches the belief something else.
 
 use crate::body::Stamp;
 use serde::{Deserialize, Serialize};
 
-/// Why a body did not do what it was asked to. `because` is one plain sentence for people and logs.
+/// Failure of a request. `because` is one plain sentence for people and logs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
 #[serde(rename_all = "snake_case")]
 pub enum Failure {
-    /// By the map, no route leads there: trying again is useless until the map changes.
+    /// No route on the map: a retry is useless until the map changes.
     #[error("unreachable: {because}")]
     Unreachable {
-        /// What stands in the way, or what was asked for that does not exist.
+        /// Obstacle, or missing destination.
         because: String,
     },
     /// Something that the map does not know stood in the way; another route or a later try may work.
     #[error("blocked: {because}")]
     Blocked {
-        /// Where and by what, as far as the body knows.
+        /// Place and obstacle, as far as the body knows.
         because: String,
         /// The door or thing of the map that it was, by name, if the body knows.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -25,19 +25,19 @@ pub enum Failure {
     /// The time limit passed. The body stands still, wherever it got to.
     #[error("timed out: {because}")]
     TimedOut {
-        /// What took how long.
+        /// Request and the time that it took.
         because: String,
     },
     /// Somebody stopped it.
     #[error("cancelled: {because}")]
     Cancelled {
-        /// What was stopped.
+        /// Stopped request.
         because: String,
     },
     /// No frame came although one was due.
     #[error("no frame: {because}")]
     SensorDropped {
-        /// What is missing.
+        /// Missing frame.
         because: String,
         /// When it was due, on the body's clock.
         stamp_ns: Stamp,
@@ -45,27 +45,27 @@ pub enum Failure {
     /// The body does not know where it is.
     #[error("lost: {because}")]
     Lost {
-        /// How it noticed.
+        /// Sign by which it noticed.
         because: String,
     },
     /// The hand did not do what it was asked to; the scene may have changed nevertheless.
     #[error("slipped: {because}")]
     Slipped {
-        /// What happened, as far as the body felt it.
+        /// Event, as far as the body felt it.
         because: String,
-        /// How far the hand moved while it felt the object, metres.
+        /// Distance that the hand moved in contact with the object, metres.
         moved_m: f64,
     },
     /// This body cannot do that at all (see [`Description`](crate::Description)).
     #[error("not able to: {because}")]
     Unable {
-        /// What is missing.
+        /// Missing part.
         because: String,
     },
     /// The body is broken for good; nothing more can be asked of it.
     #[error("broken: {because}")]
     Broken {
-        /// What broke.
+        /// Broken part.
         because: String,
     },
 }

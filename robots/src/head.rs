@@ -3,7 +3,7 @@
 use crate::parts::Head;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Where the head points, in the base frame.
+/// Direction of the head, in the base frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gaze {
     /// Counter-clockwise from the base's x.

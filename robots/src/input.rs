@@ -4,7 +4,7 @@ use serde::de::DeserializeOwned;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// What is wrong in a file, drawn under its text.
+/// Fault in a file, drawn under its text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.drawn())]
 pub struct InputError {
@@ -16,9 +16,9 @@ pub struct InputError {
     pub column: usize,
     /// The line itself.
     pub excerpt: String,
-    /// What was found and what was expected.
+    /// Found and expected values.
     pub problem: String,
-    /// What to do about it.
+    /// Mend.
     pub mend: String,
 }
 
@@ -81,11 +81,11 @@ pub enum Step {
 /// A value that the format allows and the meaning does not.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Objection {
-    /// Where in the document.
+    /// Path in the document.
     pub path: Vec<Step>,
-    /// What was found and what was expected.
+    /// Found and expected values.
     pub problem: String,
-    /// What to do about it.
+    /// Mend.
     pub mend: String,
 }
 

@@ -1,11 +1,11 @@
-//! What a body is made of: a base, a head, an arm with a hand, and its sensors, each of which may be missing.
+//! Parts of a body: base, head, arm with a hand, sensors, each of which may be missing.
 
 use crate::failure::Failure;
 use descry_perception::Intrinsics;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// What a body is and can do. Does not change while it lives.
+/// Parts and abilities of a body. Constant while it lives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
@@ -13,11 +13,11 @@ pub struct Description {
     pub name: String,
     /// True if the world is simulated too.
     pub simulated: bool,
-    /// What drives; `None` if the body stays at its one station.
+    /// Base; `None` if the body stays at its one station.
     pub base: Option<Base>,
-    /// What turns the camera; `None` if the camera looks where the base's pose says.
+    /// Head that turns the camera; `None` if the camera looks where the base's pose says.
     pub head: Option<Head>,
-    /// What pushes, and opens doors.
+    /// Arm that pushes and opens doors.
     pub arm: Option<Arm>,
     /// The depth camera.
     pub camera: Option<Camera>,
@@ -64,7 +64,7 @@ impl std::fmt::Display for Part {
 }
 
 impl Description {
-    /// Whether the body has a part.
+    /// True if the body has the part.
     pub fn has(&self, part: Part) -> bool {
         match part {
             Part::Base => self.base.is_some(),
@@ -83,12 +83,12 @@ impl Description {
         if self.has(part) { Ok(()) } else { Err(self.lacks(part)) }
     }
 
-    /// That the body has no such part.
+    /// Failure of a body that lacks the part.
     pub(crate) fn lacks(&self, part: Part) -> Failure {
         Failure::Unable { because: format!("{} has no {part}", self.name) }
     }
 
-    /// That the body has no sense of that name.
+    /// Failure of a body that lacks a sense of that name.
     pub(crate) fn lacks_sense(&self, name: &str) -> Failure {
         Failure::Unable { because: format!("{} has no sense \"{name}\"", self.name) }
     }
@@ -98,12 +98,12 @@ impl Description {
         self.arm.as_ref()?.hand.as_ref()
     }
 
-    /// How far from the base's middle the arm reaches, metres.
+    /// Reach of the arm from the base's middle, metres.
     pub fn reach_m(&self) -> Option<f64> {
         self.arm.as_ref().map(|arm| arm.reach_m)
     }
 
-    /// What a straight way takes, seconds, as [`Speeds::duration_s`]; none without a base, which gets nowhere.
+    /// Duration of a straight drive, seconds, as [`Speeds::duration_s`]; none without a base.
     pub fn duration_s(&self, distance_m: f64, turned_rad: f64) -> f64 {
         self.base.as_ref().map_or(0.0, |base| base.speeds.duration_s(distance_m, turned_rad))
     }
@@ -114,7 +114,7 @@ impl Description {
     }
 }
 
-/// What drives.
+/// Base that drives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Base {
     /// Outline on the floor.
@@ -149,7 +149,7 @@ impl Footprint {
     }
 }
 
-/// How fast a body moves.
+/// Speeds of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Speeds {
     /// Along the ground, metres a second.
@@ -162,7 +162,7 @@ impl Speeds {
     /// A body that is slower never arrives.
     pub const LEAST: Speeds = Speeds { linear_m_s: 0.001, angular_rad_s: 0.0001 };
 
-    /// What a straight way takes on which the base turns while it drives: max(ds/v, dθ/ω), seconds.
+    /// Duration of a straight drive during which the base turns: max(ds/v, dθ/ω), seconds.
     pub fn duration_s(&self, distance_m: f64, turned_rad: f64) -> f64 {
         (distance_m / self.linear_m_s).max(turned_rad / self.angular_rad_s)
     }
@@ -171,7 +171,7 @@ impl Speeds {
 /// The head that carries the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// Where the head's axes cross, in the base frame, metres. The camera looks from there.
+    /// Centre of rotation of the head, in the base frame, metres. The camera looks from there.
     pub base_from_head: Point3<f64>,
     /// Greatest turn to either side, radians.
     pub pan_limit_rad: f64,
@@ -184,9 +184,9 @@ pub struct Head {
 /// An arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Arm {
-    /// How far from the base's middle it reaches, metres.
+    /// Reach from the base's middle, metres.
     pub reach_m: f64,
-    /// What grasps at its end; `None` if it only pushes.
+    /// Gripper at its end; `None` if it only pushes.
     pub hand: Option<Gripper>,
 }
 
@@ -206,12 +206,12 @@ pub struct Camera {
     pub intrinsics: Intrinsics,
     /// Least and greatest depth that it measures, metres.
     pub range_m: (f64, f64),
-    /// Whether frames may have a colour image.
+    /// True if frames may have a colour image.
     pub colour: bool,
 }
 
 impl Camera {
-    /// Whether a point in its optical frame lies in its field of view and range.
+    /// True if a point in its optical frame lies in its field of view and range.
     pub fn shows(&self, p: &Point3<f64>) -> bool {
         if p.z <= 0.0 || p.z < self.range_m.0 || p.z > self.range_m.1 {
             return false;
@@ -227,7 +227,7 @@ impl Camera {
 pub struct Laser {
     /// Name of its frame, x straight ahead.
     pub frame: String,
-    /// Where it is on the base; it does not move there.
+    /// Pose of the laser on the base; constant.
     pub base_from_laser: Isometry3<f64>,
     /// Angle of the first reading, anticlockwise from straight ahead, radians.
     pub first_rad: f64,
@@ -245,7 +245,7 @@ pub struct Laser {
 pub struct Sense {
     /// As people and domains call it: `label reader`.
     pub name: String,
-    /// What its readings say and in which form, in a line; it stands in the record beside each.
+    /// Meaning and form of its readings, in a line; the record has it beside each reading.
     pub about: String,
 }
 

@@ -1,4 +1,4 @@
-//! What a body is asked and what it answers, as values: what tapes keep, programs are sent, and conformance asks.
+//! Requests and answers as values, for tapes, programs and conformance.
 
 use crate::body::{
     Colour, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, PoseEstimate, Push, Pushed,
@@ -108,7 +108,7 @@ impl std::fmt::Display for Request {
     }
 }
 
-/// What the body answered.
+/// Answer of the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
@@ -175,7 +175,7 @@ impl Answer {
         self
     }
 
-    /// Where the base is, if it says.
+    /// Stated pose of the base, if the answer has one.
     pub(crate) fn place(&self) -> Option<&Isometry3<f64>> {
         match self {
             Answer::Pose(pose) => Some(&pose.map_from_base),
@@ -214,7 +214,7 @@ impl Exposure {
     }
 }
 
-/// What the camera measured in a frame.
+/// Measurements of the camera in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pixels {
     /// Organised, in the optical frame, metres; NaN is "no return".

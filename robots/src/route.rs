@@ -1,4 +1,4 @@
-//! Where a body can go on its map, and what that costs.
+//! Routes of a body on its map, and their cost.
 //!
 //! The map is inflated by the footprint. Shortest any-angle routes bend only at convex corners of what is blocked, so the search runs
 //! on those corners (a visibility graph, Lozano-Pérez and Wesley 1979) and a pair of poses costs a few lines of sight. Duration after
@@ -29,7 +29,7 @@ const MOST_ACCESSES: usize = 4096;
 pub struct Route {
     /// From the start to the goal, both included; straight lines between, turns on the spot at each.
     pub points_m: Vec<Point2<f64>>,
-    /// What it takes, the turns at both ends included.
+    /// Cost, the turns at both ends included.
     pub travel: Travel,
 }
 
@@ -44,7 +44,7 @@ pub struct Router {
     corners: Vec<Point2<f64>>,
     seen: Vec<OnceLock<Vec<u32>>>,
     rows: Vec<OnceLock<Vec<Option<Leg>>>>,
-    /// By the bits of the coordinates.
+    /// Accesses by the bits of the coordinates.
     accesses: Mutex<BTreeMap<[u64; 2], Arc<Access>>>,
 }
 
@@ -58,14 +58,14 @@ struct Leg {
     previous: u32,
 }
 
-/// How a pose reaches the corners: straight lines to those that it sees.
+/// Access of a pose to the corners: straight lines to those that it sees.
 #[derive(Debug)]
 struct Access {
     point: Point2<f64>,
     corners: Vec<(u32, f64, f64)>,
 }
 
-/// Which corners a route passes.
+/// Corners of a route.
 #[derive(Clone, Copy)]
 enum Via {
     Straight,
@@ -122,7 +122,7 @@ impl Router {
         }))
     }
 
-    /// What going from one pose to another takes.
+    /// Cost of the drive from one pose to another.
     ///
     /// # Errors
     /// [`Failure::Unreachable`] with the reason.
@@ -130,7 +130,8 @@ impl Router {
         self.travel_to_each(from, std::slice::from_ref(to)).swap_remove(0)
     }
 
-    /// What going from one pose to each of the others takes; the lines of sight of the start are shared.
+    /// Cost of the drives from one pose to each of the others; the lines of sight of the start are
+    /// shared.
     pub fn travel_to_each(&self, from: &Pose2, to: &[Pose2]) -> Vec<Result<Travel, Failure>> {
         let start = self.start_access(from);
         to.iter()
@@ -142,7 +143,7 @@ impl Router {
             .collect()
     }
 
-    /// What going from each pose to each other takes: `table[from][to]`.
+    /// Cost of the drives between all poses: `table[from][to]`.
     pub fn travel_table(&self, poses: &[Pose2]) -> Vec<Vec<Result<Travel, Failure>>> {
         let ends: Vec<_> = poses.iter().map(|p| self.goal_access(p)).collect();
         let row = |from: &Pose2, start: &Result<Arc<Access>, Failure>| {

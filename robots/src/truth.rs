@@ -1,4 +1,5 @@
-//! How everything really stands, as a simulator says it: for scoring and reports only. Nothing that decides may read it.
+//! True state of a scene, as a simulator states it: for scoring and reports only. No decision may
+//! read it.
 
 use crate::body::{Pose2, Stamp};
 use nalgebra::{Isometry3, Point3};
@@ -10,7 +11,7 @@ use std::path::Path;
 pub struct Truth {
     /// When.
     pub stamp_ns: Stamp,
-    /// Where the base is.
+    /// Pose of the base.
     pub base: Pose2,
     /// Every object of the scene, in the order of the scene file; then the obstacles that the map does not show.
     pub objects: Vec<TrueObject>,
@@ -23,7 +24,7 @@ pub struct Truth {
     /// Share of it that the camera saw from the start.
     #[serde(default)]
     pub target_visible_from_start: Option<f64>,
-    /// What went wrong so far, and what others did.
+    /// Faults and others' deeds so far.
     #[serde(default)]
     pub events: Vec<Event>,
 }
@@ -33,7 +34,7 @@ pub struct Truth {
 pub struct TrueObject {
     /// Unique in the scene.
     pub name: String,
-    /// What it is.
+    /// Kind.
     pub kind: String,
     /// The surface it stands on; none in the hand, on the floor or taken away.
     pub surface: Option<String>,
@@ -45,7 +46,7 @@ pub struct TrueObject {
     pub in_hand: bool,
     /// False once it has been taken away.
     pub present: bool,
-    /// Where its base stands, in the map.
+    /// Pose of its base, in the map.
     pub map_from_object: Isometry3<f64>,
     /// Middle of its body (a handle left out), in the map, metres.
     pub centre_m: Point3<f64>,
@@ -58,7 +59,7 @@ pub struct TrueObject {
 pub struct TrueDoor {
     /// As people call it.
     pub name: String,
-    /// Whether it is shut.
+    /// True if it is shut.
     pub shut: bool,
 }
 
@@ -67,7 +68,7 @@ pub struct TrueDoor {
 pub struct Event {
     /// When.
     pub stamp_ns: Stamp,
-    /// What, in one sentence.
+    /// Event, in one sentence.
     pub what: String,
 }
 

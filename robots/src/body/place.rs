@@ -25,7 +25,7 @@ impl Pose2 {
         Pose2 { x_m, y_m, yaw_rad: (point.y - y_m).atan2(point.x - x_m) }
     }
 
-    /// Where it stands.
+    /// Position in the map.
     pub fn point(&self) -> Point2<f64> {
         Point2::new(self.x_m, self.y_m)
     }
@@ -70,6 +70,6 @@ impl std::fmt::Display for Place {
 pub struct Station {
     /// Unique among the stations of the body.
     pub name: String,
-    /// Where the base stands there.
+    /// Pose of the base there.
     pub map_from_base: Isometry3<f64>,
 }

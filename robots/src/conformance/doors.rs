@@ -5,7 +5,7 @@ use crate::body::{CancellationToken, Place, Pose2, Robot, Watch};
 use crate::failure::Failure;
 use nalgebra::Vector2;
 
-/// How far from the middle of a door the base stands to open it, metres.
+/// Distance of the base from the middle of a door to open it, metres.
 const BEFORE_M: f64 = 0.7;
 /// Hands slip now and then, not always.
 const TRIES: usize = 8;

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 
 /// Hands slip now and then, not always.
 const TRIES: usize = 8;
-/// Where there is nothing to grasp, in the base frame, metres.
+/// Point without anything to grasp, in the base frame, metres.
 const THIN_AIR: [f64; 3] = [0.5, 0.0, 1.9];
 
 /// The hand is empty before and after.

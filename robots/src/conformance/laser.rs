@@ -1,4 +1,4 @@
-//! What a body with a laser promises; who has none says so.
+//! Promises of a body with a laser; a body without one says so.
 
 use super::{Breach, ROUNDING, done, ensure, gap};
 use crate::body::{CancellationToken, Pose2, Robot, Scanned, Watch};

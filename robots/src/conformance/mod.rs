@@ -1,4 +1,4 @@
-//! What every body promises, as one check that any implementation of [`Robot`] can run in its tests.
+//! Conformance test: the promises of every body, for the tests of any implementation of [`Robot`].
 //!
 //! The body is driven, looks, takes frames and sweeps its laser; it needs one place besides its own that it can reach, open doors, an empty hand, and no
 //! mishaps. [`check_carrying`] is for bodies with a hand and needs to be told of an object.
@@ -21,9 +21,9 @@ use std::sync::Mutex;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{promise}: {found}")]
 pub struct Breach {
-    /// What every body does.
+    /// Promise.
     pub promise: &'static str,
-    /// What this one did.
+    /// Observed behaviour.
     pub found: String,
 }
 
@@ -142,7 +142,7 @@ fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
     })
 }
 
-/// How far two transforms are apart, metres and radians, whichever is more.
+/// Distance of two transforms: metres or radians, whichever is more.
 fn gap(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let moved = (a.translation.vector - b.translation.vector).norm();
     moved.max(a.rotation.angle_to(&b.rotation))

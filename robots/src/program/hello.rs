@@ -18,7 +18,7 @@ const MOST_READINGS: usize = 65_536;
 /// Most surfaces, rooms, doors or stations.
 const MOST_NAMES: usize = 10_000;
 
-/// What a program says first.
+/// First message of a program.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Hello {
@@ -30,16 +30,16 @@ pub(super) struct Hello {
     /// True if the world is simulated too.
     #[serde(default)]
     simulated: bool,
-    /// Where its clock begins, nanoseconds.
+    /// Start of its clock, nanoseconds.
     #[serde(default)]
     now_ns: Stamp,
-    /// What drives; left out by a body that stays at its one station.
+    /// Base; left out by a body that stays at its one station.
     base: Option<Base>,
     /// The depth camera; left out if there is none.
     camera: Option<Camera>,
-    /// What turns the camera; left out if nothing does.
+    /// Head that turns the camera; left out if nothing does.
     head: Option<Head>,
-    /// What pushes and grasps; left out if there is none.
+    /// Arm that pushes and grasps; left out if there is none.
     arm: Option<Arm>,
     /// A laser that sweeps level; left out if there is none.
     laser: Option<Laser>,
@@ -75,9 +75,9 @@ pub(super) struct Hello {
 struct Base {
     /// Its outline on the floor.
     footprint: Footprint,
-    /// How fast it drives, metres a second.
+    /// Driving speed, metres a second.
     linear_m_s: f64,
-    /// How fast it turns on the spot, radians a second.
+    /// Speed of turning on the spot, radians a second.
     angular_rad_s: f64,
     /// Kept between the footprint and what the map shows, metres.
     #[serde(default = "default_clearance_m")]
@@ -105,16 +105,16 @@ struct Camera {
     cy: f64,
     /// Least and greatest depth that it measures, metres.
     range_m: (f64, f64),
-    /// What a depth of 1 stands for, metres.
+    /// Length of one unit of depth, metres.
     #[serde(default = "default_unit_m")]
     unit_m: f64,
-    /// Whether a colour image of the same pixels follows the depths.
+    /// True if a colour image of the same pixels follows the depths.
     #[serde(default)]
     colour: bool,
     /// Name of its frame in records.
     #[serde(default = "default_camera_frame")]
     frame: String,
-    /// Where it is, if no head turns it; the base's own pose if nothing is said.
+    /// Pose of the camera on the base, if no head turns it; the base's own pose if left out.
     base_from_camera: Option<Isometry3<f64>>,
 }
 
@@ -129,7 +129,7 @@ fn default_camera_frame() -> String {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Arm {
-    /// How far from the base's middle it reaches, metres.
+    /// Reach from the base's middle, metres.
     reach_m: f64,
     /// The widest thing that the hand takes, metres; left out if it only pushes.
     hand_opening_m: Option<f64>,
@@ -138,7 +138,7 @@ struct Arm {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Laser {
-    /// Where it is on the base; it does not move there.
+    /// Pose of the laser on the base; constant.
     base_from_laser: Isometry3<f64>,
     /// Angle of the first reading, anticlockwise from straight ahead, radians.
     first_rad: f64,
@@ -160,9 +160,9 @@ fn default_laser_frame() -> String {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct BodyFrames {
-    /// Of the map.
+    /// Name of the map frame.
     map: String,
-    /// Of the base.
+    /// Name of the base frame.
     base: String,
 }
 
@@ -190,12 +190,12 @@ struct Map {
 pub(super) struct Greeting {
     pub known: Known,
     pub clearance_m: f64,
-    /// Of a camera that no head turns.
+    /// Pose of a camera that no head turns.
     pub base_from_camera: Isometry3<f64>,
     pub pixels: PixelFormat,
 }
 
-/// How the bytes of a frame are read.
+/// Byte layout of a frame.
 #[derive(Clone, Copy)]
 pub(super) struct PixelFormat {
     pub unit_m: f64,
@@ -210,7 +210,7 @@ impl PixelFormat {
 }
 
 impl Hello {
-    /// What the body is, with the bytes that came after the line: the cells of the map.
+    /// Checks the message, with the bytes after its line: the cells of the map.
     ///
     /// # Errors
     /// What in it cannot be.
@@ -315,7 +315,7 @@ impl Hello {
         self.check_rooms()
     }
 
-    /// What is said of surfaces and doors is about rooms that there are.
+    /// Checks that surfaces and doors name existing rooms.
     fn check_rooms(&self) -> Result<(), String> {
         let rooms: Vec<&str> = self.rooms.iter().map(|room| room.name.as_str()).collect();
         let known = |what: &str, name: &str, room: &String| match rooms.contains(&room.as_str()) {

@@ -21,7 +21,7 @@ pub(super) struct Message {
     pub bytes: Vec<u8>,
 }
 
-/// Why no more can be read: the stream has ended, or this is not what the protocol allows.
+/// End of the stream, or a breach of the protocol.
 #[derive(Clone, Debug)]
 pub(super) enum Ended {
     Closed,

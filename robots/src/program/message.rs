@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The latest stamp that a program may say: what comes later leaves no room to reckon with.
 const LATEST_NS: Stamp = 4_000_000_000_000_000_000;
-/// How far the length of a quaternion may be from 1.
+/// Greatest deviation of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
 /// A request as a line.
@@ -21,7 +21,7 @@ pub(super) struct Ask<'a> {
     pub time_limit_s: f64,
 }
 
-/// What a request says besides its name.
+/// Arguments of a request.
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum Arguments<'a> {
@@ -36,7 +36,7 @@ pub(super) enum Arguments<'a> {
 }
 
 impl<'a> Arguments<'a> {
-    /// Of a request, and of a drive the way on the map.
+    /// Arguments of a request; for a drive also the way on the map.
     pub fn of(request: &'a Request, route_m: &'a [Point2<f64>]) -> Self {
         match request {
             Request::Pose | Request::Sense | Request::Scan | Request::Hand => Arguments::Nothing {},
@@ -73,7 +73,7 @@ pub(super) struct Said {
 pub(super) enum What {
     /// It has understood the request and begins.
     Accepted(serde::de::IgnoredAny),
-    /// How far it has got.
+    /// Progress.
     Feedback(Feedback),
     /// It is done; what is in it depends on the request.
     Done(serde_json::Value),
@@ -84,7 +84,7 @@ pub(super) enum What {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Feedback {
-    /// How much of it is done, 0 to 1.
+    /// Done share, 0 to 1.
     pub fraction: f64,
     /// Driven so far, metres.
     #[serde(default)]
@@ -111,87 +111,87 @@ impl Said {
     }
 }
 
-/// What `pose` is answered with.
+/// Answer to `pose`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PoseSaid {
-    /// Where localisation says that the base is now.
+    /// Stated pose of the base now.
     pub map_from_base: Isometry3<f64>,
     /// Standard deviation along each axis, metres; as the hello says if left out.
     pub sigma_m: Option<f64>,
     /// Standard deviation of the heading, radians; as the hello says if left out.
     pub sigma_rad: Option<f64>,
-    /// Where it stands, if it has stations.
+    /// Name of its station, if it has stations.
     pub station: Option<String>,
 }
 
-/// What `drive_to` is answered with.
+/// Answer to `drive_to`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DrivenSaid {
     /// As odometry counted it, metres.
     pub distance_m: f64,
-    /// Where localisation says that the base is now.
+    /// Stated pose of the base now.
     pub map_from_base: Isometry3<f64>,
 }
 
-/// What `look_at` is answered with.
+/// Answer to `look_at`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LookedSaid {
-    /// By what angle the head's limits miss the point, radians.
+    /// Angle by which the head's limits miss the point, radians.
     pub miss_rad: f64,
 }
 
-/// What `sense` is answered with; the pixels follow as bytes.
+/// Answer to `sense`; the pixels follow as bytes.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensedSaid {
     /// When the frame was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// Where the base was then.
+    /// Pose of the base at that time.
     pub map_from_base: Isometry3<f64>,
-    /// Where the camera was on the base then.
+    /// Pose of the camera on the base at that time.
     pub base_from_camera: Isometry3<f64>,
 }
 
-/// What `scan` is answered with; the ranges follow as bytes.
+/// Answer to `scan`; the ranges follow as bytes.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ScannedSaid {
     /// When the sweep was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// Where the base was then.
+    /// Pose of the base at that time.
     pub map_from_base: Isometry3<f64>,
 }
 
-/// What `read` is answered with.
+/// Answer to `read`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReadSaid {
     /// When it was read, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
-    /// What was read.
+    /// Reading.
     pub said: serde_json::Value,
 }
 
-/// What `push_aside` is answered with.
+/// Answer to `push_aside`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PushedSaid {
-    /// How far the thing was moved, metres.
+    /// Distance that the thing was moved, metres.
     pub moved_m: f64,
 }
 
-/// What `grasp` is answered with.
+/// Answer to `grasp`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraspedSaid {
-    /// How far the hand is open around the thing, metres.
+    /// Opening of the hand around the thing, metres.
     pub width_m: f64,
 }
 
-/// What `open_door` and `place` are answered with.
+/// Answer to `open_door` and `place`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NothingSaid {}

@@ -10,7 +10,7 @@ pub(super) enum Peer {
 }
 
 impl Peer {
-    /// What it means that it says no more.
+    /// Meaning of the end of its output.
     pub fn farewell(&self) -> &'static str {
         match self {
             Self::Started(_) => "the program has ended",
@@ -18,7 +18,7 @@ impl Peer {
         }
     }
 
-    /// Whether it has ended although its output may still be open. A connection says so itself.
+    /// True if it has ended although its output may still be open. A connection says so itself.
     pub fn has_ended(&self) -> bool {
         match self {
             Self::Started(process) => process.has_ended(),
@@ -26,7 +26,7 @@ impl Peer {
         }
     }
 
-    /// How it ended and what it said last; nothing of who is elsewhere.
+    /// Exit status and last words; empty for a remote peer.
     pub fn epitaph(&mut self) -> String {
         match self {
             Self::Started(process) => process.epitaph(),

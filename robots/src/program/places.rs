@@ -1,5 +1,5 @@
-//! What is answered here without asking the program: where it can go at what cost, and where its camera would be. Planning asks
-//! thousands of such questions; they need no round trips.
+//! Predictions that need no question to the program: reachable places, their cost, poses of the
+//! camera. Planning asks thousands of them.
 
 use crate::body::{Door, Place, Pose2, Station, Travel};
 use crate::failure::Failure;
@@ -18,11 +18,11 @@ const MOST_ROUTERS: usize = 64;
 /// The map of a program's hello, with the routes on it.
 pub(super) struct Places {
     clearance_m: f64,
-    /// Of a camera that no head turns.
+    /// Pose of a camera that no head turns.
     base_from_camera: Isometry3<f64>,
     /// Doors that ended a drive and were not opened since.
     shut: Mutex<BTreeSet<String>>,
-    /// By the doors that count as shut.
+    /// Routers by the set of doors that count as shut.
     routers: Mutex<BTreeMap<Vec<String>, Arc<Router>>>,
 }
 
@@ -123,19 +123,19 @@ impl Places {
         Ok(turned.unwrap_or(base * self.base_from_camera))
     }
 
-    /// By what angle a camera that no head turns misses a point, radians.
+    /// Angle by which a camera that no head turns misses a point, radians.
     pub fn miss_rad(&self, map_from_base: &Isometry3<f64>, point: &Point3<f64>) -> f64 {
         let seen = (map_from_base * self.base_from_camera).inverse_transform_point(point);
         seen.coords.angle(&Vector3::z())
     }
 }
 
-/// What there is to drive on, and how fast: with a map and a base.
+/// Map and speeds to drive with; none without a map or a base.
 fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
     Some((known.map.as_ref()?, known.description.base.as_ref()?.speeds))
 }
 
-/// Where the base stands at a place.
+/// Pose of the base at a place.
 ///
 /// # Errors
 /// [`Failure::Unreachable`] for a station that there is not, a pose where only stations are, and numbers that are none.

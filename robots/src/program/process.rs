@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// What of the environment a program sees. Keys, tokens and logins are not among it.
+/// Environment variables that a program sees. Keys, tokens and logins are not among them.
 const ENVIRONMENT: [&str; 12] = [
     "PATH",
     "HOME",
@@ -28,9 +28,9 @@ const ENVIRONMENT: [&str; 12] = [
 const LAST_WORDS: usize = 4096;
 /// Lines of them that are shown.
 const SHOWN_LINES: usize = 6;
-/// How long a program has to end by itself once its input is closed.
+/// Time for a program to end by itself once its input is closed.
 const PARTING: Duration = Duration::from_millis(500);
-/// How often it is asked whether it has ended.
+/// Interval between checks for its end.
 const GLANCE: Duration = Duration::from_millis(5);
 
 /// A program in a process group of its own.
@@ -62,7 +62,7 @@ impl Process {
         Ok((process, stdin, stdout))
     }
 
-    /// Whether the program has ended; something that it has started may live on.
+    /// True if the program has ended; a process that it has started may live on.
     pub fn has_ended(&self) -> bool {
         self.ends_within(Duration::ZERO)
     }
@@ -81,7 +81,8 @@ impl Process {
         }
     }
 
-    /// How it ended and what it said last, once it has closed its output or broken the protocol: ends what is left of it.
+    /// Exit status and last words, after it closed its output or broke the protocol; ends the rest
+    /// of its processes.
     pub fn epitaph(&mut self) -> String {
         let by_itself = self.ends_within(GLANCE * 20);
         let status = self.kill();
@@ -112,7 +113,7 @@ impl Process {
 }
 
 impl Drop for Process {
-    /// By now its input is closed: it has a moment to stop the body, then all of its group is killed.
+    /// Kills its process group, after a moment to stop the body; its input is closed by now.
     fn drop(&mut self) {
         self.ends_within(PARTING);
         self.kill();

@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 use tokio::sync::Mutex;
 
-/// How long a program may take, in seconds of the wall's clock, how much it may say, and how much memory it has.
+/// Limits of a program: seconds on the wall, bytes of output, memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// From the start to the hello.
@@ -457,7 +457,7 @@ impl ProgramRobot {
         self.known.description.lacks(part)
     }
 
-    /// Whether there is a hand, and the point is one.
+    /// Checks that there is a hand, and that the point is finite.
     fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
         self.known.description.need(Part::Hand)?;
         match point.iter().all(|x| x.is_finite()) {

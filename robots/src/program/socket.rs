@@ -11,9 +11,9 @@ pub(super) enum Socket {
     Tcp(TcpStream),
 }
 
-/// Where what a program says is read.
+/// Stream from the program.
 type Reader = Box<dyn Read + Send>;
-/// Where what it is told is written.
+/// Stream to the program.
 type Writer = Box<dyn Write + Send>;
 
 impl Socket {

@@ -14,10 +14,10 @@ const LONGEST_S: f64 = 1e9;
 /// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
-/// How often a silent program is asked whether it is still there.
+/// Interval between checks of a silent program.
 const GLANCE: Duration = Duration::from_millis(200);
 
-/// What a request was answered with.
+/// Answer to a request.
 pub(super) struct Done {
     pub said: serde_json::Value,
     pub bytes: Vec<u8>,
@@ -26,7 +26,7 @@ pub(super) struct Done {
 }
 
 impl Done {
-    /// What it took on the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub fn duration_s(&self) -> f64 {
         (self.now_ns - self.before_ns) as f64 * 1e-9
     }
@@ -58,14 +58,14 @@ impl Drop for Asker {
     }
 }
 
-/// Why there is no message.
+/// Reason for which no message came.
 enum Silence {
     Late,
     Ended(Ended),
     Gone,
 }
 
-/// Why a request is being stopped.
+/// Reason for stopping a request.
 struct Stopping {
     by: Instant,
     failure: Failure,
@@ -263,7 +263,7 @@ impl Talk {
     }
 }
 
-/// What a line says about the request that is open.
+/// Reads a line about the open request.
 fn read(message: &Message, id: u64, before_ns: Stamp) -> Result<Said, String> {
     let said: Said = serde_json::from_str(&message.line).map_err(|e| {
         format!(

@@ -32,7 +32,7 @@ pub struct StoredFrame {
     pub depth: PathBuf,
     /// If there is one.
     pub colour: Option<PathBuf>,
-    /// Where the camera was.
+    /// Pose of the camera.
     pub world_from_camera: Isometry3<f64>,
 }
 
@@ -47,7 +47,7 @@ pub struct Recording {
     pub intrinsics: Intrinsics,
     /// Index of the first station.
     pub start: usize,
-    /// What `recording.toml` says.
+    /// Contents of `recording.toml`.
     pub settings: Settings,
     /// Frames without a pose because tracking was lost: they are no stations.
     pub lost: Vec<String>,

@@ -1,5 +1,5 @@
-//! What was recorded is a robot too: frames of a folder or of a record ([`RecordedRobot`]), and a run with all that its body was
-//! asked and answered ([`TapedRobot`]).
+//! Recordings as robots: frames of a folder or of a record ([`RecordedRobot`]), and a run with all
+//! requests to its body and their answers ([`TapedRobot`]).
 //!
 //! A folder of depth frames with poses is a robot: it can stand where a frame was taken, and looking returns that frame.
 //!

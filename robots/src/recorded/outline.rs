@@ -13,7 +13,7 @@ const LEAST_AREA_M2: f64 = 1e-4;
 /// Most corners: each edge is held against each other.
 const MOST_CORNERS: usize = 1000;
 
-/// What is wrong, and how to mend it.
+/// Fault, and its mend.
 pub(crate) type Fault = (String, &'static str);
 
 /// Checks the corners of an outline, in order around it, metres.

@@ -20,7 +20,7 @@ const FRAME_S: f64 = 0.1;
 
 /// Frames that somebody took, one at each station.
 pub trait Footage: Send + Sync {
-    /// What the camera measured there.
+    /// Measurements of the camera at a station.
     ///
     /// # Errors
     /// Why the frame cannot be read.

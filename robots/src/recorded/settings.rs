@@ -1,4 +1,4 @@
-//! What a folder of frames does not say by itself.
+//! Settings of a folder of frames that the frames do not tell.
 
 use crate::input::{self, InputError, Objection, Step};
 use crate::parts::Speeds;
@@ -15,7 +15,7 @@ const LEAST_ANGULAR_DEG_S: f64 = 0.01;
 pub struct Settings {
     /// For people; the folder's name if left out.
     pub name: Option<String>,
-    /// Where the frames are, from the file's own folder.
+    /// Folder of the frames, from the file's own folder.
     pub folder: Option<String>,
     /// Units of a depth image in a metre.
     pub depth_scale: f64,
@@ -50,7 +50,7 @@ pub struct SurfaceSettings {
     pub name: String,
     /// Corners in order around it, along the world's x and y, metres.
     pub outline_m: Vec<[f64; 2]>,
-    /// Of its top, along the world's z, metres.
+    /// Height of its top, along the world's z, metres.
     pub height_m: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What a body was asked and what it answered, in order: enough to live through it again.
+//! Requests to a body and their answers, in order: enough to play the run again.
 
 use crate::body::{Door, Place, Robot, Room, Stamp, Station, SurfaceHint, Travel};
 use crate::failure::Failure;
@@ -8,7 +8,7 @@ use crate::request::{Answer, Pixels, Request};
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 
-/// What a body is and knows when a run begins.
+/// Description and map of a body at the beginning of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
     /// See [`Robot::description`].
@@ -30,7 +30,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// What a body says of itself.
+    /// Description and map that a body states.
     pub fn of(robot: &dyn Robot) -> Self {
         Known {
             description: robot.description().clone(),
@@ -60,14 +60,14 @@ pub enum Question {
     },
     /// [`Robot::camera_at`].
     CameraAt {
-        /// Where the base would stand.
+        /// Pose of the base.
         place: Place,
-        /// What the head would look at.
+        /// Target of the head.
         look_at: Option<Point3<f64>>,
     },
 }
 
-/// What the body said to a question.
+/// Answer of the body to a question.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
@@ -80,7 +80,7 @@ pub enum Reply {
 /// A request with its answer, and what was asked since the request before.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// What was asked of the map before, as far as it was news.
+    /// Answers of the map that were new since the last message.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub replies: Vec<(Question, Reply)>,
     /// The request and its answer; none at the end of a run.
@@ -89,7 +89,7 @@ pub struct Entry {
     pub now_ns: Stamp,
 }
 
-/// Where a body's answers are kept.
+/// Keeper of a body's answers.
 pub trait Tape: Send + Sync {
     /// Keeps an entry: when this returns it is safe, but a frame only with its pixels, which come next.
     ///

@@ -37,18 +37,18 @@ const SAME_PLACE_RAD: f64 = 0.05;
 struct State {
     now_ns: Stamp,
     played: VecDeque<Entry>,
-    /// What the map says, by question (as JSON), as far as the tape has it by now.
+    /// Answers of the map by question (as JSON), as far as the tape has been read.
     replies: BTreeMap<String, Reply>,
     /// Questions with news since the last answer.
     pending: Vec<(Question, Reply)>,
     ended: Option<String>,
-    /// Where the base was last, as it said.
+    /// Last stated pose of the base.
     at: Option<Isometry3<f64>>,
-    /// What the head was told to look at, if nothing else has moved since.
+    /// Target of the head, if nothing else has moved since.
     gaze: Option<Point3<f64>>,
-    /// Whether the live body was asked where it is, since the tape ended.
+    /// True if the live body was asked for its pose since the tape ended.
     met: bool,
-    /// How much the run's clock is ahead of the live body's.
+    /// Lead of the run's clock over the live body's.
     ahead_ns: Stamp,
 }
 
@@ -87,12 +87,13 @@ impl TapedRobot {
         TapedRobot { known, live, tape, speed: None, state: Mutex::new(state) }
     }
 
-    /// What it is and knew when the run began.
+    /// Description and map at the beginning of the run.
     pub fn known(&self) -> &Known {
         &self.known
     }
 
-    /// Why it could play no further: the tape ends there, or says something else than what was asked. None if it could.
+    /// Reason for which it could play no further: the tape ends there, or differs from the
+    /// requests. None if it could.
     pub fn ended(&self) -> Option<String> {
         self.lock().ended.clone()
     }
@@ -304,9 +305,9 @@ impl State {
     }
 }
 
-/// How a body is met where a tape ends.
+/// Meeting of the live body where the tape ends.
 enum Met {
-    /// Where the tape leaves it, or it was met before.
+    /// At the end of the tape, or after an earlier meeting.
     Here,
     /// There, and the last that it did was to look at this.
     Looking(Point3<f64>),
@@ -314,7 +315,7 @@ enum Met {
     Elsewhere(Failure),
 }
 
-/// What the tape has is no answer to what was asked: only a damaged record can say so.
+/// Failure for an answer of the wrong kind: only a damaged record can hold one.
 fn mixed_up<T>(answer: Answer) -> Result<T, Failure> {
     match answer {
         Answer::Failed(failure) => Err(failure),

@@ -183,8 +183,8 @@ impl Failures {
     }
 }
 
-/// What stands where in the visit asked for: who comes or moves finds a place beside those that are there, by draws of his own, so that all others stay
-/// where they stood.
+/// Places the objects of the visit asked for: an object that comes or moves is placed beside those
+/// that are there, by draws of its own, so that all others stay.
 fn visits(spec: &SceneSpec, seed: u64) -> Option<Vec<Object>> {
     let mut there: Vec<Option<Object>> = vec![None; spec.objects.len()];
     let mut asked = Vec::new();

@@ -14,15 +14,15 @@ pub const HEAD: Head = Head {
 };
 /// Kept between the footprint and what the map shows, metres: about two standard deviations of localisation.
 pub const SAFETY_M: f64 = 0.05;
-/// How far from the base's origin the arm reaches, metres.
+/// Reach of the arm from the base's origin, metres.
 pub const REACH_M: f64 = 1.8;
 /// The widest thing that the hand takes, metres.
 pub const HAND_OPENING_M: f64 = 0.12;
 /// The base is round, metres.
 pub const RADIUS_M: f64 = 0.25;
-/// How fast the base moves.
+/// Speeds of the base.
 pub const SPEEDS: Speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };
-/// How fast the head turns.
+/// Speed of the head.
 pub const HEAD_SPEED_RAD_S: f64 = 1.0;
 
 const FIELD_OF_VIEW_DEG: (f64, f64) = (57.0, 43.0);
@@ -48,7 +48,7 @@ pub fn camera() -> Camera {
     Camera { frame: "camera".into(), intrinsics: intrinsics(), range_m: (0.45, 5.0), colour: true }
 }
 
-/// What the simulated body is.
+/// Description of the simulated body.
 pub fn description() -> Description {
     Description {
         name: "simulated tabletop robot".into(),

@@ -20,7 +20,7 @@ pub struct Composed {
 pub struct Piece {
     /// Its solid, the origin at the centre of its base.
     pub shape: Shape,
-    /// Where that origin is in the thing, metres.
+    /// Position of that origin in the thing, metres.
     #[serde(default)]
     pub at_m: [f64; 3],
     /// Turned about the thing's x, then y, then z axis, degrees.
@@ -29,7 +29,7 @@ pub struct Piece {
     /// Red, green, blue; that of the object if left out.
     #[serde(default)]
     pub colour: Option<[u8; 3]>,
-    /// What is printed on it.
+    /// Pattern that is printed on it.
     #[serde(default)]
     pub pattern: Option<Pattern>,
 }
@@ -40,7 +40,7 @@ pub struct Piece {
 pub struct Pattern {
     /// Side of the larger patches, metres; smaller ones within them have two fifths of it.
     pub size_m: f64,
-    /// By how much red, green and blue differ at most.
+    /// Greatest difference of red, green and blue.
     pub spread: f64,
     /// Another one for another print.
     #[serde(default)]
@@ -52,11 +52,12 @@ pub struct Pattern {
 pub struct Paint {
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// What is printed on it.
+    /// Pattern that is printed on it.
     pub pattern: Option<Pattern>,
 }
 
-/// Of the colour's change the larger patches make so much, the smaller so much; and the side of these as a share of those.
+/// Shares of the colour's change by larger and by smaller patches; and the side of the smaller ones
+/// as a share of the larger.
 const LARGER: f64 = 0.7;
 const SMALLER: f64 = 0.5;
 const SMALLER_SIDE: f64 = 0.4;
@@ -113,7 +114,7 @@ impl Composed {
         all.reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h))).unwrap_or_default()
     }
 
-    /// How far it reaches from its axis, metres, at most.
+    /// Greatest distance from its axis, metres.
     pub fn radius_m(&self) -> f64 {
         let reach = |(low, high): (Point3<f64>, Point3<f64>)| {
             low.x.abs().max(high.x.abs()).hypot(low.y.abs().max(high.y.abs()))

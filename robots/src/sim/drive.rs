@@ -13,11 +13,11 @@ const STEP_M: f64 = 0.05;
 /// One step of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
-    /// Where the base is after it.
+    /// Pose of the base afterwards.
     pub pose: Pose2,
-    /// What it takes, seconds.
+    /// Duration, seconds.
     pub seconds: f64,
-    /// What it drives, metres.
+    /// Distance, metres.
     pub metres: f64,
 }
 
@@ -55,7 +55,7 @@ pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<
     steps
 }
 
-/// How well the base knows where it is and stops where it wants.
+/// Accuracy of localisation and of stopping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
     /// Standard deviation of the estimate along x and y, metres.

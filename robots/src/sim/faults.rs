@@ -1,4 +1,4 @@
-//! What can go wrong in the simulated room, on purpose: declared, seeded, and the same in every run of a seed.
+//! Injected faults of the simulated room: declared, seeded, and the same in every run of a seed.
 //!
 //! ```toml
 //! [[fault]]
@@ -79,7 +79,7 @@ impl FaultKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
-    /// Which.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// At the drive (or frame, or grasp) of this number, from 1.
     #[serde(default)]
@@ -96,7 +96,7 @@ pub struct Fault {
     /// The door that is shut; the seed chooses if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub door: Option<String>,
-    /// How far it is moved, metres.
+    /// Distance that it is moved, metres.
     #[serde(default = "default_by_m")]
     pub by_m: f64,
 }
@@ -125,7 +125,7 @@ impl FaultPlan {
         Ok(plan)
     }
 
-    /// What goes wrong in a scene, and then all of this.
+    /// Joins the faults of a scene with these, the scene's first.
     pub fn after(self, scene: &SceneSpec) -> FaultPlan {
         FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
     }

@@ -15,7 +15,7 @@ const SLIP_CHANCE: f64 = 0.08;
 const FIND_M: f64 = 0.12;
 /// The hand reaches this far above and below the object for its middle, metres.
 const FIND_HEIGHT_M: f64 = 0.05;
-/// What slides out of the hand is displaced by up to this much, metres.
+/// Greatest displacement of an object that slides out of the hand, metres.
 const SLIDE_M: f64 = 0.05;
 /// Directions tried for it.
 const SLIDE_TRIES: usize = 8;
@@ -23,12 +23,12 @@ const SLIDE_TRIES: usize = 8;
 const PLACE_SIGMA_M: f64 = 0.01;
 /// The hand finds a surface whose height is at most this far from where it was said to be, metres.
 const SURFACE_HEIGHT_M: f64 = 0.1;
-/// What would jut out by up to this much is put down a little further inside, metres.
+/// Overhang that is corrected by putting the object a little further inside, metres.
 const EDGE_M: f64 = 0.05;
-/// Where the held object's foot is, in the base frame.
+/// Position of the held object's foot, in the base frame.
 pub(crate) const BASE_FROM_HAND: Vector3<f64> = Vector3::new(0.35, 0.0, 0.9);
 
-/// What a grasp did.
+/// Result of a grasp.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Taken {
     /// There was no object.
@@ -86,7 +86,7 @@ fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Why something is not put down.
+/// Reason for which an object is not put down.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoPlace {
     /// There is no surface.
@@ -142,7 +142,7 @@ pub(crate) fn put(
     Ok(name)
 }
 
-/// Where an object in the hand is.
+/// Pose of an object in the hand.
 pub(crate) fn map_from_held(map_from_base: &Isometry3<f64>) -> Isometry3<f64> {
     map_from_base * Translation3::from(BASE_FROM_HAND)
 }

@@ -1,4 +1,4 @@
-//! What the simulated body does with its arm: pushing, grasping, placing, opening doors.
+//! Arm of the simulated body: pushing, grasping, placing, opening doors.
 
 use crate::body::{Grasp, Grasped, Opened, Placed, Placing, Pose2, Progress, Push, Pushed, Watch};
 use crate::failure::Failure;
@@ -23,7 +23,7 @@ const GRASP_S: f64 = 12.0;
 const PLACE_S: f64 = 10.0;
 /// Opening a door, seconds.
 const DOOR_S: f64 = 6.0;
-/// How far from the middle of a door the base stands at most to open it, metres.
+/// Greatest distance of the base from the middle of a door to open it, metres.
 const DOOR_REACH_M: f64 = 1.2;
 /// Chance that the hand slips off a door.
 const DOOR_SLIP_CHANCE: f64 = 0.08;
@@ -42,7 +42,7 @@ fn unable(because: impl Into<String>) -> Failure {
     Failure::Unable { because: because.into() }
 }
 
-/// Where the arm is asked to go must be a point within its reach, with no wall before it.
+/// Checks that a target of the arm is finite, within its reach and not behind a wall.
 fn in_reach(state: &State, what: &str, at: &Point3<f64>) -> Result<(), Failure> {
     let reach_m = (at.xy() - state.estimate.point()).norm();
     if reach_m <= REACH_M && at.z.is_finite() {

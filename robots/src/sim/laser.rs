@@ -18,7 +18,7 @@ pub struct Laser {
     pub step_rad: f64,
     /// Readings in a sweep.
     pub readings: usize,
-    /// Of the plane above the floor.
+    /// Height of the plane above the floor.
     pub height_m: f64,
     /// Nothing farther returns.
     pub reach_m: f64,
@@ -57,7 +57,8 @@ impl Laser {
     }
 }
 
-/// What a laser reads that truly stands at `map_from_laser`, told with the pose that localisation states. Infinite ranges: nothing within reach.
+/// Simulates a sweep of a laser at `map_from_laser`, with the stated pose. Infinite ranges: no
+/// return.
 pub fn sweep(
     scene: &Scene,
     laser: &Laser,
@@ -108,7 +109,7 @@ fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
         .collect()
 }
 
-/// How far a level ray goes; infinite if it meets nothing.
+/// Range of a level ray; infinite without a hit.
 fn nearest_m(
     room: &RoomSpec,
     solids: &[(Isometry3<f64>, Solid)],

@@ -1,4 +1,5 @@
-//! What a Kinect makes of an ideal frame: noise after Nguyen, Izadi and Lovell 2012, quantised disparity, lost pixels.
+//! Noise of a Kinect on an ideal frame: after Nguyen, Izadi and Lovell 2012, quantised disparity,
+//! lost pixels.
 //!
 //! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads.
 
@@ -6,7 +7,7 @@ use crate::sim::render::Frame;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// How a depth camera falls short.
+/// Parameters of a depth camera's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthNoise {
     /// Between projector and camera; what only one of them sees is lost in a shadow. Metres.
@@ -94,7 +95,7 @@ pub fn share(bits: u64) -> f64 {
     (bits >> 11) as f64 / ((1u64 << 53) as f64)
 }
 
-/// What the camera reports for an ideal frame: depths along z in metres, NaN where nothing returns.
+/// Turns an ideal frame into the camera's: depths along z in metres, NaN without a return.
 ///
 /// σ_axial = 1.2 mm + 1.9 mm/m²·(z − 0.4 m)² + 0.1 mm·θ²/(√z·(90° − θ)²), σ_lateral = 0.8 px + 0.034 px·θ/(90° − θ).
 pub fn observe(

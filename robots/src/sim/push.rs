@@ -22,7 +22,7 @@ const FIND_HEIGHT_M: f64 = 0.05;
 /// The push goes on in steps of this length, metres, each looked at for what is in the way.
 const STEP_M: f64 = 0.005;
 
-/// What the push did.
+/// Effect of a push.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     /// There was no object.
@@ -31,9 +31,9 @@ pub enum Effect {
     Moved {
         /// Index of the object.
         object: usize,
-        /// How far, metres.
+        /// Distance, metres.
         moved_m: f64,
-        /// Why it was less than asked for.
+        /// Reason for which the push was shorter than asked for.
         stopped: Option<&'static str>,
     },
 }

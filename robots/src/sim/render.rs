@@ -11,7 +11,7 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-/// What an ideal camera sees; row by row.
+/// Frame of an ideal camera; row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The camera.
@@ -22,7 +22,7 @@ pub struct Frame {
     pub depth_m: Vec<f32>,
     /// Cosine of the angle between the ray and the surface's normal.
     pub cosine: Vec<f32>,
-    /// What it shows: see the labels of [`world`](crate::sim::world).
+    /// Label of what it shows, as in [`world`](crate::sim::world).
     pub label: Vec<u16>,
     /// Red, green, blue, shaded.
     pub colour: Vec<[u8; 3]>,

@@ -31,16 +31,16 @@ const FRAME_S: f64 = 0.1;
 /// From the trigger to the sweep, seconds.
 const SWEEP_S: f64 = 0.03;
 
-/// What a run of the simulator is made with besides the scene.
+/// Options of the simulator besides the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimOptions {
     /// Fixes noise, localisation and mishaps. The arrangement has a seed of its own.
     pub seed: u64,
-    /// What goes wrong on purpose.
+    /// Injected faults.
     pub faults: FaultPlan,
-    /// How well the body knows where it is.
+    /// Accuracy of localisation.
     pub localisation: Localisation,
-    /// How the camera falls short.
+    /// Noise of the camera.
     pub noise: DepthNoise,
     /// The laser.
     pub laser: Laser,
@@ -67,7 +67,7 @@ struct Departure {
     end: Option<(usize, End)>,
 }
 
-/// How a drive went.
+/// Result of a drive.
 struct Trip {
     at: Option<Pose2>,
     elapsed_s: f64,
@@ -139,7 +139,7 @@ impl SimRobot {
         }
     }
 
-    /// How everything really is. For scoring and reports: nothing that decides may ask.
+    /// True state of the scene. For scoring and reports: no decision may read it.
     pub fn truth(&self) -> Truth {
         let state = self.lock();
         Truth::of(&state.scene, state.now_ns, &state.map_from_base(), &state.events)
@@ -285,7 +285,7 @@ impl SimRobot {
         }
     }
 
-    /// What others do while the base drives, and what falls on the way.
+    /// Applies faults that happen during a drive: what others do, and what falls on the way.
     fn disturb(&self, departure: &Departure, trip: &Trip) {
         for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken, FaultKind::ObjectRelocated] {
             for fault in self.strike(kind, departure.number) {

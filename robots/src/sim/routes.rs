@@ -1,4 +1,4 @@
-//! What the simulated body knows of ways: its map, and a router for each set of doors that counted as shut.
+//! Map of the simulated body, with a router for each set of doors that counts as shut.
 
 use crate::grid::OccupancyGrid;
 use crate::parts::Speeds;

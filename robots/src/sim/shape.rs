@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 pub use part::{Hit, Part};
 
-/// What an object is made of. Lengths in metres, outer sizes.
+/// Shape of an object. Lengths in metres, outer sizes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
@@ -62,7 +62,7 @@ pub struct Mug {
     /// Thickness of wall and base.
     #[serde(default = "default_wall_m")]
     pub wall_m: f64,
-    /// How far the handle stands out from the wall: half a ring of this outer radius.
+    /// Reach of the handle from the wall: half a ring of this outer radius.
     #[serde(default = "default_handle_m")]
     pub handle_m: f64,
     /// Thickness of the handle.
@@ -86,13 +86,13 @@ pub struct Cylinder {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Canister {
-    /// Of the body.
+    /// Diameter of the body.
     pub diameter_m: f64,
     /// From base to the top of the lid.
     pub height_m: f64,
-    /// Of the lid.
+    /// Diameter of the lid.
     pub lid_diameter_m: f64,
-    /// Of the lid alone.
+    /// Height of the lid alone.
     pub lid_height_m: f64,
 }
 
@@ -128,7 +128,7 @@ pub struct Rod {
 pub struct Bow {
     /// Across the ring, which is how high it stands.
     pub height_m: f64,
-    /// Of the rod that is bent.
+    /// Thickness of the rod that is bent.
     pub thickness_m: f64,
 }
 
@@ -142,7 +142,7 @@ fn default_handle_thickness_m() -> f64 {
     0.01
 }
 
-/// What two shapes need to keep apart on a table.
+/// Footprint that keeps two shapes apart on a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
     /// Around the origin.
@@ -172,7 +172,7 @@ impl Shape {
         }
     }
 
-    /// What it is composed of, if it is.
+    /// Parts, if it is composed.
     fn composed(&self) -> Option<&Composed> {
         match self {
             Shape::Composed(composed) => Some(composed),
@@ -203,7 +203,7 @@ impl Shape {
         (Point3::new(-half_x, -half_y, 0.0), Point3::new(high_x.max(half_x), half_y, self.height_m()))
     }
 
-    /// What it covers on the table, at any height.
+    /// Footprint on the table, over all heights.
     pub fn outline(&self) -> Outline {
         match self {
             Shape::Box(Cuboid { size_m }) => {
@@ -214,7 +214,7 @@ impl Shape {
         }
     }
 
-    /// How wide a hand must open around its body, a handle left out, metres.
+    /// Required opening of a hand around its body, a handle left out, metres.
     pub fn width_m(&self) -> f64 {
         match self {
             Shape::Ball(_) | Shape::Bow(_) | Shape::Composed(_) | Shape::Household(_) => {

@@ -1,4 +1,4 @@
-//! What changes in the simulated room while it runs.
+//! Changing state of the simulated room.
 
 use crate::body::{Pose2, Stamp};
 use crate::failure::Failure;
@@ -17,9 +17,9 @@ use nalgebra::{Isometry3, Point2, Point3, Translation3, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// What stops the base is seen by its own scanner up to this far around it, metres.
+/// Range within which the base's own scanner sees what stops it, metres.
 const SCANNER_M: f64 = 0.8;
-/// What the laser meets up to this far from it is kept in mind, metres; and not so near to a wall that it may be the wall.
+/// Range within which the laser's hits are remembered, metres; hits close to a wall are left out.
 const NOTICED_M: f64 = 2.5;
 const NEAR_WALL_M: f64 = 0.2;
 /// Goals within this distance of one that was found unreachable are unreachable too, metres.
@@ -44,11 +44,11 @@ pub(crate) struct State {
     pub frames: u64,
     pub grasps: u64,
     pub unreachable: Vec<Pose2>,
-    /// What the base may bump into: its map does not show it.
+    /// Obstacles that the base's map does not show.
     pub unknown: Vec<ObstacleSpec>,
 }
 
-/// What ends a drive on its way.
+/// Reason for which a drive ends on its way.
 pub(crate) enum End {
     Person,
     Stuck,
@@ -57,12 +57,12 @@ pub(crate) enum End {
 }
 
 impl State {
-    /// Where the base really is.
+    /// True pose of the base.
     pub fn map_from_base(&self) -> Isometry3<f64> {
         self.really(&self.estimate)
     }
 
-    /// Where the base really is when it believes to be at `estimate`.
+    /// True pose of the base when the stated one is `estimate`.
     fn really(&self, estimate: &Pose2) -> Isometry3<f64> {
         estimate.isometry() * self.error.inverse()
     }
@@ -242,7 +242,7 @@ impl State {
         }
     }
 
-    /// What the hand holds falls to the floor where the base was on its way.
+    /// Drops the held object to the floor where the base was on its way.
     pub fn drop_held(&mut self, on_the_way: Option<&Pose2>) {
         let Some(i) = self.held() else { return };
         let at = on_the_way.map_or(self.map_from_base(), |pose| self.really(pose)).translation;

@@ -1,4 +1,5 @@
-//! What a pair of cameras makes of an ideal frame: noise of the disparity, and nothing where a surface is bare.
+//! Noise of a stereo camera on an ideal frame: error of the disparity, and no depth on bare
+//! surfaces.
 //!
 //! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads. Which spots of a surface are bare depends on
 //! where they are: they are bare from every side.

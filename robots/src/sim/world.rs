@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Side of a cell of the robot's map, metres.
 pub const MAP_RESOLUTION_M: f64 = 0.05;
 
-/// Where an object is.
+/// State of an object: on a surface, in the hand, on the floor, taken away.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stand {
@@ -32,15 +32,15 @@ pub enum Stand {
 pub struct Object {
     /// Unique in the scene.
     pub name: String,
-    /// What it is.
+    /// Kind.
     pub kind: String,
     /// Its solid.
     pub shape: Shape,
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// Where it is.
+    /// State.
     pub stands: Stand,
-    /// Where its base stands; where it last stood while it is in the hand or taken away.
+    /// Pose of its base; the last one while it is in the hand or taken away.
     pub map_from_object: Isometry3<f64>,
 }
 
@@ -99,15 +99,15 @@ pub struct Scene {
     pub walls: Vec<Wall>,
     /// Doors in those walls.
     pub doors: Vec<HungDoor>,
-    /// What things stand on.
+    /// Surfaces.
     pub surfaces: Vec<SurfaceSpec>,
     /// Boxes on the floor.
     pub obstacles: Vec<ObstacleSpec>,
-    /// Where the robot stands first.
+    /// Pose of the robot at first.
     pub start: Pose2,
     /// Objects in the order of the scene file.
     pub objects: Vec<Object>,
-    /// What the arrangement was chosen for.
+    /// Required visibility by which the arrangement was chosen.
     pub target: Option<TargetSpec>,
     /// Share of the target that the camera sees from the start.
     pub target_visible_from_start: Option<f64>,
@@ -115,11 +115,11 @@ pub struct Scene {
     pub mapped: bool,
     /// The pair of cameras, if the body has one instead of the depth camera.
     pub stereo: Option<Stereo>,
-    /// Which visit this is.
+    /// Number of the visit.
     pub visit: usize,
 }
 
-/// What a pixel shows.
+/// Label of a pixel without anything.
 pub const LABEL_NOTHING: u16 = 0;
 /// Floor, walls and doors.
 pub const LABEL_ROOM: u16 = 1;
@@ -131,7 +131,7 @@ pub const LABEL_OBJECT: u16 = 3;
 /// One rigid thing made of parts.
 #[derive(Clone, Debug)]
 pub struct Solid {
-    /// Where its frame is.
+    /// Pose of its frame.
     pub map_from_solid: Isometry3<f64>,
     /// Its surfaces.
     pub parts: Vec<Part>,
@@ -141,7 +141,7 @@ pub struct Solid {
     pub bounds: (Point3<f64>, Point3<f64>),
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// What its pixels show.
+    /// Label of its pixels.
     pub label: u16,
 }
 
@@ -207,7 +207,7 @@ const BEYOND_M: f64 = 10.0;
 const SEAT_M: f64 = 0.06;
 /// Thickness of a chair's back, metres.
 const BACK_M: f64 = 0.04;
-/// Of every wall.
+/// Colour of every wall.
 pub const WALL_COLOUR: [u8; 3] = [205, 205, 195];
 const PANEL_COLOUR: [u8; 3] = [140, 90, 60];
 
@@ -329,7 +329,7 @@ impl Scene {
         walls.chain(self.doors.iter().filter(|d| d.shut).map(HungDoor::panel))
     }
 
-    /// Whether a wall or a shut door stands between two points of the map.
+    /// True if a wall or a shut door stands between two points of the map.
     pub(super) fn is_between(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         self.partitions().any(|solid| {
             let solid_from_map = solid.map_from_solid.inverse();
@@ -372,7 +372,8 @@ impl Scene {
         grid
     }
 
-    /// What the body knows of the floor when it begins: the rooms, or without a map nothing, far beyond all walls.
+    /// Map of the floor that the body begins with: the rooms, or without a map an unknown area far
+    /// beyond all walls.
     pub fn known_map(&self) -> OccupancyGrid {
         if self.mapped {
             return self.map();
@@ -381,7 +382,7 @@ impl Scene {
         OccupancyGrid::covering(self.room.low() - beyond, self.room.high() + beyond, MAP_RESOLUTION_M)
     }
 
-    /// What stands on the floor that the body's map does not show, as boxes: what it may bump into. Without a map that is everything.
+    /// Obstacles that the body's map does not show, as boxes: all of them without a map.
     pub fn unknown(&self) -> Vec<ObstacleSpec> {
         if self.mapped {
             return self.obstacles.iter().filter(|o| !o.on_map).cloned().collect();

@@ -1,4 +1,4 @@
-//! What every part of a scene checks: lengths, numbers, names.
+//! Checks that all parts of a scene share: lengths, numbers, names.
 
 use crate::input::{Objection, Step};
 

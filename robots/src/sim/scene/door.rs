@@ -8,7 +8,7 @@ use crate::input::{Objection, Step};
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Whether a door is open.
+/// State of a door.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DoorState {
@@ -26,13 +26,13 @@ pub struct DoorSpec {
     pub name: String,
     /// Middle of the opening, in the map, within the wall.
     pub position_m: [f64; 2],
-    /// Of the opening, along the wall.
+    /// Width of the opening, along the wall.
     #[serde(default = "default_width_m")]
     pub width_m: f64,
-    /// Of the opening, above the floor.
+    /// Height of the opening, above the floor.
     #[serde(default = "default_height_m")]
     pub height_m: f64,
-    /// How it is at first; open if neither this nor `shut_chance` is given.
+    /// State at first; open if neither this nor `shut_chance` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<DoorState>,
     /// Or the chance, chosen by the seed, that it is shut at first.
@@ -63,7 +63,7 @@ pub struct Doorway {
     pub width_m: f64,
     /// Above the floor, metres.
     pub height_m: f64,
-    /// Of the wall, metres.
+    /// Thickness of the wall, metres.
     pub thickness_m: f64,
     /// The rooms on either side.
     pub between: [String; 2],
@@ -77,7 +77,7 @@ impl Doorway {
         half
     }
 
-    /// What the map says of it.
+    /// Map entry of the door.
     pub(crate) fn hint(&self) -> Door {
         Door {
             name: self.name.clone(),

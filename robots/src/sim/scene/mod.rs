@@ -137,7 +137,7 @@ pub struct SceneSpec {
     /// Things on the floor.
     #[serde(default, rename = "obstacle")]
     pub obstacles: Vec<ObstacleSpec>,
-    /// Where the robot stands first.
+    /// Pose of the robot at first.
     pub start: StartSpec,
     /// Things on surfaces.
     #[serde(default, rename = "object")]
@@ -145,7 +145,7 @@ pub struct SceneSpec {
     /// Least gap between things on a surface, metres.
     #[serde(default = "default_gap_m")]
     pub gap_m: f64,
-    /// What the arrangement must show and hide.
+    /// Required visibility of one object.
     #[serde(default)]
     pub target: Option<TargetSpec>,
     /// False if the body has no map of it.
@@ -154,13 +154,13 @@ pub struct SceneSpec {
     /// A pair of cameras instead of the depth camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stereo: Option<Stereo>,
-    /// How many visits it tells of; between them things come, go and move.
+    /// Number of visits; between them things come, go and move.
     #[serde(default = "default_one")]
     pub visits: usize,
-    /// Which of them this is.
+    /// Number of this visit.
     #[serde(default = "default_one")]
     pub visit: usize,
-    /// What goes wrong in it on purpose.
+    /// Injected faults.
     #[serde(default, rename = "fault", skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
 }
@@ -173,7 +173,7 @@ fn default_true() -> bool {
     true
 }
 
-/// Where the robot stands first.
+/// Pose of the robot at first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartSpec {
@@ -242,7 +242,7 @@ impl SceneSpec {
         self.check_target()
     }
 
-    /// Whether what is there in some visits only (none: in all) is there now.
+    /// True if an object that is there in the given visits (none: in all) is there now.
     pub(crate) fn is_there(&self, visits: &[usize], visit: usize) -> bool {
         visits.is_empty() || visits.contains(&visit)
     }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct ObjectSpec {
     /// Unique in the scene.
     pub name: String,
-    /// What it is; the name if left out.
+    /// Kind; the name if left out.
     #[serde(default)]
     pub kind: Option<String>,
     /// Its solid.
@@ -22,7 +22,7 @@ pub struct ObjectSpec {
     /// The surface it stands on, or several of which the seed chooses one; the first if left out.
     #[serde(default, with = "one_or_many", skip_serializing_if = "Vec::is_empty")]
     pub on: Vec<String>,
-    /// How likely each of the surfaces is, as shares of their sum; equal if left out.
+    /// Probability of each of the surfaces, as shares of their sum; equal if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Vec<f64>>,
     /// An object that comes earlier; this one stands on another surface than that.
@@ -54,7 +54,7 @@ pub struct ObjectSpec {
     pub moves: Vec<usize>,
 }
 
-/// What an arrangement must show and hide.
+/// Required visibility of one object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TargetSpec {

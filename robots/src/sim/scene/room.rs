@@ -18,7 +18,7 @@ pub struct RoomSpec {
     pub position_m: [f64; 2],
     /// Inside, along x and y.
     pub size_m: [f64; 2],
-    /// Of the walls; the highest holds for all.
+    /// Height of the walls; the highest holds for all.
     #[serde(default = "default_wall_height_m")]
     pub wall_height_m: f64,
 }
@@ -93,7 +93,7 @@ impl RoomSpec {
 }
 
 impl SceneSpec {
-    /// Where the room of that number stands in the document: `[room]` is no list.
+    /// Path of a room in the document: `[room]` is no list.
     fn room_path(&self, i: usize, key: &'static str) -> Vec<Step> {
         match self.rooms.as_slice() {
             [one] if one.name.is_empty() => vec![Step::Key("room"), Step::Key(key)],

@@ -10,14 +10,14 @@ use crate::sim::world::upright;
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// How a surface is held up.
+/// Support of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceKind {
     /// On four legs.
     #[default]
     Table,
-    /// By a wall, or by the uprights at its ends: a shelf board, a counter.
+    /// Board by a wall, or between uprights at its ends: a shelf board, a counter.
     Board,
 }
 
@@ -27,7 +27,7 @@ pub enum SurfaceKind {
 pub struct SurfaceSpec {
     /// Unique among the surfaces.
     pub name: String,
-    /// How it is held up.
+    /// Support.
     #[serde(default)]
     pub kind: SurfaceKind,
     /// Sides from the floor to a board, at both ends of its own x.
@@ -41,9 +41,9 @@ pub struct SurfaceSpec {
     pub yaw_deg: f64,
     /// Along its own x and y.
     pub size_m: [f64; 2],
-    /// Of the top above the floor.
+    /// Height of the top above the floor.
     pub height_m: f64,
-    /// Of the top.
+    /// Thickness of the top.
     #[serde(default = "default_thickness_m")]
     pub thickness_m: f64,
     /// Red, green, blue.
@@ -76,7 +76,7 @@ pub struct ObstacleSpec {
     /// A seat on four legs this thick, not a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs_m: Option<f64>,
-    /// How high its back stands above such a seat, metres; none: it has no back.
+    /// Height of the back above such a seat, metres; none: no back.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub back_m: Option<f64>,
     /// The visits in which it is there; all if left out.

@@ -27,7 +27,7 @@ pub enum Part {
     },
     /// Half of a torus that stands upright in the x-z plane, on the side away from the axis.
     Handle {
-        /// Of the ring.
+        /// Centre of the ring.
         centre: Point3<f64>,
         /// From the ring's centre to the middle of the rod.
         major_m: f64,
@@ -57,14 +57,14 @@ pub enum Part {
     },
     /// Another surface in a frame of its own.
     Turned {
-        /// That frame.
+        /// Pose of that frame.
         part_from_here: Isometry3<f64>,
         /// The surface there.
         part: Box<Part>,
     },
 }
 
-/// Where a ray meets a surface.
+/// Hit of a ray on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// In units of the ray's direction.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub use self::registry::{Attachments, CallStatistics};
 
-/// What a module is for, as written in `:modules`.
+/// Kind of a module, as written in `:modules`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CallKind {
@@ -45,11 +45,11 @@ impl fmt::Display for CallKind {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum FactValue {
-    /// Of a predicate.
+    /// Value of a predicate.
     Truth(bool),
-    /// Of a numeric fluent.
+    /// Value of a numeric fluent.
     Number(f64),
-    /// Of an object fluent: the object's name.
+    /// Value of an object fluent: the object's name.
     Object(Arc<str>),
     /// A fluent that has no value yet.
     Undefined,
@@ -82,7 +82,7 @@ pub enum Read {
 pub struct Call {
     /// The module's PDDL name.
     pub module: Arc<str>,
-    /// What is asked.
+    /// Kind of the module.
     pub kind: CallKind,
     /// Names of the objects that the call is about; in an action with a `:grounding` call the proposed parameter
     /// comes last.
@@ -131,17 +131,18 @@ impl fmt::Display for Call {
     }
 }
 
-/// What an attachment says.
+/// Answer of an attachment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Answer {
-    /// Of a condition module.
+    /// Answer of a condition module.
     Truth(bool),
-    /// Of a cost module; infinite means not applicable.
+    /// Answer of a cost module; infinite means not applicable.
     Number(f64),
-    /// Of an effect module: one value for each term that the module lists, in that order.
+    /// Answer of an effect module: one value for each term that the module lists, in that order.
     Writes(Vec<FactValue>),
-    /// Of a grounding module: every parameter that it proposes (none: the action is not applicable).
+    /// Answer of a grounding module: every parameter that it proposes (none: the action is not
+    /// applicable).
     Proposals(Vec<Arc<str>>),
 }
 
@@ -173,7 +174,7 @@ impl Answer {
     }
 }
 
-/// Why an attachment gave no usable answer.
+/// Reason for which an attachment gave no usable answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CallError {
@@ -191,9 +192,9 @@ pub enum CallError {
     /// An answer of the wrong kind, a negative or undefined cost, or a number that is not finite.
     #[error("answered {got}, expected {expected}")]
     WrongAnswer {
-        /// What the module must answer.
+        /// Expected answer.
         expected: String,
-        /// What came.
+        /// Given answer.
         got: String,
     },
     /// No answer in time.
@@ -217,11 +218,11 @@ pub struct AttachmentError {
     pub module: String,
     /// Name of the attachment.
     pub attachment: String,
-    /// Why.
+    /// Cause.
     pub cause: CallError,
 }
 
-/// How carefully a call is to be answered.
+/// Accuracy of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Level {
     /// For plans: the real answer.
@@ -234,7 +235,7 @@ pub enum Level {
 ///
 /// Any `Fn(&Call) -> Result<Answer, CallError>` that may be shared between threads is an attachment that reads nothing.
 pub trait Attachment: Send + Sync {
-    /// What the answer depends on besides the arguments: the cache key, and the readings that a call carries.
+    /// Read set besides the arguments: the cache key, and the readings that a call carries.
     fn reads(&self) -> Vec<Read> {
         Vec::new()
     }

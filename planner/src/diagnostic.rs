@@ -1,4 +1,4 @@
-//! What is wrong with a text, where, and how to mend it.
+//! Diagnostics: faults of a text, with place and mend.
 
 mod excerpt;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 /// A named text: a domain, a problem or a plan. The name is what messages call it, usually the path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Source {
-    /// What messages call the text.
+    /// Name of the text in messages.
     pub name: String,
     /// The text itself.
     pub text: String,
@@ -53,7 +53,7 @@ impl Span {
     }
 }
 
-/// Whether a finding stops the work or only deserves a look.
+/// Severity: stops the work, or only deserves a look.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -68,7 +68,7 @@ pub enum Severity {
 pub struct Label {
     /// The place.
     pub span: Span,
-    /// What is there.
+    /// Text at the place.
     pub text: String,
 }
 
@@ -83,7 +83,7 @@ pub struct Diagnostic {
     pub message: String,
     /// The places; the first is where the finding is reported.
     pub labels: Vec<Label>,
-    /// What to do about it.
+    /// Mend.
     pub help: Option<String>,
 }
 
@@ -142,12 +142,12 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Whether a fault is among them (warnings do not count).
+    /// True if a fault is among them (warnings do not count).
     pub fn has_errors(&self) -> bool {
         self.list.iter().any(|finding| finding.severity == Severity::Error)
     }
 
-    /// Whether there is nothing to say at all.
+    /// True if there is no finding.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

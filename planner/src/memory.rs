@@ -1,12 +1,12 @@
-//! How much memory is in use, how much may be, and lists that grow without being copied.
+//! Memory limits, and lists that grow without being copied.
 
 use std::ops::{Index, IndexMut};
 
-/// How much memory planning may take.
+/// Memory limit of planning.
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryLimit {
     bytes: usize,
-    /// What the process has in use, where somebody can tell.
+    /// Memory in use by the process, if a caller can tell.
     used: Option<fn() -> u64>,
 }
 
@@ -20,7 +20,7 @@ impl MemoryLimit {
         MemoryLimit { bytes: bytes - bytes / RESERVE, used: used.filter(|_| bytes != usize::MAX) }
     }
 
-    /// What the caller may take if only what is counted can be told; `None` where the process tells what it has in use.
+    /// Limit for counted memory; `None` if the process tells its use.
     pub(crate) fn counted(&self) -> Option<usize> {
         (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
     }
@@ -43,7 +43,7 @@ impl MemoryLimit {
     }
 }
 
-/// Whether a list of this length and capacity grows soon.
+/// True if a list of this length and capacity grows soon.
 pub(crate) fn soon(length: usize, capacity: usize) -> bool {
     length + length / 8 >= capacity
 }

@@ -1,4 +1,4 @@
-//! How planning is asked for, and how it ends.
+//! Options, statistics and outcomes of planning.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -10,7 +10,7 @@ use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::Explanation;
 use crate::plan::Plan;
 
-/// How to plan.
+/// Options of planning.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
@@ -27,12 +27,13 @@ pub struct Options {
     pub memory_used: Option<fn() -> u64>,
     /// Give up, or stop improving, after this many evaluated states.
     pub evaluation_limit: Option<u64>,
-    /// How many searches may go on side by side, for plans of actions that take no time; none: one. Their number changes nothing
-    /// but how long it takes, as long as nothing runs out. Where states or what the searches keep are counted, there is one.
+    /// Number of parallel searches for plans without durations; none: one. The plan is the same for
+    /// any number, as long as nothing runs out. Where states or the memory of searches are counted,
+    /// there is one.
     pub threads: Option<NonZeroUsize>,
 }
 
-/// What planning took.
+/// Statistics of planning.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Statistics {
     /// States evaluated by a heuristic.
@@ -48,39 +49,39 @@ pub struct Statistics {
     /// Set where the task has preferences that no search looked for: those that the metric does not count, or that ask for
     /// times or attachments. They only score plans.
     pub scored_only: bool,
-    /// By attachment, for this call alone.
+    /// Statistics by attachment, for this call alone.
     pub attachments: BTreeMap<String, CallStatistics>,
 }
 
-/// How planning ended.
+/// Outcome of planning.
 #[derive(Debug, Clone)]
 pub enum Outcome {
     /// A plan, validated.
     Solved {
         /// The best plan found.
         plan: Plan,
-        /// What it took.
+        /// Statistics.
         statistics: Statistics,
     },
     /// Proven to have no plan; where `why` names actions that overlap themselves, none in which no action does.
     Unsolvable {
-        /// Why.
+        /// Explanation.
         why: Explanation,
-        /// What it took.
+        /// Statistics.
         statistics: Statistics,
     },
     /// Stopped before a plan was found, or (anytime) before the best one was proven best: then with a plan.
     OutOfTime {
         /// The best plan so far.
         best: Option<Plan>,
-        /// What it took.
+        /// Statistics.
         statistics: Statistics,
     },
     /// The memory limit was reached.
     OutOfMemory {
         /// The best plan so far.
         best: Option<Plan>,
-        /// What it took.
+        /// Statistics.
         statistics: Statistics,
     },
 }
@@ -95,7 +96,7 @@ impl Outcome {
         }
     }
 
-    /// What it took.
+    /// Statistics of any outcome.
     pub fn statistics(&self) -> &Statistics {
         match self {
             Outcome::Solved { statistics, .. }
@@ -115,7 +116,7 @@ impl Outcome {
     }
 }
 
-/// Why there is no answer at all.
+/// Error for which planning gave no answer at all.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
@@ -134,7 +135,7 @@ pub enum PlanError {
     /// The search's plan does not pass validation: a fault of this crate.
     #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
     Internal {
-        /// What the validator said.
+        /// Message of the validator.
         reason: String,
         /// The plan.
         plan: Plan,
@@ -142,7 +143,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// What can be drawn under the text of the domain, if it is the domain's fault.
+    /// Findings to draw under the text of the domain, if the domain is at fault.
     pub fn findings(&self) -> Option<&Findings> {
         match self {
             PlanError::Refused(findings) | PlanError::Attachment { findings, .. } => Some(findings),

@@ -19,7 +19,7 @@ pub struct Step {
     pub action: String,
     /// Names of the objects, and behind them what grounding modules proposed.
     pub arguments: Vec<String>,
-    /// How long it takes; 0 for an instantaneous action.
+    /// Duration; 0 for an instantaneous action.
     pub duration_s: f64,
 }
 

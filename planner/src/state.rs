@@ -39,7 +39,7 @@ impl State {
         state
     }
 
-    /// Whether a fact is true.
+    /// True if a fact holds.
     pub fn holds(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.facts[predicate.index()].contains(arguments)
     }
@@ -115,7 +115,7 @@ impl State {
         self.numbers[function.index()].iter().map(|(arguments, value)| (&**arguments, *value))
     }
 
-    /// Of how many arguments a predicate is true.
+    /// Number of argument tuples for which a predicate is true.
     pub fn count(&self, predicate: PredicateId) -> usize {
         self.facts[predicate.index()].len()
     }

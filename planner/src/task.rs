@@ -73,13 +73,13 @@ pub struct Task {
     pub init: Init,
     /// The goal.
     pub goal: Scoped<Condition>,
-    /// Where the goal stands.
+    /// Span of the goal.
     pub goal_span: Span,
     /// Trajectory constraints; those that a preference stands before carry it.
     pub constraints: Vec<Trajectory>,
     /// Preferences, by name; several preferences may share a name, which then counts their violations.
     pub preferences: Vec<Preference>,
-    /// What to minimise or maximise.
+    /// Metric.
     pub metric: Option<Metric>,
     /// `:moduleoptions` of the problem.
     pub module_options: Vec<ModuleOption>,
@@ -100,7 +100,7 @@ pub struct Type {
     pub ancestors: Vec<TypeId>,
     /// The objects that are of it, in rising order.
     pub objects: Vec<ObjectId>,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -111,7 +111,7 @@ pub struct Object {
     pub name: String,
     /// Its declared types (more than one after `either`: it is of all of them).
     pub types: Vec<TypeId>,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -124,7 +124,7 @@ pub struct Parameter {
     pub types: Vec<TypeId>,
     /// The objects that fit, in rising order.
     pub objects: Arc<[ObjectId]>,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -137,7 +137,7 @@ pub struct Predicate {
     pub parameters: Vec<Parameter>,
     /// The stratum of its rules, if it is derived: rules of stratum `n` use negated derived atoms only of lower strata.
     pub stratum: Option<u32>,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -150,7 +150,7 @@ pub struct Function {
     pub parameters: Vec<Parameter>,
     /// `None` for numbers, else the types of the objects that are its values.
     pub result: Option<Vec<TypeId>>,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -159,15 +159,15 @@ pub struct Function {
 pub struct Module {
     /// Its name, case kept.
     pub name: String,
-    /// What it does.
+    /// Kind.
     pub kind: CallKind,
     /// Its parameters: slots `0..parameters.len()` of `writes`.
     pub parameters: Vec<Parameter>,
-    /// What an effect module writes, over its parameters, in the order in which it answers.
+    /// Terms that an effect module writes, over its parameters, in the order of its answers.
     pub writes: Vec<Written>,
     /// The token as it was written, `fn@lib.so`, case kept.
     pub function: String,
-    /// Where it is declared.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -189,7 +189,7 @@ pub struct ModuleOption {
     pub function: String,
     /// Its arguments, case kept.
     pub arguments: Vec<String>,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -220,7 +220,7 @@ pub struct Atom {
     pub predicate: PredicateId,
     /// Its arguments.
     pub arguments: Vec<Term>,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -231,7 +231,7 @@ pub struct Fluent {
     pub function: FunctionId,
     /// Its arguments.
     pub arguments: Vec<Term>,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -242,7 +242,7 @@ pub struct Call {
     pub module: ModuleId,
     /// Its arguments.
     pub arguments: Vec<Term>,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -273,7 +273,7 @@ impl Condition {
     /// The condition that always holds.
     pub const TRUE: Condition = Condition::And(Vec::new());
 
-    /// Whether it is the empty conjunction.
+    /// True for the empty conjunction.
     pub fn is_true(&self) -> bool {
         matches!(self, Condition::And(parts) if parts.is_empty())
     }
@@ -315,14 +315,14 @@ pub enum Expression {
     Duration,
     /// Makespan of the plan, in seconds; in metrics alone. For a plan of instantaneous actions the number of its steps.
     TotalTime,
-    /// How often preferences of this name are violated; in metrics alone.
+    /// Number of violations of preferences of this name; in metrics alone.
     Violated(PreferenceId),
-    /// What a cost module answers.
+    /// Answer of a cost module.
     Call(Call),
 }
 
-/// What holds or happens at the start, through the inside, and at the end of an action.
-/// Everything of an instantaneous action is at its start.
+/// Parts of an action at the start, through the inside, and at the end. An instantaneous action has
+/// all at its start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timed<T> {
     /// At start.
@@ -360,12 +360,12 @@ pub struct Action {
     pub grounding: Vec<Call>,
     /// Preferences over its conditions; a violation counts each time.
     pub preferences: Vec<(PreferenceId, Timed<Condition>)>,
-    /// Where its name stands.
+    /// Span of the name.
     pub span: Span,
 }
 
 impl Action {
-    /// Whether it takes time.
+    /// True for durative actions.
     pub fn is_durative(&self) -> bool {
         self.duration.is_some()
     }
@@ -380,7 +380,7 @@ pub struct DurationBound {
     pub comparison: Comparison,
     /// The bound.
     pub value: Expression,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -392,13 +392,13 @@ pub struct Effect {
     /// When it happens. For an effect at start only `start` may say something; for one at end `start` and `over_all`
     /// are conditions on those earlier times.
     pub when: Timed<Condition>,
-    /// What changes.
+    /// Change.
     pub change: Change,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
-/// What an effect changes. Deletions happen before additions.
+/// Change by an effect. Deletions happen before additions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// The atom becomes true.
@@ -420,7 +420,7 @@ pub struct Rate {
     pub fluent: Fluent,
     /// Change per second, sign included.
     pub per_second: Expression,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -435,7 +435,7 @@ pub struct Rule {
     pub slots: usize,
     /// The body.
     pub body: Condition,
-    /// Where its head stands.
+    /// Span of the head.
     pub span: Span,
 }
 
@@ -460,13 +460,13 @@ pub struct GroundFluent {
 /// The initial state in the order of the text.
 #[derive(Debug, Clone, Default)]
 pub struct Init {
-    /// What is true; everything else is false.
+    /// True facts; all others are false.
     pub facts: Vec<Fact>,
     /// Numbers; every other one is undefined.
     pub numbers: Vec<(GroundFluent, f64)>,
     /// Values of object functions; every other one is undefined.
     pub objects: Vec<(GroundFluent, ObjectId)>,
-    /// What happens by itself later, in order of time.
+    /// Timed initial literals, in order of time.
     pub timed: Vec<TimedInitial>,
 }
 
@@ -475,9 +475,9 @@ pub struct Init {
 pub struct TimedInitial {
     /// When, from the beginning of the plan.
     pub time_s: f64,
-    /// What changes.
+    /// Change.
     pub change: GroundChange,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -509,7 +509,7 @@ pub struct Trajectory {
     pub slots: usize,
     /// If it is only preferred: the preference, once for each binding of `forall`.
     pub preference: Option<PreferenceId>,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -531,7 +531,7 @@ pub struct PreferredGoal {
     pub condition: Condition,
     /// Slots in all.
     pub slots: usize,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -540,9 +540,9 @@ pub struct PreferredGoal {
 pub struct Metric {
     /// Minimised, or else maximised.
     pub minimise: bool,
-    /// What.
+    /// Expression to minimise or maximise.
     pub value: Expression,
-    /// Where it stands.
+    /// Span.
     pub span: Span,
 }
 
@@ -577,7 +577,7 @@ impl Task {
         &self.actions[id.index()]
     }
 
-    /// Whether an object is of one of the types.
+    /// True if an object is of one of the types.
     pub fn fits(&self, object: ObjectId, types: &[TypeId]) -> bool {
         self.object(object)
             .types
@@ -585,7 +585,7 @@ impl Task {
             .any(|&own| types.iter().any(|wanted| self.type_of(own).ancestors.contains(wanted)))
     }
 
-    /// Whether any action takes time, or anything happens by itself: plans then carry times.
+    /// True if an action takes time or a timed initial literal exists: plans then carry times.
     pub fn is_temporal(&self) -> bool {
         !self.init.timed.is_empty() || self.actions.iter().any(Action::is_durative)
     }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Answer, Attachment, AttachmentError, Call, CallError, CallKind, FactValue, Level, Read};
 
-/// How often an attachment was asked.
+/// Number of questions to an attachment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct CallStatistics {
     /// Exact calls that reached the attachment.
@@ -45,7 +45,8 @@ struct CacheKey {
     level: Level,
     module: Arc<str>,
     arguments: Vec<Arc<str>>,
-    /// Of each reading two bits: false, true, or one of the others. A call may read hundreds of facts.
+    /// Truth values of the readings, two bits each: false, true, or one of the others. A call may
+    /// read hundreds of facts.
     truths: Vec<u64>,
     /// The readings that are no truths, in their order.
     others: Vec<KeyValue>,
@@ -146,7 +147,7 @@ impl Attachments {
         self.registered.get(name).map_or(&[], |registered| &registered.reads)
     }
 
-    /// Where answers are counted that a caller remembered by itself.
+    /// Counter of answers that a caller cached by itself.
     pub(crate) fn hits(&self, name: &str) -> Option<&AtomicU64> {
         self.registered.get(name).map(|registered| &registered.hits)
     }

@@ -11,11 +11,11 @@ use super::numbers::{Numbers, is_plain};
 /// Costs that are not whole numbers are multiplied by the first of these that makes them so, or else by the very first, and rounded
 /// for the search; plans report exact costs.
 const COST_SCALES: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
-/// What is no farther from a whole number is one.
+/// Greatest distance from a whole number at which a number counts as whole.
 const WHOLE: f64 = 1e-6;
 /// Costs above this are scaled down for the search.
 const LARGEST_COST: f64 = 1.0e6;
-/// What the search counts of a plan at most: below a bound that is none.
+/// Greatest cost of a plan that the search can count; an infinite bound is above it.
 pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
 /// Lists of different lengths in one array.
@@ -48,7 +48,7 @@ impl<T> Lists<T> {
         &self.items
     }
 
-    /// How many lists.
+    /// Number of lists.
     pub(crate) fn len(&self) -> usize {
         self.starts.len() - 1
     }
@@ -93,29 +93,29 @@ pub struct Compiled {
     pub domains: Vec<u32>,
     /// Number of variables that are not derived.
     pub basic: usize,
-    /// By variable: number of its first fact.
+    /// First fact of each variable.
     pub offsets: Vec<u32>,
     /// Number of facts.
     pub facts: usize,
-    /// By operator.
+    /// Preconditions by operator.
     pub preconditions: Lists<Fact>,
-    /// By operator.
+    /// Effects by operator.
     pub effects: Lists<Achieve>,
-    /// Of effects.
+    /// Conditions of conditional effects.
     pub conditions: Vec<Fact>,
-    /// By operator, whether it may give an object several values at once; empty where none may.
+    /// True, by operator, if it may give an object several values at once; empty if none may.
     contested: Vec<bool>,
-    /// By variable that is not derived, whether it is an object.
+    /// True, by variable that is not derived, for object fluents.
     objects: Vec<bool>,
-    /// By operator: for the search.
+    /// Search costs by operator.
     pub costs: Vec<u32>,
-    /// What a plan costs.
+    /// Measure of a plan's cost.
     pub measure: Measure,
-    /// What exact costs were multiplied by.
+    /// Factor from exact costs to search costs.
     pub cost_scale: f64,
-    /// Whether all costs are one.
+    /// True if all costs are one.
     pub unit_cost: bool,
-    /// Whether some operator costs nothing.
+    /// True if some operator costs nothing.
     pub free_operators: bool,
     /// Bodies of axioms, by stratum in rising order.
     pub axiom_bodies: Lists<Fact>,
@@ -123,15 +123,15 @@ pub struct Compiled {
     pub axiom_heads: Vec<Fact>,
     /// First axiom of each stratum, and the number of axioms.
     pub strata: Vec<usize>,
-    /// By fact: axioms with the fact in their body.
+    /// Axioms with a fact in their body, by fact.
     pub axioms_with: Lists<u32>,
-    /// What must hold in the end.
+    /// Goal facts.
     pub goal: Vec<Fact>,
     /// The first state, derived variables included.
     pub initial: Vec<u32>,
-    /// By fact: its predicate or function; `u32::MAX` for "none of those".
+    /// Predicate or function by fact; `u32::MAX` for "none of those".
     pub symbols: Vec<u32>,
-    /// By fact: its variable.
+    /// Variable by fact.
     pub variables: Vec<u32>,
     /// The numbers and what changes them.
     pub numbers: Arc<Numbers>,
@@ -160,7 +160,7 @@ pub fn is_classical(task: &GroundTask) -> bool {
             .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
-/// By action, whether it may give an object several values at once; empty where none may.
+/// True, by action, if it may give an object several values at once; empty if none may.
 fn contested(task: &GroundTask) -> Vec<bool> {
     let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
     let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
@@ -256,7 +256,7 @@ impl Compiled {
         self.offsets[fact.variable as usize] + fact.value
     }
 
-    /// Whether a fact holds.
+    /// True if a fact holds.
     #[inline]
     pub(crate) fn holds(&self, fact: u32, state: &[u32]) -> bool {
         let variable = self.variables[fact as usize] as usize;
@@ -291,21 +291,22 @@ impl Compiled {
         self.costs.len()
     }
 
-    /// Whether the operator can be applied.
+    /// True if the operator is applicable.
     #[inline]
     pub fn applicable(&self, operator: u32, state: &[u32]) -> bool {
         self.preconditions.get(operator as usize).iter().all(|f| state[f.variable as usize] == f.value)
             && self.possible(operator, state)
     }
 
-    /// Whether an operator of which the preconditions hold leaves all numbers defined and finite, and gives each object one value.
+    /// True if an operator whose preconditions hold leaves all numbers defined and finite, and
+    /// gives each object one value.
     #[inline]
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         (self.numbers.is_empty() || self.numbers.possible(operator, state))
             && (self.contested.is_empty() || self.agrees(operator, state))
     }
 
-    /// Whether there are operators that are not possible wherever their preconditions hold.
+    /// True if some operators are not possible wherever their preconditions hold.
     pub(crate) fn some_impossible(&self) -> bool {
         !self.numbers.is_empty() || !self.contested.is_empty()
     }
@@ -394,7 +395,7 @@ impl Compiled {
         }
     }
 
-    /// Whether the search counts costs as the metric does.
+    /// True if the search counts costs exactly as the metric does.
     pub(crate) fn has_exact_costs(&self) -> bool {
         let exact = |(&counted, &exact): (&u32, &f64)| f64::from(counted) == exact;
         self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(exact)

@@ -1,15 +1,15 @@
-//! What a plan costs: a sum over its operators where the metric is one, else what the metric makes of its states.
+//! Cost of a plan: a sum over its operators if the metric is one, else a function of its states.
 
 use crate::ground::{Expression, GroundTask};
 
 use super::compiled::Compiled;
 use super::numbers::{Linear, Numbers, add_linear};
 
-/// How plans are measured.
+/// Measure of plans.
 #[derive(Clone, Debug)]
 pub struct Measure {
     kind: Kind,
-    /// By operator: what it costs, or what it is taken to cost where that depends on the state.
+    /// Cost by operator, or an estimate where the cost depends on the state.
     pub estimates: Vec<f64>,
 }
 
@@ -17,14 +17,14 @@ pub struct Measure {
 enum Kind {
     /// The estimates are exact.
     Sum,
-    /// By operator: what it adds in the state before it, times the sign.
+    /// Cost by operator in the state before it, times the sign.
     Adding(Vec<Expression>, f64),
-    /// What the last state makes of the metric, times the sign.
+    /// Metric of the last state, times the sign.
     Last(Expression, f64),
 }
 
 impl Measure {
-    /// How plans of a task are measured.
+    /// Measure of the plans of a task.
     pub(crate) fn new(task: &GroundTask, numbers: &Numbers) -> Measure {
         let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
         if let Some(metric) = task.metric.as_ref().filter(|m| !m.additive) {
@@ -44,12 +44,12 @@ impl Measure {
         Measure { kind, estimates }
     }
 
-    /// Whether a plan costs the sum of what its operators cost.
+    /// True if a plan costs the sum of its operators' costs.
     pub(crate) fn is_sum(&self) -> bool {
         matches!(self.kind, Kind::Sum)
     }
 
-    /// What a plan that ends in a state costs, where that is known from the state alone.
+    /// Cost of a plan by its last state, where that state alone decides it.
     pub(crate) fn of_last(&self, numbers: &Numbers, state: &[u32]) -> Option<f64> {
         match &self.kind {
             Kind::Last(expression, sign) => Some(sign * numbers.value(expression, state)),
@@ -77,8 +77,8 @@ impl Measure {
     }
 }
 
-/// Where the metric is a weighted sum of numbers, an operator costs what its changes add to it as far as that is known
-/// beforehand; else each counts one.
+/// Measure by the last state: where the metric is a weighted sum of numbers, an operator is
+/// estimated by its state-independent changes; else each counts one.
 fn of_last(expression: &Expression, sign: f64, numbers: &Numbers) -> Measure {
     let kind = Kind::Last(expression.clone(), sign);
     let mut linear = Linear::default();

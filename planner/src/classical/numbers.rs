@@ -14,16 +14,16 @@ use super::compiled::Lists;
 pub struct NumberChange {
     /// Facts (those of comparisons included) under which it happens.
     pub conditions: Vec<Fact>,
-    /// Which number.
+    /// Number that changes.
     pub number: u32,
-    /// How it changes.
+    /// Kind of change.
     pub change: Option<Change>,
-    /// By or to how much.
+    /// Amount.
     pub amount: Option<Expression>,
 }
 
 impl NumberChange {
-    /// How much it adds, if that is the same in every state.
+    /// Added amount, if it is the same in every state.
     pub(crate) fn constant_gain(&self) -> Option<f64> {
         match (self.change, &self.amount) {
             (Some(Change::Increase), Some(Expression::Constant(by))) => Some(*by),
@@ -51,21 +51,22 @@ pub struct Numbers {
     base: usize,
     /// Numeric conditions.
     pub comparisons: Vec<Comparison>,
-    /// By comparison: left minus right as a sum, if it is one.
+    /// Left minus right by comparison, as a sum, if it is one.
     pub linear: Vec<Option<Linear>>,
-    /// By comparison: the numbers that it reads.
+    /// Numbers that each comparison reads.
     pub reads: Vec<Vec<u32>>,
-    /// By number: the comparisons that read it.
+    /// Comparisons that read each number.
     pub read_by: Lists<u32>,
     /// First values; NaN where undefined.
     pub initial: Vec<f64>,
-    /// By operator.
+    /// Changes of numbers by operator.
     pub changes: Vec<Vec<NumberChange>>,
-    /// By operator: comparisons that it may turn.
+    /// Comparisons whose truth each operator may change.
     turned: Lists<u32>,
-    /// By operator: whether a number may become undefined or infinite, which forbids the operator.
+    /// True, by operator, if a number may become undefined or infinite, which forbids the operator.
     risky: Vec<bool>,
-    /// By operator: whether changes of one number may contradict each other, which forbids the operator.
+    /// True, by operator, if changes of one number may contradict each other, which forbids the
+    /// operator.
     contradicting: Vec<bool>,
 }
 
@@ -135,12 +136,12 @@ impl Numbers {
         Fact { variable: self.first as u32 + comparison, value: 0 }
     }
 
-    /// Whether the task has none.
+    /// True if the task has no numbers.
     pub(crate) fn is_empty(&self) -> bool {
         self.initial.is_empty() && self.comparisons.is_empty()
     }
 
-    /// How many there are.
+    /// Number of numeric fluents.
     pub(crate) fn len(&self) -> usize {
         self.initial.len()
     }
@@ -187,7 +188,7 @@ impl Numbers {
         self.value(left, state) - self.value(right, state)
     }
 
-    /// What changes add to left minus right of a comparison; NaN where that is not the same in every state.
+    /// Change of left minus right of a comparison; NaN if it depends on the state.
     pub(crate) fn gain(&self, comparison: u32, changes: &[NumberChange]) -> f64 {
         let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
         let weight = |n: u32| linear.weights.iter().find(|(number, _)| *number == n).map_or(0.0, |w| w.1);
@@ -195,7 +196,7 @@ impl Numbers {
         gains.filter(|(weight, _)| *weight != 0.0).map(|(weight, gain)| weight * gain).sum()
     }
 
-    /// What changes add to left minus right of a comparison in a state; NaN where they do more than add.
+    /// Change of left minus right of a comparison in a state; NaN if the changes do more than add.
     pub(crate) fn gain_in(&self, comparison: u32, changes: &[NumberChange], state: &[u32]) -> f64 {
         let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
         let added = |c: &NumberChange| {
@@ -248,7 +249,8 @@ impl Numbers {
         }
     }
 
-    /// Whether all numbers that an operator changes stay defined and finite, and no changes contradict each other.
+    /// True if all numbers that an operator changes stay defined and finite, and no changes
+    /// contradict each other.
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         if !self.risky[operator as usize] {
             return true;
@@ -264,7 +266,7 @@ impl Numbers {
         })
     }
 
-    /// Whether changes that happen in a state contradict each other.
+    /// True if changes that happen in a state contradict each other.
     fn contradict(&self, operator: u32, state: &[u32]) -> bool {
         let happens = |c: &&NumberChange| c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
         let happening = self.changes[operator as usize].iter().filter(happens);
@@ -292,7 +294,7 @@ const MOST_TIMES: f64 = 1.0e6;
 /// Part of a repetition that is left to rounding.
 const SLACK: f64 = 1.0e-9;
 
-/// How often something must be added to a gap (left minus right) until it stands in the relation to zero; `None` if
+/// Number of additions until a gap (left minus right) stands in the relation to zero; `None` if
 /// adding does not help.
 pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32> {
     let (missing, gain) = match relation {
@@ -327,7 +329,7 @@ pub(crate) fn evaluate(expression: &Expression, number: &impl Fn(u32) -> f64) ->
     }
 }
 
-/// Whether an expression is made of numbers alone.
+/// True if an expression consists of numbers alone.
 pub(crate) fn is_plain(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(_) | Expression::Fluent(_) => true,

@@ -1,4 +1,5 @@
-//! Which operators are applicable: a decision tree over variables (Helmert 2006, section 5.3.1) in one flat array.
+//! Successor generator: a decision tree over variables (Helmert 2006, section 5.3.1) in one flat
+//! array.
 
 use super::compiled::Compiled;
 

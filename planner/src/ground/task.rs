@@ -23,7 +23,7 @@ pub struct Fact {
     pub value: u32,
 }
 
-/// What a value of a finite-domain variable says in the words of the lifted task.
+/// Meaning of a value of a finite-domain variable in the lifted task.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Meaning {
     /// The atom holds (and no other atom of its variable does).
@@ -51,7 +51,8 @@ pub enum Meaning {
 /// A finite-domain variable: a group of atoms of which at most one holds, or one object fluent.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// What each value says. Of a two-valued variable over one atom, value 0 is the atom, value 1 its absence.
+    /// Meanings of the values. Of a two-valued variable over one atom, value 0 is the atom, value 1
+    /// its absence.
     pub values: Vec<Meaning>,
     /// Set for a derived variable, which no effect writes: the stratum of its axioms. Its default is value 1 (absent).
     pub stratum: Option<u32>,
@@ -63,7 +64,7 @@ impl Variable {
         self.values.len() as u32
     }
 
-    /// Whether it is an object fluent: of two values that it is given at once, neither is its value.
+    /// True for object fluents: given two values at once, it has neither.
     pub fn is_object(&self) -> bool {
         matches!(self.values[0], Meaning::Object { .. })
     }
@@ -91,7 +92,7 @@ pub enum Expression {
     Duration,
     /// `total-time`: the makespan, only in metrics.
     TotalTime,
-    /// Whether a preference is violated, as a number; only in metrics.
+    /// Number of a preference's violations; only in metrics.
     Violated(u32),
     /// The sum of all.
     Sum(Vec<Expression>),
@@ -106,7 +107,7 @@ pub enum Expression {
 }
 
 impl Expression {
-    /// Whether the value is a weighted sum of numbers.
+    /// True if the value is a weighted sum of numbers.
     pub fn is_linear(&self) -> bool {
         match self {
             Expression::Constant(_) | Expression::Fluent(_) => true,
@@ -128,7 +129,7 @@ impl Expression {
 }
 
 impl Expression {
-    /// By how much a sum ([`Expression::is_linear`]) changes with a number.
+    /// Coefficient of a number in a sum ([`Expression::is_linear`]).
     pub fn weight_of(&self, fluent: NumericId) -> f64 {
         match self {
             Expression::Fluent(own) => f64::from(u8::from(*own == fluent)),
@@ -159,7 +160,7 @@ impl Expression {
 pub struct Comparison {
     /// Left side.
     pub left: Expression,
-    /// How left must compare to right.
+    /// Relation of left to right.
     pub relation: Relation,
     /// Right side.
     pub right: Expression,
@@ -177,29 +178,29 @@ pub struct Conjunction {
 }
 
 impl Conjunction {
-    /// Whether nothing is asked.
+    /// True for the empty conjunction.
     pub fn is_empty(&self) -> bool {
         self.facts.is_empty() && self.comparisons.is_empty() && self.calls.is_empty()
     }
 }
 
-/// What one effect does.
+/// Outcome of one effect.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The variable takes the value.
     Set(Fact),
     /// The number changes.
     Change {
-        /// Which number.
+        /// Number that changes.
         fluent: NumericId,
-        /// How it changes.
+        /// Kind of change.
         change: Change,
-        /// By or to how much; evaluated in the state before the effects.
+        /// Amount, evaluated in the state before the effects.
         amount: Expression,
     },
     /// The number changes continuously while the action runs: by `rate` a second.
     Flow {
-        /// Which number.
+        /// Number that changes.
         fluent: NumericId,
         /// Change a second.
         rate: Expression,
@@ -225,12 +226,13 @@ pub struct When {
 pub struct Effect {
     /// `None` where it happens always.
     pub when: Option<Box<When>>,
-    /// What happens.
+    /// Outcome.
     pub outcome: Outcome,
 }
 
 impl Effect {
-    /// Whether both give one object fluent different values where both happen, which is possible as far as their conditions tell.
+    /// True if both give one object fluent different values where both happen, which is possible as
+    /// far as their conditions tell.
     pub(crate) fn contests(&self, other: &Effect, variables: &[Variable]) -> bool {
         let (Outcome::Set(one), Outcome::Set(another)) = (&self.outcome, &other.outcome) else {
             return false;
@@ -241,7 +243,7 @@ impl Effect {
             && !self.excludes(other)
     }
 
-    /// Whether the conditions of both cannot hold at once.
+    /// True if the conditions of both cannot hold at once.
     fn excludes(&self, other: &Effect) -> bool {
         let (Some(one), Some(other)) = (&self.when, &other.when) else { return false };
         let differs = |fact: &Fact| {
@@ -250,14 +252,14 @@ impl Effect {
         one.here.facts.iter().any(differs)
     }
 
-    /// Whether some of these effects may give an object fluent several values at once.
+    /// True if some of these effects may give an object fluent several values at once.
     pub(crate) fn some_contest(effects: &[Effect], variables: &[Variable]) -> bool {
         let mut later = effects.iter().enumerate();
         later.any(|(place, one)| effects[..place].iter().any(|other| one.contests(other, variables)))
     }
 }
 
-/// Where a ground thing comes from: an action, axiom or module of the lifted task with its arguments.
+/// Origin of a ground action, axiom or call: its lifted counterpart with the arguments.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Origin {
     /// Index in the lifted task's list (actions: instantaneous and durative share one).
@@ -271,11 +273,11 @@ pub struct Origin {
 pub struct Action {
     /// The lifted action and its arguments.
     pub origin: Origin,
-    /// What must hold.
+    /// Precondition.
     pub condition: Conjunction,
-    /// What happens.
+    /// Effects.
     pub effects: Vec<Effect>,
-    /// What it adds to the metric; see [`Metric::additive`].
+    /// Contribution to the metric; see [`Metric::additive`].
     pub cost: Expression,
 }
 
@@ -286,19 +288,19 @@ pub struct DurativeAction {
     pub origin: Origin,
     /// Bounds on the duration in seconds, evaluated in the state at the start (`true`) or at the end (`false`).
     pub duration: Vec<DurationBound>,
-    /// What must hold right before the start.
+    /// Condition right before the start.
     pub at_start: Conjunction,
-    /// What must hold strictly between start and end.
+    /// Condition strictly between start and end.
     pub over_all: Conjunction,
-    /// What must hold right before the end.
+    /// Condition right before the end.
     pub at_end: Conjunction,
-    /// What happens at the start.
+    /// Effects at the start.
     pub start_effects: Vec<Effect>,
-    /// What happens while it runs ([`Outcome::Flow`] only).
+    /// Continuous effects ([`Outcome::Flow`] only).
     pub flow_effects: Vec<Effect>,
-    /// What happens at the end.
+    /// Effects at the end.
     pub end_effects: Vec<Effect>,
-    /// What it adds to the metric besides time; see [`Metric::additive`].
+    /// Contribution to the metric besides time; see [`Metric::additive`].
     pub cost: Expression,
 }
 
@@ -307,7 +309,7 @@ pub struct DurativeAction {
 pub struct DurationBound {
     /// Evaluated at the end of the action instead of at its start.
     pub at_end: bool,
-    /// How `?duration` must compare to the expression.
+    /// Relation of `?duration` to the expression.
     pub relation: Relation,
     /// Seconds.
     pub seconds: Expression,
@@ -318,7 +320,7 @@ pub struct DurationBound {
 pub struct Axiom {
     /// The derived fact, always value 0 of its variable.
     pub head: Fact,
-    /// What must hold.
+    /// Condition.
     pub body: Conjunction,
 }
 
@@ -327,7 +329,7 @@ pub struct Axiom {
 pub struct TimedEffect {
     /// When, in seconds from the start of the plan.
     pub time_s: f64,
-    /// What happens, in the order of the problem file.
+    /// Outcomes, in the order of the problem file.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -336,7 +338,7 @@ pub struct TimedEffect {
 pub struct Call {
     /// The module of the lifted task and the arguments.
     pub origin: Origin,
-    /// What an effect module writes, in its order; empty for others.
+    /// Terms that an effect module writes, in its order; empty for others.
     pub writes: Vec<Place>,
 }
 
@@ -353,22 +355,23 @@ pub enum Place {
     Nowhere,
 }
 
-/// What is to be made small or large.
+/// Metric.
 #[derive(Clone, Debug)]
 pub struct Metric {
-    /// Whether to make it small.
+    /// True for minimisation.
     pub minimise: bool,
     /// The whole expression.
     pub expression: Expression,
     /// True where the metric is a constant, plus the costs of the plan's actions, plus `time_weight` × makespan.
     pub additive: bool,
-    /// Whether actions make it better than it was without them: then it may have no best value.
+    /// Improvement by actions beyond the value without them: if any, a best value may
+    /// not exist.
     pub earns: Earns,
     /// The weight of `total-time` in an additive metric.
     pub time_weight: f64,
 }
 
-/// Whether actions make a metric better.
+/// Tells if actions may improve a metric beyond its value without them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Earns {
     /// Whatever is done, it gets no better.
@@ -382,9 +385,9 @@ pub enum Earns {
 /// A state: a value a variable (derived ones included and up to date), a number a numeric fluent (NaN where undefined).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {
-    /// By variable.
+    /// Values by variable.
     pub values: Vec<u32>,
-    /// By numeric fluent.
+    /// Values by numeric fluent.
     pub numbers: Vec<f64>,
 }
 
@@ -409,15 +412,15 @@ pub struct GroundTask {
     pub timed: Vec<TimedEffect>,
     /// The first state, with derived variables evaluated where no call is involved.
     pub initial: Values,
-    /// What must hold in the end.
+    /// Goal.
     pub goal: Conjunction,
-    /// What is to be made small or large; `None` counts steps (classical) or time (temporal).
+    /// Metric; `None` counts steps (classical) or time (temporal).
     pub metric: Option<Metric>,
     /// Sets of facts of which at most one holds, beyond those that share a variable.
     pub mutex_groups: Vec<Vec<Fact>>,
     /// False where the goal is out of reach even when nothing is ever taken away.
     pub goal_reachable: bool,
-    /// Where it is out of reach: which atoms nobody achieves, the goal's first.
+    /// Obstacles of an unreachable task: atoms without achievers, the goal's first.
     pub obstacles: Vec<super::obstacles::Obstacle>,
 }
 

@@ -1,4 +1,4 @@
-//! What numbers can become when nothing is ever taken away.
+//! Interval relaxation of numbers: nothing is ever taken away.
 //!
 //! Two relaxations work together. Where an operator adds the same to a linear condition whenever it is applied, how
 //! often it must be applied is known (subgoaling with repetitions; Scala, Haslum, Thiébaux and Ramirez 2020, sections 4
@@ -14,9 +14,10 @@ use crate::ground::{Change, Expression, Relation};
 
 use super::relaxed::Relevant;
 
-/// How often a bound of an interval may move before it is taken to move without end.
+/// Number of moves of an interval's bound after which it counts as unbounded.
 const MOST_WIDENINGS: u8 = 6;
-/// How often a node is taken to be applied for a condition that it does not help soon, though intervals leave it open.
+/// Number of applications assumed for a condition that a node does not help soon, though intervals
+/// leave it open.
 const UNLIKELY: u32 = 1000;
 /// Nothing.
 const NONE: u32 = u32::MAX;
@@ -80,7 +81,7 @@ impl Range {
         if upper { self.high } else { self.low }
     }
 
-    /// Whether some value stands in this relation to one of the other.
+    /// True if some value stands in this relation to one of the other.
     fn may(self, relation: Relation, other: Range) -> bool {
         !self.is_empty()
             && !other.is_empty()
@@ -105,14 +106,14 @@ fn range(expression: &Expression, ranges: &impl Fn(u32) -> Range) -> Range {
     }
 }
 
-/// What a number can be made near a state.
+/// Reachable values of a number near a state.
 #[derive(Clone, Copy, Debug)]
 struct Near {
     first: Range,
     range: Range,
     /// The nodes that made it lowest and highest.
     by: [u32; 2],
-    /// How often its bounds moved.
+    /// Number of moves of its bounds.
     moves: u8,
 }
 
@@ -141,7 +142,7 @@ impl Near {
     }
 }
 
-/// Whether a gap (left minus right) must grow for the relation to hold.
+/// True if a gap (left minus right) must grow for the relation to hold.
 fn upwards(relation: Relation, gap: f64) -> bool {
     match relation {
         Relation::AtLeast | Relation::Greater => true,
@@ -154,34 +155,34 @@ fn upwards(relation: Relation, gap: f64) -> bool {
 #[derive(Clone, Copy, Debug, Default)]
 struct Move {
     comparison: u32,
-    /// What one application adds to left minus right; NaN where that depends on the state.
+    /// Change of left minus right by one application; NaN if it depends on the state.
     gain: f64,
 }
 
-/// What numbers can become, with the working memory of one evaluation.
+/// Reachable intervals of numbers, with the working memory of one evaluation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Intervals {
     /// Facts of the first comparison: fact `first + 2 * c` says that comparison `c` holds.
     first: u32,
     numbers: Arc<Numbers>,
-    /// By node.
+    /// Moves by node.
     moves: Lists<Move>,
     changes: Lists<NumberChange>,
-    /// By number: nodes whose amounts read it.
+    /// Nodes whose amounts read a number, by number.
     amounts_on: Vec<Vec<u32>>,
-    /// By comparison: asked for by anyone.
+    /// True, by comparison, if anyone asks for it.
     needed: Vec<bool>,
-    /// By number: nodes that raise it, and by how much at least.
+    /// Nodes that raise a number, with the least amount, by number.
     givers: Vec<Vec<(u32, f64)>>,
-    /// Whether intervals are needed at all.
+    /// True if intervals are needed at all.
     dynamic: bool,
     gaps: Vec<f64>,
     ranges: Vec<Range>,
     widened: Vec<[u8; 2]>,
-    /// By number: the node that moved it last.
+    /// Node that moved a number last, by number.
     mover: Vec<u32>,
-    /// By number: what one application of each node makes of its first value, which tells how much is added where amounts
-    /// depend on numbers (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
+    /// Values of a number after one application of each node to its first value, which estimates
+    /// state-dependent amounts (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
     near: Vec<Near>,
     times: Vec<u32>,
     /// Facts that the last node brings about, with how often it must be applied.
@@ -259,7 +260,7 @@ impl Intervals {
         self.moves.push(moves);
     }
 
-    /// Whether the task has no numbers.
+    /// True if the task has no numbers.
     pub(super) fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
@@ -363,8 +364,8 @@ impl Intervals {
         (after != before || nearer).then_some(number)
     }
 
-    /// How often a node must be applied for a condition with its amounts as they are, or as they can soon be where that
-    /// saves more than the step that it takes.
+    /// Number of applications of a node for a condition with its present amounts, or with those it
+    /// can soon have where that saves more than the extra step.
     fn times_now(&self, node: u32, comparison: u32) -> u32 {
         let still = self.times_with(node, comparison, &|number| self.near[number as usize].first);
         let soon = self.times_with(node, comparison, &|number| self.near[number as usize].range);
@@ -385,7 +386,7 @@ impl Intervals {
         if gain.is_finite() { repetitions(gap, relation, gain).unwrap_or(UNLIKELY) } else { 1 }
     }
 
-    /// What a change adds to left minus right of a comparison, as an amount and its weight.
+    /// Change of left minus right of a comparison, as an amount and its weight.
     fn added<'a>(&self, change: &'a NumberChange, comparison: u32) -> Option<(&'a Expression, f64)> {
         let linear = self.numbers.linear[comparison as usize].as_ref()?;
         let (_, weight) = linear.weights.iter().find(|(n, w)| *n == change.number && *w != 0.0)?;
@@ -429,7 +430,7 @@ impl Intervals {
         self.times[(fact - self.first) as usize / 2] = times;
     }
 
-    /// How often the supporter of a comparison's fact is to be applied; `None` for other facts.
+    /// Number of applications of a comparison's supporter; `None` for other facts.
     pub(super) fn repeats(&self, fact: u32) -> Option<u32> {
         if self.is_empty() || fact < self.first {
             return None;

@@ -44,9 +44,9 @@ pub struct Landmarks {
 /// The search for landmarks.
 struct Find<'a> {
     task: &'a Compiled,
-    /// By fact: operators (and, after them, axioms) that bring it about.
+    /// Achievers by fact: operators, and after them axioms.
     achievers: Lists<u32>,
-    /// By fact: operators and axioms that need it.
+    /// Operators and axioms that need a fact, by fact.
     needed_by: Lists<u32>,
     all: Vec<Landmark>,
     by_facts: FxHashMap<Vec<u32>, u32>,
@@ -77,7 +77,7 @@ impl Landmarks {
         Landmarks { words: all.len().div_ceil(64).max(1), by_fact, goals, all }
     }
 
-    /// How many there are.
+    /// Number of landmarks.
     pub(crate) fn len(&self) -> usize {
         self.all.len()
     }
@@ -221,7 +221,7 @@ impl<'a> Find<'a> {
         found
     }
 
-    /// By fact: reachable (nothing ever taken away) if none of `without` ever becomes true.
+    /// Relaxed reachability by fact, if none of `without` ever becomes true.
     fn reach_without(&mut self, without: &[u32]) -> Vec<bool> {
         let task = self.task;
         let operators = task.operators();
@@ -312,12 +312,12 @@ fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Land
     }
 }
 
-/// Which facts exclude each other.
+/// Mutexes between facts.
 struct Exclusions<'a> {
     mutex_groups: &'a [Vec<Fact>],
-    /// By fact: its mutex groups.
+    /// Mutex groups by fact.
     groups_of: Lists<u32>,
-    /// By fact, and by variable: the landmark of a goal; `u32::MAX` for none.
+    /// Landmark of a goal by fact and by variable; `u32::MAX` for none.
     goal_of_fact: Vec<u32>,
     goal_of_variable: Vec<u32>,
 }
@@ -353,7 +353,7 @@ impl<'a> Exclusions<'a> {
         }
     }
 
-    /// Whether two facts never hold together.
+    /// True if two facts never hold together.
     fn exclude(&self, task: &Compiled, one: u32, other: u32) -> bool {
         let groups = self.groups_of.get(other as usize);
         one != other
@@ -362,7 +362,7 @@ impl<'a> Exclusions<'a> {
     }
 }
 
-/// Whether `first` is ordered before `second`, directly or not.
+/// True if `first` is ordered before `second`, directly or not.
 fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool {
     let mut seen = vec![false; all.len()];
     let mut stack = vec![second];
@@ -379,7 +379,7 @@ fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool
     false
 }
 
-/// Which landmarks each state of a search has seen on its way.
+/// Landmark status of each state: landmarks accepted on its way.
 pub(crate) struct Status {
     accepted: Rows<u64>,
     scratch: Vec<u64>,
@@ -450,7 +450,7 @@ impl Status {
         }
     }
 
-    /// How many landmarks are still to come: not yet seen, or seen and needed again.
+    /// Landmark count: landmarks not yet accepted, or accepted and needed again.
     pub(crate) fn left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
         let bits = self.of(id);
         let seen: u32 = bits.iter().map(|w| w.count_ones()).sum();
@@ -470,7 +470,8 @@ impl Status {
         left
     }
 
-    /// How many goals are still to come, or to come again; one that came before others it would have to be given up for is.
+    /// Goal count: goals still to come, or to come again; a goal achieved before others that it has
+    /// to be given up for is one.
     pub(crate) fn goals_left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
         let bits = self.of(id);
         let open = |&&goal: &&u32| {
@@ -479,7 +480,7 @@ impl Status {
         landmarks.goals.iter().filter(open).count() as u32
     }
 
-    /// Whether an operator brings about a landmark that is due.
+    /// True if an operator achieves a landmark that is due.
     pub(crate) fn advances(&self, landmarks: &Landmarks, task: &Compiled, id: u32, operator: u32) -> bool {
         let bits = self.of(id);
         task.effects.get(operator as usize).iter().any(|effect| {

@@ -14,10 +14,10 @@ const NONE: u32 = u32::MAX;
 /// Repetitions of an operator that gives back what is used up, at most.
 const MOST_REFILLS: f64 = 1000.0;
 
-/// How many steps weigh as much as a unit of cost where operators without cost exist.
+/// Number of steps that weigh as much as a unit of cost where zero-cost operators exist.
 const COST_OVER_STEPS: u32 = 64;
 
-/// How the heuristic counts operators.
+/// Operator cost of the heuristic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counting {
     /// Every operator counts one.
@@ -29,7 +29,7 @@ pub enum Counting {
 }
 
 impl Counting {
-    /// What an operator of this cost counts.
+    /// Counted cost of an operator.
     pub(crate) fn of(self, task: &Compiled, operator: usize) -> u32 {
         match self {
             Counting::Steps => 1,
@@ -50,7 +50,7 @@ pub struct Relevant {
     pub at: u32,
     /// The operator.
     pub operator: u32,
-    /// How often it is applied for the number that it is to move.
+    /// Number of applications for the number that it is to change.
     pub times: u32,
     /// The fact of the numeric condition that it is repeated for; `u32::MAX` for none, [`REFILL`] for a number that the
     /// relaxed plan uses up.
@@ -71,12 +71,12 @@ pub struct Relaxed {
     /// By node (an operator's unconditional effects, one conditional effect, or an axiom).
     preconditions: Lists<u32>,
     effects: Lists<u32>,
-    /// By node: place of its operator in `names`; `NONE` for an axiom.
+    /// Index of the node's operator in `names`; `NONE` for an axiom.
     operators: Vec<u32>,
     names: Vec<u32>,
     base_costs: Vec<u32>,
     open: Vec<u32>,
-    /// By fact: nodes that need it.
+    /// Nodes that need a fact, by fact.
     waiting: Lists<u32>,
     /// Nodes that need nothing.
     free: Vec<u32>,
@@ -92,9 +92,9 @@ pub struct Relaxed {
     marked: Vec<u32>,
     mark: u32,
     stack: Vec<u32>,
-    /// By place of an operator: where it stands in the relaxed plan at hand.
+    /// Position in the relaxed plan by index of an operator.
     slots: Vec<u32>,
-    /// What numbers can become.
+    /// Interval relaxation of numbers.
     intervals: Intervals,
     /// Operators of the last relaxed plan, by rising cost.
     pub plan: Vec<Relevant>,
@@ -295,7 +295,7 @@ impl Relaxed {
         }
     }
 
-    /// What the relaxed plan at hand has of a node's operator.
+    /// Entry of a node's operator in the relaxed plan.
     fn known(&self, node: u32) -> Option<&Relevant> {
         let place = self.operators[node as usize] as usize;
         let marked = self.marked.get(self.fact_costs.len() + place)? == &self.mark;
@@ -343,7 +343,7 @@ struct Build<'a> {
     needed: Vec<bool>,
     preconditions: Lists<u32>,
     effects: Lists<u32>,
-    /// By node: its operator's changes of numbers.
+    /// Changes of numbers by the node's operator, by node.
     changes: Lists<NumberChange>,
     operators: Vec<u32>,
     base_costs: Vec<u32>,

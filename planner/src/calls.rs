@@ -23,19 +23,19 @@ use self::terms::{Origin, Sources, Terms};
 /// A failed call on its way up to [`crate::plan`].
 pub type Failure = Box<AttachmentError>;
 
-/// What all calls of a module share.
+/// Data that all calls of a module share.
 struct Asked<'a> {
     /// The name of the attachment; empty for a module that is never called.
     attachment: String,
     module: Arc<str>,
     kind: CallKind,
-    /// How many terms it writes.
+    /// Number of terms that it writes.
     writes: usize,
     /// Counts answers that were known already, for the statistics of the attachment.
     hits: Option<&'a AtomicU64>,
     /// The positions of the arguments on which it depends what a call reads.
     positions: Vec<usize>,
-    /// What its calls read, where their arguments make no difference to that.
+    /// Sources of its readings, if the arguments make no difference to them.
     sources: Option<Arc<Sources>>,
 }
 
@@ -59,15 +59,15 @@ pub struct Calls<'a> {
     ground: &'a GroundTask,
     attachments: &'a Attachments,
     names: Vec<Arc<str>>,
-    /// By module.
+    /// Shared data by module.
     asked: Vec<Asked<'a>>,
-    /// By call.
+    /// Sources of the readings by call.
     sources: Vec<Arc<Sources>>,
     /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
     /// Answers of calls that read something, without a proposed parameter, by call, exact and relaxed.
     known: RefCell<Vec<[Known; 2]>>,
-    /// What the question asked last reads: room that is used again.
+    /// Buffer for the readings of the last question.
     read: RefCell<Vec<u64>>,
     terms: Terms,
     /// Calls that were answered otherwise than needed: what was needed, and the proposed parameter.
@@ -169,7 +169,7 @@ impl<'a> Calls<'a> {
         Bound { asked, arguments: &origin.arguments, sources: &self.sources[call as usize] }
     }
 
-    /// Whether a condition module says yes.
+    /// Answer of a condition module.
     pub fn truth(
         &self,
         call: CallId,
@@ -183,7 +183,7 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// Whether a condition module says what is needed; what it denies is remembered.
+    /// True if a condition module gives the needed answer; refusals are remembered.
     pub fn agrees(
         &self,
         (call, wanted): (CallId, bool),
@@ -284,19 +284,19 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// What the answer depends on: variables, then numbers.
+    /// Read set of the answer: variables, then numbers.
     pub fn reads(&self, call: CallId) -> (&[VariableId], &[NumericId]) {
         let sources = &self.sources[call as usize];
         (&sources.variables, &sources.numbers)
     }
 
-    /// Whether the answer, without a proposed parameter, is the same in every state.
+    /// True if the answer, without a proposed parameter, is the same in every state.
     pub fn settles(&self, call: CallId) -> bool {
         let (variables, numbers) = self.reads(call);
         variables.is_empty() && numbers.is_empty()
     }
 
-    /// What has been answered otherwise than needed so far.
+    /// Answers so far that differed from the needed ones.
     pub fn refusals(&self) -> Refusals {
         let mut refusals = Refusals::default();
         let refused = self.refused.borrow();
@@ -310,7 +310,7 @@ impl<'a> Calls<'a> {
         refusals
     }
 
-    /// What kind of module is called.
+    /// Kind of the called module.
     pub fn kind(&self, call: CallId) -> CallKind {
         self.bound(call).asked.kind
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 /// Values grouped by key, in their order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Grouped<T> {
-    /// By key, where its values begin; one more for the end.
+    /// Begin of the values of each key; one more for the end.
     from: Vec<u32>,
     pub(crate) values: Vec<T>,
 }
@@ -28,7 +28,7 @@ impl<T: Copy + Default> Grouped<T> {
         Grouped { from, values }
     }
 
-    /// Where the values of a key stand.
+    /// Range of the values of a key.
     pub(crate) fn range(&self, key: u32) -> Range<usize> {
         self.from[key as usize] as usize..self.from[key as usize + 1] as usize
     }
@@ -38,7 +38,7 @@ impl<T: Copy + Default> Grouped<T> {
         &self.values[self.range(key)]
     }
 
-    /// How many keys there are.
+    /// Number of keys.
     pub(crate) fn keys(&self) -> usize {
         self.from.len() - 1
     }

@@ -1,4 +1,4 @@
-//! Where the facts stand that a call reads.
+//! Sources of the facts that a call reads.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::ground::{GroundTask, Meaning, NumericId, VariableId};
 use crate::semantics::calls::{Symbol, instances};
 use crate::task::{ObjectId, Task};
 
-/// Where a reading comes from.
+/// Source of a reading.
 #[derive(Debug, Clone)]
 pub(super) enum Origin {
     /// True where the variable has the value.

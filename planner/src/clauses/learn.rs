@@ -1,5 +1,4 @@
-//! What is learned from a conflict: the clause of the first unique implication point, made smaller by what follows from
-//! the rest of it.
+//! Conflict analysis: the clause of the first unique implication point, minimised.
 
 use super::Literal;
 use super::solver::{NONE, PAIR, Solver};
@@ -8,7 +7,7 @@ use super::solver::{NONE, PAIR, Solver};
 pub(super) struct Learned {
     pub clause: Vec<Literal>,
     pub level: u32,
-    /// How many levels its literals are of.
+    /// Number of decision levels of its literals (LBD).
     pub rank: u32,
 }
 
@@ -67,7 +66,7 @@ impl Solver {
         self.literals(reason).filter(|&other| other != literal).collect()
     }
 
-    /// Whether a literal's reason lies in what was marked.
+    /// True if a literal's reason lies in the marked literals.
     fn follows(&self, literal: Literal) -> bool {
         let reason = self.reasons[literal.variable() as usize];
         let marked = |other: Literal| {

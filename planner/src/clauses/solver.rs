@@ -3,7 +3,7 @@
 
 use super::Literal;
 
-/// Where a clause lies in the arena; [`NONE`] for no reason.
+/// Position of a clause in the arena; [`NONE`] for no reason.
 pub(super) type Place = u32;
 pub(super) const NONE: Place = u32::MAX;
 /// Set in a reason that is a clause of two: the other literal.
@@ -19,7 +19,7 @@ const KEPT_MORE: usize = 500;
 /// Learned clauses with literals of so few levels are never forgotten.
 const GLUE: u32 = 2;
 
-/// What came of a search.
+/// Answer of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// All clauses hold under the values.
@@ -50,16 +50,16 @@ pub struct Solver {
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
     kept: usize,
-    /// By literal: the others of the clauses of two with its negation.
+    /// Binary clauses by literal: the other literals of clauses with its negation.
     pairs: Vec<Vec<Literal>>,
-    /// By literal: clauses that watch it.
+    /// Clauses that watch a literal, by literal.
     watches: Vec<Vec<Watch>>,
-    /// By literal: 1 true, -1 false, 0 open.
+    /// Value by literal: 1 true, -1 false, 0 open.
     values: Vec<i8>,
-    /// By variable.
+    /// Decision level by variable.
     pub(super) levels: Vec<u32>,
     pub(super) reasons: Vec<u32>,
-    /// By variable: how much it had to do with late conflicts.
+    /// Activity by variable: its part in recent conflicts.
     activity: Vec<f64>,
     bump: f64,
     pub(super) trail: Vec<Literal>,
@@ -67,7 +67,7 @@ pub struct Solver {
     /// Up to where the trail was followed.
     followed: usize,
     contradiction: bool,
-    /// What is to be tried next, the last one first.
+    /// Decisions to try next, the last one first.
     plan: Vec<Literal>,
     conflicts: u64,
     restart_at: u64,
@@ -119,7 +119,7 @@ impl Solver {
         }
     }
 
-    /// How much a variable had to do with late conflicts.
+    /// Activity of a variable: its part in recent conflicts.
     pub(crate) fn activity(&self, variable: u32) -> f64 {
         self.activity[variable as usize]
     }

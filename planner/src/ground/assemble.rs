@@ -417,14 +417,14 @@ impl Expression {
 }
 
 impl Instantiate<'_> {
-    /// Whether the atom's predicate is one that effects, rules or timed literals change.
+    /// True if effects, rules or timed literals change the atom's predicate.
     fn changes(&self, atom: u32) -> bool {
         let predicate = self.atoms.predicate(atom) as usize;
         predicate < self.statics.task.predicates.len() + self.statics.task.functions.len()
             && self.statics.fluent[predicate]
     }
 
-    /// Whether the atom is of a plain predicate (of an object function, another value may replace it).
+    /// True for an atom of a plain predicate (of an object function, another value may replace it).
     fn atoms_hold(&self, atom: usize) -> bool {
         atom < self.atoms.len()
             && (self.atoms.predicate(atom as u32) as usize) < self.statics.task.predicates.len()

@@ -17,7 +17,7 @@ struct Index {
     /// Bit `i`: argument `i` is part of the key.
     mask: u32,
     chains: FxHashMap<u64, Chain>,
-    /// By row: the next row with the same key, or `NONE`.
+    /// Next row with the same key, by row, or `NONE`.
     next: Vec<u32>,
 }
 
@@ -33,7 +33,7 @@ struct Table {
 /// Every atom that was found reachable, numbered in the order in which it was found.
 pub(super) struct Atoms {
     tables: Vec<Table>,
-    /// By atom: predicate and row.
+    /// Predicate and row, by atom.
     places: Vec<(u32, u32)>,
     /// Bits that hold one object.
     bits: u32,
@@ -56,7 +56,7 @@ impl Atoms {
         Atoms { tables: (0..predicates).map(|_| table()).collect(), places: Vec::new(), bits }
     }
 
-    /// How many atoms there are.
+    /// Number of atoms.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }
@@ -120,8 +120,8 @@ impl Atoms {
         (atom, true)
     }
 
-    /// How many atoms of the predicate agree with the bound arguments (all others are `NONE`), at most: two different
-    /// keys may share a chain when the arguments are too many for one word.
+    /// Upper bound on the number of atoms of the predicate that agree with the bound arguments (all
+    /// others are `NONE`): two keys may share a chain when the arguments are too many for one word.
     pub(super) fn count(&mut self, predicate: u32, pattern: &[u32]) -> u32 {
         let mask = mask_of(pattern);
         if mask == 0 {

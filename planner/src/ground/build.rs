@@ -21,7 +21,7 @@ use super::rules::{self, Rules};
 use super::statics::{Statics, Tries};
 use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
 
-/// Why a task was not grounded.
+/// Reason for which a task was not grounded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GroundError {
     /// The caller's stop signal.
@@ -127,7 +127,7 @@ pub(crate) fn ground_with(
     Ok(ground)
 }
 
-/// By atom of an object function: a number for the function with its arguments.
+/// Number of the function with its arguments, by atom of an object function.
 fn valued(task: &Task, atoms: &Atoms) -> FxHashMap<u32, u32> {
     let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
     let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
@@ -469,7 +469,7 @@ fn later(
     Some(Later { over_all, end, end_effects, flows, duration })
 }
 
-/// Whether effects need a number that never has a value.
+/// True if effects need a number that never has a value.
 fn never(effects: &[GroundEffect]) -> bool {
     let undefined = |amount: &Expression| matches!(amount, Expression::Constant(value) if !value.is_finite());
     let fails =

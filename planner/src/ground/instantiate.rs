@@ -21,7 +21,7 @@ pub(super) struct Clauses {
 }
 
 impl Clauses {
-    /// Whether it always holds.
+    /// True if it always holds.
     pub(super) fn is_true(&self) -> bool {
         self.literals.is_empty()
             && self.comparisons.is_empty()
@@ -54,7 +54,7 @@ impl Clauses {
     }
 }
 
-/// What a ground effect does, in atoms.
+/// Ground effect in atoms.
 #[derive(Clone, Debug)]
 pub(super) enum Deed {
     Add(u32),
@@ -70,7 +70,7 @@ pub(super) struct RawCall {
     pub writes: Vec<RawPlace>,
 }
 
-/// What a call writes: a number, an atom, or one of the values of an object function.
+/// Target of a call's write: a number, an atom, or one of the values of an object function.
 #[derive(Clone, Debug)]
 pub(super) enum RawPlace {
     Number(u32),
@@ -95,7 +95,7 @@ impl RawCall {
 /// A ground effect.
 #[derive(Clone, Debug)]
 pub(super) struct GroundEffect {
-    /// Where it happens, at the start, over all; `None` for always.
+    /// Condition at the start, over all, at the end; `None` for always.
     pub when: Option<Box<[Clauses; 3]>>,
     pub deed: Deed,
 }
@@ -107,7 +107,7 @@ struct Never;
 pub(super) struct Instantiate<'a> {
     pub statics: &'a Statics<'a>,
     pub atoms: Atoms,
-    /// By atom: true in every reachable state.
+    /// True, by atom, if it holds in every reachable state.
     pub always: Vec<bool>,
     pub numerics: Vec<NumericFluent>,
     pub comparisons: Vec<Comparison>,

@@ -27,12 +27,12 @@ pub(crate) struct Transitions {
     before: Vec<u32>,
     adds: Vec<Changed>,
     deletes: Vec<Changed>,
-    /// By transition, where its parts end.
+    /// Ends of the parts of a transition, by transition.
     ends: Vec<[u32; 3]>,
 }
 
 impl Transitions {
-    /// How many there are.
+    /// Number of transitions.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
@@ -86,7 +86,7 @@ struct Part {
     key: Vec<u8>,
 }
 
-/// How much is tried before giving up the search for further groups.
+/// Number of candidates after which the search for further groups ends.
 const MOST_CANDIDATES: usize = 400;
 /// Transitions looked at in all.
 const MOST_WORK: usize = 30_000_000;
@@ -94,14 +94,14 @@ const MOST_WORK: usize = 30_000_000;
 struct Synthesis<'a, N: AtomNames> {
     names: &'a N,
     transitions: &'a Transitions,
-    /// By predicate: transitions that add an atom of it.
+    /// Transitions that add an atom of a predicate, by predicate.
     adders: FxHashMap<u32, Vec<u32>>,
     /// Predicates at and beyond this one are tokens, of which any number of arguments may be counted.
     first_token: u32,
     work: usize,
 }
 
-/// Why a candidate fails: a transition that adds to a key without taking away.
+/// Counterexample to a candidate: a transition that adds to a key without deleting.
 struct Unbalanced {
     transition: u32,
     add: usize,

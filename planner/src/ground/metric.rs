@@ -5,9 +5,9 @@ use super::raw::{RawAction, RawTask};
 use super::relevant::{is_risky, reads};
 use super::task::{Change, Comparison, Earns, Expression, Metric};
 
-/// How the metric is made up.
+/// Composition of the metric.
 pub(super) struct Costs {
-    /// By numeric fluent: its weight in the metric, if all it does is add up costs.
+    /// Weight in the metric by numeric fluent, if the fluent only adds up costs.
     pub weights: Vec<Option<f64>>,
     pub metric: Option<Metric>,
     /// Numeric fluents that the metric reads otherwise.
@@ -92,7 +92,7 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]
     read
 }
 
-/// Whether actions make an additive metric better.
+/// Tells if actions improve an additive metric.
 fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     let earns = |effect: &GroundEffect| match &effect.deed {
         Deed::Change(id, change, amount) => added(*change, amount, sign * weights[*id as usize]),
@@ -105,7 +105,7 @@ fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     effects.map(earns).max().unwrap_or(Earns::Never)
 }
 
-/// Whether a change of a number makes a sum smaller in which it has a weight.
+/// Tells if a change of a number lowers a sum in which it has a weight.
 pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
     let weight = match change {
         _ if weight == 0.0 => return Earns::Never,
@@ -120,7 +120,7 @@ pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
     }
 }
 
-/// Whether an expression times a factor is never below zero, as far as its constants tell.
+/// True if an expression times a factor is never below zero, as far as its constants tell.
 fn is_at_least_nothing(expression: &Expression, factor: f64) -> bool {
     match expression {
         Expression::Constant(value) => factor * value >= 0.0,
@@ -178,7 +178,8 @@ pub(super) fn costs(
 }
 
 impl Costs {
-    /// What the action adds to the metric by fluents that only add up; those effects are removed.
+    /// Contribution of the action to the metric by fluents that only add up costs; those effects
+    /// are removed.
     pub(super) fn of(&self, action: &mut RawAction) -> Expression {
         if self.metric.is_none() && action.later.is_none() {
             strip(&self.weights, &mut action.effects, &mut Vec::new());

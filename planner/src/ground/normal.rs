@@ -70,7 +70,7 @@ pub(super) enum Number {
     Violated(u32),
 }
 
-/// What an effect changes.
+/// Change by an effect.
 #[derive(Clone, Debug)]
 pub(super) enum Change_ {
     Add(Pattern),
@@ -168,7 +168,7 @@ pub(super) struct Normal {
     pub predicate_count: usize,
 }
 
-/// Where extra atoms that define fresh variables go while terms are flattened.
+/// Collects extra atoms that define fresh variables while terms are flattened.
 struct Scope<'a> {
     task: &'a Task,
     domains: Vec<Arc<[ObjectId]>>,
@@ -376,13 +376,13 @@ impl<'a> Scope<'a> {
         Effect_ { forall, when, change }
     }
 
-    /// Whether an atom is of an object function that may have no value.
+    /// True for an atom of an object function that may have no value.
     fn unsure(&self, atom: &Pattern) -> bool {
         let function = atom.predicate.checked_sub(self.task.predicates.len() as u32);
         function.is_some_and(|function| may_be_undefined(self.task, FunctionId(function)))
     }
 
-    /// That the objects which an effect names are defined where it happens.
+    /// Condition that the objects named by an effect are defined where it happens.
     fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Formula {
         let atoms = fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), true)).collect();
         let defined = Formula::Exists(fresh.slots.clone(), Box::new(Formula::And(atoms)));
@@ -397,10 +397,10 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// What effects need to have a result.
+/// Conditions under which effects have a result.
 #[derive(Default)]
 struct Needs {
-    /// Of their action.
+    /// Conditions of their action.
     conditions: Vec<Formula>,
     /// Effects that must not happen, beside those at its end that depend on earlier times.
     forbidden: Vec<Effect_>,
@@ -420,7 +420,7 @@ fn without_result(function: u32, forall: &[u32], when: &Timed3<Formula>, fresh: 
     Effect_ { forall: forall.to_vec(), when, change }
 }
 
-/// Whether an object function may have no value for some arguments.
+/// True if an object function may have no value for some arguments.
 fn may_be_undefined(task: &Task, function: FunctionId) -> bool {
     let arguments: usize =
         task.function(function).parameters.iter().map(|parameter| parameter.objects.len()).product();
@@ -527,7 +527,7 @@ pub(super) enum Target {
     Object(Pattern),
 }
 
-/// What an effect module writes.
+/// Targets that an effect module writes.
 pub(super) fn module_writes(task: &Task, module: u32) -> Vec<Target> {
     let module = &task.modules[module as usize];
     let mut scope = Scope::new(task, module.parameters.len());

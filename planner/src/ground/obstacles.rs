@@ -1,4 +1,4 @@
-//! Why a goal is out of reach even when nothing is ever taken away: which atoms nobody achieves.
+//! Explains goals that are unreachable even under delete relaxation: atoms without achievers.
 
 use super::atoms::{Atoms, NONE};
 use super::normal::{Action_, Change_, Formula, Normal, Pattern, Term};

@@ -24,7 +24,7 @@ pub fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
     Pairs::reached(task, &facts).map_or_else(Vec::new, |pairs| pairs.groups(&facts))
 }
 
-/// By fact: the facts that may hold together with it, itself among them if it can be reached.
+/// Facts that may hold together with a fact (h2), by fact; itself among them if reachable.
 struct Pairs {
     words: usize,
     rows: Vec<u64>,

@@ -26,7 +26,7 @@ use crate::task::{
 use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
 use touch::Mentioned;
 
-/// What an action is called that sees in time what must come about; it stands where the constraint does.
+/// Name of the action that observes in time what must come about; its place is the constraint's.
 pub(crate) const WITNESS: &str = "see it";
 /// Preferences of one action that become conditions of its copies, at most.
 const MOST_OF_AN_ACTION: usize = 3;
@@ -78,12 +78,12 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
     Some(compiler.finish())
 }
 
-/// What is asked of the conditions.
+/// Demand of a constraint.
 #[derive(Debug, Clone, Copy)]
 enum Asked {
-    /// What an automaton accepts.
+    /// Acceptance by an automaton.
     States(&'static Automaton),
-    /// That the first one holds at some time up to this one, in seconds.
+    /// Truth of the first condition at some time up to this one, in seconds.
     Within(f64),
 }
 
@@ -128,7 +128,7 @@ impl Instance {
         self.flags.get(self.automaton.flags)
     }
 
-    /// What must hold in the last state.
+    /// Condition on the last state.
     fn kept(&self) -> Condition {
         let broken = any([self.cases(self.automaton.broken), self.cases(self.automaton.open)]);
         all(self.was_broken().map(negated).into_iter().chain([negated(&broken)]))
@@ -139,12 +139,13 @@ struct Compiler<'t> {
     task: &'t Task,
     made: Task,
     fixed: Fixed,
-    /// By preference: the function that counts its violations, if the metric asks for them.
+    /// Function that counts the violations of a preference, by preference, if the metric asks for
+    /// them.
     counters: Vec<Option<FunctionId>>,
     /// Instances by what they say, with how often it is said.
     said: FxHashMap<(String, Option<PreferenceId>), usize>,
     instances: Vec<(Stated, f64)>,
-    /// What each preference that is not decided asks of the last state, and how often.
+    /// Condition and weight of each undecided preference in the last state.
     kept: Vec<(PreferenceId, f64, Condition)>,
     /// Violations that nothing can avert.
     lost: FxHashMap<PreferenceId, f64>,

@@ -27,7 +27,7 @@ pub(super) struct RawAction {
     pub start: Clauses,
     pub effects: Vec<GroundEffect>,
     pub later: Option<Box<Later>>,
-    /// What it adds to the metric.
+    /// Contribution to the metric.
     pub cost: Expression,
 }
 
@@ -44,7 +44,7 @@ pub(super) struct RawTask {
     pub actions: Vec<RawAction>,
     pub axioms: Vec<RawAxiom>,
     pub goal: Clauses,
-    /// By atom: true at first (derived atoms are not).
+    /// True, by atom, in the initial state (derived atoms are not).
     pub init: Vec<bool>,
     /// Number of the first atom that stands for a disjunction.
     pub inner: u32,
@@ -65,7 +65,7 @@ impl<'a> Resolve<'a> {
         Resolve { next, tries, known: FxHashMap::default(), axioms: Vec::new() }
     }
 
-    /// How many atoms there are now.
+    /// Present number of atoms.
     pub(super) fn atoms(&self) -> u32 {
         self.next
     }
@@ -132,7 +132,7 @@ fn join(left: &Clauses, right: &Clauses) -> Clauses {
     joined
 }
 
-/// Whether it asks for an atom and its absence (literals sorted).
+/// True if it asks for an atom and its absence (literals sorted).
 pub(super) fn contradictory(clauses: &Clauses) -> bool {
     clauses.literals.windows(2).any(|pair| pair[0] ^ 1 == pair[1])
 }

@@ -36,7 +36,7 @@ pub(super) struct Head {
 
 /// Tests a filter under a complete binding, with what is known to be static; true where it is not known to be false.
 pub(super) trait Possible {
-    /// Whether the formula may hold in some reachable state.
+    /// True if the formula may hold in some reachable state.
     fn possible(
         &self,
         atoms: &Atoms,
@@ -45,7 +45,7 @@ pub(super) trait Possible {
         domains: &[Arc<[ObjectId]>],
     ) -> bool;
 
-    /// Whether it was asked to stop: then what was said since means nothing.
+    /// True after a request to stop: results since then are void.
     fn is_stopped(&self) -> bool;
 }
 
@@ -56,10 +56,10 @@ pub(super) struct Stopped;
 pub(super) struct Reach<'a, P: Possible> {
     pub atoms: Atoms,
     pub rules: &'a [Rule],
-    /// By predicate: whether effects or rules add its atoms.
+    /// True, by predicate, if effects or rules add its atoms.
     pub fluent: &'a [bool],
     pub possible: P,
-    /// By action: its instances, flat.
+    /// Instances by action, flat.
     pub instances: Vec<Vec<u32>>,
     /// Upper bound on atoms and instances together.
     pub limit: usize,
@@ -76,7 +76,7 @@ const TRIED_AT_ONCE: usize = 1 << 14;
 struct Join<'r> {
     rule: &'r Rule,
     domains: &'r [Arc<[ObjectId]>],
-    /// By slot, sorted objects as bits, where the domain is not everything.
+    /// Objects that fit a slot, as bits, by slot, where they are not all.
     fits: &'r [Option<Vec<u64>>],
     binding: Vec<u32>,
     trigger: u32,

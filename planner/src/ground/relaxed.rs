@@ -5,11 +5,11 @@ use crate::grouped::Grouped;
 use super::instantiate::{Clauses, Deed, GroundEffect, RawCall};
 use super::raw::{RawAction, RawTask};
 
-/// What the fixpoint found.
+/// Result of the fixpoint.
 pub(super) struct Reached {
-    /// By atom.
+    /// True, by atom, if reachable.
     pub atoms: Vec<bool>,
-    /// By atom: something may take it away, or it is not there at first.
+    /// True, by atom, if something may delete it, or it is initially false.
     pub absent: Vec<bool>,
 }
 
@@ -23,7 +23,7 @@ struct Fixpoint {
     unary: Vec<Unary>,
     /// Atoms (those beyond the task's stand for "the action was started") with operators that wait for them.
     waits: Vec<(u32, u32)>,
-    /// What the operator at hand waits for.
+    /// Open conditions of the operator at hand.
     wanted: Vec<u32>,
 }
 

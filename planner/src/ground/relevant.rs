@@ -7,13 +7,13 @@ use super::raw::{RawAction, RawTask};
 use super::task::{Change, Comparison, Expression};
 use crate::model::agreement::contradictions;
 
-/// What matters.
+/// Relevant atoms and numbers.
 pub(super) struct Relevant {
-    /// By atom: asked for.
+    /// True, by atom, if its truth is asked for.
     pub wanted: Vec<bool>,
-    /// By atom: its absence is asked for.
+    /// True, by atom, if its absence is asked for.
     pub unwanted: Vec<bool>,
-    /// By numeric fluent.
+    /// True, by numeric fluent, if relevant.
     pub numerics: Vec<bool>,
 }
 
@@ -21,9 +21,9 @@ struct Work<'a> {
     relevant: Relevant,
     comparisons: &'a [Comparison],
     calls: &'a [RawCall],
-    /// By numeric fluent: without a value at first.
+    /// True, by numeric fluent, if initially undefined.
     undefined: &'a [bool],
-    /// By atom of an object function: the function with its arguments.
+    /// Function with its arguments, by atom of an object function.
     valued: &'a FxHashMap<u32, u32>,
     changed: bool,
 }
@@ -45,8 +45,8 @@ pub(super) fn reads(expression: &Expression, fluent: &mut dyn FnMut(u32), call: 
     }
 }
 
-/// Whether a change may find something undefined: then the action cannot be taken, whoever asks for the number.
-/// `undefined` says of the numeric fluents which have no value at first.
+/// True if a change may read something undefined: the action is then inapplicable, whoever needs
+/// the number. `undefined` marks the numeric fluents without an initial value.
 pub(super) fn is_risky(change: Change, fluent: u32, amount: &Expression, undefined: &[bool]) -> bool {
     let mut risky = change == Change::ScaleDown || change != Change::Assign && undefined[fluent as usize];
     reads(amount, &mut |id| risky |= undefined[id as usize], &mut |_| {});
@@ -58,7 +58,7 @@ fn known(expression: &Expression) -> f64 {
     if let Expression::Constant(value) = expression { *value } else { f64::NAN }
 }
 
-/// Whether an expression may be undefined although all that it reads is defined.
+/// True if an expression may be undefined although all that it reads is defined.
 fn may_fail(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => !value.is_finite(),
@@ -127,7 +127,7 @@ impl Work<'_> {
         }
     }
 
-    /// Whether it may matter that this does not happen.
+    /// True if the absence of this effect may matter.
     fn harms(&self, deed: &Deed) -> bool {
         match deed {
             Deed::Add(a) => self.relevant.unwanted[*a as usize],
@@ -189,7 +189,7 @@ impl Work<'_> {
         }
     }
 
-    /// Whether one object would have to have two values for both to happen.
+    /// True if both effects would give one object two values.
     fn exclude(&self, one: &GroundEffect, other: &GroundEffect) -> bool {
         let (Some(one), Some(other)) = (&one.when, &other.when) else { return false };
         let has = |literal: u32| if literal & 1 == 0 { self.valued.get(&(literal >> 1)) } else { None };

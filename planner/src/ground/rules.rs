@@ -31,15 +31,15 @@ pub(super) struct Alternative {
 pub(super) struct Rules {
     pub rules: Vec<Rule>,
     pub alternatives: Vec<Alternative>,
-    /// By action: an instance may be found more than once.
+    /// True, by action, if an instance may be found more than once.
     pub repeats: Vec<bool>,
-    /// By predicate, the ones that stand for "the action was applied" included.
+    /// True, by predicate, if it changes; "the action was applied" predicates included.
     pub fluent: Vec<bool>,
-    /// By predicate: whether rules define it.
+    /// True, by predicate, if rules define it.
     derived: Vec<bool>,
 }
 
-/// Which predicates change, before any "applied" predicate is added.
+/// Predicates that change, before any "applied" predicate is added.
 pub(super) fn fluent_predicates(task: &Task, normal: &Normal) -> Vec<bool> {
     let mut fluent = vec![false; normal.predicate_count];
     for action in &normal.actions {
@@ -287,8 +287,9 @@ impl Rules {
         }
     }
 
-    /// What must hold for the action to start, and what may still be brought about while it runs. A condition over
-    /// all must hold at the start already unless the start itself, or one that comes with it, brings it about.
+    /// Splits a durative action's conditions: those needed at the start, and those that may be
+    /// achieved while it runs. A condition over all must hold at the start unless the start itself,
+    /// or a simultaneous one, achieves it.
     fn split(&self, action: &Action_, given: &Given) -> (Vec<Formula>, Vec<Formula>) {
         let mut start = vec![action.condition.start.clone()];
         let mut later = Vec::new();
@@ -304,7 +305,7 @@ impl Rules {
     }
 }
 
-/// What starts bring about.
+/// Effects of action starts.
 #[derive(Default)]
 struct Given {
     predicates: FxHashSet<u32>,

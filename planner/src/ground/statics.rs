@@ -1,4 +1,4 @@
-//! What no action changes: evaluated away while grounding.
+//! Static predicates and functions: evaluated away while grounding.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -12,12 +12,12 @@ use super::atoms::{Atoms, NONE};
 use super::normal::{Formula, Named, Number, Pattern};
 use super::reach::Possible;
 
-/// What does not change in any state.
+/// Static predicates and functions.
 pub(super) struct Statics<'a> {
     pub task: &'a Task,
-    /// By predicate (object functions after them): whether its atoms change.
+    /// True, by predicate (object functions after them), if its atoms change.
     pub fluent: Vec<bool>,
-    /// By function: whether some effect writes its numbers.
+    /// True, by function, if some effect writes its numbers.
     pub written: Vec<bool>,
     /// The initial numbers.
     pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
@@ -49,7 +49,7 @@ impl<'a> Tries<'a> {
         !self.stopped.get()
     }
 
-    /// Whether it was asked to stop: then what was made since is not whole.
+    /// True after a request to stop: results since then are incomplete.
     pub(super) fn are_stopped(&self) -> bool {
         self.stopped.get()
     }
@@ -121,7 +121,7 @@ impl Possible for &Statics<'_> {
     }
 }
 
-/// Whether the test holds for every combination of objects of the slots.
+/// True if the test holds for every combination of objects of the slots.
 pub(super) fn each(
     slots: &[u32],
     binding: &mut Vec<u32>,

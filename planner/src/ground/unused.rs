@@ -25,7 +25,7 @@ pub(super) fn leave_out_what_nothing_uses(task: &Task, actions: &mut [Action_]) 
     }
 }
 
-/// By slot, whether something mentions it.
+/// True, by slot, if something mentions it.
 fn used(action: &Action_) -> Vec<bool> {
     let mut used = vec![false; action.domains.len()];
     let mut note = |term: &Term| {
@@ -59,8 +59,8 @@ fn used(action: &Action_) -> Vec<bool> {
     used
 }
 
-/// Whether of runs that overlap the one that ends first is enough: all that an action does is to bring about at its end what
-/// nobody takes away.
+/// True if, of overlapping instances, the one that ends first suffices: the action's only effects
+/// are additions at its end that nobody deletes.
 fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let lasts = |effect: &Effect_| match &effect.change {
         Change_::Add(added) => {
@@ -83,8 +83,8 @@ fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
         && action.end_effects.iter().all(|effect| always(effect) && lasts(effect))
 }
 
-/// Whether an action goes on alone: it asks for something and takes it at its start, and only actions that do the same give it back,
-/// at their end.
+/// True if instances of an action exclude each other: it needs and deletes an atom at its start,
+/// and only actions that do the same restore it, at their end.
 fn alone(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let mut taken = action.start_effects.iter().filter_map(|effect| match &effect.change {
         Change_::Delete(pattern) => Some(pattern),
@@ -112,7 +112,7 @@ fn alone(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     })
 }
 
-/// Whether an action asks for an atom at its start, and takes it away, whatever else holds.
+/// True if an action needs an atom at its start and deletes it unconditionally.
 fn takes(action: &Action_, pattern: &Pattern) -> bool {
     let same = |other: &Pattern| other.predicate == pattern.predicate && other.terms == pattern.terms;
     let bound = |term: &Term| !matches!(term, Term::Slot(slot) if *slot as usize >= action.arity);

@@ -6,27 +6,27 @@ use super::task::{Conjunction, Effect, Fact, Outcome, Variable, When};
 /// An atom that no variable carries.
 const NOWHERE: Fact = Fact { variable: u32::MAX, value: 0 };
 
-/// Where each atom went.
+/// Encoding of atoms in variables.
 pub(super) struct Encoding {
-    /// By atom: the fact that says it holds; `NOWHERE` for atoms that never change or do not matter.
+    /// Fact that states an atom, by atom; `NOWHERE` for atoms that never change or do not matter.
     facts: Vec<Fact>,
-    /// By atom: the fact that says it does not hold, where one fact says so.
+    /// Fact that states an atom's absence, by atom, if a single fact does.
     absent: Vec<Option<Fact>>,
-    /// By atom: a two-valued variable of its own besides the one that it shares.
+    /// Extra two-valued variable of an atom, by atom, besides the one that it shares.
     doubles: Vec<Option<u32>>,
-    /// By variable: whether one of its atoms has a double.
+    /// True, by variable, if one of its atoms has an extra variable.
     doubled: Vec<bool>,
-    /// By variable: the value for "none of those".
+    /// Value for "none of those" by variable.
     none: Vec<Option<u32>>,
-    /// By atom: holds in every reachable state.
+    /// True, by atom, if it holds in every reachable state.
     always: Vec<bool>,
-    /// By variable: its atoms, by value.
+    /// Atoms of a variable by value, by variable.
     pub atoms: Vec<Vec<u32>>,
-    /// So many first variables are object functions.
+    /// Number of object functions, which are the first variables.
     objects: usize,
 }
 
-/// What decides about the grouping.
+/// Inputs of the choice of groups.
 pub(super) struct Choice<'a> {
     /// Atoms that get a variable.
     pub carried: &'a [bool],
@@ -283,7 +283,7 @@ impl Encoding {
     }
 }
 
-/// By variable: whether "none of those" is needed at first, or the variable has one atom only.
+/// True, by variable, if "none of those" is initially needed, or the variable has one atom only.
 pub(super) fn used_none(variables: &[Variable], initial: &[u32]) -> Vec<bool> {
     variables.iter().zip(initial).map(|(v, &i)| v.values.len() <= 2 || i + 1 == v.domain_size()).collect()
 }

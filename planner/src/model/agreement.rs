@@ -21,7 +21,8 @@ impl Assignment {
     }
 }
 
-/// Whether two changes of one number, each with its amount, have a result together; of amounts that are not known (NaN), no.
+/// True if two changes of one number, each with its amount, have a joint result; false for unknown
+/// amounts (NaN).
 fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f64)) -> bool {
     let adds = |change: Assignment| matches!(change, Assignment::Increase | Assignment::Decrease);
     let scales = |change: Assignment| matches!(change, Assignment::ScaleUp | Assignment::ScaleDown);

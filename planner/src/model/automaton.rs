@@ -22,10 +22,10 @@ use Literal::{First, Flag, Second};
 /// Conjunctions of literals; one of them is enough.
 pub(crate) type Cases = &'static [&'static [Literal]];
 
-/// What an operator asks.
+/// Automaton of a trajectory constraint (PDDL3).
 #[derive(Debug)]
 pub(crate) struct Automaton {
-    /// How many flags it has, all of them down at first.
+    /// Number of flags, all of them initially down.
     pub flags: usize,
     /// States that break it, whatever comes later.
     pub broken: Cases,
@@ -68,7 +68,7 @@ static SOMETIME_BEFORE: Automaton = Automaton {
 };
 
 impl Automaton {
-    /// That of an operator; `None` for one that asks for times.
+    /// Automaton of an operator; `None` for one that asks for times.
     pub(crate) fn of(operator: Modal) -> Option<&'static Automaton> {
         match operator {
             Modal::AtEnd => Some(&AT_END),
@@ -81,7 +81,7 @@ impl Automaton {
         }
     }
 
-    /// Whether it is content with a plan, given the truths of both conditions state by state.
+    /// True if it accepts a plan, given the truths of both conditions state by state.
     pub(crate) fn accepts(&self, truths: impl IntoIterator<Item = (bool, bool)>) -> bool {
         let mut flags = [false; 2];
         let mut open = true;

@@ -1,5 +1,5 @@
-//! What holds between two happenings, while numbers change steadily: PDDL 2.1 (Fox and Long 2003), section 8.3, asks for
-//! conditions over all in the open interval between them, so that what holds at both ends need not hold on the way.
+//! Conditions over open intervals with linearly changing numbers: PDDL 2.1 (Fox and Long 2003),
+//! section 8.3; truth at both ends does not imply truth in between.
 
 use super::relation::Relation;
 
@@ -25,7 +25,7 @@ pub fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64
     parts
 }
 
-/// Where a difference is nothing or turns back, inside the interval.
+/// Zeros and turning points of a difference inside the interval.
 fn turns([first, middle, last]: [f64; 3]) -> Vec<f64> {
     // The parabola through three points: a·x² + b·x + first.
     let a = 2.0 * (first - 2.0 * middle + last);

@@ -1,5 +1,5 @@
-//! What planner, validator and monitor share: numbers and how they compare, walking over what is said, and what is asked of
-//! the states on the way.
+//! Definitions that planner, validator and monitor share: comparisons of numbers, walks over
+//! expressions, trajectory constraints.
 
 #[doc(hidden)]
 pub mod agreement;

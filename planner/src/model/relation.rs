@@ -1,4 +1,4 @@
-//! How numbers compare, everywhere: two that differ by no more than rounding explains are equal.
+//! Comparison of numbers, everywhere: numbers that differ by no more than rounding are equal.
 
 use crate::task::Comparison;
 
@@ -7,7 +7,7 @@ const TOLERANCE: f64 = 1e-7;
 /// So are large ones that differ by no more than this part of the larger.
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 
-/// How two numbers compare.
+/// Relation of two numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Relation {
     /// `<`
@@ -37,12 +37,12 @@ impl Relation {
         }
     }
 
-    /// Whether everything on one side of a bound will do.
+    /// True if all numbers on one side of a bound fulfil it.
     pub fn is_bound(self) -> bool {
         !matches!(self, Relation::Equal | Relation::Unequal)
     }
 
-    /// Whether two numbers stand in this relation; never if one is undefined (NaN).
+    /// True if two numbers stand in this relation; false if one is undefined (NaN).
     ///
     /// Of `<`, `=` and `>` exactly one holds of any two numbers.
     pub fn holds(self, left: f64, right: f64) -> bool {

@@ -10,7 +10,7 @@ pub(crate) enum Part<'t> {
     Call(&'t Call),
     /// The value of a function, read or changed.
     Fluent(&'t Fluent),
-    /// What an effect changes.
+    /// Change by an effect.
     Change(&'t Change),
 }
 

@@ -16,7 +16,7 @@ use super::store::{NO_STATE, Store};
 const SMALLEST_WINDOW: usize = 4;
 /// States evaluated for a window in the first round.
 const FIRST_EVALUATIONS: u32 = 12;
-/// How much the estimate of a state may overshoot before it is left out.
+/// Overestimate of a state's distance, in per cent, above which it is left out.
 const TRUST_PERCENT: u64 = 80;
 
 /// The work of improving one plan after another.
@@ -24,13 +24,13 @@ pub struct Improve<'a> {
     task: &'a Compiled,
     successors: &'a Successors,
     stop: &'a (dyn Fn() -> bool + Sync),
-    /// By variable: operators that write it.
+    /// Operators that write a variable, by variable.
     writers: Lists<u32>,
-    /// By variable: written in the window at hand.
+    /// True, by variable, if written in the window at hand.
     touched: Vec<bool>,
     lookahead: Lookahead,
     store: Store,
-    /// By operator: what improvement counts.
+    /// Cost of an operator for improvement, by operator.
     costs: Vec<u32>,
     queue: BinaryHeap<std::cmp::Reverse<(u64, u32, u32, u32)>>,
     state: Vec<u32>,
@@ -73,7 +73,7 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// What improvement counts for a plan.
+    /// Cost of a plan for improvement.
     pub(crate) fn cost(&self, plan: &[u32]) -> u64 {
         plan.iter().map(|&op| u64::from(self.costs[op as usize])).sum()
     }
@@ -235,8 +235,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Whether the rest of a plan still reaches the goal after a window planned again. That is sure without numbers: of
-    /// them, a window's goal says nothing.
+    /// True if the rest of a plan still reaches the goal after a replanned window. That is certain
+    /// without numbers: a window's goal does not mention them.
     fn fits(&mut self, from: &[u32], window: &[u32], rest: &[u32]) -> bool {
         let task = self.task;
         if !task.some_impossible() {
@@ -455,9 +455,10 @@ fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     (after, waits)
 }
 
-/// What the rest of a plan needs at each of its steps.
+/// Needs of the rest of a plan at each of its steps.
 struct Needs {
-    /// By variable: steps at which a value is needed, with the value, or written (`u32::MAX`); rising.
+    /// Steps at which a value of a variable is needed, with the value, or written (`u32::MAX`), by
+    /// variable; rising.
     events: Vec<Vec<(u32, u32)>>,
 }
 

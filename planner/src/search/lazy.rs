@@ -14,23 +14,23 @@ use super::lookahead::Lookahead;
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
-/// How far preferred operators get ahead when a heuristic makes progress.
+/// Priority boost of preferred operators when a heuristic makes progress.
 const BOOST: i64 = 1000;
 
-/// What one search does.
+/// Configuration of one search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strategy {
     /// Greedy where `None`, else weighted A* with this weight.
     pub weight: Option<u32>,
-    /// How the heuristics count operators.
+    /// Operator costs of the heuristics.
     pub counting: Counting,
-    /// Whether to try lookahead states.
+    /// True to try lookahead states.
     pub lookahead: bool,
-    /// Whether the newest of equally good states comes first instead of the oldest.
+    /// True for LIFO tie-breaking among equally good states, false for FIFO.
     pub newest: bool,
-    /// Whether the number of landmarks left orders open lists of its own.
+    /// True to order further open lists by the landmark count.
     pub landmarks: bool,
-    /// Whether operators that bring about landmarks are preferred too.
+    /// True to prefer also operators that achieve landmarks.
     pub towards_landmarks: bool,
     /// Only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
@@ -42,7 +42,7 @@ pub(crate) struct Strategy {
     pub evaluation_limit: u64,
 }
 
-/// How a search ended.
+/// End of a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
     /// A plan.
@@ -90,7 +90,7 @@ pub struct Allowed<'c> {
 }
 
 impl Allowed<'_> {
-    /// Whether a search must end: it was stopped, or nobody waits for it.
+    /// True if a search must end: it was stopped, or nobody waits for it.
     pub(crate) fn has_ended(&self, shared: &Shared<'_>) -> bool {
         self.cancelled.load(Ordering::Relaxed) || (shared.stop)()
     }
@@ -109,7 +109,7 @@ pub(crate) struct Search<'a, 's> {
     /// Relaxed-plan lists, then landmark lists; each: all operators, preferred ones.
     lists: [OpenList; 4],
     best: [u32; 2],
-    /// By state: landmarks accepted so far.
+    /// Accepted landmarks by state.
     status: Status,
     counts: Counts,
     /// Entries made since memory was looked at.
@@ -138,7 +138,7 @@ impl Counts {
         self.work += other.work;
     }
 
-    /// What was added since earlier counts.
+    /// Counts added since earlier ones.
     pub(crate) fn since(self, before: Counts) -> Counts {
         Counts {
             evaluated: self.evaluated - before.evaluated,
@@ -183,7 +183,7 @@ impl<'a, 's> Search<'a, 's> {
         self.relaxed.work + (self.counts.evaluated + self.counts.expanded) * STATE_WORK
     }
 
-    /// What the search took so far.
+    /// Counts of the search so far.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
@@ -256,7 +256,8 @@ impl<'a, 's> Search<'a, 's> {
         self.visit(id)
     }
 
-    /// Whether a known state is to be visited: never expanded, or (weighted A*) reached more cheaply.
+    /// True if a known state is to be visited: never expanded, or (weighted A*) reached more
+    /// cheaply.
     fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
         let reopens = self.strategy.weight.is_some() || self.strategy.bound != u32::MAX;
         if cost < self.store.cost(id) && reopens {
@@ -297,7 +298,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Whether a plan that ends in `self.state` is good enough.
+    /// True if a plan that ends in `self.state` is good enough.
     fn is_better(&self) -> bool {
         let task = self.shared.task;
         let costs = || task.measure.of_last(&task.numbers, &self.state);

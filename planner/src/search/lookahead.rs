@@ -10,7 +10,7 @@ use super::steer::movers;
 pub struct Lookahead {
     /// By fact: operators that bring it about.
     achievers: Lists<u32>,
-    /// By fact: how many operators of the rest (and goals) need it.
+    /// Number of remaining operators (and goals) that need a fact, by fact.
     pub(super) needed: Vec<i32>,
     pub(super) rest: Vec<Relevant>,
     /// Operators of the relaxed plan that are there to move a number.
@@ -19,7 +19,7 @@ pub struct Lookahead {
     pub(super) refills: Vec<Relevant>,
     pub(super) state: Vec<u32>,
     next: Vec<u32>,
-    /// By comparison: what each operator adds to left minus right.
+    /// Operators that change left minus right of a comparison, with the change, by comparison.
     pub(super) movers: Lists<(u32, f64)>,
     /// The operators applied, in order.
     pub plan: Vec<u32>,
@@ -176,7 +176,7 @@ pub(super) fn count(needed: &mut [i32], task: &Compiled, operator: u32, by: i32)
     }
 }
 
-/// Whether an operator takes away a fact that another one needs.
+/// True if an operator deletes a fact that another one needs.
 fn takes_from(task: &Compiled, operator: u32, other: u32) -> bool {
     let effects = task.effects.get(operator as usize).iter().filter(|e| e.from == e.to);
     let mut effects = effects.map(|effect| effect.fact);

@@ -25,7 +25,7 @@ const DEPTH_BITS: u32 = 12;
 const STATE_WORK: u64 = 30;
 const NARROW_STATE_WORK: u64 = 100;
 
-/// What is remembered of a state besides what the store holds.
+/// Data about a state besides the store's.
 #[derive(Clone, Copy)]
 struct Memory {
     /// Index of the relaxed plan that is followed.
@@ -100,7 +100,7 @@ pub struct Search<'a, 's> {
     store: Store,
     status: Status,
     memory: Rows<Memory>,
-    /// By state: which facts of the relaxed plan that is followed have been true on the way.
+    /// Facts of the followed relaxed plan that have been true on the way, by state.
     done: Rows<u64>,
     /// Relaxed plans that are followed: their facts.
     anchors: Vec<Vec<u32>>,
@@ -136,7 +136,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// What the search took so far.
+    /// Counts of the search so far.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
@@ -145,7 +145,7 @@ impl<'a, 's> Search<'a, 's> {
         self.relaxed.work + self.counts.work
     }
 
-    /// Whether the first state may lead to the goal at all.
+    /// True if the first state may lead to the goal.
     fn start(&mut self) -> bool {
         let task = self.shared.task;
         let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
@@ -161,7 +161,7 @@ impl<'a, 's> Search<'a, 's> {
         reachable
     }
 
-    /// How much is left to come: landmarks, or goals.
+    /// Landmark count, or goal count.
     fn left(&self, id: u32, state: &[u32]) -> u32 {
         let (landmarks, task) = (self.shared.landmarks, self.shared.task);
         match self.narrow {
@@ -315,7 +315,7 @@ impl<'a, 's> Search<'a, 's> {
         self.open.push(key, (child, 0));
     }
 
-    /// What is left to come, and how many facts of the relaxed plan have been made true.
+    /// Landmark or goal count, and number of achieved facts of the relaxed plan.
     fn kind(&self, id: u32) -> (u32, u32) {
         let done = self.done.row(id as usize);
         (self.memory[id as usize].left, done.iter().map(|word| word.count_ones()).sum())

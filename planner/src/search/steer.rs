@@ -8,12 +8,13 @@ use crate::heuristics::relaxed::Relevant;
 
 use super::lookahead::{Lookahead, MOST_STEPS, count};
 
-/// How many operators may be made applicable one for another.
+/// Number of operators that may be made applicable one for another.
 const DEPTH: u32 = 4;
-/// How often all conditions of an operator are looked at again.
+/// Number of passes over all conditions of an operator.
 const ROUNDS: usize = 4;
 
-/// By comparison: the operators that add to left minus right, with what they add; NaN where that depends on the state.
+/// Operators that add to left minus right of a comparison, with the amount, by comparison; NaN if
+/// it depends on the state.
 pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
     let numbers = &task.numbers;
     let mut pairs = Vec::new();
@@ -148,12 +149,12 @@ impl Lookahead {
         best.map(|(_, mover)| mover)
     }
 
-    /// What an operator adds to left minus right of a comparison in the state at hand.
+    /// Change of left minus right of a comparison by an operator in the state at hand.
     fn gain(&self, task: &Compiled, operator: u32, comparison: u32) -> f64 {
         task.numbers.gain_in(comparison, &task.numbers.changes[operator as usize], &self.state)
     }
 
-    /// Whether so many applications of an operator turn a condition that holds.
+    /// True if so many applications of an operator falsify a condition that holds.
     fn breaks(&self, task: &Compiled, operator: u32, times: u32, fact: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || !task.holds(fact, &self.state) {

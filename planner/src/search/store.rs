@@ -6,7 +6,7 @@ use crate::memory::{Rows, soon};
 /// No state.
 pub(crate) const NO_STATE: u32 = u32::MAX;
 
-/// Where a variable lies in a packed state.
+/// Position of a variable in a packed state.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     word: u32,
@@ -19,7 +19,7 @@ pub(crate) struct Store {
     places: Vec<Place>,
     /// Words of the packed variables; the numbers follow, one word each.
     packed_words: usize,
-    /// Where the numbers begin in an unpacked state.
+    /// Position of the numbers in an unpacked state.
     numbers: usize,
     packed: Rows<u64>,
     /// Open addressing: state numbers, `NO_STATE` for free.
@@ -28,14 +28,14 @@ pub(crate) struct Store {
     scratch: Vec<u64>,
 }
 
-/// What led to a state.
+/// Parent and operator of a state.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     parent: u32,
     operator: u32,
     /// From the first state, in the search's costs.
     cost: u32,
-    /// Whether the successors were made.
+    /// True if the successors were generated.
     expanded: bool,
 }
 
@@ -165,7 +165,7 @@ impl Store {
         *way = Way { parent, operator, cost, ..*way };
     }
 
-    /// Whether its successors were made.
+    /// True if its successors were generated.
     pub(crate) fn is_expanded(&self, id: u32) -> bool {
         self.ways[id as usize].expanded
     }

@@ -45,7 +45,7 @@ fn single(mut list: Vec<Condition>, many: fn(Vec<Condition>) -> Condition) -> Co
     }
 }
 
-/// Whether it is the empty disjunction.
+/// True for the empty disjunction.
 pub(super) fn is_false(condition: &Condition) -> bool {
     matches!(condition, Condition::Or(parts) if parts.is_empty())
 }
@@ -76,9 +76,9 @@ pub(super) fn each_binding(
     }
 }
 
-/// What never changes.
+/// Constant predicates and functions.
 pub(super) struct Fixed {
-    /// By predicate: whether nothing changes it.
+    /// True, by predicate, if nothing changes it.
     predicates: Vec<bool>,
     facts: FxHashSet<Fact>,
 }

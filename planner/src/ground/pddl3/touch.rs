@@ -1,4 +1,4 @@
-//! Which actions may change the truth of a condition.
+//! Finds the actions that may change the truth of a condition.
 
 use rustc_hash::FxHashSet;
 
@@ -11,7 +11,7 @@ use crate::task::{
 
 use super::conditions::{all, any};
 
-/// What conditions without variables depend on.
+/// Read set of conditions without variables.
 #[derive(Debug, Default)]
 pub(super) struct Mentioned {
     atoms: Vec<Atom>,
@@ -58,7 +58,7 @@ impl Mentioned {
         }
     }
 
-    /// Whether it changes by itself: while actions run, or at given times.
+    /// True if it changes by itself: while actions run, or at given times.
     pub(super) fn drifts(&self, task: &Task) -> bool {
         let mut rates = task.actions.iter().flat_map(|action| &action.continuous);
         let timed = |change: &GroundChange| match change {
@@ -92,7 +92,7 @@ impl Mentioned {
     }
 }
 
-/// Where the arguments that an effect writes may be these; `None` if never.
+/// Unifier of the arguments that an effect writes with the given ones; `None` if there is none.
 fn unified(action: &Action, effect: &Effect, written: &[Term], own: &[Term]) -> Option<Condition> {
     let mut parts = Vec::new();
     for (written, own) in written.iter().zip(own) {

@@ -5,7 +5,7 @@ use crate::pddl::parse::ACTION_PARTS;
 
 /// Letters in a line, where that can be had.
 pub const WIDTH: usize = 120;
-/// By how much a part stands farther in than what it is a part of.
+/// Indentation of a part within its list.
 const STEP: usize = 2;
 /// Blanks before the comments of neighbouring lines.
 const BEFORE_COMMENT: usize = 2;
@@ -45,7 +45,7 @@ struct Line {
 struct Page {
     done: Vec<Line>,
     line: Line,
-    /// Whether a table is printed.
+    /// True while a table is printed.
     in_table: bool,
 }
 
@@ -137,11 +137,11 @@ impl Page {
     }
 }
 
-/// How the parts of a list stand in lines of their own.
+/// Indentation of the parts of a list in lines of their own.
 enum Indent {
     /// A step farther in than the line in which it begins.
     Body,
-    /// So many columns behind what opens it.
+    /// Alignment: number of columns behind the opening.
     Aligned(usize),
 }
 

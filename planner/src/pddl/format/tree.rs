@@ -1,13 +1,13 @@
 //! Lists, words and comments as they stand in a text, with the line breaks before each.
 
-/// What stands in a text.
+/// Node of a text: a word, a comment or a list.
 #[derive(Debug, Clone)]
 pub struct Node<'a> {
     /// Line breaks before it.
     pub breaks: usize,
-    /// Where there are none, blanks before it.
+    /// Number of blank lines before it, if it begins a line; else blanks.
     pub blanks: usize,
-    /// What it is.
+    /// Content.
     pub what: What<'a>,
 }
 
@@ -18,7 +18,7 @@ pub enum What<'a> {
     Word(&'a str),
     /// From its semicolon to the end of the line, and the column at which it begins.
     Comment(&'a str, usize),
-    /// What opens it, what stands in it, what closes it.
+    /// Opening sign, contents and closing sign.
     List(char, Vec<Node<'a>>, char),
 }
 
@@ -31,12 +31,12 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// Whether it is a comment.
+    /// True for comments.
     pub fn is_comment(&self) -> bool {
         matches!(self.what, What::Comment(..))
     }
 
-    /// Whether it is a list.
+    /// True for lists.
     pub fn is_list(&self) -> bool {
         matches!(self.what, What::List(..))
     }
@@ -98,7 +98,7 @@ fn put<'a>(open: &mut [(Gap, char, Vec<Node<'a>>)], Gap { breaks, blanks }: Gap,
     }
 }
 
-/// What stands between two nodes.
+/// Gap between two nodes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Gap {
     breaks: usize,

@@ -34,13 +34,13 @@ pub(super) struct Form {
     always: Lists<Said>,
     /// Over a step and the facts of the moment after it.
     step: Lists<Said>,
-    /// By fact: operators that bring it about.
+    /// Operators that add a fact, by fact.
     pub adders: Lists<u32>,
     /// Operators in the order of their application within a step.
     pub order: Vec<u32>,
     /// The goals' facts, those first that others would cut off.
     pub goals: Vec<u32>,
-    /// By fact, and by operator: the first moment at which it can hold, or be applied; `u32::MAX` for never.
+    /// First moment at which a fact can hold, or an operator can be applied; `u32::MAX` for never.
     first_fact: Vec<u32>,
     first_operator: Vec<u32>,
 }
@@ -120,7 +120,7 @@ impl Form {
         }
     }
 
-    /// What operators need and bring about, and that nothing comes about by itself.
+    /// Clauses for preconditions and effects of operators, and the frame axioms.
     fn change(&mut self, task: &Compiled) {
         for operator in 0..task.operators() as u32 {
             let not = self.does(operator).not();

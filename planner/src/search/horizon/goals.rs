@@ -20,7 +20,7 @@ pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<Fact>], adders: &Lis
     arranged(&ways).into_iter().map(|goal| goals[goal as usize]).collect()
 }
 
-/// By goal and fact: whether they exclude each other.
+/// True, by goal and fact, if they exclude each other.
 fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<Vec<bool>> {
     let with = |&goal: &u32| {
         let mut excluded = vec![false; task.facts];

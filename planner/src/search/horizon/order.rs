@@ -2,7 +2,7 @@
 
 use crate::classical::compiled::Compiled;
 
-/// What an operator does to a fact at the time when it is applied together with others.
+/// Use of a fact by an operator that is applied in parallel with others.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Use {
     pub fact: u32,
@@ -11,7 +11,7 @@ pub(super) struct Use {
     pub takes: bool,
 }
 
-/// By operator: the facts that it needs, and those that it takes away from others.
+/// Facts that an operator needs, and those that it deletes for others, by operator.
 pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
     let used = |operator: usize| {
         let needs = task.preconditions.get(operator);

@@ -1,5 +1,6 @@
-//! What to try next: an operator that supports the earliest open subgoal (Rintanen 2012, "Planning as satisfiability:
-//! heuristics"). Once all are supported, what holds stays, and nothing else is done.
+//! Decision heuristic: an operator that supports the earliest open subgoal (Rintanen 2012,
+//! "Planning as satisfiability: heuristics"). Once all are supported, facts persist and nothing
+//! else is done.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -10,10 +11,11 @@ use crate::clauses::solver::{Decide, Solver};
 
 use super::form::Form;
 
-/// What was found to be supported since the last conflict: decisions add to what is set, so that it need not be looked at again.
+/// Subgoals supported since the last conflict: decisions only add values, so they need no second
+/// check.
 #[derive(Default)]
 pub(super) struct Agenda {
-    /// By moment and fact, whether it is or was a subgoal.
+    /// True, by moment and fact, if it is or was a subgoal.
     seen: Vec<bool>,
     /// Subgoals to be looked at, by moment and rank.
     subgoals: BinaryHeap<Reverse<(usize, u32, u32)>>,

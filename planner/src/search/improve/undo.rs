@@ -1,4 +1,5 @@
-//! What steps undo of one another in plans that count: steps that do nothing but move numbers by constants.
+//! Cancels steps that undo one another in plans that count: steps that only change numbers by
+//! constants.
 //!
 //! Other steps are moved to where they can first be taken, so that a number need not come back for them. Then steps
 //! that move the same numbers in opposite directions go together, as many of each as cancel out, where the rest of the
@@ -9,7 +10,7 @@ use rustc_hash::FxHashMap;
 use super::Improve;
 use crate::classical::compiled::Compiled;
 
-/// So many steps of one kind cancel others at most.
+/// Greatest number of steps of one kind that are cancelled together.
 const MOST_TOGETHER: u32 = 6;
 /// Words of all the states along a plan, at most.
 const MOST_WORDS: usize = 1 << 24;
@@ -66,7 +67,7 @@ fn shift(task: &Compiled, operator: u32) -> Option<(Vec<u32>, Vec<f64>)> {
     Some(gains.into_iter().unzip())
 }
 
-/// How many of one and of the other come to nothing.
+/// Numbers of both steps whose changes cancel.
 fn balance(one: &[f64], other: &[f64]) -> Option<(usize, usize)> {
     let counts = (1..=MOST_TOGETHER).flat_map(|own| (1..=MOST_TOGETHER).map(move |count| (own, count)));
     let cancels = |&(own, count): &(u32, u32)| {
@@ -105,7 +106,7 @@ impl Improve<'_> {
         self.work += plan.len() as u64 * 2;
     }
 
-    /// Whether steps can be taken from a state and reach the goal.
+    /// True if steps can be applied from a state and reach the goal.
     fn reaches(&mut self, from: &[u32], steps: impl Iterator<Item = u32>) -> bool {
         let task = self.task;
         self.state.clear();

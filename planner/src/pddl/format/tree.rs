@@ -5,7 +5,7 @@
 pub struct Node<'a> {
     /// Line breaks before it.
     pub breaks: usize,
-    /// Number of blank lines before it, if it begins a line; else blanks.
+    /// Blanks before it, if it does not begin a line.
     pub blanks: usize,
     /// Content.
     pub what: What<'a>,

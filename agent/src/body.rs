@@ -1,4 +1,4 @@
-//! Which body pursues a goal: the simulated one in a scene, a recording, or a program.
+//! Choice of the body that pursues a goal: simulator, recording or program.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ pub mod tape;
 
 /// A body that was opened.
 pub struct Body {
-    /// What the agent sees of it.
+    /// Robot, as the agent sees it.
     pub robot: Arc<dyn Robot>,
     /// Name and text of the scene that it stands in, if it was read from one.
     pub scene: Option<(String, String)>,
@@ -29,7 +29,7 @@ enum Told {
     Program(program::TruthFile),
 }
 
-/// Where something is in truth.
+/// True place of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruePlace {
     /// The middle of its body, in the map, metres.
@@ -51,7 +51,8 @@ impl Body {
         Self { truth: Some(Told::Simulator(Arc::clone(&robot))), ..Self::new(robot) }
     }
 
-    /// How everything stands now, for reports; none of a body that is no simulation, or does not say.
+    /// True state of the scene now, for reports; none for a body that is no simulation or does not
+    /// state it.
     ///
     /// # Errors
     /// If what a program wrote of it cannot be read.
@@ -63,8 +64,8 @@ impl Body {
         }
     }
 
-    /// Where an object of that name or kind stands in truth, the one nearest to where it is believed to stand if there are
-    /// several. None without a simulation, or if it is not there.
+    /// True place of an object of that name or kind, the one nearest to the believed place if there
+    /// are several. None without a simulation, or if it is absent.
     pub fn true_place(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<TruePlace> {
         let truth = self.truth().ok().flatten()?;
         let distance = |at: &[f64; 3]| {

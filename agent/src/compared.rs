@@ -1,17 +1,17 @@
-//! What a condition in PDDL asks of numbers.
+//! Numeric comparison in a PDDL condition.
 
 /// A number that is compared: `(>= (presence a-ring ?s) 0.8)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared<'c> {
     /// Its word.
     pub word: &'c str,
-    /// What it is of; variables begin with `?`.
+    /// Function and its arguments; variables begin with `?`.
     pub of: Vec<&'c str>,
-    /// What it is held against, if that is written as a number.
+    /// Right side, if it is a number.
     pub wanted: Option<f64>,
-    /// Whether less of it is wanted, not more.
+    /// True if less is wanted, not more.
     pub less: bool,
-    /// Whether it is wanted of all that its variables may stand for, not of one.
+    /// True if it must hold for all values of its variables, not for one.
     pub of_all: bool,
 }
 
@@ -29,7 +29,7 @@ pub fn all(condition: &str) -> impl Iterator<Item = Compared<'_>> {
     })
 }
 
-/// What a goal wants of a number, if it compares it so.
+/// Value that a goal demands of a number, if it compares the number with one.
 pub fn wanted(goal: &str, number: &str) -> Option<f64> {
     all(goal).filter(|compared| compared.fits(number)).find_map(|compared| compared.wanted)
 }
@@ -40,7 +40,7 @@ pub fn words(number: &str) -> impl Iterator<Item = &str> {
 }
 
 impl Compared<'_> {
-    /// Whether it is about a number; what is said of a variable is said of any.
+    /// True if it is about the given number; a comparison of a variable fits any object.
     pub fn fits(&self, number: &str) -> bool {
         let mut own = words(number);
         let is_word = own.next() == Some(self.word);

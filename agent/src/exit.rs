@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use descry_domains::world::WorldError;
 
-/// How a command ended.
+/// Exit of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Achieved, plan found, valid, no finding.
@@ -30,7 +30,7 @@ pub enum Exit {
 }
 
 impl Exit {
-    /// How a command ends that a signal stopped.
+    /// Exit of a command that a signal stopped.
     pub fn of_signal(signal: u8) -> Self {
         match signal {
             1 => Self::HungUp,
@@ -46,10 +46,10 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Why a command could not do what it was asked, ready to be shown.
+/// Error of a command, ready to be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
-    /// What was given cannot be used; the text points at the place and offers a mend.
+    /// Unusable input; the text points at the place and offers a mend.
     #[error("{0}")]
     BadInput(String),
     /// The robot or a store failed for good.
@@ -58,7 +58,7 @@ pub enum CommandError {
     /// Somebody stopped it; the text says how to go on.
     #[error("{said}")]
     Stopped {
-        /// What is kept, and how to go on.
+        /// Kept results, and the way to go on.
         said: String,
         /// The signal that stopped it.
         signal: u8,

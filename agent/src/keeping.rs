@@ -1,4 +1,4 @@
-//! Where and how the record of a run is kept.
+//! Storage of a run's record.
 
 #[doc(hidden)]
 pub mod remote;
@@ -11,11 +11,11 @@ use serde::{Deserialize, Serialize};
 use crate::exit::CommandError;
 pub use remote::{Address, is_address};
 
-/// Where and how a record is kept: part of what a run was started with.
+/// Storage options of a record: part of the settings of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Keeping {
-    /// Where the record is kept, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: in the run's folder.
+    /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: the run's folder.
     pub memory: Option<String>,
     /// When something counts as recorded; none: when it is on the disk.
     pub durability: Option<Kept>,
@@ -53,7 +53,7 @@ impl Keeping {
         }
     }
 
-    /// Whether anything that was recorded may be gone.
+    /// True if recorded data may have been pruned.
     pub fn prunes(&self) -> bool {
         self.options().retention != Retention::default()
     }

@@ -16,9 +16,9 @@ use crate::report::Report;
 use crate::run::{self, Beginning, Task, Watcher, programs};
 use descry_domains::abilities::searching::policies;
 
-/// Of these kinds, what comes about again must be what was recorded, byte for byte.
+/// Kinds of documents that a replay must reproduce byte for byte.
 const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
-/// What a report says of this run alone, or knows from a simulator.
+/// Keys of a report that differ from run to run, or come from a simulator.
 const OWN: [&str; 7] = ["wall_s", "planning_s", "geometry_s", "run", "true_position_m", "true_on", "true_in"];
 
 /// The outcome of a replay.
@@ -26,21 +26,21 @@ const OWN: [&str; 7] = ["wall_s", "planning_s", "geometry_s", "run", "true_posit
 pub struct Replayed {
     /// The run's folder.
     pub run: String,
-    /// What is not as it was written. Of such a record nothing is played.
+    /// Damage of the record. A damaged record is not played.
     pub damage: Vec<Fault>,
-    /// Whether everything that was recorded came about again.
+    /// True if everything recorded was reproduced.
     pub same: bool,
     /// Documents that are the same, by kind.
     pub compared: Vec<(&'static str, usize)>,
     /// The verdict that it came to, if it came to one.
     pub verdict: Option<Value>,
-    /// Where the run was cut off.
+    /// Place where the run was cut off.
     pub cut_off: Option<String>,
-    /// What is not the same, one line each.
+    /// Differences, one line each.
     pub differences: Vec<String>,
 }
 
-/// How a run is to be lived through again.
+/// Options of a replay.
 #[derive(Debug, Clone, Copy)]
 pub struct Replay<'a> {
     /// The run's folder.
@@ -185,7 +185,7 @@ fn compare_reports(recorded: Option<&Report>, found: Option<&Report>) -> Vec<Str
         .collect()
 }
 
-/// Where the replay records: the folder that was asked for, or one that goes with the command.
+/// Folder of the replay's own record: the one that was asked for, or a temporary one.
 struct Scratch {
     folder: PathBuf,
     goes: bool,

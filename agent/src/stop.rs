@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use descry_robots::CancellationToken;
 
-/// Whether somebody wants a run to stop, and by which signal. Clones are of one and the same.
+/// Request to stop a run, with its signal. Clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
     token: CancellationToken,
@@ -19,7 +19,7 @@ impl Stop {
         self.token.cancel();
     }
 
-    /// Whether it was asked for.
+    /// True after the request.
     pub fn is_asked(&self) -> bool {
         self.token.is_cancelled()
     }
@@ -32,7 +32,7 @@ impl Stop {
         }
     }
 
-    /// What skills and bodies wait on.
+    /// Token on which skills and bodies wait.
     pub fn token(&self) -> &CancellationToken {
         &self.token
     }

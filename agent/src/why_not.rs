@@ -1,5 +1,5 @@
-//! Why an action is not in the plan: what keeps it from being taken, whether any plan can have
-//! it, and what a plan with it takes.
+//! Contrastive explanation for an action that is not in the plan: missing conditions, existence and
+//! cost of a plan with it.
 
 use descry_planner::task::{Atom, Change, Condition, Effect, Predicate, PredicateId, Task, Term, Timed};
 use descry_planner::{Attachments, Options, Outcome, Plan, PlanError, Semantics, Source, Span, Step};
@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use crate::exit::CommandError;
 
-/// What is said of an action.
+/// Answer about an action.
 #[derive(Debug, Serialize)]
 pub struct Answer {
     /// The action, as it is written in plans.
     pub action: String,
-    /// Whether the plan that was found has it.
+    /// True if the plan that was found has it.
     pub in_plan: bool,
     /// The parts of its condition that do not hold at first.
     pub unmet: Vec<String>,
@@ -22,7 +22,7 @@ pub struct Answer {
     pub with_it: Tried,
 }
 
-/// How looking for a plan ended.
+/// Result of looking for a plan with it.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tried {
@@ -152,7 +152,7 @@ fn call(step: &Step) -> String {
     format!("({}{arguments})", step.action)
 }
 
-/// How much a plan is, in words.
+/// Size of a plan, in words.
 fn size(plan: &Plan) -> String {
     let cost = plan.cost.map_or(String::new(), |c| format!(", cost {c}"));
     let makespan = plan.makespan_s().map_or(String::new(), |s| format!(", makespan {s:.3}"));

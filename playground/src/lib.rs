@@ -27,7 +27,9 @@ pub fn planned(domain: &str, problem: &str, stop: &(dyn Fn() -> bool + Sync)) ->
     match plan(&task, &Attachments::new(), &options, stop, &mut |_| {}) {
         Ok(Outcome::Unsolvable { why, .. }) => json!({ "status": "unsolvable", "why": why.to_string() }),
         Ok(outcome) => match outcome.plan() {
-            Some(plan) => json!({ "status": "solved", "steps": steps(plan), "text": plan.to_string(), "cost": plan.cost }),
+            Some(plan) => {
+                json!({ "status": "solved", "steps": steps(plan), "text": plan.to_string(), "cost": plan.cost })
+            }
             None => json!({ "status": "out_of_time" }),
         },
         Err(error) => json!({ "status": "failed", "why": error.to_string() }),

@@ -27,7 +27,7 @@ impl TruthFile {
         Self(std::env::temp_dir().join(format!("descry-truth-{}-{number}.json", std::process::id())))
     }
 
-    /// Where it is, once it has been written.
+    /// Path of the file, once it has been written.
     pub fn path(&self) -> &Path {
         &self.0
     }

@@ -66,7 +66,7 @@ pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> 
     Ok(RecordedRobot::of(known, 0, Box::new(Clouds { record, documents })))
 }
 
-/// Whether a folder is that of a run, or holds a record.
+/// True if a folder is that of a run, or holds a record.
 pub fn is_record(folder: &Path) -> bool {
     crate::run::header(folder).is_ok()
         || [folder.to_owned(), folder.join("record")].iter().any(|f| f.join("segments").is_dir())
@@ -82,7 +82,7 @@ fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
     name
 }
 
-/// What the record says of the body that made it, or what is usual.
+/// Description of the body that made a record, or the usual one if the record has none.
 fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, place: &str) -> Description {
     let usual = Settings::default();
     let unknown = || Description {

@@ -20,9 +20,9 @@ const MAP: &str = "map";
 
 /// Keeps a body's answers in a record, and has the frames of those that were kept.
 pub struct RecordTape {
-    /// Where answers are kept.
+    /// Record that new answers go to.
     pub into: Arc<Record>,
-    /// Where the frames of earlier answers are.
+    /// Record that holds the frames of earlier answers.
     pub from: Arc<Record>,
 }
 
@@ -51,7 +51,7 @@ impl Tape for RecordTape {
     }
 }
 
-/// What a recorded cloud's camera measured, colours of its time included.
+/// Pixels of a recorded cloud's camera, with the colours of its time.
 ///
 /// # Errors
 /// Why it cannot be read.
@@ -101,7 +101,7 @@ pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
 
-/// What the body of a record is; none if the record does not say.
+/// Body of a record; none if the record does not state it.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be read.

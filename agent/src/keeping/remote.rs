@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::exit::CommandError;
 
-/// How the address of a store in MongoDB begins.
+/// Scheme of addresses in MongoDB.
 const SCHEME: &str = "mongodb://";
 /// The environment variable that holds name and password for a server, as `NAME:PASSWORD`.
 const LOGIN: &str = "DESCRY_MONGODB_LOGIN";
@@ -52,7 +52,7 @@ impl std::fmt::Display for Address {
     }
 }
 
-/// Whether a place is the address of a store, and no folder.
+/// True for an address of a store, false for a folder.
 pub fn is_address(place: &Path) -> bool {
     place.to_str().is_some_and(|text| text.starts_with("mongodb"))
 }

@@ -1,4 +1,4 @@
-//! What a run began with, as the first document of its record: all that it takes to live through it again.
+//! Beginning of a run, as the first document of its record: all that a replay needs.
 
 use std::path::PathBuf;
 
@@ -10,17 +10,17 @@ use serde::{Deserialize, Serialize};
 use super::Header;
 use crate::exit::CommandError;
 
-/// What a run began with.
+/// Beginning of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Beginning {
-    /// What it was started with.
+    /// Settings of the run.
     #[serde(flatten)]
     pub header: Header,
     /// The texts of the domain.
     pub files: Files,
-    /// Where the domain's programs are run.
+    /// Working folder of the domain's programs.
     pub folder: Option<PathBuf>,
-    /// What was remembered of earlier runs.
+    /// Memory of earlier runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub past: Option<Past>,
     /// Name and text of the scene, if the body stood in one that has a text.
@@ -31,7 +31,7 @@ pub struct Beginning {
 const RUN: &str = "run";
 
 impl Beginning {
-    /// What a run with this domain begins with.
+    /// Beginning of a run with this domain.
     pub fn new(header: Header, domain: &Domain, scene: Option<(String, String)>) -> Self {
         Beginning { header, files: domain.files.clone(), folder: domain.folder.clone(), past: None, scene }
     }
@@ -46,7 +46,7 @@ impl Beginning {
         record.put(draft).map(|_| ()).map_err(CommandError::broken)
     }
 
-    /// What the run of a record began with; none if the record does not say.
+    /// Beginning of a record's run; none if the record has none.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be read.

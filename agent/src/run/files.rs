@@ -1,4 +1,4 @@
-//! What stands beside the record of a run: with what it was started, and how it ended.
+//! Files beside the record of a run: its settings, and its report.
 
 use std::path::Path;
 
@@ -12,16 +12,16 @@ use crate::exit::CommandError;
 use crate::keeping::{self, RECORD};
 use crate::report::Report;
 
-/// What a run was started with, in its folder.
+/// Settings of a run, in its folder.
 pub(super) const HEADER: &str = "run.json";
-/// How it ended.
+/// Report of a run, in its folder.
 const REPORT: &str = "report.json";
 /// The kind under which it is recorded how a run ended.
 const REPORTED: &str = "report";
 /// Under this key a file says the checksum of all else in it.
 const CHECKSUM: &str = "crc32";
 
-/// What a run was started with: what its folder says, or its record where that is missing or damaged.
+/// Settings of a run from its folder, or from its record if the file is missing or damaged.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the folder holds no run.
@@ -47,12 +47,12 @@ fn recorded(folder: &Path) -> Option<Record> {
     Record::open_shared(&folder.join(RECORD)).ok()
 }
 
-/// What a record says that its run was started with.
+/// Settings of a run from its record.
 fn begun(record: &Record) -> Option<Header> {
     Beginning::of(record).ok().flatten().map(|beginning| beginning.header)
 }
 
-/// What a folder says that its run was started with, if its record says no other.
+/// Settings of a run from its folder, if its record has no others.
 fn own_header(folder: &Path, begun: Option<&Header>) -> Result<Header, String> {
     let path = folder.join(HEADER);
     let header: Header = read_json(&path)?;
@@ -72,12 +72,12 @@ fn of_another(path: &Path) -> String {
     format!("{} is that of another run: it does not say what the record says", path.display())
 }
 
-/// Whether a folder is that of a run.
+/// True if a folder is that of a run.
 pub(super) fn is_run(folder: &Path) -> bool {
     [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
 }
 
-/// What is lost with what a folder says a run was started with, if that is missing or damaged: its record says all else.
+/// Loss through a missing or damaged settings file; the record has all else.
 pub fn lost_of_header(folder: &Path) -> Option<String> {
     let why = own_header(folder, recorded(folder).as_ref().and_then(begun).as_ref()).err()?;
     Some(format!("whether the run was cut off and gone on with: {why}"))
@@ -118,7 +118,7 @@ pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     })
 }
 
-/// Whether a run has ended, and its folder says how.
+/// True if a run has ended and its folder holds the report.
 pub fn has_ended(folder: &Path) -> bool {
     folder.join(REPORT).exists()
 }

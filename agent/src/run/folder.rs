@@ -16,7 +16,7 @@ pub struct Folder {
     _lock: File,
 }
 
-/// What is locked.
+/// Lock file of a run.
 const LOCK: &str = "run.lock";
 
 impl Folder {
@@ -89,7 +89,7 @@ impl Folder {
         Err(refused(stem, "no number is left for a new run: remove some, or name a folder with --run"))
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -1,4 +1,4 @@
-//! What the programs of a domain answered, in the record of the run.
+//! Answers of a domain's programs, in the record of the run.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,14 +23,14 @@ struct Exchange {
     answered: Value,
 }
 
-/// Where the answers of programs go to, and come from.
+/// Source and destination of programs' answers.
 struct Programs {
     into: Arc<Record>,
     robot: Arc<TapedRobot>,
     played: Mutex<VecDeque<Exchange>>,
-    /// Whether programs are run for what the record does not answer.
+    /// True if programs are run for questions that the record does not answer.
     run: bool,
-    /// Why a replay could go no further.
+    /// Reason for which a replay could go no further.
     ended: Mutex<Option<String>>,
 }
 
@@ -42,7 +42,8 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Why a replay could go no further: the record has no answer to what a program was asked. None if it could.
+    /// Reason for which a replay could go no further: the record has no answer to a program's
+    /// question. None if it could.
     pub fn ended(&self) -> Option<String> {
         self.programs.as_ref()?.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -121,7 +122,7 @@ pub fn on_record(
     Ok(Kept { domain, programs: Some(programs) })
 }
 
-/// That the programs which a record names may be run here.
+/// Checks that the programs named by a record may be run here.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names them, unless it is `allowed` or there are none.

@@ -1,4 +1,4 @@
-//! What outlasts a run: read from its store when the run begins, kept there when it ends.
+//! Persistent belief: read from its store when a run begins, written there when it ends.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ const LONGEST_WAIT: Duration = Duration::from_secs(10);
 /// So often it is looked whether that one is done.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// What a store remembers of earlier runs; nothing if it is new.
+/// Memory of earlier runs in a store; empty for a new store.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if it is no store; [`CommandError::Broken`] if it cannot be read.

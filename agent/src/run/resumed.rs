@@ -15,7 +15,8 @@ use crate::body;
 use crate::exit::CommandError;
 use crate::report::Report;
 
-/// That a run was cut off and gone on with. It stands beside the record, which is the same as if nothing had happened.
+/// Note that a run was cut off and gone on with. It stands beside the record, which is the same as
+/// without a cut.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Resumed {
     /// When, seconds since 1970.
@@ -24,18 +25,18 @@ pub struct Resumed {
     pub after: Option<u64>,
 }
 
-/// What makes a domain from a record ready to be used.
+/// Prepares a domain from a record for use.
 pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 'a;
 
-/// How a run is gone on with.
+/// Options for going on with a run.
 pub struct GoingOn<'a> {
     /// The run's folder.
     pub folder: &'a Path,
     /// The goal that it is expected to have, if one was said.
     pub said: Option<&'a str>,
-    /// Where the body is now, if it is not where the run began with it.
+    /// Address of the body now, if it has changed since the beginning.
     pub robot: Option<&'a str>,
-    /// Whether the programs that the record names may be run.
+    /// True if the programs named by the record may be run.
     pub allow_programs: bool,
     /// Binds functions in the places of programs.
     pub prepare: &'a Prepare<'a>,

@@ -116,7 +116,7 @@ fn a_value_of_the_file_may_be_given_on_the_command_line() {
     assert_eq!(set, changed, "nothing else differs");
     for (wrong, words) in [
         ("goal.1.say=\"x\"", "has: 0"),
-        ("rums=5", "has: name, kind, about, domain, scene, runs"),
+        ("rums=5", "has: about, domain, first_seed, goal"),
         ("goal=5", "no such key"),
         ("runs", "expected KEY=VALUE"),
         ("runs=five of them", "no TOML value"),

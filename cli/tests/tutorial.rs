@@ -23,13 +23,15 @@ fn tasks(markdown: &str) -> Vec<Task<'_>> {
     while let Some(line) = lines.next() {
         if let Some(language) = line.strip_prefix("```") {
             let block: Vec<&str> = lines.by_ref().take_while(|l| *l != "```").collect();
-            tasks.push(match language {
-                "console" => Task::Run { lines: block },
-                _ => Task::Edit {
+            match language {
+                "console" => tasks.push(Task::Run { lines: block }),
+                // For a shell elsewhere: what is installed here is what is tested.
+                "sh" => {}
+                _ => tasks.push(Task::Edit {
                     sentence: last_sentence(&paragraph.join(" ")),
                     text: block.join("\n") + "\n",
-                },
-            });
+                }),
+            }
             paragraph.clear();
         } else if line.is_empty() {
             ended = true;

@@ -263,13 +263,16 @@ impl<'a> Reader<'a> {
     }
 
     fn restriction(&self, preposition: &str, place: &[String]) -> Option<Restriction> {
+        if !["in", "on", "inside"].contains(&preposition) {
+            return None;
+        }
         let is_place =
-            |of: &&str| ["in", "on", "inside"].contains(&preposition) && *of != "thing" && *of != "kind";
-        self.lexicon.types().filter(is_place).find_map(|of| {
-            let preposition = if preposition == "inside" { "in" } else { preposition }.to_string();
-            let symbol = named(self.lexicon.of_type(of), place)?.symbol.clone();
-            Some(Restriction { preposition, of_type: of.into(), symbol })
-        })
+            |of: &&str| *of != "thing" && *of != "kind" && named(self.lexicon.of_type(of), place).is_some();
+        // Of the types that have the name, the narrowest has the fewest.
+        let of = self.lexicon.types().filter(is_place).min_by_key(|of| self.lexicon.of_type(of).len())?;
+        let symbol = named(self.lexicon.of_type(of), place)?.symbol.clone();
+        let preposition = if preposition == "inside" { "in" } else { preposition }.to_string();
+        Some(Restriction { preposition, of_type: of.into(), symbol })
     }
 
     fn called(&self, of_type: &str, words: &[String]) -> Option<Noun> {

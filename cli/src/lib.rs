@@ -1,7 +1,9 @@
 //! The command line, and what serves editors and assistants.
 
+mod child;
 pub mod commands;
 pub mod findings;
 pub mod layout;
 pub mod lsp;
 mod mcp;
+mod serve;

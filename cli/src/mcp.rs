@@ -14,7 +14,7 @@ use std::thread::JoinHandle;
 
 use serde_json::{Value, json};
 
-use call::Call;
+use crate::child::Child;
 
 /// Versions of the protocol that are spoken, the newest first.
 const VERSIONS: [&str; 4] = ["2025-11-25", "2025-06-18", "2025-03-26", "2024-11-05"];
@@ -63,7 +63,7 @@ pub(crate) fn serve(served: Served) -> io::Result<()> {
             Err(e) => refuse(&Value::Null, PARSE_ERROR, &format!("the message is no JSON: {e}")),
         }
     }
-    server.calls.values().for_each(|call| call.cancel());
+    server.calls.values().for_each(|call| call.stop());
     for thread in server.threads {
         let _ = thread.join();
     }
@@ -73,7 +73,7 @@ pub(crate) fn serve(served: Served) -> io::Result<()> {
 struct Server {
     served: Arc<Served>,
     /// Calls by the text of their id.
-    calls: BTreeMap<String, Arc<Call>>,
+    calls: BTreeMap<String, Arc<Child>>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -91,7 +91,7 @@ impl Server {
             if method == "notifications/cancelled"
                 && let Some(call) = self.calls.get(&parameters["requestId"].to_string())
             {
-                call.cancel();
+                call.stop();
             }
             return;
         };
@@ -118,7 +118,7 @@ impl Server {
         let progress = parameters["_meta"].get("progressToken").cloned();
         self.calls.retain(|_, call| !call.has_ended());
         self.threads.retain(|thread| !thread.is_finished());
-        let call = Arc::new(Call::default());
+        let call = Arc::new(Child::default());
         self.calls.insert(id.to_string(), Arc::clone(&call));
         let (id, served) = (id.clone(), Arc::clone(&self.served));
         self.threads.push(std::thread::spawn(move || {
@@ -129,7 +129,7 @@ impl Server {
                 let said = json!({ "progressToken": token, "progress": steps, "message": line });
                 say(&json!({ "jsonrpc": "2.0", "method": "notifications/progress", "params": said }));
             };
-            let result = call.carry_out(&task, &served, &mut tell);
+            let result = call::carry_out(&call, &task, &served, &mut tell);
             // Who cancelled a call waits for no answer.
             if let Some(result) = result {
                 answer(&id, result);

@@ -20,6 +20,7 @@ mod page;
 mod programs;
 mod readme;
 mod record;
+mod serve;
 mod shapes;
 mod signals;
 mod surfaces;

@@ -26,7 +26,7 @@ const EXIT_CODES: &str = "Exit codes:
   130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
 /// Each command with lines that show what it is for.
-pub const EXAMPLES: [(&str, &[&str]); 23] = [
+pub const EXAMPLES: [(&str, &[&str]); 24] = [
     (
         "find",
         &[
@@ -62,6 +62,7 @@ pub const EXAMPLES: [(&str, &[&str]); 23] = [
         &["descry fmt domain.pddl problem.pddl", "descry fmt --check domains", "descry fmt < domain.pddl"],
     ),
     ("lsp", &["descry lsp"]),
+    ("serve", &["descry serve", "descry serve --folder ~/agent --domain home --robot socket:/tmp/robot"]),
     ("mcp", &["descry mcp", "descry mcp --folder ~/runs --robot socket:/tmp/robot"]),
     (
         "recognise",

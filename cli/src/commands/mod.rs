@@ -28,6 +28,7 @@ mod replay;
 mod robot;
 #[doc(hidden)]
 pub mod runs;
+mod serve;
 mod show;
 mod validate;
 
@@ -62,6 +63,8 @@ pub enum Command {
     Lsp(lsp::Arguments),
     /// Serve assistants that call tools: check, plan, validate, run in simulation, explain and more (MCP, standard input and output)
     Mcp(mcp::Arguments),
+    /// Stay: take goals over HTTP, pursue one after the other, urgent ones first, and remember what was seen
+    Serve(serve::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
     /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
@@ -113,6 +116,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Fmt(arguments) => fmt::run(arguments),
         Command::Lsp(arguments) => lsp::run(arguments),
         Command::Mcp(arguments) => mcp::run(arguments),
+        Command::Serve(arguments) => serve::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),

@@ -1,0 +1,115 @@
+//! The goals of an agent that stays: a queue, and a journal that outlives the process.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+/// Where a goal stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum State {
+    /// It waits for its turn.
+    Queued,
+    /// It is pursued.
+    Running,
+    /// Something more urgent, or the end of the server, came between; it is gone on with.
+    Interrupted,
+    /// It came to a verdict.
+    Ended,
+    /// Somebody cancelled it.
+    Cancelled,
+}
+
+/// A goal that was given.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Goal {
+    /// Its number, from 1.
+    pub(super) id: u64,
+    /// Its words.
+    pub(super) goal: String,
+    /// Whether it goes before those that are not.
+    pub(super) urgent: bool,
+    pub(super) state: State,
+    /// The folder of its run, once it has one.
+    pub(super) run: Option<String>,
+    /// The process that pursues it.
+    pub(super) process: Option<u32>,
+    /// How it ended, as `descry do --json` says.
+    pub(super) report: Option<Value>,
+}
+
+impl Goal {
+    /// Whether nothing more comes of it.
+    pub(super) fn is_over(&self) -> bool {
+        matches!(self.state, State::Ended | State::Cancelled)
+    }
+}
+
+/// All goals, each kept on disk as it is now before anybody is told.
+pub(super) struct Goals {
+    all: BTreeMap<u64, Goal>,
+    journal: File,
+}
+
+impl Goals {
+    /// Reads the journal of a folder: the last line of a goal is how it stands; a line that was cut off is none.
+    ///
+    /// # Errors
+    /// The journal cannot be read or written.
+    pub(super) fn of(folder: &Path) -> io::Result<Self> {
+        let path = folder.join("goals.jsonl");
+        let text = match std::fs::read(&path) {
+            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(e),
+        };
+        let lines = text.lines().filter_map(|line| serde_json::from_str::<Goal>(line).ok());
+        let all = lines.map(|goal| (goal.id, goal)).collect();
+        let mut journal = OpenOptions::new().append(true).create(true).open(path)?;
+        if !text.is_empty() && !text.ends_with('\n') {
+            journal.write_all(b"\n")?;
+        }
+        Ok(Self { all, journal })
+    }
+
+    /// A new goal.
+    ///
+    /// # Errors
+    /// It cannot be kept.
+    pub(super) fn add(&mut self, goal: String, urgent: bool) -> io::Result<Goal> {
+        let id = self.all.keys().next_back().map_or(1, |last| last + 1);
+        let (run, process, report) = Default::default();
+        self.keep(Goal { id, goal, urgent, state: State::Queued, run, process, report })
+    }
+
+    /// Keeps how a goal stands now.
+    ///
+    /// # Errors
+    /// The journal cannot be written.
+    pub(super) fn keep(&mut self, goal: Goal) -> io::Result<Goal> {
+        let line = format!("{}\n", serde_json::to_string(&goal)?);
+        self.journal.write_all(line.as_bytes())?;
+        self.journal.sync_data()?;
+        self.all.insert(goal.id, goal.clone());
+        Ok(goal)
+    }
+
+    pub(super) fn get(&self, id: u64) -> Option<&Goal> {
+        self.all.get(&id)
+    }
+
+    pub(super) fn all(&self) -> impl Iterator<Item = &Goal> {
+        self.all.values()
+    }
+
+    /// What is pursued next: urgent ones first, then what was interrupted, then the oldest.
+    pub(super) fn next(&self) -> Option<Goal> {
+        let waits = |goal: &&Goal| matches!(goal.state, State::Queued | State::Interrupted);
+        let turn = |goal: &&Goal| (!goal.urgent, goal.state != State::Interrupted, goal.id);
+        self.all().filter(waits).min_by_key(turn).cloned()
+    }
+}

@@ -243,28 +243,7 @@ impl LocalStore {
     /// The bytes of a record that lie there, as they were written.
     fn read(&self, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
         let path = segment_path(&self.dir, place.segment);
-        let damaged = |what: String| Error::Damaged {
-            place: path.clone(),
-            at: spot.at,
-            what: format!("record {} {what}", place.id),
-        };
-        let file = self.file(place, &path)?;
-        let there = file.metadata().map_err(|e| Error::file("cannot read", &path, e))?.len();
-        if spot.at.checked_add(length).is_none_or(|end| end > there) {
-            return Err(damaged(format!(
-                "is lost: it has {length} bytes there, and the file ends at {there}"
-            )));
-        }
-        let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
-        file.read_exact_at(&mut bytes, spot.at).map_err(|e| damaged(format!("cannot be read: {e}")))?;
-        let found = crc32fast::hash(&bytes);
-        if found != spot.crc32 {
-            let written = spot.crc32;
-            return Err(damaged(format!(
-                "is damaged: its checksum is {found:08x}, written was {written:08x}"
-            )));
-        }
-        Ok(bytes)
+        read_at(&*self.file(place, &path)?, &path, place, spot, length)
     }
 
     fn file(&self, place: &Place, path: &Path) -> Result<Arc<File>, Error> {
@@ -285,19 +264,8 @@ impl LocalStore {
     }
 
     fn document(&self, place: &Place) -> Result<Document, Error> {
-        let spot = place.located.document;
-        let bytes = self.read(place, spot, place.located.document_bytes)?;
-        let damaged = |what: String| Error::Damaged {
-            place: segment_path(&self.dir, place.segment),
-            at: spot.at,
-            what,
-        };
-        let document: Document = serde_json::from_slice(&bytes)
-            .map_err(|e| damaged(format!("the document of record {} is no longer one: {e}", place.id)))?;
-        if document.id != place.id {
-            return Err(damaged(format!("record {} stands where {} should", document.id, place.id)));
-        }
-        Ok(document)
+        let path = segment_path(&self.dir, place.segment);
+        document_at(&*self.file(place, &path)?, &path, place)
     }
 
     /// Pins records, beside those that `by` holds or instead of them.
@@ -504,6 +472,40 @@ impl LocalStore {
         index.close()?;
         Closed::write(&self.dir, segments, records, next)
     }
+}
+
+/// The bytes of a record that lie there in its segment, as they were written.
+fn read_at(file: &File, path: &Path, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
+    let damaged = |what: String| Error::Damaged {
+        place: path.to_owned(),
+        at: spot.at,
+        what: format!("record {} {what}", place.id),
+    };
+    let there = file.metadata().map_err(|e| Error::file("cannot read", path, e))?.len();
+    if spot.at.checked_add(length).is_none_or(|end| end > there) {
+        return Err(damaged(format!("is lost: it has {length} bytes there, and the file ends at {there}")));
+    }
+    let mut bytes = vec![0; usize::try_from(length).unwrap_or(0)];
+    file.read_exact_at(&mut bytes, spot.at).map_err(|e| damaged(format!("cannot be read: {e}")))?;
+    let found = crc32fast::hash(&bytes);
+    if found != spot.crc32 {
+        let written = spot.crc32;
+        return Err(damaged(format!("is damaged: its checksum is {found:08x}, written was {written:08x}")));
+    }
+    Ok(bytes)
+}
+
+/// The document that lies there in its segment.
+fn document_at(file: &File, path: &Path, place: &Place) -> Result<Document, Error> {
+    let spot = place.located.document;
+    let bytes = read_at(file, path, place, spot, place.located.document_bytes)?;
+    let damaged = |what: String| Error::Damaged { place: path.to_owned(), at: spot.at, what };
+    let document: Document = serde_json::from_slice(&bytes)
+        .map_err(|e| damaged(format!("the document of record {} is no longer one: {e}", place.id)))?;
+    if document.id != place.id {
+        return Err(damaged(format!("record {} stands where {} should", document.id, place.id)));
+    }
+    Ok(document)
 }
 
 /// A lock whose holder panicked guards data that is checked on the disk anyway.

@@ -258,10 +258,10 @@ impl Index {
         result.map_err(|e| Error::index(&dir, e))
     }
 
-    /// Number, segment and chunk of every record, in the order of their numbers.
-    pub fn numbers(&self) -> Result<Vec<(RecordId, u64, u64)>, Error> {
-        let read = |r: &Row| Ok((RecordId(unsigned(r, 0)?), unsigned(r, 1)?, unsigned(r, 2)?));
-        self.rows("SELECT id, segment, chunk FROM records ORDER BY id", [], read)
+    /// Number and segment of every record, in the order of their numbers.
+    pub fn numbers(&self) -> Result<Vec<(RecordId, u64)>, Error> {
+        let read = |r: &Row| Ok((RecordId(unsigned(r, 0)?), unsigned(r, 1)?));
+        self.rows("SELECT id, segment FROM records ORDER BY id", [], read)
     }
 
     /// The number that the next record gets.

@@ -4,9 +4,10 @@
 //! it is made again from the segments: on the disk by who writes, in memory by who reads.
 
 use super::closed::Closed;
-use super::index::{INDEX, Index, SegmentRow};
+use super::index::{INDEX, Index, Place, SegmentRow};
+use super::scan::{Scan, scan};
 use super::segment::Segment;
-use super::{Recovery, lock, pins, scan, segment_dir, segment_path};
+use super::{Recovery, lock, pins, segment_dir, segment_path};
 use crate::document::{Document, RecordId};
 use crate::error::Error;
 use crate::stores::Fault;
@@ -35,7 +36,9 @@ const LOOKS: usize = 3;
 pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
     let closed = Closed::read(dir);
     let whole = closed.as_ref().is_some_and(|closed| is_as_closed(dir, closed));
-    let old = Old::read(dir, closed)?;
+    let mut old = Old::read(dir, closed)?;
+    // It is about to be moved away.
+    old.index = None;
     let opened = if whole && old.is_current {
         Index::open(dir, log_bytes).and_then(|index| look_over(dir, index)).and_then(without_faults)?
     } else {
@@ -119,8 +122,9 @@ fn on_disk(dir: &Path) -> Result<BTreeSet<u64>, Error> {
     Ok(numbers)
 }
 
+/// The length of a segment; none if it is not there, or no file.
 fn length(dir: &Path, number: u64) -> Option<u64> {
-    fs::metadata(segment_path(dir, number)).ok().map(|m| m.len())
+    fs::metadata(segment_path(dir, number)).ok().filter(fs::Metadata::is_file).map(|m| m.len())
 }
 
 /// Holds the segments against an index that can be trusted.
@@ -181,9 +185,10 @@ fn lost_text(lost: &BTreeSet<RecordId>) -> String {
 struct Old {
     closed: Option<Closed>,
     is_current: bool,
+    /// The index itself, for who reads.
+    index: Option<Index>,
     rows: BTreeMap<u64, SegmentRow>,
-    /// The chunks and the records of each segment.
-    chunks: BTreeMap<u64, BTreeSet<u64>>,
+    /// The records of each segment.
     records: BTreeMap<u64, BTreeSet<RecordId>>,
     next: u64,
 }
@@ -199,12 +204,18 @@ impl Old {
             is_current => is_current.unwrap_or(false),
         };
         old.rows = index.segments().unwrap_or_default().into_iter().map(|row| (row.number, row)).collect();
-        for (id, segment, chunk) in index.numbers().unwrap_or_default() {
-            old.chunks.entry(segment).or_default().insert(chunk);
+        for (id, segment) in index.numbers().unwrap_or_default() {
             old.records.entry(segment).or_default().insert(id);
         }
         old.next = index.next_id().map_or(0, |id| id.0);
+        old.index = Some(index);
         Ok(old)
+    }
+
+    /// Where the index has those of some records of a segment.
+    fn places(&self, segment: u64, ids: &BTreeSet<RecordId>) -> Vec<Place> {
+        let places = self.index.as_ref().and_then(|index| index.places(segment, false).ok());
+        places.unwrap_or_default().into_iter().filter(|place| ids.contains(&place.id)).collect()
     }
 
     /// The length of a segment that was complete.
@@ -226,8 +237,10 @@ struct Rebuild<'a> {
     dir: &'a Path,
     index: Index,
     old: Old,
-    /// Whether torn ends are cut off and segments finished.
+    /// Whether torn ends are cut off and segments finished, if nothing is damaged.
     mend: bool,
+    /// Segments with a torn end or without a summary.
+    unfinished: Vec<(u64, Scan)>,
     segments: BTreeMap<u64, u64>,
     recovery: Recovery,
     /// What says that something is pinned, or is no more.
@@ -242,6 +255,7 @@ impl<'a> Rebuild<'a> {
             index,
             old,
             mend,
+            unfinished: Vec::new(),
             segments: BTreeMap::new(),
             recovery: Recovery::default(),
             of_pins: BTreeMap::new(),
@@ -252,6 +266,7 @@ impl<'a> Rebuild<'a> {
     fn run(mut self) -> Result<Opened, Error> {
         let there = on_disk(self.dir)?;
         let expected = self.old.expected();
+        let is_new = there.is_empty() && self.old.rows.is_empty();
         there.iter().try_for_each(|number| self.read(*number))?;
         for number in expected.difference(&there) {
             let known = self.old.records.get(number).cloned().unwrap_or_default();
@@ -266,17 +281,20 @@ impl<'a> Rebuild<'a> {
         self.index.pin_again(&said)?;
         let closed_next = self.old.closed.as_ref().map_or(0, |closed| closed.next);
         self.index.keep_numbers(RecordId(self.old.next.max(closed_next)))?;
-        self.count();
+        self.count(is_new);
+        if self.mend && self.recovery.faults.is_empty() {
+            let unfinished = std::mem::take(&mut self.unfinished);
+            unfinished.into_iter().try_for_each(|(number, scan)| self.finish(number, scan))?;
+        }
         let last = there.last().max(expected.last()).copied().unwrap_or(0);
         let Rebuild { index, segments, recovery, .. } = self;
         Ok(Opened { index, segments, next_segment: last + 1, recovery })
     }
 
     /// Says what came back, and what did not that no fault speaks of yet.
-    fn count(&mut self) {
+    fn count(&mut self, is_new: bool) {
         let known: BTreeSet<RecordId> = self.old.records.values().flatten().copied().collect();
         self.recovery.regained = self.found.difference(&known).count() as u64;
-        let is_new = self.segments.is_empty() && self.old.rows.is_empty();
         self.recovery.index_rebuilt = !is_new && (self.old.closed.is_some() || !self.old.is_current);
         let Some(closed) = &self.old.closed else { return };
         let missing = closed.records.saturating_sub(self.found.len() as u64);
@@ -290,11 +308,15 @@ impl<'a> Rebuild<'a> {
     /// Takes in what a segment holds.
     fn read(&mut self, number: u64) -> Result<(), Error> {
         let path = segment_path(self.dir, number);
-        let bytes = length(self.dir, number).unwrap_or(0);
-        let chunks: Vec<u64> = self.old.chunks.get(&number).into_iter().flatten().copied().collect();
+        let Some(bytes) = length(self.dir, number) else {
+            self.recovery.faults.push(fault(self.dir, number, "is no file".into()));
+            return Ok(());
+        };
+        // What the index knew of a segment that still grew was acknowledged, and nothing behind it.
+        let acknowledged = self.old.rows.get(&number).filter(|row| !row.sealed).map(|row| row.bytes);
         let (index, of_pins) = (&mut self.index, &mut self.of_pins);
         let mut found = BTreeSet::new();
-        let scan = scan::scan(&path, &chunks, |records, end| {
+        let scan = scan(&path, acknowledged, |records, end| {
             let rows: Vec<_> = records.iter().map(|(d, l)| (d, l)).collect();
             index.insert(number, end, &rows)?;
             for (document, _) in records {
@@ -305,48 +327,81 @@ impl<'a> Rebuild<'a> {
             }
             Ok(())
         })?;
-        let lost: BTreeSet<RecordId> = self
-            .old
-            .records
-            .get(&number)
-            .into_iter()
-            .flatten()
-            .filter(|id| !found.contains(id))
-            .copied()
-            .collect();
+        let known = self.old.records.get(&number).into_iter().flatten();
+        let mut lost: BTreeSet<RecordId> = known.filter(|id| !found.contains(id)).copied().collect();
+        if !lost.is_empty() {
+            let proven = self.proven(number, scan.end, &lost)?;
+            lost.retain(|id| !proven.contains(id));
+            found.extend(proven);
+        }
         self.found.append(&mut found);
+        self.judge(number, bytes, &scan, &lost);
+        if self.old.sealed(number).is_none() && !scan.complete {
+            // Beside somebody who writes, what stands behind the last record is no part of it.
+            self.unfinished.push((number, scan));
+            return Ok(());
+        }
+        self.segments.insert(number, bytes);
+        self.index.seal(number, bytes)
+    }
+
+    /// Says what a segment lacks.
+    fn judge(&mut self, number: u64, bytes: u64, scan: &Scan, lost: &BTreeSet<RecordId>) {
         let was_complete = self.old.sealed(number);
-        let is_damaged = !scan.damaged.is_empty();
-        for (at, what) in scan.damaged.iter().chain(scan.torn.iter().filter(|_| was_complete.is_some())) {
+        let torn = scan.torn.iter().filter(|_| was_complete.is_some());
+        for (at, what) in scan.damaged.iter().chain(torn) {
             self.recovery.faults.push(fault(self.dir, number, format!("byte {at}: {what}")));
         }
-        let whole_to = if scan.complete { bytes } else { scan.end };
         match was_complete {
-            Some(was) if bytes != was || is_damaged || !lost.is_empty() => {
-                let what = format!("has {bytes} of {was} bytes{}", lost_text(&lost));
+            Some(was) if bytes != was || !scan.damaged.is_empty() || !lost.is_empty() => {
+                let what = format!("has {bytes} of {was} bytes{}", lost_text(lost));
                 self.recovery.faults.push(fault(self.dir, number, what));
             }
             Some(_) => (),
-            None if !self.mend && !lost.is_empty() => {
-                let what = format!("ends at byte {bytes}{}", lost_text(&lost));
+            None if !lost.is_empty() && (!self.mend || !scan.damaged.is_empty()) => {
+                let what = format!("ends at byte {bytes}{}", lost_text(lost));
                 self.recovery.faults.push(fault(self.dir, number, what));
             }
             None => {
                 self.recovery.lost += lost.len() as u64;
-                self.recovery.dropped_bytes += bytes - whole_to;
+                self.recovery.dropped_bytes += if scan.complete { 0 } else { bytes - scan.end };
             }
         }
-        let mut end = bytes;
-        if was_complete.is_none() && !scan.complete {
-            if !self.mend {
-                // As it is beside somebody who writes: what stands behind the last record is no part of it.
-                return Ok(());
+    }
+
+    /// Takes in, of records in damaged chunks, those that the checksums in the index prove whole.
+    fn proven(
+        &mut self,
+        number: u64,
+        end: u64,
+        lost: &BTreeSet<RecordId>,
+    ) -> Result<BTreeSet<RecordId>, Error> {
+        let path = segment_path(self.dir, number);
+        let file = fs::File::open(&path).map_err(|e| Error::file("cannot read", &path, e))?;
+        let mut proven = BTreeSet::new();
+        for place in self.old.places(number, lost) {
+            let Ok(document) = super::document_at(&file, &path, &place) else { continue };
+            let mut blobs = document.blobs.iter().zip(&place.located.blobs);
+            if blobs.all(|(info, spot)| super::read_at(&file, &path, &place, *spot, info.bytes).is_ok()) {
+                self.index.insert(number, end, &[(&document, &place.located)])?;
+                proven.insert(place.id);
+                if pins::speaks(&document) {
+                    self.of_pins.insert(document.id, document);
+                }
             }
-            if scan.chunks.is_empty() && !is_damaged {
-                return fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e));
-            }
-            end = Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?.finish()?;
         }
+        Ok(proven)
+    }
+
+    /// Cuts the torn end of a segment off and writes its summary; one without a chunk goes.
+    fn finish(&mut self, number: u64, scan: Scan) -> Result<(), Error> {
+        let path = segment_path(self.dir, number);
+        if scan.chunks.is_empty() {
+            return fs::remove_file(&path).map_err(|e| Error::file("cannot delete", &path, e));
+        }
+        let mut segment = Segment::reopen(&path, number, scan.end, scan.channels, scan.chunks)?;
+        segment.write(&[&scan.unwritten])?;
+        let end = segment.finish()?;
         self.segments.insert(number, end);
         self.index.seal(number, end)
     }

@@ -1,4 +1,8 @@
-//! Reading a segment from end to end, as far as it is whole.
+//! Reading a segment from end to end: every chunk whose checksum holds, wherever it stands.
+//!
+//! A segment is a row of chunks, and each proves itself: its head gives its length three times, and its checksum covers its data.
+//! Where a chunk cannot be read, the bytes behind it are searched for the next one that proves itself, so that damage costs the
+//! chunks it hits and no other. Damage is told apart from the unfinished last write of a process that was killed.
 
 use super::segment::{
     CHUNK_HEAD, Channels, ChunkEntry, Located, MAGIC, MESSAGE_HEAD, RECORD_HEAD, Spot, message_index, op,
@@ -9,19 +13,23 @@ use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-/// What a segment holds.
+/// Content of a segment.
 #[derive(Default)]
 pub(super) struct Scan {
-    /// Where the last whole chunk and its index end: what stands behind belongs to no record.
+    /// End of the last whole chunk; bytes behind it belong to no record.
     pub end: u64,
+    /// Bytes of the message index that the last whole chunk lacks, because its write was cut there.
+    pub unwritten: Vec<u8>,
     /// Whether the summary follows.
     pub complete: bool,
     pub channels: Channels,
     pub chunks: Vec<ChunkEntry>,
-    /// Why reading stopped before the end of the file: where and what.
+    /// Unfinished last write: where it begins and what it lacks.
     pub torn: Option<Fault>,
-    /// Chunks that are damaged while what follows them is not: where and what.
+    /// Damage, which no unfinished write explains: where it begins and what it costs.
     pub damaged: Vec<Fault>,
+    /// Greatest number of a record read so far.
+    last: Option<u64>,
 }
 
 /// The bytes of a segment with a name for every way in which they can be wrong.
@@ -33,13 +41,19 @@ struct Bytes {
 /// Where something is wrong, and what.
 pub(super) type Fault = (u64, String);
 
+/// Bytes that the search for the next chunk reads at once.
+const WINDOW: u64 = 1 << 20;
+
 impl Bytes {
+    fn open(path: &Path) -> std::io::Result<Self> {
+        let file = File::open(path)?;
+        Ok(Bytes { length: file.metadata()?.len(), file })
+    }
+
     fn read(&self, at: u64, length: u64) -> Result<Vec<u8>, Fault> {
         if at.checked_add(length).is_none_or(|end| end > self.length) {
-            return Err((
-                at,
-                format!("{length} bytes should follow, the file has {}", self.length.saturating_sub(at)),
-            ));
+            let left = self.length.saturating_sub(at);
+            return Err((at, format!("{length} bytes should follow, the file has {left}")));
         }
         let mut bytes = vec![0; length as usize];
         self.file.read_exact_at(&mut bytes, at).map_err(|e| (at, format!("cannot be read: {e}")))?;
@@ -55,80 +69,198 @@ impl Bytes {
         }
         Ok((head[0], length))
     }
+
+    /// Whether nothing but zeros stands between an offset and the end of the file.
+    fn is_blank_from(&self, mut at: u64) -> bool {
+        while at < self.length {
+            let length = WINDOW.min(self.length - at);
+            match self.read(at, length) {
+                Ok(bytes) if bytes.iter().all(|b| *b == 0) => at += length,
+                _ => return false,
+            }
+        }
+        true
+    }
 }
 
 /// A little-endian number of `width` bytes; 0 where there are none.
 fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let slice = bytes.get(at..at + width).unwrap_or(&[]);
-    slice.iter().rev().fold(0, |v, b| v << 8 | u64::from(*b))
+    match slice.try_into() {
+        Ok(eight) => u64::from_le_bytes(eight),
+        Err(_) => slice.iter().rev().fold(0, |v, b| v << 8 | u64::from(*b)),
+    }
 }
 
-/// Reads a segment chunk by chunk and hands over each record that is whole. `known` says, in order, where chunks are
-/// known to begin: reading goes on there behind what is damaged.
-///
-/// # Errors
-/// If the file cannot be opened, or `take` fails. Damage is no error: the scan says where it stopped.
-pub(super) fn scan(
-    path: &Path,
-    known: &[u64],
-    mut take: impl FnMut(Vec<(Document, Located)>, u64) -> Result<(), Error>,
-) -> Result<Scan, Error> {
-    let fail = |e| Error::file("cannot read", path, e);
-    let file = File::open(path).map_err(fail)?;
-    let bytes = Bytes { length: file.metadata().map_err(fail)?.len(), file };
-    let mut scan = Scan::default();
-    let mut at = match start(&bytes) {
-        Ok(at) => at,
-        Err(fault) => {
-            scan.torn = Some(fault);
-            return Ok(scan);
-        }
-    };
-    scan.end = at;
-    while at < bytes.length {
-        match step(&bytes, at, &mut scan) {
-            Ok(Step::Chunk(records, end)) => {
-                (at, scan.end) = (end, end);
-                take(records, end)?;
-            }
-            Ok(Step::Unindexed(records, fault)) => match behind(&bytes, at, known) {
-                Some(end) => {
-                    (at, scan.end) = (end, end);
-                    scan.damaged.push(fault);
-                    take(records, end)?;
-                }
-                // The index of a chunk is written with it: one whose index is cut was not acknowledged.
-                None => {
-                    scan.torn = Some(fault);
-                    break;
-                }
-            },
-            Ok(Step::End) => {
-                scan.torn = summary(&bytes, at).err();
-                scan.complete = scan.torn.is_none();
-                break;
-            }
-            Err(fault) => match behind(&bytes, at, known) {
-                Some(end) => {
-                    (at, scan.end) = (end, end);
-                    scan.damaged.push(fault);
-                }
-                None => {
-                    scan.torn = Some(fault);
-                    break;
-                }
-            },
+/// Head of a chunk as it stands in the file.
+struct Head {
+    /// Bytes of the chunk's data, by each of the three fields that give them.
+    sizes: [Option<u64>; 3],
+    times: (u64, u64),
+    crc32: u32,
+    /// Whether code and compression are those of a chunk of ours.
+    is_chunk: bool,
+}
+
+/// Bytes of a chunk in front of its data.
+const HEAD: u64 = RECORD_HEAD + CHUNK_HEAD;
+
+impl Head {
+    fn parse(head: &[u8]) -> Self {
+        Head {
+            sizes: [
+                number(head, 1, 8).checked_sub(CHUNK_HEAD),
+                Some(number(head, 25, 8)),
+                Some(number(head, 41, 8)),
+            ],
+            times: (number(head, 9, 8), number(head, 17, 8)),
+            crc32: number(head, 33, 4) as u32,
+            is_chunk: head.first() == Some(&op::CHUNK) && number(head, 37, 4) == 0,
         }
     }
+
+    /// The size that at least two of its fields give: one damaged field is outvoted.
+    fn agreed(&self) -> Option<u64> {
+        let [a, b, c] = self.sizes;
+        let size = if a == b || a == c {
+            a
+        } else if b == c {
+            b
+        } else {
+            None
+        };
+        size.filter(|size| *size > 0)
+    }
+
+    fn is_whole(&self) -> bool {
+        self.is_chunk
+            && self.agreed().is_some()
+            && self.sizes[0] == self.sizes[1]
+            && self.sizes[0] == self.sizes[2]
+    }
+}
+
+/// Reads a segment chunk by chunk and hands over each record that is whole. From `acknowledged` on, where it is known, no write
+/// was ever finished.
+///
+/// # Errors
+/// If the file cannot be opened, or `take` fails. Damage is no error: the scan names it.
+pub(super) fn scan(
+    path: &Path,
+    acknowledged: Option<u64>,
+    mut take: impl FnMut(Vec<(Document, Located)>, u64) -> Result<(), Error>,
+) -> Result<Scan, Error> {
+    let bytes = Bytes::open(path).map_err(|e| Error::file("cannot read", path, e))?;
+    let mut scan = Scan::default();
+    let begin = start(&bytes);
+    let mut at = *begin.as_ref().unwrap_or(&0);
+    let mut read = begin.and_then(|at| step(&bytes, at));
+    scan.end = at;
+    while at < bytes.length {
+        match read {
+            Ok(None) => {
+                match summary(&bytes, at) {
+                    Ok(()) => scan.complete = true,
+                    Err(fault) => scan.stop(&bytes, at, fault, acknowledged),
+                }
+                break;
+            }
+            Ok(Some(chunk)) => {
+                let records = scan.adopt(chunk);
+                at = scan.end;
+                take(records, at)?;
+            }
+            Err(fault) => {
+                // A header of which any byte may be wrong does not say where the first chunk is.
+                let from = if scan.chunks.is_empty() { 0 } else { at };
+                let Some(next) = resume(&bytes, from) else {
+                    scan.stop(&bytes, at, fault, acknowledged);
+                    break;
+                };
+                let gap = scan.gap(&bytes, from, next, &fault);
+                scan.damaged.push(gap);
+                at = next;
+            }
+        }
+        if scan.torn.is_some() {
+            break;
+        }
+        read = step(&bytes, at);
+    }
+    if bytes.length == 0 {
+        scan.torn = Some((0, "the file is empty".into()));
+    }
     Ok(scan)
+}
+
+impl Scan {
+    /// Takes in a chunk and returns its records.
+    fn adopt(&mut self, chunk: Chunk) -> Vec<(Document, Located)> {
+        self.end = chunk.end;
+        self.unwritten = chunk.unwritten;
+        self.torn = chunk.torn;
+        self.damaged.extend(chunk.faults);
+        self.last = chunk.records.iter().map(|(document, _)| document.id.0).max().max(self.last);
+        self.channels.schemas.extend(chunk.channels.schemas);
+        self.channels.channels.extend(chunk.channels.channels);
+        for (channel, count) in chunk.channels.messages {
+            *self.channels.messages.entry(channel).or_default() += count;
+        }
+        self.chunks.push(chunk.entry);
+        chunk.records
+    }
+
+    /// Says that bytes between two chunks cannot be read, and which numbers are missing there.
+    fn gap(&self, bytes: &Bytes, from: u64, to: u64, (at, what): &Fault) -> Fault {
+        let first = match step(bytes, to) {
+            Ok(Some(chunk)) => chunk.records.first().map(|(document, _)| document.id.0),
+            _ => None,
+        };
+        let missing = match (self.last.unwrap_or(0), first) {
+            (last, Some(first)) if first == last + 2 => format!("; record {} is missing there", last + 1),
+            (last, Some(first)) if first > last + 2 => {
+                format!("; records {} to {} are missing there", last + 1, first - 1)
+            }
+            _ => String::new(),
+        };
+        (
+            *at,
+            format!("{what}; {} bytes cannot be read, and reading goes on at byte {to}{missing}", to - from),
+        )
+    }
+
+    /// Says what stands behind the last whole chunk: an unfinished write, or damage.
+    fn stop(&mut self, bytes: &Bytes, at: u64, (place, what): Fault, acknowledged: Option<u64>) {
+        if acknowledged.is_some_and(|end| at >= end) || is_unfinished(bytes, at) {
+            self.torn = Some((place, what));
+        } else {
+            let left = bytes.length - at;
+            self.damaged.push((place, format!("{what}; the last {left} bytes cannot be read")));
+        }
+    }
+}
+
+/// Whether what stands from an offset to the end of the file is the beginning of a write that was never finished. It is if the
+/// file ends within a head, or before the data that a whole head announces, or within the summary, or holds zeros alone.
+fn is_unfinished(bytes: &Bytes, at: u64) -> bool {
+    let left = bytes.length.saturating_sub(at);
+    let Ok(found) = bytes.read(at, left.min(HEAD)) else { return false };
+    let begun = match found.first() {
+        _ if at == 0 => left < HEAD && (MAGIC.starts_with(&found) || found.starts_with(MAGIC)),
+        Some(&op::CHUNK) if left >= HEAD => {
+            let head = Head::parse(&found);
+            head.is_whole() && head.agreed().is_some_and(|size| size > left - HEAD)
+        }
+        Some(&op::CHUNK) => true,
+        Some(&op::DATA_END) => !bytes.read(bytes.length - 8, 8).is_ok_and(|end| end == MAGIC),
+        _ => false,
+    };
+    begun || bytes.is_blank_from(at)
 }
 
 /// Checks what stands behind the data of a complete segment.
 fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     let start = at + RECORD_HEAD + 4;
-    if bytes.read(at, RECORD_HEAD + 4)?[1..] != [4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0] {
-        return Err((at, "the end of the data is not as it was written".into()));
-    }
     let rest = bytes.read(start, bytes.length.saturating_sub(start))?;
     let footer = rest.len().checked_sub(RECORD_HEAD as usize + 20 + MAGIC.len());
     let footer = footer.ok_or((start, "the summary is cut".to_owned()))?;
@@ -146,26 +278,46 @@ fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Where reading can go on behind a damaged chunk: behind its index, if both are there in their full length, or where
-/// the next chunk is known to begin.
-fn behind(bytes: &Bytes, at: u64, known: &[u64]) -> Option<u64> {
-    let next = known.iter().copied().find(|k| *k > at && matches!(bytes.head(*k), Ok((op::CHUNK, _))));
-    let by_length = || {
-        let (op::CHUNK, length) = bytes.head(at).ok()? else { return None };
-        let mut end = at + RECORD_HEAD + length;
-        while let Ok((op::MESSAGE_INDEX, length)) = bytes.head(end) {
-            end += RECORD_HEAD + length;
+/// The next offset behind a damaged place from which reading can go on: a chunk that proves itself, or the end of the data.
+/// A chunk whose damaged data is all there is passed as a whole, so that nothing within its blobs is taken for a chunk.
+fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
+    let passed = bytes.read(at, HEAD).ok().map(|head| Head::parse(&head)).filter(|head| head.is_chunk);
+    let passed = passed.and_then(|head| head.agreed()).and_then(|size| at.checked_add(HEAD + size));
+    let is_followed = |end: &u64| matches!(bytes.head(*end), Ok((op::MESSAGE_INDEX, _)));
+    let mut from = passed.filter(is_followed).unwrap_or(at + 1);
+    while from < bytes.length {
+        let window = bytes.read(from, (WINDOW + HEAD).min(bytes.length - from)).ok()?;
+        for offset in 0..window.len().min(WINDOW as usize) {
+            let here = &window[offset..];
+            let place = from + offset as u64;
+            let is_end = here.starts_with(&END_OF_DATA) && summary(bytes, place).is_ok();
+            let is_chunk = here.len() >= HEAD as usize
+                && Head::parse(here).agreed().is_some_and(|size| size <= bytes.length - place - HEAD)
+                && chunk(bytes, place).is_ok();
+            if is_end || is_chunk {
+                return Some(place);
+            }
         }
-        matches!(bytes.head(end), Ok((op::CHUNK | op::DATA_END, _))).then_some(end)
-    };
-    by_length().filter(|end| next.is_none_or(|n| *end <= n)).or(next)
+        from += WINDOW;
+    }
+    None
 }
 
-enum Step {
-    Chunk(Vec<(Document, Located)>, u64),
-    /// Its records are whole, the index behind it is not.
-    Unindexed(Vec<(Document, Located)>, Fault),
-    End,
+/// The record that ends the data, of which no checksum is written.
+const END_OF_DATA: [u8; 13] = [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+
+/// A chunk that proved itself.
+struct Chunk {
+    records: Vec<(Document, Located)>,
+    entry: ChunkEntry,
+    channels: Channels,
+    /// Where the next should begin.
+    end: u64,
+    /// What is wrong with it, though its records are whole.
+    faults: Vec<Fault>,
+    /// Its message index where the file ends within.
+    torn: Option<Fault>,
+    unwritten: Vec<u8>,
 }
 
 fn start(bytes: &Bytes) -> Result<u64, Fault> {
@@ -173,77 +325,73 @@ fn start(bytes: &Bytes) -> Result<u64, Fault> {
         return Err((0, "this is no MCAP file: it does not begin with its magic bytes".into()));
     }
     match bytes.head(8)? {
-        (op::HEADER, length) => Ok(8 + RECORD_HEAD + length),
+        (op::HEADER, length) => {
+            let profile = number(&bytes.read(8 + RECORD_HEAD, 4)?, 0, 4);
+            let library = number(&bytes.read(8 + RECORD_HEAD + 4 + profile, 4)?, 0, 4);
+            let fits = length == 8 + profile + library;
+            fits.then_some(8 + RECORD_HEAD + length)
+                .ok_or_else(|| (8, format!("a header of {length} bytes does not fit its texts")))
+        }
         (code, _) => Err((8, format!("a header should follow, found a record of kind {code:#04x}"))),
     }
 }
 
-fn step(bytes: &Bytes, at: u64, scan: &mut Scan) -> Result<Step, Fault> {
-    let (code, length) = bytes.head(at)?;
-    match code {
-        op::CHUNK => {
-            let (records, mut entry, mut found, messages) = chunk(bytes, at, length)?;
-            let index_at = at + RECORD_HEAD + length;
-            let (index, begins) = message_index(&messages);
-            if bytes.read(index_at, index.len() as u64).is_ok_and(|found| found == index) {
-                entry.indexes = begins.into_iter().map(|(channel, at)| (channel, index_at + at)).collect();
-            }
-            entry.index_bytes = index.len() as u64;
-            let end = index_at + entry.index_bytes;
-            let fault = entry
-                .indexes
-                .is_empty()
-                .then(|| (index_at, "the message index is not that of its chunk".into()));
-            scan.chunks.push(entry);
-            scan.channels.schemas.append(&mut found.schemas);
-            scan.channels.channels.append(&mut found.channels);
-            for (channel, count) in found.messages {
-                *scan.channels.messages.entry(channel).or_default() += count;
-            }
-            Ok(match fault {
-                Some(fault) => Step::Unindexed(records, fault),
-                None => Step::Chunk(records, end),
-            })
-        }
-        op::DATA_END => Ok(Step::End),
-        other => Err((at, format!("a chunk should follow, found a record of kind {other:#04x}"))),
+/// The chunk at an offset; none at the end of the data.
+fn step(bytes: &Bytes, at: u64) -> Result<Option<Chunk>, Fault> {
+    if bytes.read(at, END_OF_DATA.len() as u64).is_ok_and(|found| found == END_OF_DATA) {
+        return Ok(None);
     }
+    chunk(bytes, at).map(Some)
 }
 
-/// Records, entry for the summary, what was declared, and channel, time and offset of each message.
-type ChunkParts = (Vec<(Document, Located)>, ChunkEntry, Channels, Vec<(u16, u64, u64)>);
-
-fn chunk(bytes: &Bytes, at: u64, length: u64) -> Result<ChunkParts, Fault> {
-    if length < CHUNK_HEAD {
-        return Err((at, format!("a chunk of {length} bytes is shorter than its head")));
-    }
-    let head = bytes.read(at + RECORD_HEAD, CHUNK_HEAD)?;
-    let (data_bytes, crc, compression) = (number(&head, 16, 8), number(&head, 24, 4), number(&head, 28, 4));
-    if compression != 0 || data_bytes != length - CHUNK_HEAD || number(&head, 32, 8) != data_bytes {
-        return Err((at, "the head of the chunk does not fit its length".into()));
-    }
-    let data_at = at + RECORD_HEAD + CHUNK_HEAD;
+/// Reads the chunk at an offset. Damaged fields of its head are outvoted by the others; its checksum decides.
+fn chunk(bytes: &Bytes, at: u64) -> Result<Chunk, Fault> {
+    let code = bytes.read(at, 1)?[0];
+    let raw = bytes.read(at, HEAD)?;
+    let head = Head::parse(&raw);
+    let Some(data_bytes) = head.agreed() else {
+        return Err((
+            at,
+            format!("a chunk should follow, found a record of kind {code:#04x} whose head does not fit"),
+        ));
+    };
+    let data_at = at + HEAD;
     let data = bytes.read(data_at, data_bytes)?;
-    let found_crc = u64::from(crc32fast::hash(&data));
-    if found_crc != crc {
-        return Err((at, format!("the chunk's checksum is {found_crc:08x}, written was {crc:08x}")));
+    let found = crc32fast::hash(&data);
+    // One bit of the checksum itself may be damaged.
+    if (found ^ head.crc32).count_ones() > 1 {
+        return Err((at, format!("the chunk's checksum is {found:08x}, written was {:08x}", head.crc32)));
     }
     let (records, channels, messages) = records(&data, at)?;
     let times = || messages.iter().map(|(_, stamp_ns, _)| *stamp_ns);
-    let (start_ns, end_ns) = (times().min().unwrap_or(0), times().max().unwrap_or(0));
-    if (start_ns, end_ns) != (number(&head, 0, 8), number(&head, 8, 8)) {
-        return Err((at, "the head of the chunk does not give the times of its messages".into()));
+    let times = (times().min().unwrap_or(0), times().max().unwrap_or(0));
+    let mut faults = Vec::new();
+    if !head.is_whole() || found != head.crc32 || times != head.times {
+        faults.push((at, "the head of the chunk is damaged; its records are whole".into()));
+    }
+    let index_at = data_at + data_bytes;
+    let (index, begins) = message_index(&messages);
+    let there = bytes.read(index_at, (index.len() as u64).min(bytes.length - index_at))?;
+    let same = index.iter().zip(&there).take_while(|(a, b)| a == b).count();
+    let (mut torn, mut unwritten, mut end) = (None, Vec::new(), index_at + index.len() as u64);
+    if same < index.len() && bytes.is_blank_from(index_at + same as u64) {
+        torn = Some((index_at, "the message index is cut; the records of its chunk are whole".into()));
+        end = index_at;
+        unwritten = index.clone();
+    } else if same < index.len() {
+        faults.push((index_at, "the message index is not that of its chunk; its records are whole".into()));
+        end = if begins_at(bytes, end) { end } else { index_at };
     }
     let entry = ChunkEntry {
-        start_ns,
-        end_ns,
+        start_ns: times.0,
+        end_ns: times.1,
         offset: at,
-        bytes: RECORD_HEAD + length,
+        bytes: HEAD + data_bytes,
         data_bytes,
-        index_bytes: 0,
-        indexes: Vec::new(),
+        index_bytes: index.len() as u64,
+        indexes: begins.into_iter().map(|(channel, at)| (channel, index_at + at)).collect(),
     };
-    Ok((records, entry, channels, messages))
+    Ok(Chunk { records, entry, channels, end, faults, torn, unwritten })
 }
 
 type RecordParts = (Vec<(Document, Located)>, Channels, Vec<(u16, u64, u64)>);
@@ -326,4 +474,11 @@ fn located_blobs(
 /// The document that a message is, if it is one; the messages of blobs never begin with a brace.
 fn document(content: &[u8]) -> Option<Document> {
     if content.first() == Some(&b'{') { serde_json::from_slice(content).ok() } else { None }
+}
+
+/// Whether a chunk, or the end of the data or of the file, stands at an offset.
+fn begins_at(bytes: &Bytes, at: u64) -> bool {
+    at == bytes.length
+        || bytes.read(at, HEAD).is_ok_and(|head| Head::parse(&head).is_whole())
+        || bytes.read(at, END_OF_DATA.len() as u64).is_ok_and(|found| found == END_OF_DATA)
 }

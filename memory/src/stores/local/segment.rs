@@ -477,7 +477,8 @@ impl Segment {
         });
     }
 
-    fn write(&mut self, parts: &[&[u8]]) -> Result<(), Error> {
+    /// Writes bytes at the end.
+    pub fn write(&mut self, parts: &[&[u8]]) -> Result<(), Error> {
         let mut slices: Vec<IoSlice> = parts.iter().map(|p| IoSlice::new(p)).collect();
         let mut rest = slices.as_mut_slice();
         let fail = |path: &Path, e| Error::file("cannot write", path, e);

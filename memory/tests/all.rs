@@ -1,6 +1,7 @@
 //! What records promise, from outside: one program, so that what all tests share is built and linked once.
 
 mod crash;
+mod damage;
 mod formats;
 mod record;
 mod stores;

@@ -52,7 +52,10 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// A store as a killed process leaves it: five records, nothing finished. Also where each record's chunk ends.
+/// Bytes of the message index behind a chunk of one record with one blob: one message on each of two channels.
+const MESSAGE_INDEX: u64 = 2 * (9 + 2 + 4 + 16);
+
+/// A store as a killed process leaves it: five records, nothing finished. Also where the data of each record's chunk ends.
 fn killed(dir: &Path) -> (Vec<RecordId>, Vec<u64>) {
     let live = dir.join("live");
     let store = LocalStore::create(&live, "", options()).unwrap();
@@ -60,7 +63,7 @@ fn killed(dir: &Path) -> (Vec<RecordId>, Vec<u64>) {
     let mut ids = Vec::new();
     for i in 0..5 {
         ids.extend(store.append(&[draft(i, 300 + 40 * i as usize)]).unwrap());
-        ends.push(fs::metadata(&segments(&live)[0]).unwrap().len());
+        ends.push(fs::metadata(&segments(&live)[0]).unwrap().len() - MESSAGE_INDEX);
     }
     copy(&live, &dir.join("killed"));
     (ids, ends)

@@ -32,7 +32,8 @@ pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
             for (document, located) in records {
                 // Records that were pinned and moved on are found here and expected elsewhere.
                 if let Some(known) = expected.remove(&document.id) {
-                    if known.located == located {
+                    let known = &known.located;
+                    if known.document == located.document && known.blobs == located.blobs {
                         report.whole += 1;
                         report.bytes +=
                             located.document_bytes + document.blobs.iter().map(|b| b.bytes).sum::<u64>();

@@ -339,7 +339,7 @@ fn no_damage_costs_what_is_whole() {
 }
 
 #[test]
-#[ignore = "slow: 200 damaged records of each kind, a minute"]
+#[ignore = "slow: 200 damaged records of each kind, four minutes beside other work"]
 fn no_damage_of_many_costs_what_is_whole() {
     check_kinds(200);
 }

@@ -96,7 +96,11 @@ pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
             && index.is_current()?
             && (!is_written || index.check().is_ok_and(|faults| faults.is_empty()))
         {
-            return look_over(dir, index);
+            let opened = look_over(dir, index)?;
+            // In a segment of another length records may lie elsewhere than the index says.
+            if is_written || opened.recovery.faults.is_empty() {
+                return Ok(opened);
+            }
         }
     }
     let old = Old::read(dir, Closed::read(dir))?;

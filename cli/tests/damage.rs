@@ -213,7 +213,7 @@ fn files_of_another_run_are_told_from_its_own() {
 }
 
 #[test]
-#[ignore = "spoils 100 records and asks nine commands of each: some minutes"]
+#[ignore = "slow: spoils 100 records and asks nine commands of each: some minutes"]
 fn a_hundred_damaged_records_are_used_as_far_as_they_are_whole() {
     let folder = TempDir::new().expect("a folder can be made");
     println!("of 60 runs that had ended: {:?}", check_damage(&ended(folder.path()), 0..60));

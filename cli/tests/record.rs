@@ -53,8 +53,9 @@ fn a_simulated_run_is_played_again_and_goes_on_after_kills() {
 }
 
 #[test]
+#[ignore = "data: reads ../shared"]
 fn a_run_on_real_views_is_played_again_and_goes_on_after_kills() {
-    let Some(kitchen) = shared("data/kitchen") else { return };
+    let kitchen = shared("data/kitchen");
     let robot = format!("recorded:{}", kitchen.display());
     check_goal(&["do", "find mug with confidence 0.96", "--robot", &robot], &[&[1], &[12, 10]]);
 }
@@ -82,8 +83,9 @@ fn a_record_of_the_simulation_is_a_body() {
 }
 
 #[test]
+#[ignore = "data: reads ../shared"]
 fn a_record_of_real_views_is_a_body() {
-    let Some(kitchen) = shared("data/kitchen") else { return };
+    let kitchen = shared("data/kitchen");
     check_as_body("mug", &["--robot", &format!("recorded:{}", kitchen.display())]);
 }
 

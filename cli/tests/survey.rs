@@ -203,7 +203,7 @@ fn a_room_is_mapped_and_all_of_a_kind_are_found_in_it() {
 }
 
 #[test]
-#[ignore = "two rooms, two minutes"]
+#[ignore = "slow: two rooms, two minutes"]
 fn two_rooms_are_mapped_and_the_cup_is_found_in_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let goal = "map the room and find cup A";

@@ -332,7 +332,7 @@ fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder() {
 }
 
 #[test]
-#[ignore = "216 views: half a minute"]
+#[ignore = "slow: 216 views: half a minute"]
 fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder_however_it_is_turned() {
     check_cartons(1);
 }
@@ -384,7 +384,7 @@ fn what_stands_level_with_a_box_is_parted_from_it() {
 }
 
 #[test]
-#[ignore = "200 views: half a minute"]
+#[ignore = "slow: 200 views: half a minute"]
 fn what_stands_level_with_a_box_is_parted_from_it_whatever_the_noise() {
     check_beside_a_box(8, 28);
 }
@@ -442,8 +442,14 @@ fn the_published_score_cannot_reject_the_mug() {
 #[test]
 fn the_same_cloud_gives_the_same_percepts_whatever_the_threads() {
     let things = [CUP, Thing::Tin { x: -0.2, y: 0.1, radius: 0.05, height: 0.2 }];
-    let one = percepts(&things, 0.3, &Descry::default());
-    assert_eq!(one, percepts(&things, 0.3, &Descry::default()));
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+        pool.install(|| percepts(&things, 0.3, &Descry::default()))
+    };
+    let one = with(1);
+    assert!(!one.is_empty());
+    assert_eq!(one, with(2));
+    assert_eq!(one, with(7));
 }
 
 #[test]

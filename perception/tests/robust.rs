@@ -224,7 +224,7 @@ fn organised_normals_keep_apart_what_is_apart() {
 }
 
 #[test]
-#[ignore = "ten million points take seconds"]
+#[ignore = "slow: ten million points take seconds"]
 fn ten_million_points() {
     let points: Vec<Point3<f32>> = (0..10_000_000u32)
         .map(|i| {
@@ -243,7 +243,7 @@ fn ten_million_points() {
 }
 
 #[test]
-#[ignore = "ten million points take seconds"]
+#[ignore = "slow: ten million points take seconds"]
 fn ten_million_points_from_table_to_cup() {
     // A table of 2.4 by 1.6 m, a cup with a floor, no grid; the camera stands 1 m beside and above.
     let camera = Isometry3::translation(0.0, -1.0, 1.7);

@@ -206,7 +206,7 @@ fn random_tasks_mean_the_same_to_all() {
 }
 
 #[test]
-#[ignore = "a hundred thousand tasks: minutes"]
+#[ignore = "slow: a hundred thousand tasks: minutes"]
 fn a_hundred_thousand_random_tasks_mean_the_same_to_all() {
     compare_all(1_000..101_000);
 }

@@ -232,7 +232,7 @@ fn random_tasks_are_planned_for_as_all_short_plans_say() {
 }
 
 #[test]
-#[ignore = "twenty thousand tasks: minutes"]
+#[ignore = "slow: twenty thousand tasks: minutes"]
 fn many_random_tasks_are_planned_for_as_all_short_plans_say() {
     println!("{:?}", brute::compare_all(1_000..21_000));
 }

@@ -24,10 +24,11 @@ fn old_habits_are_read() {
     assert_eq!(task.module_options[0].arguments, ["-Scene", "Table.xml"]);
 }
 
-/// Where the published tasks are, if they are there.
-fn published() -> Option<PathBuf> {
+/// Where the published tasks are.
+fn published() -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/pddl");
-    path.is_dir().then_some(path)
+    assert!(path.is_dir(), "{} is not there", path.display());
+    path
 }
 
 fn folders(path: &Path) -> Vec<PathBuf> {
@@ -54,11 +55,9 @@ fn domains_of(problem: &Path, files: &[PathBuf]) -> Vec<PathBuf> {
 }
 
 #[test]
+#[ignore = "data: the published tasks of ../shared/pddl"]
 fn published_tasks_have_no_false_finding() {
-    let Some(path) = published() else {
-        println!("skipped: the published tasks are not there");
-        return;
-    };
+    let path = published();
     let load = |path: &Path| {
         Source::new(path.display().to_string(), std::fs::read_to_string(path).unwrap_or_default())
     };

@@ -207,18 +207,16 @@ async fn a_frame_that_spoils_later_is_dropped_with_its_name() {
     }
 }
 
-fn shared(name: &str) -> Option<PathBuf> {
+fn shared(name: &str) -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data").join(name);
-    if !path.is_dir() {
-        println!("skipped: {} is not here", path.display());
-        return None;
-    }
-    Some(path)
+    assert!(path.is_dir(), "{} is not there", path.display());
+    path
 }
 
 #[tokio::test]
+#[ignore = "data: frames of ../shared/data"]
 async fn a_real_kitchen_is_driven_through() {
-    let Some(path) = shared("kitchen") else { return };
+    let path = shared("kitchen");
     let robot = RecordedRobot::open(&path).unwrap();
     let stations = robot.stations().unwrap().to_vec();
     assert!(stations.len() > 10);
@@ -230,8 +228,9 @@ async fn a_real_kitchen_is_driven_through() {
 }
 
 #[test]
+#[ignore = "data: frames of ../shared/data"]
 fn a_real_room_asks_for_its_camera() {
-    let Some(path) = shared("dining_room") else { return };
+    let path = shared("dining_room");
     let error = Recording::open(&path).unwrap_err().to_string();
     assert!(error.contains("which camera"), "{error}");
     let elsewhere = tempfile::TempDir::new().unwrap();

@@ -71,7 +71,7 @@ fn what_is_new_is_learned_and_found_where_it_was_moved_to() {
 }
 
 #[test]
-#[ignore = "three more runs: a minute"]
+#[ignore = "slow: three more runs: a minute"]
 fn what_is_new_is_learned_known_better_when_met_again_and_found_where_it_was_moved_to() {
     check_learned(true);
 }

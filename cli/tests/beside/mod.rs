@@ -2,12 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-/// A folder beside the checkout; without it a test says that it is skipped.
-pub fn shared(path: &str) -> Option<PathBuf> {
+/// A folder beside the checkout, for tests that run when they are asked for.
+pub fn shared(path: &str) -> PathBuf {
     let found = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared").join(path);
-    if !found.exists() {
-        eprintln!("skipped: {} is not there", found.display());
-        return None;
-    }
-    Some(found)
+    assert!(found.exists(), "{} is not there", found.display());
+    found
 }

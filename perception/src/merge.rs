@@ -26,7 +26,6 @@ use joint::{Found, Round};
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use parts::{Part, Parts, Plane};
 use prepare::Prepared;
-use rayon::prelude::*;
 use search::{Oriented, PERHAPS_SHARE, SURE_SHARE};
 use serde::{Deserialize, Serialize};
 
@@ -212,12 +211,12 @@ struct Ready {
 
 impl Ready {
     fn of(views: &[View], options: &MergeOptions) -> Ready {
-        let (prepared, maps) = views.par_iter().map(|view| Ready::of_view(view, options)).unzip();
+        let (prepared, maps) = pool::map(views, 1, |view| Ready::of_view(view, options)).into_iter().unzip();
         Ready { prepared, maps }
     }
 
     fn of_view(view: &View, options: &MergeOptions) -> (Prepared, Option<DepthMap>) {
-        rayon::join(|| prepare::prepare(view, options), || DepthMap::from_view(view, &view.world_from_camera))
+        pool::join(|| prepare::prepare(view, options), || DepthMap::from_view(view, &view.world_from_camera))
     }
 }
 
@@ -324,7 +323,7 @@ fn filter_and_thin(
     prepared: &[Prepared],
     options: &MergeOptions,
 ) -> Result<Vec<Step>, MergeError> {
-    let given = views.par_iter().map(|v| v.cloud.count_finite()).sum();
+    let given = pool::map(views, 1, |view| view.cloud.count_finite()).into_iter().sum();
     let points = prepared.iter().map(|p| p.points.len()).sum();
     if points == 0 {
         let band = options

@@ -7,6 +7,7 @@ mod all;
 mod nearby;
 
 use crate::cloud::{CloudError, is_finite};
+use crate::pool;
 use nalgebra::Point3;
 
 pub(crate) use nearby::{Nearby, least};
@@ -322,7 +323,7 @@ fn build(items: &mut [Item], nodes: &mut [Bounds], leaves: usize) {
     let mut build_left = || build(left, left_nodes, left_leaves);
     let mut build_right = || build(right, right_nodes, leaves - left_leaves);
     if parallel {
-        rayon::join(build_left, build_right);
+        pool::join(build_left, build_right);
     } else {
         build_left();
         build_right();

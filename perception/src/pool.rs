@@ -1,8 +1,120 @@
-//! Work that is shared out among threads.
+//! Work shared among threads. What is done is behind a reference to a closure, so that the machinery that shares it is compiled once
+//! and not for every place that uses it. Results stand in the order of what they are of, whatever the number of threads.
 
-use rayon::prelude::*;
 use std::cmp::Reverse;
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use tracing::Span;
+
+/// Shares for each thread where work is split: enough that no thread waits long for the last one.
+const SHARES: usize = 8;
+
+type Work<'a> = &'a mut (dyn FnMut() + Send);
+
+fn both(one: Work<'_>, other: Work<'_>) {
+    rayon::join(one, other);
+}
+
+/// Does two pieces of work, beside each other where a thread is free.
+pub(crate) fn join<A: Send, B: Send>(
+    one: impl FnOnce() -> A + Send,
+    other: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    let (mut one, mut other) = (Some(one), Some(other));
+    let (mut first, mut second) = (None, None);
+    both(&mut || first = one.take().map(|work| work()), &mut || second = other.take().map(|work| work()));
+    (first.expect("the first was done"), second.expect("the second was done"))
+}
+
+/// Does the work of each share of a range; no share is shorter than `least`.
+fn share(range: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)) {
+    if range.len() < 2 * least {
+        return work(range);
+    }
+    let middle = range.start + range.len() / 2;
+    both(&mut || share(range.start..middle, least, work), &mut || share(middle..range.end, least, work));
+}
+
+/// Least length of a share of so many, where `least` are worth a thread.
+fn length(count: usize, least: usize) -> usize {
+    count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
+}
+
+/// What comes of each number below `count`, if anything; a share has `least` of them or more. `state` is a share's own.
+pub(crate) fn filter_with<S, R: Send>(
+    count: usize,
+    least: usize,
+    state: impl Fn() -> S + Sync,
+    result: impl Fn(&mut S, usize) -> Option<R> + Sync,
+) -> Vec<R> {
+    let shares = Mutex::new(Vec::new());
+    share(0..count, length(count, least), &|range| {
+        let (start, mut state) = (range.start, state());
+        let some: Vec<R> = range.filter_map(|n| result(&mut state, n)).collect();
+        shares.lock().unwrap_or_else(PoisonError::into_inner).push((start, some));
+    });
+    let mut shares = shares.into_inner().unwrap_or_else(PoisonError::into_inner);
+    shares.sort_unstable_by_key(|(start, _)| *start);
+    let mut all = Vec::with_capacity(shares.iter().map(|(_, some)| some.len()).sum());
+    shares.into_iter().for_each(|(_, some)| all.extend(some));
+    all
+}
+
+/// What comes of each number below `count`, if anything.
+pub(crate) fn filter<R: Send>(
+    count: usize,
+    least: usize,
+    result: impl Fn(usize) -> Option<R> + Sync,
+) -> Vec<R> {
+    filter_with(count, least, || (), |(), n| result(n))
+}
+
+/// What comes of each number below `count`.
+pub(crate) fn each<R: Send>(count: usize, least: usize, result: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    filter(count, least, |n| Some(result(n)))
+}
+
+/// What comes of each of a slice.
+pub(crate) fn map<T: Sync, R: Send>(all: &[T], least: usize, result: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    each(all.len(), least, |n| result(&all[n]))
+}
+
+/// Does something with each of a slice and its number. `state` is a share's own.
+pub(crate) fn for_each<T: Send, S>(
+    all: &mut [T],
+    least: usize,
+    state: impl Fn() -> S + Sync,
+    work: impl Fn(&mut S, usize, &mut T) + Sync,
+) {
+    let length = length(all.len(), least);
+    let mut slices: Vec<Mutex<&mut [T]>> = all.chunks_mut(length).map(Mutex::new).collect();
+    share(0..slices.len(), 1, &|range| {
+        let mut state = state();
+        for n in range {
+            let mut slice = slices[n].lock().unwrap_or_else(PoisonError::into_inner);
+            (n * length..).zip(slice.iter_mut()).for_each(|(n, one)| work(&mut state, n, one));
+        }
+    });
+    slices.clear();
+}
+
+/// What comes of the first of the numbers that anything comes of.
+pub(crate) fn find_first<R: Send>(
+    range: Range<usize>,
+    result: impl Fn(usize) -> Option<R> + Sync,
+) -> Option<R> {
+    let best = AtomicUsize::new(usize::MAX);
+    let found = filter(range.len(), 1, |n| {
+        if n > best.load(Ordering::Relaxed) {
+            return None;
+        }
+        let result = result(range.start + n)?;
+        best.fetch_min(n, Ordering::Relaxed);
+        Some(result)
+    });
+    found.into_iter().next()
+}
 
 /// Does a piece of work in a thread of the pool: what it shares out again need not wake the pool and wait for it each time.
 pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R {
@@ -17,7 +129,16 @@ pub fn heaviest_first<T: Sync, R: Send>(
 ) -> Vec<R> {
     let mut order: Vec<usize> = (0..all.len()).collect();
     order.sort_by_key(|&n| Reverse(weight(&all[n])));
-    let mut done: Vec<(usize, R)> = order.into_iter().par_bridge().map(|n| (n, each(&all[n]))).collect();
+    let next = AtomicUsize::new(0);
+    let done = Mutex::new(Vec::with_capacity(all.len()));
+    let take = || {
+        while let Some(&n) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let result = each(&all[n]);
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((n, result));
+        }
+    };
+    share(0..rayon::current_num_threads(), 1, &|_| take());
+    let mut done: Vec<(usize, R)> = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_unstable_by_key(|(n, _)| *n);
     done.into_iter().map(|(_, result)| result).collect()
 }

@@ -154,7 +154,7 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
         (parts, slots)
     };
     let half = voxels.count_runs() / 2;
-    let ((mut parts, slots), (others, _)) = rayon::join(|| of(0..half), || of(half..voxels.count_runs()));
+    let ((mut parts, slots), (others, _)) = pool::join(|| of(0..half), || of(half..voxels.count_runs()));
     for (part, other) in others {
         match slots[part as usize] {
             Some(slot) => {
@@ -176,7 +176,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
     let rows = Rows::of(surface);
     let [first, second] = [0..half, half..cloud.len()].map(|range| (range.start, &cloud.points[range]));
     let of = |(from, points): (usize, &[Point3<f32>])| above_of(from as u32, points, surface, &rows, options);
-    let ((mut indices, mut points), more) = rayon::join(|| of(first), || of(second));
+    let ((mut indices, mut points), more) = pool::join(|| of(first), || of(second));
     indices.extend(more.0);
     points.extend(more.1);
     (indices, points)

@@ -18,7 +18,6 @@ use crate::pool;
 use crate::scale::APART_M;
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::mpsc;
 
@@ -341,7 +340,7 @@ pub fn find_surfaces(
                 large_planes(&samples, (options.seed, ROUNDS), is_level, found);
             })
         };
-        let ((), rays) = rayon::join(planes, || role::rays(&samples, seen));
+        let ((), rays) = pool::join(planes, || role::rays(&samples, seen));
         drop(teller);
         let mut faces: Vec<(usize, Vec<Surface>)> = told.into_iter().collect();
         faces.sort_unstable_by_key(|(n, _)| *n);
@@ -357,13 +356,14 @@ pub fn find_surfaces(
             Role::Support | Role::Untold => surface.with_hidden(&samples, seen),
             Role::Floor | Role::Other => surface,
         };
-        Ok(surfaces.into_par_iter().map(|surface| options.within_region(whole(surface))).collect())
+        Ok(pool::map(&surfaces, 1, |surface| options.within_region(whole(surface.clone()))))
     })
 }
 
 /// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.
 fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
-    let mut claims: Vec<(f64, Surface)> = surfaces.into_par_iter().map(|s| (claim(&s, samples), s)).collect();
+    let claims = pool::map(&surfaces, 1, |surface| claim(surface, samples));
+    let mut claims: Vec<(f64, Surface)> = claims.into_iter().zip(surfaces).collect();
     claims.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     let mut distinct: Vec<Surface> = Vec::new();
     for (_, surface) in claims {
@@ -479,7 +479,7 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
     let of = |points: &[Point3<f32>]| -> Vec<Sample> {
         points.iter().step_by(stride).filter(|p| is_finite(p)).map(sample).collect()
     };
-    let (mut samples, more) = rayon::join(|| of(&cloud.points[..half]), || of(&cloud.points[half..]));
+    let (mut samples, more) = pool::join(|| of(&cloud.points[..half]), || of(&cloud.points[half..]));
     samples.extend(more);
     samples
 }

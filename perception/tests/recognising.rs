@@ -443,7 +443,8 @@ fn the_published_score_cannot_reject_the_mug() {
 fn the_same_cloud_gives_the_same_percepts_whatever_the_threads() {
     let things = [CUP, Thing::Tin { x: -0.2, y: 0.1, radius: 0.05, height: 0.2 }];
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+        let pool =
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         pool.install(|| percepts(&things, 0.3, &Descry::default()))
     };
     let one = with(1);

@@ -7,9 +7,9 @@ use super::mask::Mask;
 use crate::cloud::{Cloud, is_finite};
 use crate::neighbours::Neighbours;
 use crate::noise::{axial_sigma_m, lateral_sigma_m};
+use crate::pool;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 
 /// Doubt beside a depth edge: σ_e = k·exp(−d²/D²), k and D in metres.
 const EDGE_M: (f64, f64) = (1.0, 0.002);
@@ -121,7 +121,7 @@ impl Measured {
             }
             (at, normal)
         };
-        let places: Vec<_> = chosen.par_iter().map(place).collect();
+        let places: Vec<_> = pool::map(&chosen, 1, place);
         cloud.points = places.iter().map(|p| p.0).collect();
         cloud.normals = Some(places.iter().map(|p| p.1).collect());
         Ok(cloud)

@@ -17,6 +17,7 @@ pub mod skin;
 pub mod stood;
 
 use crate::cloud::{Cloud, CloudError};
+use crate::pool;
 use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};
 use crate::view::View;
 use crate::voxel::VoxelError;
@@ -24,7 +25,6 @@ use evidence::{Evidence, Judge, Verified, first_sight, unbounded, verify};
 use feature::{Features, Kind};
 use group::{Vote, matches, standing, votes};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use rayon::prelude::*;
 use scene::Seen;
 use serde::{Deserialize, Serialize};
 use skin::Skin;
@@ -215,8 +215,9 @@ impl Library {
         let of_model = |(number, model): (usize, &Known)| {
             model.find(number, &described, scene, world_from_camera, options)
         };
-        let all: Vec<Vec<Candidate>> =
-            self.models.par_iter().enumerate().map(of_model).collect::<Result<_, _>>()?;
+        let all: Vec<Vec<Candidate>> = pool::each(self.models.len(), 1, |n| of_model((n, &self.models[n])))
+            .into_iter()
+            .collect::<Result<_, _>>()?;
         Ok(all.into_iter().flatten().collect())
     }
 }

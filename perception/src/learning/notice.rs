@@ -7,12 +7,12 @@ use crate::cloud::{Cloud, Grid, is_finite};
 use crate::cluster;
 use crate::neighbours::Neighbours;
 use crate::noise::frontal_sigma_m;
+use crate::pool;
 use crate::register::{Method, Prepared, RegisterOptions, align};
 use crate::view::View;
 use crate::visibility::{DepthMap, Seen};
 use crate::voxel;
 use nalgebra::{Isometry3, Point3, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Options of change detection.
@@ -134,8 +134,7 @@ impl MetaRoom {
         let poses = self.localised(views)?;
         let maps = maps(views, &poses)?;
         let tree = Neighbours::new(&self.cloud.points)?;
-        let changes: Vec<Change> =
-            views.par_iter().zip(&maps).map(|(view, map)| self.compare(view, map, &tree)).collect();
+        let changes = pool::each(views.len(), 1, |n| self.compare(&views[n], &maps[n], &tree));
         let appeared = self.clusters(views, &poses, &changes)?;
         let (gone, removed) = self.remove(views, &maps)?;
         let added = self.add(views, &poses, &changes, &appeared)?;
@@ -302,12 +301,12 @@ impl MetaRoom {
                 near && [0.0, -1.0, 1.0].into_iter().all(is_free)
             })
         };
-        let gone: Vec<bool> = self.cloud.points.par_iter().map(|p| through(p, 1.0, 0.0)).collect();
+        let gone: Vec<bool> = pool::map(&self.cloud.points, 1, |p| through(p, 1.0, 0.0));
         let pick = |wanted: bool| -> Vec<u32> {
             (0u32..).zip(&gone).filter(|(_, g)| **g == wanted).map(|(i, _)| i).collect()
         };
         let lost = self.cloud.select(&pick(true));
-        let by_far: Vec<bool> = lost.points.par_iter().map(|p| through(p, FAR, TURNED)).collect();
+        let by_far: Vec<bool> = pool::map(&lost.points, 1, |p| through(p, FAR, TURNED));
         self.cloud = self.cloud.select(&pick(false));
         // Thinned to voxels, a cluster of so many pixels is about so many points.
         let least = self.options.least_pixels / 4;

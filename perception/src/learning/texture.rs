@@ -7,11 +7,11 @@
 use crate::cloud::{Grid, is_finite};
 use crate::noise::frontal_sigma_m;
 use crate::normals::{self, OrganisedOptions};
+use crate::pool;
 use crate::register::Sums;
 use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
 
 /// Half sides of the boxes that images are blurred with, pixels, from far to near.
 const BLURS: [usize; 3] = [5, 2, 1];
@@ -48,11 +48,8 @@ pub(super) fn refined(
     range_m: f64,
 ) -> Vec<Isometry3<f64>> {
     let _span = tracing::debug_span!("texture", views = views.len()).entered();
-    let looks: Vec<Option<Look>> = views
-        .par_iter()
-        .zip(used)
-        .map(|(view, used)| if *used { Look::of(view, range_m as f32) } else { None })
-        .collect();
+    let look = |n: usize| if used[n] { Look::of(&views[n], range_m as f32) } else { None };
+    let looks: Vec<Option<Look>> = pool::each(views.len(), 1, look);
     let active: Vec<usize> = (0..views.len()).filter(|&i| looks[i].is_some()).collect();
     if active.len() < 2 {
         return poses.to_vec();
@@ -60,20 +57,13 @@ pub(super) fn refined(
     let pairs = pairs(&active, poses);
     let mut moved = poses.to_vec();
     for blur in BLURS {
-        let images: Vec<Vec<f32>> = looks
-            .par_iter()
-            .map(|l| l.as_ref().map_or(Vec::new(), |l| blurred(&l.light, l.grid, blur)))
-            .collect();
+        let images: Vec<Vec<f32>> =
+            pool::map(&looks, 1, |l| l.as_ref().map_or(Vec::new(), |l| blurred(&l.light, l.grid, blur)));
         for _ in 0..ROUNDS {
-            let links: Vec<Sums> = pairs
-                .par_iter()
-                .map(|&(i, j)| match (&looks[i], &looks[j]) {
-                    (Some(a), Some(b)) => {
-                        link((a, &images[i]), (b, &images[j]), &moved[j].inv_mul(&moved[i]))
-                    }
-                    _ => Sums::ZERO,
-                })
-                .collect();
+            let links = pool::map(&pairs, 1, |&(i, j)| match (&looks[i], &looks[j]) {
+                (Some(a), Some(b)) => link((a, &images[i]), (b, &images[j]), &moved[j].inv_mul(&moved[i])),
+                _ => Sums::ZERO,
+            });
             if !step(&active, &pairs, &links, &mut moved) {
                 break;
             }

@@ -2,9 +2,9 @@
 
 use super::station::{Spot, thinned};
 use crate::cloud::is_finite;
+use crate::pool;
 use crate::voxel::{self, Table};
 use nalgebra::{Isometry2, Point3, Vector2, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -234,7 +234,7 @@ impl Cells {
             let towards = towards / f64::from(sums.count);
             Some((sums.cube, Region { at, towards, normal, points: sums.count }))
         };
-        let mut found: Vec<_> = self.sums.par_iter().filter_map(region).collect();
+        let mut found: Vec<_> = pool::filter(self.sums.len(), 1, |n| region(&self.sums[n]));
         found.sort_unstable_by_key(|(cube, _)| *cube);
         found.into_iter().map(|(_, region)| region).collect()
     }

@@ -5,8 +5,8 @@ use super::field::Field;
 use super::graph::{Edge, GraphError, PoseGraph, Settled};
 use super::pair::{PairFit, Prior, RectifyOptions, chained, fit_cut};
 use super::station::{FieldOfView, Spot, Station, thinned};
+use crate::pool;
 use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
-use rayon::prelude::*;
 
 /// Options for finding places that were passed before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +91,7 @@ pub fn closures(
     checked(poses, rectify, options)?;
     let poses = &poses[..poses.len().min(stations.len())];
     let plans: Vec<Vec<Spot>> =
-        stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
+        pool::map(stations, 1, |s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m));
     let ways = ways_m(poses);
     let around = |at: usize| Stretch::around(at, &plans, poses, &ways, rectify, options);
     let close = |to: usize| {
@@ -101,7 +101,8 @@ pub fn closures(
         let fit = searched(&around(from), &around(to), &start, reach_m, rectify, options)?;
         Some(Closure { from, to, fit })
     };
-    Ok(looked_at(&ways, options).into_par_iter().filter_map(close).collect())
+    let looked_at = looked_at(&ways, options);
+    Ok(pool::filter(looked_at.len(), 1, |n| close(looked_at[n])))
 }
 
 fn checked(
@@ -188,7 +189,7 @@ pub fn relocate(
     check_pose("start", 0, start)?;
     let stretch = |(stations, poses): (&[Station], &[Isometry2<f64>])| {
         let plans: Vec<Vec<Spot>> =
-            stations.par_iter().map(|s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m)).collect();
+            pool::map(stations, 1, |s| s.plan(&rectify.band_m, &rectify.field, rectify.thin_m));
         Stretch::of(plans.iter().zip(poses.iter().copied()), rectify)
     };
     Ok(searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options))
@@ -298,5 +299,6 @@ fn scores(
             .map(|by| Isometry2::new(start.translation.vector + by, angle));
         poses.filter_map(|pose| Some((field.mean_of_seen(&some, &pose)?, pose))).collect::<Vec<_>>()
     };
-    Some((-turn..=turn).into_par_iter().flat_map_iter(at_heading).collect())
+    let headings: Vec<i32> = (-turn..=turn).collect();
+    Some(pool::map(&headings, 1, |k| at_heading(*k)).into_iter().flatten().collect())
 }

@@ -11,9 +11,9 @@
 use super::error::{MappingError, check, check_pose};
 use super::field::{Field, OUTLIERS, REACH};
 use super::station::{FieldOfView, Spot, Station, shared};
+use crate::pool;
 use crate::register::{self, Method, Prepared, RegisterOptions};
 use nalgebra::{Isometry2, Isometry3, Matrix3, Point2, Point3, Rotation2, UnitComplex, Vector2, Vector3};
-use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Method for matching two plans.
@@ -147,7 +147,7 @@ pub fn rectify_drive(stations: &[Station], options: &RectifyOptions) -> Result<V
     let _span = tracing::debug_span!("rectify", stations = stations.len()).entered();
     options.check()?;
     stations.iter().enumerate().try_for_each(|(i, s)| check_pose("station", i, &s.odom_from_level))?;
-    Ok(stations.par_windows(2).map(|pair| step(&pair[0], &pair[1], options)).collect())
+    Ok(pool::each(stations.len().saturating_sub(1), 1, |n| step(&stations[n], &stations[n + 1], options)))
 }
 
 fn step(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit {

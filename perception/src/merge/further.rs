@@ -23,7 +23,6 @@ use crate::pool;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::Isometry3;
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::fmt;
 use std::sync::Arc;
@@ -146,7 +145,7 @@ impl Kept {
 
     fn go_ahead(&mut self, views: &[View]) {
         let options = self.options.clone().unwrap_or_default();
-        let are_known = views.par_iter().map(digest).eq(self.digests.par_iter().copied());
+        let are_known = pool::map(views, 1, digest) == self.digests;
         if are_known {
             self.base = self.base_of(views, &options).ok();
         }
@@ -154,14 +153,20 @@ impl Kept {
 
     /// What is known of each view by itself: of those that were here before it is kept.
     fn prepare(&mut self, views: &[View], options: &MergeOptions) {
-        let digests: Vec<u64> = views.par_iter().map(digest).collect();
+        let digests = pool::map(views, 1, digest);
         let kept = self.prepared.drain(..).zip(self.maps.drain(..));
         let mut kept: FxHashMap<u64, _> = self.digests.drain(..).zip(kept).collect();
         let kept: Vec<_> = digests.iter().map(|digest| kept.remove(digest)).collect();
-        let ready = |(view, kept): (&View, Option<(Prepared, Option<DepthMap>)>)| {
-            kept.unwrap_or_else(|| Ready::of_view(view, options))
-        };
-        (self.prepared, self.maps) = views.par_iter().zip(kept).map(ready).unzip();
+        let mut kept: Vec<Option<(Prepared, Option<DepthMap>)>> = kept;
+        pool::for_each(
+            &mut kept,
+            1,
+            || (),
+            |(), n, kept| {
+                kept.get_or_insert_with(|| Ready::of_view(&views[n], options));
+            },
+        );
+        (self.prepared, self.maps) = kept.into_iter().flatten().unzip();
         self.digests = digests;
     }
 

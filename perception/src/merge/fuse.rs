@@ -10,10 +10,10 @@ use super::returns::{Looked, Return};
 use super::settle::Before;
 use super::{Aligned, MergeOptions};
 use crate::cloud::Cloud;
+use crate::pool;
 use crate::view::View;
 use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// What is known of a voxel: running sums, weighted, while it is gathered; then means.
@@ -115,7 +115,7 @@ pub(super) fn gather(
         }
         for number in taken.len()..used.len() {
             // The next view is looked through while those before it are added.
-            let next = rayon::join(|| add(&mut all, &taken, |_| ()), || look(number)).1;
+            let next = pool::join(|| add(&mut all, &taken, |_| ()), || look(number)).1;
             if let Some(known) = &mut known {
                 known.push(Arc::clone(&next.looked));
             }
@@ -176,13 +176,18 @@ struct Taken<'a> {
 
 /// Sorts what is fused of some views into voxels and sheets; each is done with what is to be done then while others are filled.
 fn add(all: &mut [Gathered], some: &[Taken], then: impl Fn(&mut Gathered) + Sync) {
-    all.par_iter_mut().enumerate().for_each(|(grid, gathered)| {
-        for Taken { number, looked, world_from_camera, colours } in some {
-            let scale = Scale::of(world_from_camera, gathered);
-            looked.of_grid(grid).for_each(|returns| gathered.add(returns, &scale, *number, *colours));
-        }
-        then(gathered);
-    });
+    pool::for_each(
+        all,
+        1,
+        || (),
+        |(), grid, gathered| {
+            for Taken { number, looked, world_from_camera, colours } in some {
+                let scale = Scale::of(world_from_camera, gathered);
+                looked.of_grid(grid).for_each(|returns| gathered.add(returns, &scale, *number, *colours));
+            }
+            then(gathered);
+        },
+    );
 }
 
 /// Camera to grid.

@@ -5,13 +5,13 @@
 
 use super::parts::Part;
 use super::prepare::{Prepared, Surfel};
+use crate::pool;
 use crate::register::{Partner, Sums};
 use crate::scale::SHAPE_M;
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector3,
     Vector6,
 };
-use rayon::prelude::*;
 
 /// How one round of alignment looks for partners.
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,15 @@ pub(super) fn align(
     for pass in 0..round.passes {
         let share = pass as f64 / (round.passes.max(2) - 1) as f64;
         let radius = round.from_m * (round.to_m / round.from_m).powf(share);
-        let links: Vec<Link> = asked.par_iter_mut().map(|asked| link(views, asked, poses, radius)).collect();
+        let mut linked: Vec<(&mut Asked, Option<Link>)> =
+            asked.iter_mut().map(|asked| (asked, None)).collect();
+        pool::for_each(
+            &mut linked,
+            1,
+            || (),
+            |(), _, (asked, of)| *of = Some(link(views, asked, poses, radius)),
+        );
+        let links: Vec<Link> = linked.into_iter().filter_map(|(_, link)| link).collect();
         let moved = step(views, used, loose, poses, &links);
         for (i, f) in found.iter_mut().enumerate() {
             let own = links.iter().filter(|l| l.from == i || l.to == i);

@@ -6,10 +6,10 @@ use super::prepare::{Prepared, Within, coarser};
 use crate::cloud::{Cloud, Grid};
 use crate::noise::frontal_sigma_m;
 use crate::normals::{OrganisedOptions, organised_where};
+use crate::pool;
 use crate::surface::BAND;
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -69,7 +69,7 @@ impl Looked {
             returns.visit(first..rows.min(first + ROWS), |grid, of_grid| found[grid].push(of_grid));
             found
         };
-        Looked((0..rows).into_par_iter().step_by(ROWS).map(look).collect())
+        Looked(pool::each(rows.div_ceil(ROWS), 1, |n| look(n * ROWS)))
     }
 
     /// True if it was told what lies on as many planes.

@@ -4,9 +4,9 @@
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
 
 use super::parts::FEWEST;
+use crate::pool;
 use crate::surface::floor;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 /// A place on a surface with its unit normal.
@@ -226,7 +226,7 @@ pub(super) fn place(
             };
             shifted.zip(cells.scores(&turned, shifts)).map(of_shift).collect()
         };
-        let found: Vec<Candidate> = tries.par_iter().flat_map_iter(candidates).collect();
+        let found: Vec<Candidate> = pool::map(&tries, 1, candidates).into_iter().flatten().collect();
         best = distinct(&found, 2.0 * side_m);
     }
     let Candidate { x, y, turn: angle, score } = best[0];

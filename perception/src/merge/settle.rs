@@ -8,10 +8,10 @@ use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
 use crate::cloud::{Cloud, is_finite};
+use crate::pool;
 use crate::visibility::Gaze;
 use bytemuck::Zeroable;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 use std::iter::Peekable;
 use std::slice::Iter;
 
@@ -56,7 +56,7 @@ pub(super) fn fused(all: &[Gathered]) -> Fused {
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let rows: Vec<&[Settled]> =
         all.iter().flat_map(|gathered| gathered.before.rows.iter().map(Vec::as_slice)).collect();
-    let ((points, normals), (views_per_point, colours)) = rayon::join(
+    let ((points, normals), (views_per_point, colours)) = pool::join(
         || (of_all(&rows, |settled| settled.at), of_all(&rows, |settled| settled.normal)),
         || {
             let colours = coloured.then(|| of_all(&rows, |settled| settled.colour));
@@ -81,10 +81,14 @@ fn of_all<T: Zeroable + Send>(rows: &[&[Settled]], of: impl Fn(&Settled) -> T + 
         parts.push((part, row));
         rest = after;
     }
-    let fill = |(part, row): (&mut [T], &&[Settled])| {
-        part.iter_mut().zip(*row).for_each(|(one, settled)| *one = of(settled));
-    };
-    parts.into_par_iter().for_each(fill);
+    pool::for_each(
+        &mut parts,
+        1,
+        || (),
+        |(), _, (part, row): &mut (&mut [T], &&[Settled])| {
+            part.iter_mut().zip(**row).for_each(|(one, settled)| *one = of(settled));
+        },
+    );
     all
 }
 
@@ -95,7 +99,7 @@ impl Gathered {
         let is_first = rows.is_empty();
         let means = self.means(means);
         rows.resize_with(self.bricks.len().div_ceil(TOGETHER), Vec::new);
-        let settle_row = |row: &mut Vec<Settled>, (number, before): (usize, &mut Vec<Settled>)| {
+        let settle_row = |row: &mut Vec<Settled>, number: usize, before: &mut Vec<Settled>| {
             row.clear();
             let mut known_cells = before.iter().peekable();
             for brick in (number * TOGETHER..self.bricks.len()).take(TOGETHER) {
@@ -110,7 +114,7 @@ impl Gathered {
             // The memory of what was there before is the next row's.
             std::mem::swap(row, before);
         };
-        rows.par_iter_mut().enumerate().for_each_init(Vec::new, settle_row);
+        pool::for_each(&mut rows, 1, Vec::new, settle_row);
         self.before = Before { means, rows, gazes: gazes.len() };
         self.bricks.touched.fill(Mask::default());
     }
@@ -124,7 +128,7 @@ impl Gathered {
         if means.is_empty() {
             // With room for those of further looks.
             means.reserve(cells.len() + cells.len() / 2);
-            means.par_extend(cells.par_iter().with_min_len(SOME).map(Cell::mean));
+            means.extend(pool::map(cells, SOME, Cell::mean));
         } else {
             means.extend_from_slice(&cells[means.len()..]);
             self.bricks.visit_touched(|number| means[number] = cells[number].mean());

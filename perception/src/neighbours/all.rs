@@ -2,7 +2,7 @@
 
 use super::nearby::Nearby;
 use super::{Bounds, LEAF, Neighbours, Span};
-use rayon::prelude::*;
+use crate::pool;
 
 /// What one walk needs; kept between leaves.
 #[derive(Default)]
@@ -40,14 +40,12 @@ impl Neighbours {
             return out;
         }
         let mut by_slot = vec![default; self.index.len()];
-        by_slot.par_chunks_mut(LEAF).enumerate().for_each_init(
-            Scratch::default,
-            |scratch, (leaf, answers)| {
-                self.leaf_neighbours(leaf, k, scratch, |slot_in_leaf, nearby| {
-                    answers[slot_in_leaf] = result(leaf * LEAF + slot_in_leaf, nearby);
-                });
-            },
-        );
+        let mut leaves: Vec<&mut [T]> = by_slot.chunks_mut(LEAF).collect();
+        pool::for_each(&mut leaves, 1, Scratch::default, |scratch, leaf, answers| {
+            self.leaf_neighbours(leaf, k, scratch, |slot_in_leaf, nearby| {
+                answers[slot_in_leaf] = result(leaf * LEAF + slot_in_leaf, nearby);
+            });
+        });
         for (&index, &answer) in self.index.iter().zip(&by_slot).take(self.len) {
             out[index as usize] = answer;
         }

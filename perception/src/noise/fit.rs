@@ -1,10 +1,10 @@
 //! The noise of a camera from what it shows of a level face: the inverse of its depth is linear in the pixels.
 
 use super::Sensor;
+use crate::pool;
 use crate::surface::{Outline, Surface};
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
-use rayon::prelude::*;
 
 /// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together. From: chosen.
 const BLOCK_PX: usize = 24;
@@ -58,8 +58,8 @@ impl Residuals {
             .filter(|&(u, v)| is_on(map, &outline, (u + BLOCK_PX / 2, v + BLOCK_PX / 2), &normal, offset_m))
             .collect();
         let step = corners.len().div_ceil(BLOCKS).max(1);
-        let blocks = corners.into_par_iter().step_by(step);
-        self.blocks.par_extend(blocks.filter_map(|corner| block(map, corner, &normal, offset_m)));
+        let corners: Vec<_> = corners.into_iter().step_by(step).collect();
+        self.blocks.extend(pool::filter(corners.len(), 1, |n| block(map, corners[n], &normal, offset_m)));
     }
 
     /// The sensor that errs like that; what does not show stays as assumed.

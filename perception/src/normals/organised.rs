@@ -2,8 +2,8 @@
 
 use super::Normals;
 use crate::cloud::{Cloud, Grid};
+use crate::pool;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 
 /// How far to look around a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,21 +46,27 @@ pub(crate) fn organised_where(
         normals: vec![Vector3::repeat(f32::NAN); cloud.len()],
         variation: vec![f32::NAN; cloud.len()],
     };
-    let rows = found.normals.par_chunks_mut(width.max(1)).zip(found.variation.par_chunks_mut(width.max(1)));
-    rows.enumerate().for_each(|(row, (normals, variation))| {
-        for column in (0..width).step_by(LANES) {
-            let pixels = column..width.min(column + LANES);
-            if !pixels.clone().any(|column| wanted(row * width + column)) {
-                continue;
+    let mut rows: Vec<_> =
+        found.normals.chunks_mut(width.max(1)).zip(found.variation.chunks_mut(width.max(1))).collect();
+    pool::for_each(
+        &mut rows,
+        1,
+        || (),
+        |(), row, (normals, variation)| {
+            for column in (0..width).step_by(LANES) {
+                let pixels = column..width.min(column + LANES);
+                if !pixels.clone().any(|column| wanted(row * width + column)) {
+                    continue;
+                }
+                let Some((at, sums)) = image.sums(row, column, options) else { continue };
+                let [x, y, z, share] = sums.surfaces(&at, options);
+                for (lane, pixel) in pixels.enumerate() {
+                    normals[pixel] = Vector3::new(x[lane], y[lane], z[lane]);
+                    variation[pixel] = share[lane];
+                }
             }
-            let Some((at, sums)) = image.sums(row, column, options) else { continue };
-            let [x, y, z, share] = sums.surfaces(&at, options);
-            for (lane, pixel) in pixels.enumerate() {
-                normals[pixel] = Vector3::new(x[lane], y[lane], z[lane]);
-                variation[pixel] = share[lane];
-            }
-        }
-    });
+        },
+    );
     Some(found)
 }
 

@@ -20,7 +20,6 @@ use crate::scale::{APART_M, EDGE_M};
 use crate::segment::{Scene, Segment};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Our recogniser with its few numbers.
@@ -173,9 +172,10 @@ impl Descry {
                 let [foot, rim] = lies.unwrap_or_default();
                 [own.log_against(m, *stance), foot, rim].map(|log| self.verified * log)
             };
-            let each = models.par_iter().zip(&weighed.stances).zip(doubted).with_max_len(1);
-            let against: Vec<[f64; 3]> =
-                each.map(|(asked, doubted)| if doubted { against(asked) } else { [0.0; 3] }).collect();
+            let against = pool::each(models.len(), 1, |n| match doubted[n] {
+                true => against((&models[n], &weighed.stances[n])),
+                false => [0.0; 3],
+            });
             weighed = self.weigh(models, &looked.measured, toppled.as_ref(), &against);
         }
         let Weighed { probabilities, stances } = weighed;

@@ -6,9 +6,9 @@ use super::model::Range;
 use super::rays::Rays;
 use super::verify::{MERGED, Placed, placed};
 use crate::outline::Rectangle;
+use crate::pool;
 use crate::scale::{APART_M, EDGE_M};
 use crate::visibility::Seen;
-use rayon::prelude::*;
 
 /// True if most places just above the object are hidden by something nearer to the cameras.
 pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool {
@@ -115,9 +115,8 @@ impl Boxed<'_> {
 
     /// Log of how likely another box makes all views.
     fn log_of(&self, body: &Cuboid) -> f64 {
-        let views = self.rays.views.par_iter().zip(&self.placed);
-        let each = views.map(|(view, placed)| view.log_likelihood(&body.moved(placed.shift_m)));
-        each.collect::<Vec<f64>>().iter().sum()
+        let of_view = |n: usize| self.rays.views[n].log_likelihood(&body.moved(self.placed[n].shift_m));
+        pool::each(self.rays.views.len(), 1, of_view).iter().sum()
     }
 
     /// Moves its ends and turns it to where it suits all views best.
@@ -165,8 +164,7 @@ impl Boxed<'_> {
 
     /// Where another box suits each view best, from near where this one does.
     fn suited(&self, body: &Cuboid, from: &[Placed]) -> Vec<Placed> {
-        let views = self.rays.views.par_iter().zip(from);
-        views.map(|(view, from)| placed(view, body, from.shift_m, MERGED)).collect()
+        pool::each(self.rays.views.len(), 1, |n| placed(&self.rays.views[n], body, from[n].shift_m, MERGED))
     }
 }
 

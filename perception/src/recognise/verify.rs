@@ -5,8 +5,8 @@ use super::evidence::Measured;
 use super::model::{ObjectModel, Range, Shape};
 use super::percept::Stance;
 use super::rays::{BAD_VIEW, Rays, ViewRays, bounded};
+use crate::pool;
 use crate::scale::{EDGE_M, PLACE_M};
-use rayon::prelude::*;
 
 /// Thickness of the walls of vessels, metres. From: chosen.
 pub(super) const WALL_M: f64 = 0.003;
@@ -48,7 +48,7 @@ impl<'a> Own<'a> {
         let frustum = measured.round.map(|round| {
             let body = Frustum::around(&round, base_m, base_m + measured.height_m);
             let body = Frustum { wall_m: wall_m(measured), ..body };
-            rays.views.par_iter().map(|view| placed(view, &body, [0.0; 2], LAID)).collect::<Vec<_>>()
+            pool::map(&rays.views, 1, |view| placed(view, &body, [0.0; 2], LAID))
         });
         let cuboid = measured.rectangle.map(|rectangle| {
             let body = Cuboid::around(&rectangle, base_m, base_m + measured.height_m);
@@ -94,10 +94,10 @@ impl<'a> Own<'a> {
                 rim_m: widest_m / taper.max(1.0),
                 wall_m: wall_m(m),
             };
-            let views = self.rays.views.par_iter().zip(&self.placed).zip(&self.logs);
-            let each =
-                views.map(|((view, own), log)| against(placed(view, &body, own.shift_m, LAID).log - log));
-            total(&each.collect::<Vec<f64>>())
+            total(&pool::each(self.rays.views.len(), 1, |n| {
+                let moved = placed(&self.rays.views[n], &body, self.placed[n].shift_m, LAID);
+                against(moved.log - self.logs[n])
+            }))
         };
         let (middle, own) =
             (tapers.middle(), within(m.evidence.taper, tapers, apart_m / widest_m.max(LEAST_M)));

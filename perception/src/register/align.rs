@@ -3,8 +3,8 @@
 use super::equations::{Motion, Sums};
 use super::pairs::{Partner, Place};
 use super::{Ending, Fit, Method, Prepared, RegisterError, RegisterOptions};
+use crate::pool;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
-use rayon::prelude::*;
 
 /// Points whose sums are added up together: fixed, so that the sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
@@ -166,11 +166,17 @@ impl<'a> Run<'a> {
         let place = Place::of(pose);
         let centre = [centre.x, centre.y, centre.z];
         let mut partners = std::mem::take(&mut self.partners);
-        let parts: Vec<Sums> = partners
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(chunk, partners)| self.part(chunk * CHUNK, partners, &place, centre))
-            .collect();
+        let mut parts: Vec<(&mut [Partner], Sums)> =
+            partners.chunks_mut(CHUNK).map(|partners| (partners, Sums::ZERO)).collect();
+        pool::for_each(
+            &mut parts,
+            1,
+            || (),
+            |(), chunk, (partners, sums)| {
+                *sums = self.part(chunk * CHUNK, partners, &place, centre);
+            },
+        );
+        let parts: Vec<Sums> = parts.into_iter().map(|(_, sums)| sums).collect();
         self.partners = partners;
         let sums = parts.iter().fold(Sums::ZERO, Sums::join);
         (self.matched, self.square) = (sums.matched, sums.square);

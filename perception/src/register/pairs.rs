@@ -5,8 +5,8 @@
 
 use super::Prepared;
 use crate::neighbours::{LEAF, Neighbours, least};
+use crate::pool;
 use nalgebra::{Isometry3, Point3};
-use rayon::prelude::*;
 
 /// Two points that belong together.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,7 @@ pub fn pairs(
         let near = target.tree.nearest(&Point3::from(moved), within_m)?;
         Some(Pair { source: i as u32, target: near.index, distance_sq: near.distance_sq })
     };
-    (0..source.points.len()).into_par_iter().filter_map(search).collect()
+    pool::filter(source.points.len(), 1, search)
 }
 
 /// A pose ready to be applied to many points.

@@ -6,7 +6,6 @@ use super::patches::{SOME, Voxels};
 use crate::pool;
 use crate::scale::PLACE_M;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
@@ -117,7 +116,7 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
         let fuller = near.iter().filter(|&&j| own < SHARE * f64::from(voxels.counts[j as usize])).count();
         near.is_empty() || fuller >= near.len() - ((near.len() - 1) as f64 * MOST).round() as usize
     };
-    (0..voxels.len()).into_par_iter().with_min_len(SOME).map(is_thin).collect()
+    pool::each(voxels.len(), SOME, is_thin)
 }
 
 /// Gives each thin voxel to the part of its fullest neighbour that is not thin.
@@ -126,8 +125,7 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
         let near = voxels.neighbours(i).iter().map(|&j| j as usize).filter(|&j| !thin[j]);
         near.max_by_key(|&j| (voxels.counts[j], usize::MAX - j))
     };
-    let thin_ones = (0..voxels.len()).into_par_iter().with_min_len(SOME).filter(|&i| thin[i]);
-    let adopted: Vec<(usize, usize)> = thin_ones.filter_map(|i| full(i).map(|j| (i, j))).collect();
+    let adopted = pool::filter(voxels.len(), SOME, |i| full(i).filter(|_| thin[i]).map(|j| (i, j)));
     adopted.into_iter().for_each(|(i, j)| parts[i] = parts[j]);
 }
 
@@ -139,7 +137,7 @@ fn grow_patches(piece: &Piece) -> Vec<u32> {
         u128::from(voxels.curvatures[voxel].to_bits()) << 32 | u128::from(local)
     };
     let mut order: Vec<u128> = of.iter().zip(0..).map(key).collect();
-    order.par_sort_unstable();
+    order.sort_unstable();
     let mut patch_of = vec![NONE; of.len()];
     let (mut patches, mut open) = (0, Vec::new());
     for seed in order.into_iter().map(|key| key as u32) {
@@ -228,7 +226,7 @@ fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
         lengths
     };
     let half = patch_of.len() / 2;
-    let (mut lengths, others) = rayon::join(|| of(0..half), || of(half..patch_of.len()));
+    let (mut lengths, others) = pool::join(|| of(0..half), || of(half..patch_of.len()));
     others.into_iter().for_each(|(patches, length)| *lengths.entry(patches).or_default() += length);
     let mut borders: Vec<Border> =
         lengths.into_iter().map(|(patches, length)| Border { patches, length }).collect();

@@ -3,9 +3,9 @@
 use super::join::{Border, Piece, Union};
 use super::patches::SOME;
 use super::{VOXEL_ENDS, most_within};
+use crate::pool;
 use crate::scale::PLACE_M;
 use crate::surface::convex_hull;
-use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;
@@ -28,8 +28,8 @@ pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_
         let belongings = others.filter_map(|link| Belonging::of(&parts, root as u32, link.other));
         belongings.map(Reverse).collect::<Vec<_>>()
     };
-    let all = parts.par_iter().with_min_len(SOME).enumerate().flat_map_iter(of_part);
-    let mut open: BinaryHeap<Reverse<Belonging>> = all.collect::<Vec<_>>().into();
+    let all = pool::each(parts.len(), SOME, |root| of_part((root, &parts[root])));
+    let mut open: BinaryHeap<Reverse<Belonging>> = all.into_iter().flatten().collect::<Vec<_>>().into();
     let mut joins = 0;
     while let Some(Reverse(next)) = open.pop() {
         let Belonging { small, large, .. } = next;

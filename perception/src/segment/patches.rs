@@ -2,9 +2,9 @@
 
 use super::bounds;
 use crate::lattice::{Around, Lattice};
+use crate::pool;
 use crate::spread;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Occupied voxels of a set of points, in order of their place.
@@ -149,11 +149,10 @@ pub(super) fn voxels<T: Send>(
             }
             own
         };
-        let moments = (0..keys.len()).into_par_iter().with_min_len(SOME).map(moments_of);
-        (moments.collect::<Vec<Moments>>(), runs, of_run, run_ends)
+        (pool::each(keys.len(), SOME, moments_of), runs, of_run, run_ends)
     };
     let ((moments, runs, of_run, run_ends), (starts, near)) =
-        rayon::join(gathered, || neighbours(&lattice, &keys));
+        pool::join(gathered, || neighbours(&lattice, &keys));
     let mut voxels = Voxels {
         centres: moments.iter().map(|m| Point3::from(m.sum / m.count)).collect(),
         normals: Vec::new(),
@@ -168,17 +167,22 @@ pub(super) fn voxels<T: Send>(
     };
     let facing = || {
         let (mut normals, mut curvatures) = (vec![Vector3::zeros(); keys.len()], vec![1.0; keys.len()]);
-        let some = normals.par_chunks_mut(LANES).zip(curvatures.par_chunks_mut(LANES)).enumerate();
-        some.with_min_len(SOME / LANES).for_each(|(k, (normals, curvatures))| {
-            let found = surfaces(&voxels, &moments, k * LANES, viewpoints);
-            let told = normals.iter_mut().zip(curvatures).zip(found);
-            told.for_each(|((normal, curvature), found)| {
-                (*normal, *curvature) = found.unwrap_or((Vector3::zeros(), 1.0));
-            });
-        });
+        let mut some: Vec<_> = normals.chunks_mut(LANES).zip(curvatures.chunks_mut(LANES)).collect();
+        pool::for_each(
+            &mut some,
+            SOME / LANES,
+            || (),
+            |(), k, (normals, curvatures)| {
+                let found = surfaces(&voxels, &moments, k * LANES, viewpoints);
+                let told = normals.iter_mut().zip(curvatures.iter_mut()).zip(found);
+                told.for_each(|((normal, curvature), found)| {
+                    (*normal, *curvature) = found.unwrap_or((Vector3::zeros(), 1.0));
+                });
+            },
+        );
         (normals, curvatures)
     };
-    let (told, (normals, curvatures)) = rayon::join(|| meanwhile(&voxels), facing);
+    let (told, (normals, curvatures)) = pool::join(|| meanwhile(&voxels), facing);
     (voxels.normals, voxels.curvatures) = (normals, curvatures);
     (voxels, told)
 }
@@ -197,7 +201,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
         runs
     };
     let half = points.len() / 2;
-    let (mut all, more) = rayon::join(|| of(0..half), || of(half..points.len()));
+    let (mut all, more) = pool::join(|| of(0..half), || of(half..points.len()));
     let goes_on = all.last().zip(more.first()).is_some_and(|(last, first)| last.0 == first.0);
     all.extend(&more[usize::from(goes_on)..]);
     let starts = all.iter().map(|(_, first)| *first).chain([points.len() as u32]).collect();
@@ -224,7 +228,7 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     let some = keys.len().div_ceil(SHARES).max(SOME);
     let from: Vec<usize> = (0..keys.len()).step_by(some).collect();
     let shares: Vec<(Vec<u32>, Vec<u32>)> =
-        from.into_par_iter().with_max_len(1).map(|from| of(from..(from + some).min(keys.len()))).collect();
+        pool::map(&from, 1, |&from| of(from..(from + some).min(keys.len())));
     let (mut starts, mut near) = (Vec::with_capacity(keys.len() + 1), Vec::new());
     for (more_starts, more) in shares {
         starts.extend(more_starts.into_iter().map(|start| start + near.len() as u32));

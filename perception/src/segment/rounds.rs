@@ -13,7 +13,6 @@ use crate::round::{SECTORS, distance, sector};
 use crate::scale::{APART_M, PLACE_M};
 use crate::surface::floor;
 use nalgebra::{Point2, Point3, Vector2};
-use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Radii that are sought, metres. From: chosen.
@@ -52,15 +51,18 @@ pub(super) fn part(
     let all: Vec<usize> = members.values().flatten().copied().collect();
     for mut together in voxels.together(&all) {
         let mut votes = votes_of(voxels, &together);
-        while let Some(cut) = Axis::sought(&votes).par_iter().with_max_len(1).find_map_first(|axis| {
-            let body = axis.body(voxels, &together)?;
-            // Most are round.
-            let (is_round, cut) = rayon::join(
-                || is_round(voxels, &body, points, viewpoints),
-                || Cut::around(voxels, &body, axis, part_of_voxel, &members),
-            );
-            cut.filter(|_| is_round)
-        }) {
+        loop {
+            let axes = Axis::sought(&votes);
+            let cut = pool::find_first(0..axes.len(), |n| {
+                let body = axes[n].body(voxels, &together)?;
+                // Most are round.
+                let (is_round, cut) = pool::join(
+                    || is_round(voxels, &body, points, viewpoints),
+                    || Cut::around(voxels, &body, &axes[n], part_of_voxel, &members),
+                );
+                cut.filter(|_| is_round)
+            });
+            let Some(cut) = cut else { break };
             cut.body.iter().for_each(|v| {
                 members.remove(&part_of_voxel[*v]);
             });
@@ -165,7 +167,7 @@ fn votes_of(voxels: &Voxels, of: &[usize]) -> Votes {
         votes
     };
     let (first, second) = of.split_at(of.len() / 2);
-    let (mut votes, more) = rayon::join(|| some(first), || some(second));
+    let (mut votes, more) = pool::join(|| some(first), || some(second));
     votes.join(&more);
     votes
 }

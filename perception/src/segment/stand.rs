@@ -1,11 +1,11 @@
 //! What each thing stands on: the surface, another thing, or the bottom of one that it stands in.
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
+use crate::pool;
 use crate::round::{SECTORS, sector};
 use crate::scale::{APART_M, PLACE_M};
 use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
@@ -21,7 +21,7 @@ const BEARS: usize = 15;
 /// around it. Gives all tops.
 pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
-    let (tops, boxes): (Vec<f64>, Vec<_>) = parts.par_iter().with_max_len(1).map(of).unzip();
+    let (tops, boxes): (Vec<f64>, Vec<_>) = pool::map(parts, 1, of).into_iter().unzip();
     let outlines: Vec<OnceLock<Outline>> = parts.iter().map(|_| OnceLock::new()).collect();
     let outline = |part: usize| outlines[part].get_or_init(|| outline_of(&parts[part].points));
     let is_over = |other: usize, place: &Point3<f64>| {
@@ -52,7 +52,7 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
         let rims = below.iter().map(|&other| tops[other]).filter(|top| low > APART_M && *top < low + MEETS_M);
         (rims.max_by(f64::total_cmp).unwrap_or(0.0), 0.0)
     };
-    let bases: Vec<(f64, f64)> = parts.par_iter().with_max_len(1).enumerate().map(base).collect();
+    let bases: Vec<(f64, f64)> = pool::each(parts.len(), 1, |i| base((i, &parts[i])));
     for (part, base) in parts.iter_mut().zip(bases) {
         (part.base_m, part.base_sigma_m) = base;
     }

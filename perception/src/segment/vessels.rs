@@ -2,12 +2,12 @@
 
 use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, most_within, top_m};
 use crate::outline;
+use crate::pool;
 use crate::round::lying::{self, LyingRound};
 use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
 use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};
 use crate::surface::nearest_sigma_m;
 use nalgebra::Point3;
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Widest vessel, metres of radius. From: chosen.
@@ -84,21 +84,18 @@ impl Candidate {
 /// Joins parts that lie on one upright round body, and what lies inside it.
 pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment> {
     parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
-    let parts = parts.into_par_iter().enumerate();
+    let parts = parts.into_iter().enumerate();
     let mut parts: Vec<Candidate> = parts.map(|(n, part)| Candidate::new(Some(n), part)).collect();
     // All at once, as if none were joined: most are not.
-    let with_all = |(n, part)| {
-        let others = parts[n + 1..].par_iter().with_max_len(1);
-        others.map(|other| one_vessel(part, other, viewpoints)).collect()
-    };
-    let pairs: Vec<Vec<bool>> = parts.par_iter().with_max_len(1).enumerate().map(with_all).collect();
+    let with_all = |n: usize| pool::map(&parts[n + 1..], 1, |other| one_vessel(&parts[n], other, viewpoints));
+    let pairs: Vec<Vec<bool>> = pool::each(parts.len(), 1, with_all);
     let mut first = 0;
     while first < parts.len() {
-        let is_one = |second: &usize| match (parts[first].number, parts[*second].number) {
+        let is_one = |second: usize| match (parts[first].number, parts[second].number) {
             (Some(one), Some(other)) => pairs[one][other - one - 1],
-            _ => one_vessel(&parts[first], &parts[*second], viewpoints),
+            _ => one_vessel(&parts[first], &parts[second], viewpoints),
         };
-        match (first + 1..parts.len()).into_par_iter().with_max_len(1).find_first(is_one) {
+        match pool::find_first(first + 1..parts.len(), |second| is_one(second).then_some(second)) {
             Some(second) => {
                 let other = parts.remove(second);
                 parts[first] = Candidate::new(None, union(&parts[first].segment, &other.segment));

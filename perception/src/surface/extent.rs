@@ -6,9 +6,9 @@ use super::planes::{Plane, Sample};
 use super::tiles::Tiles;
 use super::{Surface, range_sigma_m};
 use crate::camera::Intrinsics;
+use crate::pool;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
-use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
@@ -108,8 +108,7 @@ impl<'a> Hiding<'a> {
             }
             !amid
         });
-        let allows = asked.par_iter().with_min_len(SOME).map(|cell| self.allows(*cell, unseen));
-        let open: Vec<bool> = allows.collect();
+        let open = pool::map(&asked, SOME, |cell| self.allows(*cell, unseen));
         let open = asked.iter().zip(open).filter(|(_, open)| *open);
         open.for_each(|(cell, _)| *owners.at(*cell) = Owner::Open);
     }

@@ -1,9 +1,9 @@
 //! The large planes of a sample of points.
 
 use crate::draw::Draws;
+use crate::pool;
 use crate::scale;
 use nalgebra::{Matrix3, Point3, Vector3};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Points looked at when a plane is sought; more do not change it. From: chosen.
@@ -96,7 +96,7 @@ pub(super) fn large_planes(
         }
         let Some(plane) = propose(&left, &cubes, &mut rng, &plausible) else { break };
         let Some(plane) = refine(plane, &left) else { break };
-        let kept: Vec<bool> = left.par_iter().with_min_len(SOME).map(|s| !plane.holds(s)).collect();
+        let kept: Vec<bool> = pool::map(&left, SOME, |s| !plane.holds(s));
         if kept.iter().filter(|kept| !**kept).count() < FEWEST {
             break;
         }
@@ -120,7 +120,7 @@ struct Cubes {
 impl Cubes {
     fn of(samples: &[Sample]) -> Cubes {
         let (first, second) = samples.split_at(samples.len() / 2);
-        let ((mut of, mut keys), (others, more)) = rayon::join(|| numbered(first), || numbered(second));
+        let ((mut of, mut keys), (others, more)) = pool::join(|| numbered(first), || numbered(second));
         // What both have has one number.
         let numbers: FxHashMap<[i32; 3], u32> = keys.iter().copied().zip(0..).collect();
         let renumber = |key| {
@@ -276,7 +276,7 @@ fn propose(
         best
     };
     let (first, second) = drawn.split_at(drawn.len() / 2);
-    let (one, other) = rayon::join(|| best_of(first), || best_of(second));
+    let (one, other) = pool::join(|| best_of(first), || best_of(second));
     // Of equals the first.
     let best = match (one, other) {
         (Some(one), Some(other)) if other.0 > one.0 => Some(other),
@@ -299,13 +299,16 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
         let around = some.iter().filter(|s| is_near(&plane, s, BANDS[0], EVER));
         around.map(|s| (*s, weight(s))).collect()
     };
-    let around: Vec<Vec<(Sample, f64)>> = samples.par_chunks(SOME).map(some_around).collect();
+    let around: Vec<Vec<(Sample, f64)>> = {
+        let some: Vec<&[Sample]> = samples.chunks(SOME).collect();
+        pool::map(&some, 1, |some| some_around(some))
+    };
     for band in BANDS {
         let sums_of = |some: &Vec<(Sample, f64)>| {
             let near = some.iter().filter(|(s, _)| is_near(&plane, s, band, 1.0));
             Sums::of(near.map(|(s, weight)| (&s.point, *weight)))
         };
-        let sums: Vec<Sums> = around.par_iter().map(sums_of).collect();
+        let sums: Vec<Sums> = pool::map(&around, 1, sums_of);
         plane = sums.into_iter().fold(Sums::default(), Sums::with).plane(&plane.normal)?;
     }
     Some(plane)

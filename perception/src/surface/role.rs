@@ -5,10 +5,10 @@
 
 use super::planes::Sample;
 use super::{Level, MOST, Surface, SurfaceOptions, TALLEST_M};
+use crate::pool;
 use crate::scale::APART_M;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -147,9 +147,9 @@ pub(super) fn tell(
 ) {
     let level = level(surfaces, up);
     let told_by = |s: &Surface| (past(s, rays), s.is_open_beneath(samples));
-    let (past, open): (Vec<Option<f64>>, Vec<bool>) = surfaces.par_iter().map(told_by).unzip();
+    let (past, open): (Vec<Option<f64>>, Vec<bool>) = pool::map(surfaces, 1, told_by).into_iter().unzip();
     let supports = |n| supports(n, surfaces, &level, (&past, &open), rays);
-    let told: Vec<(Role, Sign)> = (0..surfaces.len()).into_par_iter().map(supports).collect();
+    let told = pool::each(surfaces.len(), 1, supports);
     assign(surfaces, told);
     let eyes = seen.viewpoints();
     let mirrored: Vec<bool> = (0..surfaces.len()).map(|n| is_mirrored(n, surfaces, &eyes)).collect();

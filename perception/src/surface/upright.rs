@@ -9,10 +9,10 @@ use super::THINGS_M;
 use super::hull::convex_hull;
 use super::outline::Outline;
 use super::planes::{Plane, Sample, large_planes};
+use crate::pool;
 use crate::spread::tangents;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
-use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
 /// Planes that are sought at most. From: chosen, a shelf has a dozen.
@@ -72,7 +72,7 @@ pub(super) fn up(
         return Err(Doubt::NoPlane);
     }
     let things = Things {
-        standing: faces.par_iter().map(|face| face.carries(&rest)).collect(),
+        standing: pool::map(&faces, 1, |face| face.carries(&rest)),
         share: rest.len() as f64 / samples.len() as f64,
     };
     let mut hypotheses: Vec<Hypothesis> =

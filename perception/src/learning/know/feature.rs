@@ -1,8 +1,8 @@
 //! Local features: shape where a surface bends (SHOT: Tombari, Salti, Di Stefano 2010), the printed pattern where it is coloured.
 
 use super::skin::{Skin, across};
+use crate::pool;
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
-use rayon::prelude::*;
 
 /// A described place.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +80,8 @@ impl Features {
             }?;
             Some((Feature { at: skin.points[i as usize], normal: skin.normals[i as usize] }, descriptor))
         };
-        let described: Vec<(Feature, Box<[u8]>)> = keypoints.par_iter().filter_map(describe).collect();
+        let described: Vec<(Feature, Box<[u8]>)> =
+            pool::filter(keypoints.len(), 1, |n| describe(&keypoints[n]));
         let mut features = Features::none(kind);
         described.iter().for_each(|(feature, descriptor)| features.push(*feature, descriptor));
         features
@@ -144,7 +145,7 @@ impl Features {
             others.codes.chunks_exact(code.len()).map(|other| distance(other, code)).zip(0..)
         };
         let nearest = |own: usize| Some((codes(own).min()?.0, own));
-        let mut order: Vec<(u32, usize)> = (0..self.all.len()).into_par_iter().filter_map(nearest).collect();
+        let mut order: Vec<(u32, usize)> = pool::filter(self.all.len(), 1, nearest);
         order.sort_unstable();
         let compared = |close: &mut Vec<(u32, u32)>, &(_, own): &(u32, usize)| {
             close.clear();
@@ -159,8 +160,8 @@ impl Features {
             close.iter().map(off).min().map(|(off, other)| Alike { own, other, off })
         };
         let all = |of: &[(u32, usize)]| {
-            let each = of.par_iter().map_init(Vec::new, compared);
-            let mut all: Vec<Alike> = each.flatten().collect();
+            let mut all: Vec<Alike> =
+                pool::filter_with(of.len(), 1, Vec::new, |close, n| compared(close, &of[n]));
             all.sort_by_key(|alike| alike.off);
             all
         };

@@ -8,6 +8,7 @@ use descry_domains::abilities::searching::reasons::one_then;
 use descry_domains::actions::Carried;
 use descry_domains::answer::{Conclusion, Ended};
 use descry_domains::note::Note;
+use descry_domains::saying::Saying;
 use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
 use descry_memory::{Blob, Draft, LogLevel, Meta, Record, RecordId, viewer};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
@@ -15,19 +16,13 @@ use descry_robots::Robot;
 use descry_skills::{Call, Context, SkillFailure};
 
 use crate::exit::CommandError;
+use crate::reason::{Break, Reason, Trigger};
 use crate::report::Event;
 use crate::stop::Stop;
-use crate::{standing, weigh};
+use crate::{standing, weigh, written};
 
 /// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
 const MOST_EVALUATED: u64 = 2_500;
-
-/// What is said behind the cause of a plan that will not do, since none would in the time that is left.
-pub(crate) const TOO_LATE: &str = "; no plan would do in the time that is left";
-/// Why a look is taken although the goal holds.
-const NOT_DENIED: &str = "nothing that was seen speaks against it, and not enough was seen";
-/// Before what is said of the goal where steps of the plan are left that were to reach it.
-pub const AT_THE_END: &str = "at the end of the plan ";
 
 /// An agent at work on one goal.
 pub struct Agent<'a> {
@@ -37,7 +32,7 @@ pub struct Agent<'a> {
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
     /// The call that failed and left no plan.
-    failed: Option<String>,
+    failed: Option<Call>,
     totals: Totals,
     /// What plans are weighed by; none where that would ask programs.
     weighed_by: Option<String>,
@@ -95,6 +90,7 @@ impl<'a> Agent<'a> {
         let here = self.robot.pose().await.map_err(CommandError::broken)?;
         let goal = setting.goal;
         self.weighed_by = setting.domain.config.attachments.is_empty().then(|| goal.pddl.clone());
+        tracing::info!(goal = %goal.pddl, "pursues");
         let mut world = World::begin(setting, chooser, &here)?;
         self.say(&Event::Goal {
             said: goal.said.clone(),
@@ -108,7 +104,9 @@ impl<'a> Agent<'a> {
                 (self.totals.views, self.totals.distance_m) = world.taken();
                 let remembered = world.to_remember();
                 self.rest_on(&round, &ended)?;
-                return Ok((Conclusion { remembered, ..world.answer(&round, &ended) }, self.totals));
+                let conclusion = Conclusion { remembered, ..world.answer(&round, &ended) };
+                tracing::info!(verdict = ?conclusion.verdict, "{}", conclusion.why);
+                return Ok((conclusion, self.totals));
             }
         }
     }
@@ -116,15 +114,16 @@ impl<'a> Agent<'a> {
     /// One turn of the loop. Returns why the run ends here, if it does.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
-            match self.take_up(world, round, NOT_DENIED, Vec::new(), World::before_denying)? {
+            let reason = Reason::of(Trigger::NotDenied);
+            match self.take_up(world, round, &reason, Vec::new(), World::before_denying)? {
                 Taken::Up => world.planned(),
                 _ => return Ok(Some(Ended::Reached)),
             }
         } else {
             match self.monitor(world, round) {
                 Ok(()) => self.keep(round)?,
-                Err(because) => {
-                    if let Some(ended) = self.replan(world, round, because)? {
+                Err(trigger) => {
+                    if let Some(ended) = self.replan(world, round, Reason::of(trigger))? {
                         return Ok(Some(ended));
                     }
                 }
@@ -140,21 +139,19 @@ impl<'a> Agent<'a> {
     }
 
     /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
-    fn monitor(&self, world: &World<'_>, round: &Round) -> Result<(), String> {
+    fn monitor(&self, world: &World<'_>, round: &Round) -> Result<(), Trigger> {
         if world.takes_steps_unasked() && !self.rest().steps.is_empty() {
             return Ok(());
         }
-        match (&self.plan, descry_planner::monitor(&round.task, &round.attachments, &self.rest())) {
-            (_, Ok(())) => Ok(()),
-            (None, Err(_)) => Err(match &self.failed {
-                Some(call) => format!("{call} failed"),
-                None => "there is no plan yet".into(),
-            }),
-            (Some(_), Err(broken)) if broken.step.is_none() && !self.rest().steps.is_empty() => {
-                Err(format!("{AT_THE_END}{broken}"))
-            }
-            (Some(_), Err(broken)) => Err(broken.to_string()),
-        }
+        let rest = self.rest();
+        let Err(broken) = descry_planner::monitor(&round.task, &round.attachments, &rest) else {
+            return Ok(());
+        };
+        Err(match (&self.plan, &self.failed) {
+            (Some(_), _) => Trigger::Broken(Break::of(&broken, &rest)),
+            (None, Some(call)) => Trigger::Failed { call: call.clone() },
+            (None, None) => Trigger::Begin,
+        })
     }
 
     /// Makes a new plan. Returns how it ends if there is none.
@@ -162,36 +159,34 @@ impl<'a> Agent<'a> {
         &mut self,
         world: &mut World<'_>,
         round: &Round,
-        because: String,
+        reason: Reason,
     ) -> Result<Option<Ended>, CommandError> {
         world.planned();
-        match self.take_up(world, round, &because, Vec::new(), World::choice)? {
+        match self.take_up(world, round, &reason, Vec::new(), World::choice)? {
             Taken::Up => return Ok(None),
             Taken::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
             Taken::LeftToPlanner => {}
         }
         match self.plan(&round.task, round)? {
             Planned::Unsolvable { why, statistics } => {
-                let because = if round.situation.time_left_s.is_some() {
-                    format!("{because}{TOO_LATE}")
-                } else {
-                    because
-                };
-                match self.take_up(world, round, &because, asked_of(&statistics), World::in_time)? {
+                let reason = Reason { is_late: round.situation.time_left_s.is_some(), ..reason };
+                match self.take_up(world, round, &reason, asked_of(&statistics), World::in_time)? {
                     Taken::Up => {}
-                    _ => return Ok(Some(Ended::NoPlan(why.to_string()))),
+                    _ => return Ok(Some(Ended::NoPlan(why.reasons()))),
                 }
             }
-            Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, because)?,
+            Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, &reason)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
-                let ended = format!("the search ended after {MOST_EVALUATED} states");
-                let because = format!("{because}; {ended}");
+                let reason = Reason { search_ended_after: Some(MOST_EVALUATED), ..reason };
                 match best {
-                    Some(plan) => self.adopt(round, plan, &statistics, because)?,
+                    Some(plan) => self.adopt(round, plan, &statistics, &reason)?,
                     None => {
-                        match self.take_up(world, round, &because, asked_of(&statistics), World::fallback)? {
+                        match self.take_up(world, round, &reason, asked_of(&statistics), World::fallback)? {
                             Taken::Up => {}
-                            _ => return Ok(Some(Ended::Undecided(ended))),
+                            _ => {
+                                let why = format!("the search ended after {MOST_EVALUATED} states");
+                                return Ok(Some(Ended::Undecided(why)));
+                            }
                         }
                     }
                 }
@@ -205,7 +200,7 @@ impl<'a> Agent<'a> {
         &mut self,
         world: &mut World<'w>,
         round: &Round,
-        because: &str,
+        reason: &Reason,
         calls: Vec<(String, u64)>,
         choose: fn(&mut World<'w>, &Round) -> Result<Choice, WorldError>,
     ) -> Result<Taken, CommandError> {
@@ -214,12 +209,12 @@ impl<'a> Agent<'a> {
                 Choice::Nothing(why) => return Ok(Taken::Nothing(why)),
                 Choice::Planner => return Ok(Taken::LeftToPlanner),
                 Choice::Steps(plan) => {
-                    self.intend(round, plan, because.into(), calls)?;
+                    self.intend(round, plan, reason, calls)?;
                     return Ok(Taken::Up);
                 }
                 Choice::Towards { task, then } => match self.plan(&task, round)? {
                     Planned::Solved { plan, statistics } => {
-                        self.adopt(round, one_then(plan, then), &statistics, because.into())?;
+                        self.adopt(round, one_then(plan, then), &statistics, reason)?;
                         return Ok(Taken::Up);
                     }
                     _ => world.bar(),
@@ -230,6 +225,7 @@ impl<'a> Agent<'a> {
 
     /// Asks the planner, and notes how long it took.
     fn plan(&mut self, task: &Task, round: &Round) -> Result<Planned, CommandError> {
+        let _span = tracing::info_span!("plan").entered();
         let started = Instant::now();
         let options = descry_planner::Options {
             evaluation_limit: Some(MOST_EVALUATED),
@@ -253,9 +249,9 @@ impl<'a> Agent<'a> {
         round: &Round,
         plan: Plan,
         statistics: &Statistics,
-        because: String,
+        reason: &Reason,
     ) -> Result<(), CommandError> {
-        self.intend(round, plan, because, asked_of(statistics))
+        self.intend(round, plan, reason, asked_of(statistics))
     }
 
     /// Takes a plan up and says so.
@@ -263,14 +259,17 @@ impl<'a> Agent<'a> {
         &mut self,
         round: &Round,
         plan: Plan,
-        because: String,
+        reason: &Reason,
         calls: Vec<(String, u64)>,
     ) -> Result<(), CommandError> {
         self.totals.plans += 1;
+        let because = reason.told(&Saying::default());
+        tracing::info!(plan = self.totals.plans, steps = plan.steps.len(), "plans because {because}");
         let event = Event::Planned {
             round: self.totals.plans,
             because,
-            steps: plan.to_string().lines().filter(|l| !l.starts_with(';')).map(str::to_string).collect(),
+            reason: Some(reason.clone()),
+            steps: plan.steps.clone(),
             makespan_s: plan.makespan_s().unwrap_or(0.0),
             calls,
         };
@@ -332,7 +331,8 @@ impl<'a> Agent<'a> {
             steps.into_iter().map(|step| Carried { call: call(&step), step }).collect();
         for Carried { call, .. } in &carried {
             let because = world.explain(round, call);
-            self.say(&Event::Acting { call: call.to_string(), because })?;
+            tracing::info!(%call, "begins");
+            self.say(&Event::Acting { call: call.clone(), because })?;
         }
         let performed = match carried.as_slice() {
             [only] => vec![self.perform(world, &only.call).await?],
@@ -424,7 +424,7 @@ impl<'a> Agent<'a> {
             self.say(&Event::Noted(note))?;
         }
         if !said.is_empty() {
-            self.say(&Event::Acted { call: call.to_string(), outcome: said })?;
+            self.say(&Event::Acted { call: call.clone(), outcome: said })?;
         }
         Ok(())
     }
@@ -439,7 +439,7 @@ impl<'a> Agent<'a> {
         failure: &SkillFailure,
     ) -> Result<(), CommandError> {
         self.check_stopped()?;
-        (self.plan, self.failed) = (None, Some(call.to_string()));
+        (self.plan, self.failed) = (None, Some(call.clone()));
         let is_final = |body: &descry_robots::Failure| {
             matches!(body, descry_robots::Failure::Broken { .. } | descry_robots::Failure::Cancelled { .. })
         };
@@ -451,9 +451,15 @@ impl<'a> Agent<'a> {
         }
         let here = self.robot.pose().await.map_err(CommandError::broken)?;
         world.stands_at(&here);
-        let therefore = world.learn_from_failure(round, call, part, failure)?;
-        self.say(&Event::Failed { call: call.to_string(), because: failure.to_string(), therefore })
-            .map(|_| ())
+        let lesson = world.learn_from_failure(round, call, part, failure)?;
+        tracing::info!(%call, "failed: {failure}");
+        let unkept = match failure {
+            SkillFailure::Unkept { condition, .. } => condition.clone(),
+            _ => None,
+        };
+        let (call, because, therefore) =
+            (call.clone(), failure.to_string(), lesson.told(call, &Saying::default()));
+        self.say(&Event::Failed { call, because, unkept, therefore, lesson: Some(lesson) }).map(|_| ())
     }
 
     /// Ends the run where somebody wants it to stop: the body stands by now, and nothing more is asked of it.
@@ -486,7 +492,7 @@ impl<'a> Agent<'a> {
         let stamp_ns = self.robot.now_ns();
         let mut blobs = vec![viewer::log(stamp_ns, LogLevel::Info, "descry", &event.to_string())];
         if let Event::Planned { steps, .. } = event {
-            blobs.push(viewer::plan(stamp_ns, &steps.join("\n")));
+            blobs.push(viewer::plan(stamp_ns, &written::steps::lines(steps).join("\n")));
         }
         blobs.extend(more);
         let draft = Draft { meta, blobs, ..Draft::new("event", stamp_ns) };

@@ -4,8 +4,16 @@ use std::fmt;
 
 use descry_domains::answer::{Believed, Verdict};
 use descry_domains::goal::Goal;
+use descry_domains::lesson::Lesson;
 use descry_domains::note::Note;
+use descry_domains::saying::Saying;
+use descry_planner::Step;
+use descry_skills::Call;
 use serde::{Deserialize, Serialize};
+
+use crate::numbers::count;
+use crate::reason::Reason;
+use crate::written;
 
 /// Something that happened in a run, with its reason.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -26,10 +34,14 @@ pub enum Event {
     Planned {
         /// Number of the planning round, from 1.
         round: usize,
-        /// Why the previous plan no longer does.
+        /// Why the previous plan no longer does, in a sentence.
         because: String,
-        /// The steps with what each costs.
-        steps: Vec<String>,
+        /// The same with the values that decide it; records of earlier versions do not have it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        reason: Option<Reason>,
+        /// The steps.
+        #[serde(with = "written::steps")]
+        steps: Vec<Step>,
         /// Duration of the plan.
         makespan_s: f64,
         /// Calls of attachments that planning made, by name.
@@ -43,60 +55,107 @@ pub enum Event {
     /// A step begins.
     Acting {
         /// The call.
-        call: String,
+        #[serde(with = "written::call")]
+        call: Call,
         /// What it costs and what is hoped from it.
         because: String,
     },
     /// A step ended well.
     Acted {
         /// The call.
-        call: String,
+        #[serde(with = "written::call")]
+        call: Call,
         /// What came of it.
         outcome: String,
     },
     /// A step failed.
     Failed {
         /// The call.
-        call: String,
+        #[serde(with = "written::call")]
+        call: Call,
         /// What the body said.
         because: String,
-        /// What is concluded from it.
+        /// The condition in PDDL that should have held until the end, if that is what failed.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        unkept: Option<String>,
+        /// What is concluded from it, in a sentence.
         therefore: String,
+        /// The same as a value; records of earlier versions do not have it.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        lesson: Option<Lesson>,
     },
     /// The world has learned something.
     #[serde(untagged)]
     Noted(Note),
 }
 
-impl fmt::Display for Event {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl Event {
+    /// A word for what the event is about and what is said of it, in lines; conditions and steps as a domain says them.
+    pub fn parts(&self, saying: &Saying) -> (String, String) {
+        let said = |call: &Call| saying.say(&call.to_string());
         match self {
             Event::Goal { said, pddl, start, candidates } => {
-                writeln!(f, "goal      {said}")?;
-                writeln!(f, "          {pddl}")?;
-                write!(f, "start     {start}; {candidates} poses to look from")
+                let (wanted, poses) = (saying.say(pddl), count(*candidates, "pose"));
+                ("goal".into(), format!("{said}\n{wanted}\nfrom {start}; {poses} to look from"))
             }
-            Event::Planned { round, because, steps, makespan_s, calls } => {
-                writeln!(f, "plan {round:<4} because {because}")?;
-                for step in steps {
-                    writeln!(f, "          {step}")?;
-                }
+            Event::Planned { round, because, reason, steps, makespan_s, calls } => {
+                let because = reason.as_ref().map_or_else(|| because.clone(), |reason| reason.told(saying));
+                let steps: String = steps.iter().map(|step| timed(step, saying) + "\n").collect();
                 let calls: Vec<String> = calls.iter().map(|(name, n)| format!("{n} x {name}")).collect();
                 let asked = if calls.is_empty() { "nothing".into() } else { calls.join(", ") };
-                write!(f, "          {makespan_s:.1} s in all; asked of attachments: {asked}")
+                let text = format!(
+                    "because {because}\n{steps}{makespan_s:.1} s in all; asked of attachments: {asked}"
+                );
+                (format!("plan {round}"), text)
             }
             Event::Kept { left } => {
-                let steps = if *left == 1 { "step" } else { "steps" };
-                write!(f, "keep      the rest of the plan still reaches the goal ({left} {steps} left)")
+                let steps = count(*left, "step");
+                ("keep".into(), format!("the rest of the plan still reaches the goal ({steps} left)"))
             }
-            Event::Acting { call, because } if because.is_empty() => write!(f, "do        {call}"),
-            Event::Acting { call, because } => write!(f, "do        {call}: {because}"),
-            Event::Acted { call: _, outcome } => write!(f, "          {outcome}"),
-            Event::Failed { call, because, therefore } => {
-                write!(f, "failed    {call}: {because}; {therefore}")
+            Event::Acting { call, because } if because.is_empty() => ("do".into(), said(call)),
+            Event::Acting { call, because } => ("do".into(), format!("{}: {because}", said(call))),
+            Event::Acted { call: _, outcome } => (String::new(), outcome.clone()),
+            Event::Failed { call, because, unkept, therefore, lesson } => {
+                let because = failed(because, unkept.as_deref(), saying);
+                let therefore =
+                    lesson.as_ref().map_or_else(|| therefore.clone(), |lesson| lesson.told(call, saying));
+                ("failed".into(), format!("{}: {because}; {therefore}", said(call)))
             }
-            Event::Noted(note) => write!(f, "{note}"),
+            Event::Noted(note) => (note.head().into(), note.to_string()),
         }
+    }
+
+    /// The event in lines, behind a column for the word that it is about.
+    pub fn told(&self, saying: &Saying) -> String {
+        let (head, text) = self.parts(saying);
+        let line =
+            |(n, line): (usize, &str)| format!("{:<10}{line}", if n == 0 { head.as_str() } else { "" });
+        text.lines().enumerate().map(line).collect::<Vec<_>>().join("\n")
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.told(&Saying::default()))
+    }
+}
+
+/// A step of a plan: when it begins, what it is, how long it takes.
+pub fn timed(step: &Step, saying: &Saying) -> String {
+    let call = saying.say(&written::call_of(step).to_string());
+    match step.start_s {
+        Some(start_s) => format!("{start_s:5.1} s  {call}, {:.1} s", step.duration_s),
+        None => call,
+    }
+}
+
+/// Why a step failed, in a sentence.
+pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
+    match unkept {
+        Some(condition) => {
+            format!("it came to its end, but until then it was not always so that {}", saying.say(condition))
+        }
+        None => because.to_string(),
     }
 }
 
@@ -230,23 +289,26 @@ pub fn words(verdict: Verdict) -> &'static str {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verdict = words(self.verdict);
-        let answer = self.answer.as_ref().map(|a| format!("{a}; ")).unwrap_or_default();
-        writeln!(f, "\n{answer}{verdict}: {}", self.why)?;
+        // Of a question the answer comes first, and the verdict says no more.
+        let first = self.answer.as_deref().unwrap_or(verdict);
+        writeln!(f, "\n{first}: {}", self.why)?;
         let is_held = self.objects.iter().any(|o| o.asked && o.position_m.is_none());
         if let Some(object) = self.object.as_ref().filter(|_| is_held) {
             writeln!(f, "  {object} in the hand, confidence {:.2}", self.confidence)?;
         } else if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
             let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
-            let give_cm = self.position_sigma_m.map_or(0.0, |sigma_m| 1e2 * sigma_m);
-            let give = if give_cm >= 1.0 { format!(" give or take {give_cm:.0} cm") } else { String::new() };
+            let give = self
+                .position_sigma_m
+                .map(|sigma_m| format!(" give or take {:.0} cm", (1e2 * sigma_m).max(1.0)));
+            let give = give.unwrap_or_default();
             writeln!(
                 f,
-                "  {object}{on} at ({x:.3}, {y:.3}, {z:.3}) m{give}, confidence {:.2}",
+                "  {object}{on} at ({x:.2}, {y:.2}, {z:.2}) m{give}, confidence {:.2}",
                 self.confidence
             )?;
         }
         if let Some([x, y, z]) = self.true_position_m {
-            writeln!(f, "  in truth at ({x:.3}, {y:.3}, {z:.3}) m")?;
+            writeln!(f, "  in truth at ({x:.2}, {y:.2}, {z:.2}) m")?;
         }
         let any_asked = self.objects.iter().any(|o| o.asked);
         for (n, o) in self.objects.iter().enumerate().filter(|_| self.object.is_none()) {
@@ -256,17 +318,16 @@ impl fmt::Display for Report {
             let name = o.label.as_deref().unwrap_or("unknown");
             let on = o.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
             let at = match o.position_m {
-                Some([x, y, z]) => format!("at ({x:.3}, {y:.3}, {z:.3}) m{on}"),
+                Some([x, y, z]) => format!("at ({x:.2}, {y:.2}, {z:.2}) m{on}"),
                 None => "in the hand".into(),
             };
             writeln!(f, "  {name:16} {:.2} {at}", o.confidence)?;
         }
-        let counted = |n: usize, of: &str| format!("{n} {of}{}", if n == 1 { "" } else { "s" });
         writeln!(
             f,
             "  {}, {}, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall",
-            counted(self.views, "view"),
-            counted(self.replans, "replan"),
+            count(self.views, "view"),
+            count(self.replans, "replan"),
             self.distance_m,
             self.sim_time_s,
             self.wall_s

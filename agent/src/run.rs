@@ -132,7 +132,8 @@ pub async fn pursue(
     let kept = programs::on_record(domain, &record, None, &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
     let lived = live_through(task, &robot, &record, chooser, folder.path(), watcher).await;
-    let (mut report, remembered) = lived.map_err(|error| how_to_go_on(error, folder.path()))?;
+    let (mut report, remembered) =
+        lived.map_err(|error| how_to_go_on(error, folder.path(), record.is_at_bound()))?;
     remember(settings, past, remembered, folder.path())?;
     show_true_position(&mut report, body);
     Ok(report)
@@ -202,7 +203,8 @@ pub async fn go_on(
     let kept = programs::on_record(task.domain, &record, Some(&record), &robot, true)?;
     let task = Task { domain: &kept.domain, ..task };
     let lived = live_through(task, &robot, &record, chooser, folder.path(), watcher).await;
-    let (mut report, remembered) = lived.map_err(|error| how_to_go_on(error, folder.path()))?;
+    let (mut report, remembered) =
+        lived.map_err(|error| how_to_go_on(error, folder.path(), record.is_at_bound()))?;
     // What a run leaves that had ended is kept, and others may have gone on from there.
     if !files::has_ended(folder.path()) {
         remember(settings, task.past, remembered, folder.path())?;
@@ -242,8 +244,9 @@ pub async fn live_through(
     Ok((report, remembered))
 }
 
-/// Says of a run that was stopped, or that the body or the record has failed, how it goes on.
-pub fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
+/// Says of a run that was stopped, or that the body or the record has failed, how it goes on. A record that is at its bound cannot:
+/// the bound stays what the run was started with.
+pub fn how_to_go_on(error: CommandError, folder: &Path, is_at_bound: bool) -> CommandError {
     let folder = folder.display().to_string();
     let resume = format!("descry do --resume {}", shell::word(&folder));
     match error {
@@ -251,8 +254,7 @@ pub fn how_to_go_on(error: CommandError, folder: &Path) -> CommandError {
             let said = format!("stopped; everything until here is in {folder}\n  go on with: {resume}");
             CommandError::Stopped { said, signal }
         }
-        // The bound of a record stays what the run was started with.
-        CommandError::Broken(why) if !why.contains("--max-bytes") => {
+        CommandError::Broken(why) if !is_at_bound => {
             CommandError::Broken(format!("{why}\n  once that is mended, go on with: {resume}"))
         }
         other => other,

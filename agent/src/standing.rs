@@ -8,6 +8,7 @@ use descry_domains::answer::Ended;
 use descry_domains::situation::KnownSurface;
 use descry_domains::world::Round;
 use descry_memory::{Blob, Form};
+use descry_planner::NoPlan;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -79,24 +80,48 @@ pub struct Seen {
 /// What the end of a run rests on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rests {
-    /// Why there was nothing more to do: a word, and what was said.
-    pub ended: String,
-    /// See [`Ended`].
+    /// Why there was nothing more to do.
+    pub ended: End,
+    /// What a limit or a failure said of it; empty: nothing.
     pub said: String,
+    /// Why there is no plan.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub no_plan: Vec<NoPlan>,
     /// What is in doubt in the end.
     pub in_doubt: Vec<InDoubt>,
 }
 
+/// Why there was nothing more to do in a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum End {
+    /// The goal held.
+    #[serde(rename = "reached")]
+    Reached,
+    /// No plan reaches the goal.
+    #[serde(rename = "no plan")]
+    NoPlan,
+    /// The search for a plan came to no end.
+    #[serde(rename = "undecided")]
+    Undecided,
+    /// A limit of looks, plans or time was reached.
+    #[serde(rename = "limit")]
+    Limit,
+    /// What was done failed for good.
+    #[serde(rename = "failed")]
+    Failed,
+}
+
 /// What the end of a run rests on, as it is recorded.
-pub fn rests(round: &Round, ended: &Ended) -> Rests {
-    let (ended, said) = match ended {
-        Ended::Reached => ("reached", String::new()),
-        Ended::NoPlan(why) => ("no plan", why.clone()),
-        Ended::Undecided(why) => ("undecided", why.clone()),
-        Ended::Limit(why) => ("limit", why.clone()),
-        Ended::Failed(why) => ("failed", why.clone()),
+pub fn rests(round: &Round, of: &Ended) -> Rests {
+    let (ended, said) = match of {
+        Ended::Reached => (End::Reached, String::new()),
+        Ended::NoPlan(_) => (End::NoPlan, String::new()),
+        Ended::Undecided(why) => (End::Undecided, why.clone()),
+        Ended::Limit(why) => (End::Limit, why.clone()),
+        Ended::Failed(why) => (End::Failed, why.clone()),
     };
-    Rests { ended: ended.into(), said, in_doubt: in_doubt(round) }
+    let no_plan = if let Ended::NoPlan(why) = of { why.clone() } else { Vec::new() };
+    Rests { ended, said, no_plan, in_doubt: in_doubt(round) }
 }
 
 /// How things stand in a round, as it is kept beside an event.

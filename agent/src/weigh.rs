@@ -12,12 +12,15 @@ use descry_memory::{Blob, Form};
 use descry_planner::semantics::{Binding, Changes, Pending};
 use descry_planner::task::{Action, Comparison, Effect, FunctionId, ObjectId};
 use descry_planner::{Plan, SEPARATION_S, Semantics, State, Step, monitor};
+use descry_skills::Call;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::compared::{self, Compared};
 use crate::exit::CommandError;
-use steps::{Instead, brought, call, joined, leads, words};
+use crate::reason::Break;
+use crate::written::{self, call_of};
+use steps::{Instead, brought, joined, leads, words};
 
 /// The blob under which it is kept beside the event of a plan.
 pub const BLOB: &str = "weighed";
@@ -71,7 +74,8 @@ pub struct Expected {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Way {
     /// The calls.
-    pub steps: Vec<String>,
+    #[serde(with = "written::calls")]
+    pub steps: Vec<Call>,
     /// What each takes, seconds; records of earlier versions do not say.
     #[serde(default)]
     pub each_s: Vec<f64>,
@@ -86,9 +90,9 @@ pub struct Way {
     /// versions.
     #[serde(default)]
     pub whole: Option<Whole>,
-    /// Why the rest of the plan cannot be done behind it, where it cannot, as the monitor says it.
-    #[serde(default)]
-    pub stuck: Option<String>,
+    /// What keeps the rest of the plan from being done behind it, where something does; records of earlier versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocked: Option<Break>,
 }
 
 /// A way to its end.
@@ -110,7 +114,7 @@ impl Way {
 
     /// What its last step is about: its last object.
     pub fn about(&self) -> Option<&str> {
-        self.steps.last()?.trim_end_matches(')').rsplit(' ').next()
+        self.steps.last()?.arguments.last().map(String::as_str)
     }
 }
 
@@ -265,7 +269,7 @@ impl<'r> Scale<'r> {
         let takes_s = each_s.iter().sum();
         let gains = now.iter().map(gain).sum();
         let reaches = self.reaches(&state);
-        let steps = steps.iter().map(call).collect();
+        let steps = steps.iter().map(call_of).collect();
         Some(Way { steps, each_s, takes_s, gains, reaches, ..Way::default() })
     }
 
@@ -287,7 +291,7 @@ impl<'r> Scale<'r> {
 
     /// What other steps come to with the rest of a plan behind them, or with so much of it as is needed then: with objects
     /// exchanged, or once a step has led to where it begins. Where that cannot be done, why.
-    fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<String>) {
+    fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<Break>) {
         let ends = self.ends(other, rest);
         let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
         let all: Vec<_> = all.filter_map(|steps| Some((self.whole(&steps)?, steps))).collect();
@@ -353,7 +357,7 @@ impl<'r> Scale<'r> {
 
     /// Why the rest of a plan cannot be done behind other steps: that a number is too small then for what is left to do but looking, or
     /// else the first that is in the way of all of it.
-    fn short_of(&self, other: &Other, rest: &[Step]) -> Option<String> {
+    fn short_of(&self, other: &Other, rest: &[Step]) -> Option<Break> {
         let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
         let looked = rest.iter().rposition(is_look);
         let there = looked.and_then(|n| Some(Instead::of(&rest[n], other.steps.last()?)));
@@ -362,7 +366,7 @@ impl<'r> Scale<'r> {
         let needed: Vec<Step> = needed.iter().map(|step| there.in_step(step)).collect();
         let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
         let stuck = |end: &Vec<Step>| self.stuck(&[&other.steps, end.as_slice()].concat());
-        let by_number = stuck(&needed).filter(|why| why.contains("(>= "));
+        let by_number = stuck(&needed).filter(Break::is_of_too_little);
         by_number.or_else(|| stuck(&exchanged))
     }
 
@@ -371,8 +375,8 @@ impl<'r> Scale<'r> {
         !self.semantics.task.init.timed.is_empty()
     }
 
-    /// Why steps cannot be taken one after the other, as the monitor says it.
-    fn stuck(&self, steps: &[Step]) -> Option<String> {
+    /// What the monitor finds in steps, one after the other.
+    fn stuck(&self, steps: &[Step]) -> Option<Break> {
         let (mut state, mut begins_s, mut timed) = (self.state.clone(), 0.0, Vec::new());
         for step in steps {
             let duration_s = self.takes_s(&state, step).unwrap_or_default();
@@ -384,7 +388,7 @@ impl<'r> Scale<'r> {
         }
         let plan = Plan { steps: timed, ..Plan::default() };
         let Semantics { task, attachments, .. } = self.semantics;
-        monitor(task, attachments, &plan).err().map(|broken| broken.to_string())
+        monitor(task, attachments, &plan).err().map(|broken| Break::of(&broken, &plan))
     }
 
     /// The numbers that steps bring nearer to what is wanted.
@@ -417,8 +421,8 @@ impl<'r> Scale<'r> {
         let others = self.others(way, &chosen);
         let open = others.len() + 1;
         let led = |other: Other| {
-            let (whole, stuck) = self.led_on(&other, rest);
-            Way { whole, stuck, ..other.way }
+            let (whole, blocked) = self.led_on(&other, rest);
+            Way { whole, blocked, ..other.way }
         };
         let others = kept(others).into_iter().map(led).collect();
         chosen.whole = self.whole(&plan.steps);
@@ -434,13 +438,13 @@ impl<'r> Scale<'r> {
 
     /// What is left of the plan before, and what it comes to, or why it would not do.
     fn left(&self, plan: &Plan, left: &Plan) -> Option<Way> {
-        let steps: Vec<String> = left.steps.iter().map(call).collect();
-        if steps.is_empty() || plan.steps.iter().map(call).eq(steps.iter().cloned()) {
+        let steps: Vec<Call> = left.steps.iter().map(call_of).collect();
+        if steps.is_empty() || plan.steps.iter().map(call_of).eq(steps.iter().cloned()) {
             return None;
         }
         let whole = self.whole(&left.steps).filter(|whole| whole.reaches);
-        let stuck = if whole.is_none() { self.stuck(&left.steps) } else { None };
-        Some(Way { steps, whole, stuck, ..Way::default() })
+        let blocked = if whole.is_none() { self.stuck(&left.steps) } else { None };
+        Some(Way { steps, whole, blocked, ..Way::default() })
     }
 
     /// The quickest of all ways to take steps with one more among them, after which one that leads from an object to another is
@@ -516,7 +520,7 @@ impl<'r> Scale<'r> {
             };
             Step { arguments: all.iter().map(pick).collect(), ..steps[at].clone() }
         };
-        let ways = (0..count(&all)).map(other).filter(|other| call(other) != call(&steps[at]));
+        let ways = (0..count(&all)).map(other).filter(|other| call_of(other) != call_of(&steps[at]));
         let ways = ways.filter_map(|other| self.in_place(steps, at, &other));
         ways.filter(|other| other.way.gains > GAINED && other.way.steps != chosen.steps).collect()
     }

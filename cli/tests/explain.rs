@@ -5,7 +5,6 @@ use std::path::Path;
 
 use descry_agent::body::{scene_spec, simulate};
 use descry_agent::exit::CommandError;
-use descry_agent::explain;
 use descry_agent::report::{Event, Report};
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
@@ -311,7 +310,7 @@ fn what_the_record_does_not_say_is_said_not_to_be_known() {
     let path = folder.path().join("run");
     let header = run::header(&path).expect("a run");
     let record = descry_agent::keeping::open(&path).expect("a record");
-    let told = explain::of(&record, &header, None).expect("it can be read").to_string();
+    let told = descry_explain::of(&record, &header, None).expect("it can be read").to_string();
     assert!(told.contains("there is no verdict"), "{told}");
 }
 
@@ -438,7 +437,7 @@ fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
     let report = report.expect("it ends");
     let header = run::header(&path).expect("a run");
     let record = descry_agent::keeping::open(&path).expect("a record");
-    let told = explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();
+    let told = descry_explain::of(&record, &header, Some(&report)).expect("it is explained").to_string();
     println!("{told}");
     (told.split_whitespace().collect::<Vec<_>>().join(" "), said.join("\n"))
 }

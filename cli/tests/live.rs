@@ -5,7 +5,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Child;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::binary::{check, check_refused, documents, outcome, start};
 use crate::body::has_python;
@@ -228,4 +228,21 @@ fn a_batch_is_shown_while_it_goes_on() {
     let table =
         |out: &str| std::fs::read_to_string(folder.join(out).join("tables.md")).expect("there are tables");
     assert_eq!(table("seen"), table("alone"));
+}
+
+#[test]
+fn who_opens_connections_and_says_nothing_keeps_nobody_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut child, address, rest) =
+        shown(folder.path(), &["find", "cup A", "--seed", "3", "--run", "run", "--live"]);
+    let silent: Vec<TcpStream> = (0..200).filter_map(|_| TcpStream::connect(&address).ok()).collect();
+    assert!(silent.len() > 100, "{}", silent.len());
+    let began = Instant::now();
+    let page = got(&address, "/").expect("the page is answered");
+    assert_eq!(page.status, 200);
+    assert!(began.elapsed() < Duration::from_secs(5), "{:?}", began.elapsed());
+    drop(silent);
+    child.kill().expect("it is ended");
+    child.wait().expect("it has ended");
+    rest.join().expect("it was heard");
 }

@@ -1,6 +1,7 @@
 //! `descry show RUN --html FILE`: one page that holds everything, and that a browser draws.
 
 use crate::binary;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
@@ -18,7 +19,7 @@ fn story(page: &str) -> Value {
     let begin = "<script type=\"application/json\" id=\"story\">";
     let (_, rest) = page.split_once(begin).expect("the story is in it");
     let (told, _) = rest.split_once("</script>").expect("it ends");
-    serde_json::from_str(&told.replace("<\\/", "</")).expect("it is JSON")
+    serde_json::from_str(told).expect("it is JSON")
 }
 
 fn count(story: &Value, name: &str) -> usize {
@@ -52,10 +53,16 @@ fn a_page_stands_alone_and_tells_the_run() {
     );
     // What people read is said as the domain says it; what a step is called in the plan is beside it.
     assert_eq!(story["wanted"], "the certainty of where cup A stands is at least 0.8");
-    let calls = story["calls"].as_object().expect("calls");
-    assert!(
-        calls.values().any(|said| said.as_str().is_some_and(|s| s.starts_with("looking at the table from ")))
+    let steps = story["plans"][0]["steps"].as_array().expect("steps");
+    let said = |step: &Value| step["said"].as_str().unwrap_or_default().to_string();
+    assert!(steps.iter().any(|step| said(step).starts_with("looking at the table from ")), "{steps:?}");
+    assert_eq!(story["body_radius_m"], 0.25);
+    let sought = &story["sought"][0];
+    assert_eq!(
+        (&sought["name"], &sought["wanted"]),
+        (&"the certainty of where cup A stands".into(), &0.8.into())
     );
+    assert!(sought["values"].as_array().is_some_and(|values| values.len() > looks), "{sought}");
     let texts: Vec<&str> =
         story["moments"].as_array().into_iter().flatten().filter_map(|m| m["text"].as_str()).collect();
     let raw = texts
@@ -69,8 +76,50 @@ fn a_page_stands_alone_and_tells_the_run() {
     for word in ["The certainty of where cup A stands is now 0.", "It is no more because ", "% are left)"] {
         assert!(known[0].contains(word), "{word}: {}", known[0]);
     }
+    check_fields(&page, &story);
     assert!(page.len() < 1_000_000 * (looks + 1), "{} bytes for {looks} looks", page.len());
     in_a_browser(folder.path());
+}
+
+/// What the script of a page reads of the story is there: `story.map.rooms` is a path through the data, and what has a unit in
+/// its name is a field of something in it.
+fn check_fields(page: &str, story: &Value) {
+    let (_, script) = page.rsplit_once("<script>").expect("a script");
+    let is_of_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.' || c == '?';
+    let paths: Vec<Vec<&str>> = script
+        .match_indices("story.")
+        .map(|(at, word)| {
+            let path = script[at + word.len()..].split(|c| !is_of_name(c)).next().unwrap_or_default();
+            path.split('.').map(|name| name.trim_end_matches('?')).collect()
+        })
+        .collect();
+    assert!(paths.len() > 20, "{paths:?}");
+    for path in paths {
+        let mut at = story;
+        for name in path {
+            // What follows a list, a text or a number is the script's own.
+            let Some(fields) = at.as_object() else { break };
+            at =
+                fields.get(name).unwrap_or_else(|| panic!("the story has no {name}, which the script reads"));
+        }
+    }
+    let fields = |text: &str| -> BTreeSet<String> {
+        let names = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+        names
+            .filter(|name| ["_m", "_s", "_rad"].iter().any(|unit| name.ends_with(unit)))
+            .map(str::to_owned)
+            .collect()
+    };
+    let told = fields(&story.to_string());
+    // One room has no doors.
+    let of_doors = ["centre_m", "along_rad", "width_m"];
+    let read = script.match_indices('.').filter_map(|(at, _)| {
+        let name = script[at + 1..].split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).next()?;
+        fields(name).pop_first()
+    });
+    for name in read.filter(|name| !of_doors.contains(&name.as_str())) {
+        assert!(told.contains(&name), "no part of the story has {name}, which the script reads");
+    }
 }
 
 /// What Chromium makes of it, where it is installed.
@@ -90,6 +139,7 @@ fn in_a_browser(folder: &Path) {
         return;
     };
     let drawn = String::from_utf8_lossy(&drawn.stdout);
+    assert!(drawn.contains("r=\"0.25\""), "the body is drawn as large as it is");
     for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"see now\"", "Seen by now: "] {
         assert!(drawn.contains(part), "{part} is not drawn");
     }

@@ -2,20 +2,26 @@
 
 pub(crate) mod denied;
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use descry_memory::belief::Track;
 use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
-use descry_planner::{FactValue, Plan, after};
+use descry_planner::{Attachments, FactValue, NoPlan, Plan, Task, after};
 use descry_robots::Part;
 use serde::{Deserialize, Serialize};
 
+use crate::abilities;
 use crate::abilities::searching::adrift;
 use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
 use crate::goal::Goal;
-use crate::lexicon::{Lexicon, plural, symbol};
+use crate::lexicon::{Lexicon, one, plural, symbol};
+use crate::load::Domain;
 use crate::mind::Mind;
+use crate::no_plan;
+use crate::saying::Saying;
 use crate::situation::{Situation, Thing};
 use crate::world::Round;
 
@@ -25,7 +31,7 @@ pub enum Ended {
     /// The goal holds.
     Reached,
     /// There is no plan, and why.
-    NoPlan(String),
+    NoPlan(Vec<NoPlan>),
     /// The search for a plan came to no end, and no single step is surely worth it.
     Undecided(String),
     /// A limit of looks, plans or time was reached.
@@ -100,20 +106,15 @@ pub struct Conclusion {
 }
 
 /// What is answered when a run has ended.
-pub(crate) fn conclude(
-    goal: &Goal,
-    lexicon: &Lexicon,
-    mind: &Mind,
-    round: &Round,
-    lacks: Option<Part>,
-    ended: &Ended,
-) -> Conclusion {
-    let s = &*round.situation;
-    let asker = Asker { goal, lexicon, mind, round, lacks, s };
+pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
+    let (s, config) = (asker.s, &asker.domain.config);
     let (verdict, why) = match ended {
         Ended::Reached => asker.reached(),
         // On a map that the body has made itself ways may be missing.
-        Ended::NoPlan(why) => asker.gave_up(why, !s.chart.has_ways()),
+        Ended::NoPlan(why) => {
+            let why = no_plan::told(why, &|call| abilities::meaning(config, call));
+            asker.gave_up(&why, !s.chart.has_ways())
+        }
         Ended::Undecided(why) => asker.gave_up(why, false),
         Ended::Limit(why) => (Verdict::CannotTell, format!("it cannot be told: {why}")),
         Ended::Failed(why) => (Verdict::Failed, why.clone()),
@@ -148,14 +149,29 @@ pub(crate) const CHANGES: &str = "changes";
 const SAME_M: f64 = 0.10;
 
 /// What answering needs.
-struct Asker<'a> {
-    goal: &'a Goal,
-    lexicon: &'a Lexicon,
-    mind: &'a Mind,
-    round: &'a Round,
+pub(crate) struct Asker<'a> {
+    pub domain: &'a Domain,
+    pub goal: &'a Goal,
+    pub lexicon: &'a Lexicon,
+    pub mind: &'a Mind,
+    pub round: &'a Round,
     /// A part that the domain needs and the body does not have.
-    lacks: Option<Part>,
-    s: &'a Situation,
+    pub lacks: Option<Part>,
+    pub s: &'a Situation,
+    /// How the domain says what is written in PDDL.
+    pub saying: &'a Saying,
+    /// What the phrase's own answer may list; none: it lists nothing.
+    pub listed: Option<&'a Listed>,
+}
+
+/// All that is believed of the objects that were seen, whether the goal asks about them or not.
+pub(crate) struct Listed {
+    /// The round's problem with every object for a thing, and every kind of the domain.
+    pub task: Task,
+    /// Its calls, bound.
+    pub attachments: Attachments,
+    /// Things by symbol: the number of the object, and what it is called.
+    pub things: BTreeMap<String, (u64, String)>,
 }
 
 impl Asker<'_> {
@@ -197,12 +213,33 @@ impl Asker<'_> {
             }
         }
         for &on in &s.asked {
-            said.push(format!("everything on the {} is identified", s.surfaces[on].name));
+            said.push(self.identified(on));
         }
         if said.is_empty() || self.goal.asked.more || !self.goal.asked.denied.is_empty() {
-            said.insert(0, format!("it holds that {}", self.goal.pddl));
+            said.insert(0, format!("it holds that {}", self.saying.say(&self.goal.pddl)));
         }
         (Verdict::Achieved, said.join("; "))
+    }
+
+    /// What is told of a surface on which each object is known, or surely none of the known ones.
+    fn identified(&self, on: usize) -> String {
+        let surface = &self.s.surfaces[on];
+        let there = self.s.belief.tracks.iter().filter(|track| track.on == surface.symbol);
+        let (known, strange): (Vec<&Track>, Vec<&Track>) = there.partition(|track| track.label().is_some());
+        let objects = |n: usize| if n == 1 { "object" } else { "objects" };
+        let name = &surface.name;
+        match (known.len(), strange.len()) {
+            (0, 0) => format!("there is nothing on the {name}"),
+            (n, 0) => format!("everything on the {name} is identified: {n} {}", objects(n)),
+            (0, n) => format!("of {n} {} on the {name} none is a known one", objects(n)),
+            (k, n) => {
+                let are = |n: usize| if n == 1 { "is" } else { "are" };
+                let (objects, known, strange) = (objects(k), are(k), are(n));
+                format!(
+                    "on the {name} {k} {objects} {known} identified, and {n} {strange} none of the known ones"
+                )
+            }
+        }
     }
 
     /// None of a kind was seen, as sure as was asked for that all of it is known.
@@ -217,7 +254,7 @@ impl Asker<'_> {
         let about = format!("{}{}", kind.name, reasons::in_room(s, kind));
         match open {
             Some(open) => {
-                (Verdict::CannotTell, format!("it cannot be told whether there is a {about}, {open}"))
+                (Verdict::CannotTell, format!("it cannot be told whether there is {}, {open}", one(&about)))
             }
             None => (Verdict::NotFound, format!("there is no {about}: {seen}")),
         }
@@ -231,8 +268,8 @@ impl Asker<'_> {
         let (kind, room) = rooms.find(|(_, room)| is_bare(room))?;
         let room = self.lexicon.name_of(room);
         Some(format!(
-            "it cannot be told whether there is a {} in the {room}: no surface is known there",
-            kind.name
+            "it cannot be told whether there is {} in the {room}: no surface is known there",
+            one(&kind.name)
         ))
     }
 
@@ -294,7 +331,7 @@ impl Asker<'_> {
             return (Verdict::NotFound, no);
         }
         if !is_proven {
-            let text = format!("no plan was found that brings about {}", self.goal.pddl);
+            let text = format!("no plan was found that brings about {}", self.saying.say(&self.goal.pddl));
             return (Verdict::CannotTell, format!("{text}{says}"));
         }
         if let Some(no) = self.no_of_things() {
@@ -312,7 +349,11 @@ impl Asker<'_> {
             members => members.join("; "),
         });
         is_of_kinds.then(|| {
-            format!("{}; so it does not hold that {}", said.collect::<Vec<_>>().join("; "), self.goal.pddl)
+            format!(
+                "{}; so it does not hold that {}",
+                said.collect::<Vec<_>>().join("; "),
+                self.saying.say(&self.goal.pddl)
+            )
         })
     }
 
@@ -335,7 +376,8 @@ impl Asker<'_> {
         let known = self.surely();
         let known = if known.is_empty() { String::new() } else { format!("{}; ", known.join("; ")) };
         let lacks = self.lacks.map(|part| format!("the body has no {part}; ")).unwrap_or_default();
-        format!("{known}{lacks}nothing that can be done brings about {}{says}", self.goal.pddl)
+        let wanted = self.saying.say(&self.goal.pddl);
+        format!("{known}{lacks}nothing that can be done brings about {wanted}{says}")
     }
 
     /// Where the things stand that were asked for by name, of those of which it is sure.
@@ -503,26 +545,51 @@ impl Asker<'_> {
         if word == CHANGES {
             return arguments.first().map_or_else(|| self.all_changes(), |surface| self.changes(surface));
         }
-        let readings =
-            after(&self.round.task, &self.round.attachments, &Plan::default(), &[word]).unwrap_or_default();
+        let (task, attachments) = match self.listed {
+            Some(listed) => (&listed.task, &listed.attachments),
+            None => (&self.round.task, &self.round.attachments),
+        };
+        let readings = after(task, attachments, &Plan::default(), &[word]).unwrap_or_default();
         let fitting = readings.iter().filter(|r| {
             r.arguments.len() == arguments.len()
                 && r.arguments.iter().zip(arguments).all(|(a, b)| b == "?" || **a == *symbol(b))
         });
         let mut names: Vec<String> = Vec::new();
+        let mut told: BTreeSet<u64> = BTreeSet::new();
         for reading in fitting {
             match (&reading.value, arguments.iter().position(|a| a == "?")) {
                 (FactValue::Number(n), None) => return format!("{n:.2}"),
-                (_, Some(at)) => names.push(self.lexicon.name_of(&reading.arguments[at]).to_string()),
+                (_, Some(at)) => {
+                    let symbol = &reading.arguments[at];
+                    match self.listed.and_then(|listed| listed.things.get(symbol.as_ref())) {
+                        // One object may be known under several symbols.
+                        Some((object, name)) => names.extend(told.insert(*object).then(|| name.clone())),
+                        None => names.push(self.lexicon.name_of(symbol).to_string()),
+                    }
+                }
                 (_, None) => return "yes".into(),
             }
         }
         match (names.is_empty(), arguments.iter().any(|a| a == "?")) {
-            (false, _) => names.join(", "),
-            (true, true) => "nothing".into(),
+            (false, _) => counted(names),
+            (true, true) => "none".into(),
             (true, false) => "no".into(),
         }
     }
+}
+
+/// Names in their order, those that are the same together: `2 cups, mug`.
+fn counted(names: Vec<String>) -> String {
+    let mut all: Vec<(String, usize)> = Vec::new();
+    for name in names {
+        match all.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => all.push((name, 1)),
+        }
+    }
+    let one =
+        |(name, count): (String, usize)| if count == 1 { name } else { format!("{count} {}", plural(&name)) };
+    all.into_iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// What has changed on a surface since an earlier run looked at it; `name` is what people call it.

@@ -213,6 +213,12 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
     things
 }
 
+/// One of something, with its article: a cup, an apple.
+pub fn one(name: &str) -> String {
+    let is_vowel = name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']);
+    format!("{} {name}", if is_vowel { "an" } else { "a" })
+}
+
 /// Several of something: cups, boxes, berries.
 pub fn plural(name: &str) -> String {
     const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];

@@ -15,8 +15,8 @@ pub enum Note {
         on: String,
         /// Views in the merged cloud.
         merged: usize,
-        /// Views that could not be aligned, with the reason.
-        left_out: Vec<String>,
+        /// Views that could not be aligned.
+        left_out: Vec<LeftOut>,
         /// Points of the merged cloud.
         points: usize,
         /// Root mean square distance between the views, metres.
@@ -24,7 +24,7 @@ pub enum Note {
         /// What each object on the surface is taken for.
         objects: Vec<String>,
         /// What the last view changed in the belief.
-        changed: Vec<String>,
+        changed: Vec<BeliefChange>,
     },
     /// A surface that no map knows has come into view.
     Surface {
@@ -38,7 +38,7 @@ pub enum Note {
     /// The laser has swept.
     Swept {
         /// What is on the floor, and what is known of its shape.
-        things: Vec<String>,
+        things: Vec<OnTheFloor>,
     },
     /// A look was taken into the map.
     Charted {
@@ -85,7 +85,102 @@ pub enum Note {
     Nothing {
         /// Why.
         because: String,
+        /// What could be set otherwise; empty: nothing.
+        #[serde(default, skip_serializing_if = "String::is_empty")]
+        advice: String,
+        /// Whether the view is left out for good; else further views may still make use of it.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        is_left_out: bool,
     },
+}
+
+/// A view that was not merged with the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum LeftOut {
+    /// Its number, from 1, and why.
+    View {
+        /// The number.
+        view: usize,
+        /// Why, behind the number.
+        why: String,
+    },
+    /// As an earlier version said it.
+    Said(String),
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LeftOut::View { view, why } => write!(f, "view {view} {why}"),
+            LeftOut::Said(text) => f.write_str(text),
+        }
+    }
+}
+
+/// A change of the belief.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum BeliefChange {
+    /// How sure it is of where something stands.
+    Confidence {
+        /// Of what.
+        of: String,
+        /// Before.
+        before: f64,
+        /// After.
+        after: f64,
+    },
+    /// As an earlier version said it.
+    Said(String),
+}
+
+impl fmt::Display for BeliefChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            BeliefChange::Confidence { of, before, after } => {
+                write!(f, "confidence in {of}: {before:.2} -> {after:.2}")
+            }
+            BeliefChange::Said(text) => f.write_str(text),
+        }
+    }
+}
+
+/// A thing on the floor, as a laser sees it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum OnTheFloor {
+    /// What is known of it.
+    Thing {
+        /// In a line.
+        text: String,
+        /// Whether no sweep was taken from near it.
+        is_far: bool,
+    },
+    /// As an earlier version said it.
+    Said(String),
+}
+
+impl OnTheFloor {
+    /// What is known of it, in a line.
+    pub fn text(&self) -> &str {
+        match self {
+            OnTheFloor::Thing { text, .. } | OnTheFloor::Said(text) => text,
+        }
+    }
+}
+
+impl Note {
+    /// A word for what it is about.
+    pub fn head(&self) -> &'static str {
+        match self {
+            Note::Perceived { .. } | Note::Surface { .. } | Note::Nothing { .. } => "see",
+            Note::Swept { .. } => "sweep",
+            Note::Charted { .. } => "map",
+            Note::Visited { .. } => "visit",
+            Note::Changed { .. } => "changed",
+        }
+    }
 }
 
 impl fmt::Display for Note {
@@ -95,22 +190,24 @@ impl fmt::Display for Note {
                 let (views, mm) = (if *merged == 1 { "view" } else { "views" }, residual_m * 1e3);
                 write!(
                     f,
-                    "see       {on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} {}",
+                    "{on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} {}",
                     objects.len(),
                     if objects.len() == 1 { "object" } else { "objects" }
                 )?;
-                let lines = left_out.iter().chain(objects).chain(changed);
-                lines.into_iter().try_for_each(|text| write!(f, "\n          {text}"))
+                left_out.iter().try_for_each(|view| write!(f, "\n{view}"))?;
+                objects.iter().try_for_each(|text| write!(f, "\n{text}"))?;
+                changed.iter().try_for_each(|change| write!(f, "\n{change}"))
             }
             Note::Surface { name, at_m: [x, y, z], area_m2 } => {
                 write!(
                     f,
-                    "see       another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m"
+                    "another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m"
                 )
             }
             Note::Swept { things } => {
-                write!(f, "sweep     {} things on the floor", things.len())?;
-                things.iter().try_for_each(|text| write!(f, "\n          {text}"))
+                let all = if things.len() == 1 { "thing" } else { "things" };
+                write!(f, "{} {all} on the floor", things.len())?;
+                things.iter().try_for_each(|thing| write!(f, "\n{}", thing.text()))
             }
             Note::Charted {
                 walls,
@@ -126,24 +223,27 @@ impl fmt::Display for Note {
                 let round = and_round(*cylinders);
                 write!(
                     f,
-                    "map       {walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; the body stood {cm:.1} cm and {degrees:.1}° from where it believed"
+                    "{walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; the body stood {cm:.1} cm and {degrees:.1}° from where it believed"
                 )?;
-                surfaces.iter().try_for_each(|text| write!(f, "\n          {text}"))
+                surfaces.iter().try_for_each(|text| write!(f, "\n{text}"))
             }
             Note::Visited { waypoint, visits, moved_m, turned_rad, strange, came, gone } => {
                 match (strange, *visits, came.is_empty() && gone.is_empty()) {
-                    (Some(why), ..) => write!(f, "visit     {waypoint}: not compared: {why}")?,
-                    (_, 0 | 1, _) => write!(f, "visit     {waypoint}: for the first time")?,
-                    (_, n, true) => write!(f, "visit     {waypoint}, {n} times so far: as it was")?,
-                    (_, n, false) => write!(f, "visit     {waypoint}, {n} times so far")?,
+                    (Some(why), ..) => write!(f, "{waypoint}: not compared: {why}")?,
+                    (_, 0 | 1, _) => write!(f, "{waypoint}: for the first time")?,
+                    (_, n, true) => write!(f, "{waypoint}, {n} times so far: as it was")?,
+                    (_, n, false) => write!(f, "{waypoint}, {n} times so far")?,
                 }
                 let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
                 write!(f, "; the body stood {cm:.1} cm and {degrees:.1}° from where it believed")?;
-                came.iter().try_for_each(|text| write!(f, "\n          came: {text}"))?;
-                gone.iter().try_for_each(|text| write!(f, "\n          gone: {text}"))
+                came.iter().try_for_each(|text| write!(f, "\ncame: {text}"))?;
+                gone.iter().try_for_each(|text| write!(f, "\ngone: {text}"))
             }
-            Note::Changed { because } => write!(f, "changed   {because}; only the last view still holds"),
-            Note::Nothing { because } => write!(f, "see       nothing yet: {because}"),
+            Note::Changed { because } => write!(f, "{because}; only the last view still holds"),
+            Note::Nothing { because, advice, .. } if advice.is_empty() => {
+                write!(f, "nothing yet: {because}")
+            }
+            Note::Nothing { because, advice, .. } => write!(f, "nothing yet: {because}: {advice}"),
         }
     }
 }

@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use descry_memory::{Record, RecordId};
 use descry_perception::recognise::Recogniser;
-use descry_planner::{Attachments, Plan, Source, Task, after, monitor};
+use descry_planner::{Attachments, Cause, Plan, Source, Task, after, monitor};
 use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
@@ -28,6 +28,7 @@ use crate::abilities::surveying::chart::Chart;
 use crate::actions::{self, Carried, Grounded};
 use crate::declared;
 use crate::goal::Goal;
+use crate::lesson::Lesson;
 use crate::lexicon::{Lexicon, Places, symbol};
 use crate::load::Domain;
 use crate::mind::{Mind, Region};
@@ -38,8 +39,6 @@ use crate::words::{self, Words};
 pub use error::WorldError;
 use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled, things};
 
-/// How the reason begins why a step failed that came to its end, but not as the domain says.
-pub const NOT_AS_SAID: &str = "it has ended, but not as the domain says: ";
 /// Why there is nothing to choose.
 const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 
@@ -432,13 +431,12 @@ impl<'a> World<'a> {
             // A policy may look where nothing is promised: what was seen is believed all the same.
             Err(_) if self.takes_steps_unasked() => {}
             Err(broken) => {
-                let because = format!("{NOT_AS_SAID}{broken}");
-                return Ok(done
-                    .iter()
-                    .map(|d| {
-                        (d.call.clone(), SkillFailure::Program { because: because.clone(), passing: true })
-                    })
-                    .collect());
+                let condition = match &broken.cause {
+                    Cause::Condition { unmet, .. } => Some(unmet.condition.clone()),
+                    _ => None,
+                };
+                let failure = SkillFailure::Unkept { because: broken.to_string(), condition };
+                return Ok(done.iter().map(|d| (d.call.clone(), failure.clone())).collect());
             }
         }
         self.mind.attend();
@@ -484,7 +482,7 @@ impl<'a> World<'a> {
         call: &Call,
         step: usize,
         failure: &SkillFailure,
-    ) -> Result<String, WorldError> {
+    ) -> Result<Lesson, WorldError> {
         let domain = self.setting.domain;
         let said = json!({ "call": call.to_string(), "failure": failure.to_string() });
         perceive::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
@@ -495,7 +493,7 @@ impl<'a> World<'a> {
             if let Some(therefore) =
                 failed(&mut self.mind, eyes, &round.situation, &grounded.arguments(), failure)?
             {
-                return Ok(therefore);
+                return Ok(Lesson::Said { text: therefore });
             }
         }
         let config = actions::config(domain, call);
@@ -506,24 +504,20 @@ impl<'a> World<'a> {
         let taught: Vec<String> = actions::taught(domain, call, &config, failure, by.as_deref());
         if !taught.is_empty() {
             self.say_all(&taught)?;
-            return Ok(taught.join(" "));
+            return Ok(Lesson::Facts { facts: taught });
         }
         let tries = self.tries.entry(call.clone()).or_insert(0);
         *tries += 1;
         let (tries, limit) = (*tries, config.retries());
         if failure.is_passing() && tries <= limit {
-            return Ok(format!("try {tries} of {}", limit + 1));
+            return Ok(Lesson::Retry { tries, most: limit + 1 });
         }
         let given_up = actions::substituted(domain, call, &config.gives_up);
         self.say_all(&given_up)?;
         if given_up.is_empty() || tries > limit + 1 {
             self.given_up = Some(format!("{call} has failed {tries} times: {failure}"));
         }
-        Ok(if given_up.is_empty() {
-            format!("{call} is given up")
-        } else {
-            format!("{call} is given up: {}", given_up.join(" "))
-        })
+        Ok(Lesson::GivenUp { facts: given_up })
     }
 
     fn say_all(&mut self, atoms: &[String]) -> Result<(), WorldError> {

@@ -21,6 +21,7 @@ use recall::named;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The kinds that have a form of their own; any other word is a kind, too.
@@ -120,6 +121,8 @@ pub struct Record {
     soon: Mutex<Vec<Draft<'static>>>,
     flusher: Flusher,
     retrace: Option<Retrace>,
+    /// Whether something did not fit into the record's bound.
+    is_at_bound: AtomicBool,
 }
 
 /// Transforms on their way into a document, by child and parent.
@@ -190,6 +193,7 @@ impl Record {
             groups: Mutex::default(),
             soon: Mutex::default(),
             retrace: None,
+            is_at_bound: AtomicBool::new(false),
         }
     }
 
@@ -377,7 +381,7 @@ impl Record {
         let mut soon = self.soon.lock().unwrap_or_else(PoisonError::into_inner);
         // All or none: what was held back is not dropped with a draft that cannot be recorded.
         let drafts: Vec<Draft> = soon.iter().cloned().chain([draft]).collect();
-        let ids = self.store.append(&drafts)?;
+        let ids = self.append(&drafts)?;
         soon.clear();
         ids.last().copied().ok_or(Error::Missing { id: 0 })
     }
@@ -403,9 +407,22 @@ impl Record {
 
     fn flush_soon(&self) -> Result<(), Error> {
         let mut soon = self.soon.lock().unwrap_or_else(PoisonError::into_inner);
-        self.store.append(&soon)?;
+        self.append(&soon)?;
         soon.clear();
         Ok(())
+    }
+
+    fn append(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
+        let appended = self.store.append(drafts);
+        if matches!(appended, Err(Error::Bounded { .. })) {
+            self.is_at_bound.store(true, Ordering::Relaxed);
+        }
+        appended
+    }
+
+    /// Whether something did not fit into the bound of the record, so that nothing more can be recorded.
+    pub fn is_at_bound(&self) -> bool {
+        self.is_at_bound.load(Ordering::Relaxed)
     }
 
     /// Records several drafts, all or none.
@@ -413,7 +430,7 @@ impl Record {
     /// # Errors
     /// As [`Store::append`].
     pub fn put_all(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
-        self.store.append(drafts)
+        self.append(drafts)
     }
 
     /// Brings everything to the disk, open groups of transforms included.

@@ -5,6 +5,7 @@
 
 #[doc(hidden)]
 pub mod answers;
+mod connections;
 mod news;
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
@@ -15,8 +16,9 @@ use std::time::Duration;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 
+use connections::Connections;
 use descry_agent::exit::CommandError;
 use news::News;
 
@@ -27,7 +29,7 @@ pub const FOLLOW: &str = include_str!("live/follow.js");
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 /// How long readers are waited for that have not fetched the end yet.
 const LINGER: Duration = Duration::from_secs(5);
-/// Most connections at a time; further ones wait.
+/// Most connections at a time; for a further one another is closed, first one that has not asked for anything.
 const MOST_CONNECTIONS: usize = 64;
 /// Within this a reader must have said what it wants.
 const ASK_WITHIN: Duration = Duration::from_secs(10);
@@ -132,24 +134,30 @@ async fn serve(port: Port, shown: Arc<dyn Shown>, mut ended: watch::Receiver<boo
     let (news, _) = watch::channel(News::default());
     let news = Arc::new(news);
     tokio::spawn(news::watch(Arc::clone(&shown), Arc::clone(&news)));
-    let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    let connections = Arc::new(Connections::default());
     let accept = async {
         loop {
-            let Ok(place) = Arc::clone(&room).acquire_owned().await else { break };
             // What goes wrong with one connection is no matter of the others.
             let Ok((stream, _)) = listener.accept().await else {
                 tokio::time::sleep(LOOK_EVERY).await;
                 continue;
             };
             let (shown, news) = (Arc::clone(&shown), Arc::clone(&news));
+            let place = connections.open(MOST_CONNECTIONS);
+            let asked = place.clone();
             let service = service_fn(move |request| {
+                asked.has_asked();
                 answers::answer(request, port.address.port(), Arc::clone(&shown), Arc::clone(&news))
             });
+            let connections = Arc::clone(&connections);
             tokio::spawn(async move {
                 let mut http = http1::Builder::new();
                 http.timer(TokioTimer::new()).header_read_timeout(ASK_WITHIN);
-                let _ = http.serve_connection(TokioIo::new(stream), service).await;
-                drop(place);
+                tokio::select! {
+                    _ = http.serve_connection(TokioIo::new(stream), service) => (),
+                    () = place.evicted() => (),
+                }
+                connections.close(&place);
             });
         }
     };

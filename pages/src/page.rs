@@ -36,6 +36,6 @@ pub fn laid_out(title: &str, told: &str) -> String {
     let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());
     let parts = [("{{title}}", title.as_str()), ("{{style}}", &style), ("{{script}}", &script)];
     let page = parts.into_iter().fold(HTML.to_owned(), |page, (name, part)| page.replace(name, part));
-    // Within a script nothing may look like its end.
-    page.replace("{{story}}", &told.replace("</", "<\\/"))
+    // Within a script nothing may look like markup: neither its end nor a comment that would hide it.
+    page.replace("{{story}}", &told.replace('<', "\\u003c"))
 }

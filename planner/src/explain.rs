@@ -8,7 +8,7 @@ mod within;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::attachment::{Attachments, CallKind};
 use crate::diagnostic::{Diagnostic, Findings, Span};
@@ -35,12 +35,65 @@ pub struct Explanation {
     /// Whether the goal could surely be had if nothing were ever taken away.
     #[serde(skip)]
     pub(crate) only_lost: bool,
+    /// Attachments that did not answer as needed, in the order of their findings.
+    #[serde(skip)]
+    refused: Vec<NoPlan>,
+}
+
+/// A reason why there is no plan, as a value.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum NoPlan {
+    /// An attachment did not answer as needed.
+    Refused {
+        /// Name of the attachment.
+        module: String,
+        /// What it answered.
+        answer: Refusal,
+        /// Its calls, in PDDL.
+        calls: Vec<String>,
+    },
+    /// Every state that can be reached was seen, and none fulfils the goal.
+    Exhausted,
+    /// Anything else, in one sentence.
+    Finding {
+        /// The sentence.
+        message: String,
+        /// What to do about it.
+        help: Option<String>,
+    },
+}
+
+/// An answer of an attachment that leaves no plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refusal {
+    /// No, where yes is needed.
+    No,
+    /// Yes, where no is needed.
+    Yes,
+    /// An infinite cost.
+    Impossible,
 }
 
 impl Explanation {
     fn new(task: &Task, list: Vec<Diagnostic>) -> Explanation {
         let findings = Findings { sources: task.sources.to_vec(), list };
         Explanation { findings, ..Explanation::default() }
+    }
+
+    /// The reasons as values, in the order of the findings.
+    pub fn reasons(&self) -> Vec<NoPlan> {
+        let mut refused = self.refused.iter();
+        let reason = |finding: &Diagnostic| {
+            let plain = || NoPlan::Finding { message: finding.message.clone(), help: finding.help.clone() };
+            match finding.code {
+                REFUSED => refused.next().cloned().unwrap_or_else(plain),
+                _ if finding.message == UNREACHED => NoPlan::Exhausted,
+                _ => plain(),
+            }
+        };
+        self.findings.list.iter().map(reason).collect()
     }
 
     /// The same for plans in which these actions do not overlap themselves.
@@ -62,6 +115,8 @@ impl Explanation {
     }
 }
 
+/// What findings that tell of attachments that did not answer as needed are called.
+const REFUSED: &str = "attachment-refused";
 /// What findings that tell of actions that overlap themselves are called.
 const OVERLAP: &str = "overlap-untried";
 
@@ -114,14 +169,18 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
             .filter(untold)
             .map(|obstacle| finding(task, obstacle, &ground.obstacles, &parts)),
     );
+    let mut told_refused = Vec::new();
     for (&(module, wanted), calls) in refusals {
-        list.extend(refused(task, ModuleId(module), wanted, calls));
+        if let Some((finding, reason)) = refused(task, ModuleId(module), wanted, calls) {
+            list.push(finding);
+            told_refused.push(reason);
+        }
     }
     let only_lost = list.is_empty() && could_be_had(ground);
     if list.is_empty() {
         list.push(together(task, &parts, false, only_lost));
     }
-    Explanation { only_lost, ..Explanation::new(task, list) }
+    Explanation { only_lost, refused: told_refused, ..Explanation::new(task, list) }
 }
 
 /// What is said where no relaxation knows better.
@@ -416,7 +475,7 @@ fn trace(
 }
 
 /// What an attachment refused, under the calls in the domain.
-fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<Diagnostic> {
+fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<(Diagnostic, NoPlan)> {
     let mut sites = sites(task, module).into_iter();
     let (who, span) = sites.next()?;
     let more = calls.len().saturating_sub(SHOWN);
@@ -426,18 +485,23 @@ fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Opt
     }
     let declared = task.module(module);
     let answer = match declared.kind {
-        CallKind::Cost => "called impossible (an infinite cost)",
-        _ if wanted => "said no to",
-        _ => "said yes, where no is needed, to",
+        CallKind::Cost => Refusal::Impossible,
+        _ if wanted => Refusal::No,
+        _ => Refusal::Yes,
     };
-    let message = format!("the attachment of `{}` {answer}: {shown}", declared.name);
-    let mut finding =
-        Diagnostic::error("attachment-refused", message, span, format!("{who} depends on it here"));
+    let said = match answer {
+        Refusal::Impossible => "called impossible (an infinite cost)",
+        Refusal::No => "said no to",
+        Refusal::Yes => "said yes, where no is needed, to",
+    };
+    let message = format!("the attachment of `{}` {said}: {shown}", declared.name);
+    let mut finding = Diagnostic::error(REFUSED, message, span, format!("{who} depends on it here"));
     for (who, span) in sites {
         finding = finding.with_label(span, format!("{who} depends on it here"));
     }
     let help = "with any of these answered otherwise there might be a plan";
-    Some(finding.with_help(help))
+    let reason = NoPlan::Refused { module: declared.name.clone(), answer, calls: calls.to_vec() };
+    Some((finding.with_help(help), reason))
 }
 
 /// The functions that an expression reads.

@@ -37,7 +37,7 @@ pub use attachment::{
     Level, Read, Reading,
 };
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
-pub use explain::Explanation;
+pub use explain::{Explanation, NoPlan, Refusal};
 pub use outcome::{Options, Outcome, PlanError, Statistics};
 pub use pddl::check;
 pub use plan::{EPSILON_S, Plan, Step, number_text};
@@ -45,4 +45,4 @@ pub use semantics::Semantics;
 pub use solve::plan;
 pub use state::State;
 pub use task::Task;
-pub use validate::{Broken, SEPARATION_S, Verdict, after, endless, monitor, validate};
+pub use validate::{Broken, Cause, Moment, SEPARATION_S, Unmet, Verdict, after, endless, monitor, validate};

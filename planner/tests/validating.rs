@@ -1,8 +1,8 @@
 //! Plans replayed: what is valid, what is not, and why.
 
 use descry_planner::{
-    Answer, Attachments, Call, CallError, FactValue, Plan, Read, Semantics, Source, State, Task, Verdict,
-    endless, monitor, validate,
+    Answer, Attachments, Call, CallError, Cause, FactValue, Plan, Read, Semantics, Source, State, Task,
+    Verdict, endless, monitor, validate,
 };
 
 const KITCHEN: &str = include_str!("data/kitchen-domain.pddl");
@@ -341,6 +341,14 @@ fn preferences_and_constraints_count() {
     }
 }
 
+/// The condition that a cause is about.
+fn unmet(cause: &Cause) -> Option<&str> {
+    match cause {
+        Cause::Goal(unmet) | Cause::Condition { unmet, .. } => Some(&unmet.condition),
+        _ => None,
+    }
+}
+
 #[test]
 fn the_monitor_says_what_broke() {
     let task = task(KITCHEN, KITCHEN_PROBLEM);
@@ -359,12 +367,12 @@ fn the_monitor_says_what_broke() {
     let mut moved: State = state.clone();
     moved.set_fact(on, &[id("jug"), id("table")], false);
     let broken = monitor(&task.with_state(&moved), &attachments, &rest).expect_err("the jug is gone");
-    assert_eq!((broken.step, broken.condition.as_str()), (Some(1), "(on jug table)"));
+    assert_eq!((broken.step, unmet(&broken.cause)), (Some(1), Some("(on jug table)")));
 
     let height = task.find_function("height").expect("declared");
     state.set_number(height, &[id("shelf")], Some(5.0));
     let broken = monitor(&task.with_state(&state), &attachments, &rest).expect_err("the shelf is too high");
-    assert_eq!((broken.step, broken.condition.as_str()), (Some(0), "[reachable shelf]"));
+    assert_eq!((broken.step, unmet(&broken.cause)), (Some(0), Some("[reachable shelf]")));
     let place = &KITCHEN[broken.span.start as usize..broken.span.end as usize];
     assert_eq!(place, "[reachable ?p]");
     assert!(broken.to_string().starts_with("step 1 (put mug shelf)"), "{broken}");

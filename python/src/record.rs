@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use descry_agent::keeping;
-use descry_agent::{explain, run};
+use descry_agent::run;
 use descry_memory::{Error, Near, Order, Query};
 use numpy::{PyArray2, PyArrayDyn};
 use pyo3::prelude::*;
@@ -124,7 +124,7 @@ impl Record {
         let told = || {
             let header = run::header(&self.place)?;
             let report = run::report(&self.place)?;
-            explain::of(&self.inner, &header, report.as_ref())
+            descry_explain::of(&self.inner, &header, report.as_ref())
         };
         let told = py.detach(told).map_err(|error| failure::command(py, &error))?;
         Ok(told.text(figures))

@@ -94,6 +94,14 @@ pub enum SkillFailure {
         /// Reason.
         because: String,
     },
+    /// It was carried out, but not as the domain describes it.
+    #[error("it has ended, but not as the domain says: {because}")]
+    Unkept {
+        /// What the domain's description says instead.
+        because: String,
+        /// The condition that should have held until the end, in PDDL.
+        condition: Option<String>,
+    },
     /// It was carried out, and what it should bring about did not come about.
     #[error("it was done, but {condition} does not hold")]
     Unmet {
@@ -109,7 +117,7 @@ impl SkillFailure {
             SkillFailure::Body(failure) => failure.is_passing(),
             SkillFailure::Program { passing, .. } => *passing,
             SkillFailure::Meaningless { .. } => false,
-            SkillFailure::Unmet { .. } => true,
+            SkillFailure::Unkept { .. } | SkillFailure::Unmet { .. } => true,
         }
     }
 
@@ -118,7 +126,7 @@ impl SkillFailure {
     pub fn kind(&self) -> &'static str {
         match self {
             SkillFailure::Body(failure) => failure.kind(),
-            SkillFailure::Program { .. } => "program",
+            SkillFailure::Program { .. } | SkillFailure::Unkept { .. } => "program",
             SkillFailure::Meaningless { .. } => "meaningless",
             SkillFailure::Unmet { .. } => "unmet",
         }

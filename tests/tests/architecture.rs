@@ -73,7 +73,28 @@ fn a_crate_uses_only_the_floors_below_its_own() {
                 "descry-skills",
             ],
         ),
-        ("pages", &["descry-agent", "descry-memory", "descry-perception", "descry-planner"]),
+        (
+            "explain",
+            &[
+                "descry-agent",
+                "descry-domains",
+                "descry-memory",
+                "descry-planner",
+                "descry-robots",
+                "descry-skills",
+            ],
+        ),
+        (
+            "pages",
+            &[
+                "descry-agent",
+                "descry-domains",
+                "descry-explain",
+                "descry-memory",
+                "descry-perception",
+                "descry-planner",
+            ],
+        ),
         (
             "experiments",
             &[
@@ -91,6 +112,7 @@ fn a_crate_uses_only_the_floors_below_its_own() {
                 "descry-agent",
                 "descry-domains",
                 "descry-experiments",
+                "descry-explain",
                 "descry-memory",
                 "descry-pages",
                 "descry-perception",
@@ -103,6 +125,7 @@ fn a_crate_uses_only_the_floors_below_its_own() {
             &[
                 "descry-agent",
                 "descry-domains",
+                "descry-explain",
                 "descry-memory",
                 "descry-pages",
                 "descry-perception",
@@ -150,6 +173,7 @@ fn only_the_simulator_reads_the_truth_and_only_a_report_shows_it() {
         &["agent/src/report", "agent/src/body.rs", "agent/src/body/program.rs"],
     );
     check_absent("cli/src", &words, &["cli/src/commands/experiment"]);
+    check_absent("explain/src", &words, &[]);
     check_absent("pages/src", &words, &[]);
 }
 
@@ -180,7 +204,9 @@ fn the_loop_names_no_noun_of_any_domain() {
     let nouns = nouns();
     assert!(nouns.len() > 30, "{nouns:?}");
     // Experiments are about domains; words as short as "in" are fields of the report.
-    for file in ["agent/src", "pages/src", "cli/src"].iter().flat_map(|folder| sources(&root().join(folder)))
+    for file in ["agent/src", "explain/src", "pages/src", "cli/src"]
+        .iter()
+        .flat_map(|folder| sources(&root().join(folder)))
     {
         let name = file.strip_prefix(root()).expect("sources lie below the root").display().to_string();
         let code = code(&file);
@@ -210,6 +236,7 @@ fn signals_are_heard_in_main_alone() {
         "skills/src",
         "domains/src",
         "agent/src",
+        "explain/src",
         "pages/src",
         "experiments/src",
         "cli/src",
@@ -227,15 +254,22 @@ fn whoever_starts_a_run_brings_the_runtime() {
 
 #[test]
 fn libraries_know_no_command_line_and_print_nothing() {
-    for folder in
-        ["planner/src", "perception/src", "memory/src", "skills/src", "domains/src", "agent/src", "pages/src"]
-    {
+    for folder in [
+        "planner/src",
+        "perception/src",
+        "memory/src",
+        "skills/src",
+        "domains/src",
+        "agent/src",
+        "explain/src",
+        "pages/src",
+    ] {
         check_absent(folder, &["clap::", "println!", "eprint!", "eprintln!", "print!("], &[]);
     }
 }
 
 /// The crates that others may build from.
-const PACKAGED: [&str; 10] = [
+const PACKAGED: [&str; 11] = [
     "planner",
     "perception",
     "memory",
@@ -243,6 +277,7 @@ const PACKAGED: [&str; 10] = [
     "skills",
     "domains",
     "agent",
+    "explain",
     "pages",
     "experiments",
     "cli",
@@ -302,5 +337,72 @@ fn every_test_that_the_architecture_names_is_there() {
     assert!(named.len() > 25, "{named:?}");
     for test in named {
         assert!(tests.contains(&format!("fn {test}(")), "no test is called {test}");
+    }
+}
+
+/// Methods that take a text apart, or look for a part of it.
+const TAKING_APART: [&str; 13] = [
+    "strip_prefix",
+    "strip_suffix",
+    "split_once",
+    "rsplit_once",
+    "starts_with",
+    "ends_with",
+    "contains",
+    "replacen",
+    "trim_start_matches",
+    "trim_end_matches",
+    "match_indices",
+    "rfind",
+    "split",
+];
+
+/// Whether a text is of sentences: words and spaces, and no sign of a path, of markup or of PDDL.
+fn is_prose(text: &str) -> bool {
+    let is_sign = |sign: char| "(){}[]<>/:.-_?|#=+\"".contains(sign);
+    let has_word = text.split(' ').any(|word| word.len() > 2 && word.chars().all(|c| c.is_ascii_lowercase()));
+    has_word && !text.contains(is_sign) || text.contains("--")
+}
+
+/// The texts by which a line takes a text apart.
+fn taken_apart(line: &str) -> Vec<&str> {
+    let by = |method: &&str| {
+        let (_, rest) = line.split_once(&format!(".{method}(\""))?;
+        rest.split_once('"').map(|(text, _)| text)
+    };
+    TAKING_APART.iter().filter_map(by).collect()
+}
+
+/// Reasons, steps and verdicts are values from the planner to the page: nobody reads them out of sentences that we wrote.
+#[test]
+fn no_crate_parses_sentences_of_our_own() {
+    // What others write: the limits of a process, as Linux tells them.
+    const OF_OTHERS: [&str; 1] = ["Max address space"];
+    let folders = ["agent/src", "explain/src", "pages/src", "experiments/src", "cli/src/commands"];
+    for file in folders.iter().flat_map(|folder| sources(&root().join(folder))) {
+        let code = code(&file);
+        let (code, _tests) = code.split_once("#[cfg(test)]").unwrap_or((&code, ""));
+        for line in code.lines() {
+            let prose =
+                taken_apart(line).into_iter().find(|text| is_prose(text) && !OF_OTHERS.contains(text));
+            assert_eq!(prose, None, "{}: {}", file.display(), line.trim());
+        }
+    }
+    // The lines that stood there once would be seen.
+    for line in [
+        r#"let rest = because.strip_prefix("the goal ")?;"#,
+        r#"let tried = therefore.split_once(" of ").is_some() || therefore.starts_with("try ");"#,
+        r#"CommandError::Broken(why) if !why.contains("--max-bytes") => {"#,
+        r#"let is_said = |text: &&String| text.starts_with("confidence in ");"#,
+        r#"let is_look = because.split_once(" does not hold").is_some();"#,
+    ] {
+        assert!(taken_apart(line).into_iter().any(is_prose), "{line}");
+    }
+    // Scripts draw data; they do not read texts.
+    for script in ["pages/src/page/page.js", "pages/src/live/follow.js", "experiments/src/live.js"] {
+        let code = fs::read_to_string(root().join(script)).expect("a script is text");
+        for reading in [".match(", ".matchAll(", ".split(", ".replace(", ".search(", "new RegExp"] {
+            assert!(!code.contains(reading), "{script} takes a text apart: {reading}");
+        }
     }
 }

@@ -54,7 +54,7 @@ impl std::fmt::Display for Address {
 
 /// True for an address of a store, false for a folder.
 pub fn is_address(place: &Path) -> bool {
-    place.to_str().is_some_and(|text| text.starts_with("mongodb"))
+    place.to_str().is_some_and(|text| text.starts_with("mongodb:") || text.starts_with("mongodb+srv:"))
 }
 
 fn without_login(text: &str) -> String {

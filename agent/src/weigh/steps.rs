@@ -74,9 +74,3 @@ pub fn brought(semantics: &Semantics<'_>, step: &Step) -> Vec<String> {
 pub fn words(text: &str) -> Vec<&str> {
     text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
 }
-
-/// A step as a call in PDDL.
-pub fn call(step: &Step) -> String {
-    let arguments: String = step.arguments.iter().map(|a| format!(" {a}")).collect();
-    format!("({}{arguments})", step.action)
-}

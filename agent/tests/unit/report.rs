@@ -28,7 +28,7 @@ fn what_is_in_the_hand_stands_nowhere() {
     };
     let one = Some("the red one");
     check(one, None, "  the red one in the hand, confidence 0.97\n");
-    check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.000, 2.000, 0.800) m, confidence 0.97\n");
+    check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.00, 2.00, 0.80) m, confidence 0.97\n");
     check(None, None, "  the red one      0.97 in the hand\n");
 }
 

@@ -26,7 +26,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),
     };
-    let mut explained = descry_agent::explain::of(&record, &header, report.as_ref())?;
+    let mut explained = descry_explain::of(&record, &header, report.as_ref())?;
     let faults = &record.recovery().faults;
     let otherwise = faults.iter().map(ToString::to_string).chain(damaged.iter().map(ToString::to_string));
     for lost in otherwise.chain(descry_agent::run::lost_of_header(folder)) {

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use descry_domains::lexicon::Places;
 use descry_domains::load::DEFAULT;
+use descry_domains::saying::Saying;
 
 use crate::commands::keeping::KeepingArguments;
 use crate::commands::live::Window;
@@ -71,6 +73,9 @@ pub struct With {
     /// Begin with what earlier runs saw last, and keep what this one sees: a folder, or mongodb://HOST/DATABASE
     #[arg(long, value_name = "STORE")]
     remember: Option<String>,
+    /// Say nothing while the run goes on: print the result alone
+    #[arg(long, short)]
+    quiet: bool,
     #[command(flatten)]
     live: live::LiveArguments,
     #[command(flatten)]
@@ -94,14 +99,16 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
     let ended = match &with.resume {
         Some(folder) => {
             let said = (!words.is_empty()).then_some(&said);
-            go_on(folder, said, with.allow_programs, &mut window, stop)
+            go_on(folder, said, with, &mut window, stop)
         }
         None => begin(&said, with, &mut window, stop),
     };
     window.close();
     match &ended {
         Ok(report) if with.json => {
-            input::narrate_fitted(&report.to_string());
+            if !with.quiet {
+                input::narrate_fitted(&report.to_string());
+            }
             input::print_json(report)?;
         }
         Ok(report) => {
@@ -158,8 +165,13 @@ fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, 
     Ok(report)
 }
 
-fn tell(event: &Event) {
-    input::narrate_fitted(&event.to_string());
+/// What people hear while a run goes on.
+fn narrator(saying: Saying, is_quiet: bool) -> impl FnMut(&Event) {
+    move |event| {
+        if !is_quiet {
+            input::narrate_fitted(&event.told(&saying));
+        }
+    }
 }
 
 fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Report, CommandError> {
@@ -180,6 +192,7 @@ fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Re
         keeping: with.keeping.keeping().of_new_run(folder.path())?,
         remember: with.remember.clone(),
     };
+    let mut tell = narrator(Saying::of(&domain, &Places::of_body(&*body.robot)), with.quiet);
     let watcher = Watcher { stop, tell: &mut tell };
     let task = Task { domain: &domain, goal: &goal, past: past.as_ref() };
     let pursued = run::pursue(task, &body, &folder, &settings, chooser, watcher);
@@ -190,13 +203,15 @@ fn begin(said: &str, with: &With, window: &mut Window, stop: &Stop) -> Result<Re
 fn go_on(
     folder: &Path,
     said: Option<&String>,
-    allow_programs: bool,
+    with: &With,
     window: &mut Window,
     stop: &Stop,
 ) -> Result<Report, CommandError> {
     let said = said.map(String::as_str);
+    let allow_programs = with.allow_programs;
     let asked = GoingOn { folder, said, robot: None, allow_programs, prepare: &|_| Ok(()) };
     let mut begun = || window.open(Arc::new(Running::of(folder)));
+    let mut tell = narrator(input::saying(folder), with.quiet);
     let watcher = Watcher { stop, tell: &mut tell };
     input::runtime()?.block_on(run::resume(&asked, &mut begun, watcher))
 }

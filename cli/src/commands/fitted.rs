@@ -11,6 +11,30 @@ pub fn width(stream: &(impl IsTerminal + std::os::fd::AsFd)) -> Option<usize> {
     stream.is_terminal().then(|| known().filter(|width| *width > 0).unwrap_or(USUAL_WIDTH))
 }
 
+/// A text in which nothing steers a terminal but colours: control characters are shown as Rust writes them.
+pub fn harmless(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(sign) = rest.chars().next() {
+        let colour = colour(rest);
+        let length = if colour > 0 { colour } else { sign.len_utf8() };
+        let is_harmless = colour > 0 || !sign.is_control() || matches!(sign, '\n' | '\t');
+        match is_harmless {
+            true => out.push_str(&rest[..length]),
+            false => out.extend(sign.escape_default()),
+        }
+        rest = &rest[length..];
+    }
+    out
+}
+
+/// How long the colour is that a text begins with, as findings are drawn in: `ESC [`, numbers, `m`; 0: it begins with none.
+fn colour(text: &str) -> usize {
+    let Some(numbers) = text.strip_prefix("\u{1b}[") else { return 0 };
+    let end = numbers.find(|sign: char| !sign.is_ascii_digit() && sign != ';').unwrap_or(numbers.len());
+    if numbers[end..].starts_with('m') { 2 + end + 1 } else { 0 }
+}
+
 /// A text in lines of at most so many letters; none: as it is. What goes on stands below where its second column begins.
 pub fn fitted(text: &str, width: Option<usize>) -> String {
     let Some(width) = width else { return text.to_string() };

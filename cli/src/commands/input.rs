@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use descry_agent::run::Beginning;
 use descry_domains::check;
 use descry_domains::config::Program;
 use descry_domains::load::Domain;
 use descry_domains::program::ProgramAttachment;
+use descry_domains::saying::Saying;
 use descry_memory::Fault;
 use descry_planner::{Attachment, Attachments, Findings, Source};
 use serde::Serialize;
@@ -49,6 +51,13 @@ pub fn domain(name: &str) -> Result<Domain, CommandError> {
     Ok(domain)
 }
 
+/// How the domain of a run says what is written in PDDL; of a run whose record cannot be read, as it is written.
+pub fn saying(run: &Path) -> Saying {
+    let record = descry_agent::keeping::open_written(run);
+    let beginning = record.ok().and_then(|record| Beginning::of(&record).ok().flatten());
+    beginning.as_ref().map(descry_explain::saying_of).unwrap_or_default()
+}
+
 /// Findings as people read them: drawn under the text, in colour on a terminal.
 pub fn drawn(findings: &Findings) -> String {
     findings.render(is_coloured())
@@ -80,14 +89,14 @@ pub fn narrate(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// The same in lines that fit a terminal.
+/// The same in lines that fit a terminal; what would steer the terminal is shown escaped.
 pub fn narrate_fitted(text: &str) {
-    narrate(&fitted::fitted(text, fitted::width(&std::io::stderr())));
+    narrate(&fitted::fitted(&fitted::harmless(text), fitted::width(&std::io::stderr())));
 }
 
-/// [`print_text`] in lines that fit a terminal.
+/// [`print_text`] in lines that fit a terminal; what would steer the terminal is shown escaped.
 pub fn print_fitted(text: &str) -> Result<(), CommandError> {
-    print_text(&fitted::fitted(text, fitted::width(&std::io::stdout())))
+    print_text(&fitted::fitted(&fitted::harmless(text), fitted::width(&std::io::stdout())))
 }
 
 /// Says what of a record is lost; returns how a command ends that showed the rest.
@@ -117,7 +126,7 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
     let metadata = file.metadata().map_err(refused)?;
     let most = if metadata.is_file() { most } else { most.min(MOST_STREAM_BYTES) };
     let too_much = || {
-        let text = format!("{name}: it has more than {} MB\n  expected a smaller file", most / 1_000_000);
+        let text = format!("{name}: it has more than {} MB, the most that is read", most / 1_000_000);
         CommandError::BadInput(text)
     };
     if metadata.len() > most {

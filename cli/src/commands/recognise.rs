@@ -89,7 +89,7 @@ fn look(
 ) -> Result<Seen, CommandError> {
     let shown = path.display().to_string();
     let bytes = input::read(path, MOST_CLOUD_BYTES).map_err(|e| match e {
-        CommandError::BadInput(why) if !why.contains("expected") => {
+        CommandError::BadInput(why) => {
             CommandError::BadInput(format!("{why}\n  expected a point cloud: a PCD or PLY file"))
         }
         other => other,

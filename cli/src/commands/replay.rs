@@ -27,7 +27,8 @@ pub struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
-    let mut tell = |event: &Event| input::narrate_fitted(&event.to_string());
+    let saying = input::saying(&arguments.run);
+    let mut tell = |event: &Event| input::narrate_fitted(&event.told(&saying));
     let asked = Replay { run: &arguments.run, speed: arguments.speed, out: arguments.out.as_deref() };
     let stop = Stop::default();
     let watcher = Watcher { stop: &stop, tell: &mut tell };

@@ -8,9 +8,9 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::commands::input;
-use descry_agent::basis;
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::report::Event;
+use descry_explain::basis;
 
 /// Arguments of `descry show`.
 #[derive(clap::Args)]
@@ -49,9 +49,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
             "run": folder.display().to_string(), "events": events, "report": report, "rests_on": basis, "lost": lost,
         }))?;
     } else {
+        let saying = input::saying(folder);
         for event in &events {
             match serde_json::from_value::<Event>(event.clone()) {
-                Ok(event) => input::print_fitted(&event.to_string())?,
+                Ok(event) => input::print_fitted(&event.told(&saying))?,
                 Err(_) => input::print_text(&compact(event))?,
             }
         }

@@ -18,3 +18,11 @@ fn long_lines_are_folded_under_their_second_column() {
     check("a    bb ccc dddd", 14, "a    bb ccc\n     dddd");
     check("1 │ find me in the text", 10, "1 │ find me in the text");
 }
+
+#[test]
+fn nothing_steers_the_terminal_but_colours() {
+    let check = |text: &str, shown: &str| assert_eq!(harmless(text), shown);
+    check("cup \u{1b}[2J\u{7}A\r\n", "cup \\u{1b}[2J\\u{7}A\\r\n");
+    check("\u{1b}[1;31mred\u{1b}[0m\t\u{9b}31m", "\u{1b}[1;31mred\u{1b}[0m\t\\u{9b}31m");
+    check("größer als 3 °, \u{1b}", "größer als 3 °, \\u{1b}");
+}

@@ -166,6 +166,13 @@ pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {
         .map(|(_, a)| a)
 }
 
+/// What a call of a domain asks, if an ability answers it.
+pub fn meaning(config: &crate::config::Config, call: &str) -> Option<String> {
+    let is_own = config.attachments.contains_key(call);
+    let mut calls = used(&config.uses).flat_map(|ability| ability.calls);
+    calls.find(|c| c.name == call && !is_own).map(|c| c.about.to_string())
+}
+
 /// The fact of a name among those of the abilities that a domain uses.
 pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
     used(uses).flat_map(|a| a.facts).find(|f| f.name == name)

@@ -117,7 +117,10 @@ impl Asker<'_> {
                     format!("a chance of {chance:.2} is left that there is another {thing} on the {surface}");
                 (Verdict::CannotTell, format!("{said}; it cannot be told more, {left}; {}", self.looks()))
             }
-            None => (Verdict::NotFound, format!("{said}; so it does not hold that {}", self.goal.pddl)),
+            None => (
+                Verdict::NotFound,
+                format!("{said}; so it does not hold that {}", self.saying.say(&self.goal.pddl)),
+            ),
         })
     }
 

@@ -1,11 +1,20 @@
 //! How a run ends: when there is nothing left to do, what is remembered, what is answered.
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
 use descry_memory::remember::Remembered;
+use descry_planner::Task;
 use descry_robots::Place;
 
-use super::{Round, World};
+use super::grounds::expected;
+use super::{Round, Setting, World};
 use crate::abilities;
-use crate::answer::{self, Conclusion, Ended};
+use crate::answer::{self, Asker, Conclusion, Ended, Listed};
+use crate::config::Answers;
+use crate::lexicon::symbol;
+use crate::saying::Saying;
+use crate::situation::{Situation, Thing, thing};
 
 impl World<'_> {
     /// Why the run cannot go on, if it cannot: a limit is reached, or what is done fails for good or changes nothing.
@@ -64,8 +73,66 @@ impl World<'_> {
         let own = abilities().find_map(|a| a.answers);
         let body = round.situation.robot.description();
         let lacks = abilities().flat_map(|a| a.needs).copied().find(|part| !body.has(*part));
-        let goal = self.setting.goal;
-        own.and_then(|answers| answers(goal, &self.mind, &round.situation, ended))
-            .unwrap_or_else(|| answer::conclude(goal, &self.lexicon, &self.mind, round, lacks, ended))
+        let (domain, goal) = (self.setting.domain, self.setting.goal);
+        own.and_then(|answers| answers(goal, &self.mind, &round.situation, ended)).unwrap_or_else(|| {
+            let (saying, listed) = (Saying::of_lexicon(domain, &self.lexicon), self.listed());
+            let asker = Asker {
+                domain,
+                goal,
+                lexicon: &self.lexicon,
+                mind: &self.mind,
+                round,
+                lacks,
+                s: &round.situation,
+                saying: &saying,
+                listed: listed.as_ref(),
+            };
+            answer::conclude(&asker, ended)
+        })
+    }
+
+    /// All that is believed, where the phrase's own answer lists some of it: of each object that was seen what it is and where it
+    /// stands, of every kind.
+    fn listed(&self) -> Option<Listed> {
+        let Setting { domain, goal, .. } = &self.setting;
+        let lists = |answer: &Option<String>| answer.as_ref().is_some_and(|text| text.contains('{'));
+        let Answers { achieved, not_found, cannot_tell } = &goal.answer;
+        [achieved, not_found, cannot_tell].into_iter().any(lists).then_some(())?;
+        let mut known = self.mind.known.clone();
+        for kind in self.lexicon.of_type("kind") {
+            if known.kinds.iter().all(|of| of.symbol != kind.symbol) {
+                known.kinds.push(thing(domain, &kind.symbol));
+            }
+        }
+        let mut things = BTreeMap::new();
+        for track in &known.belief.tracks {
+            let name = track.label().or_else(|| track.kind()).unwrap_or("unknown object");
+            let named = |of: &Thing| Thing {
+                symbol: format!("{}-{}", of.symbol, track.id),
+                track: Some(track.id),
+                ..of.clone()
+            };
+            let kinds = known.kinds.iter().filter(|kind| track.probability_of(&kind.name) > 0.5);
+            let label = track.label().map(|label| thing(domain, &symbol(label)));
+            for one in kinds.map(named).chain(label.as_ref().map(named)) {
+                things.insert(one.symbol.clone(), (track.id, name.to_string(), one));
+            }
+        }
+        let asked: BTreeSet<&String> = self.asked.iter().map(|thing| &thing.symbol).collect();
+        things.retain(|symbol, _| !asked.contains(symbol));
+        known.things =
+            self.asked.iter().cloned().chain(things.values().map(|(.., one)| one.clone())).collect();
+        known.expected = expected(domain, &known);
+        let situation = Arc::new(Situation::new(known, domain.config.thresholds));
+        let task = Task::read(&domain.pddl, &self.problem(&situation).ok()?).ok()?;
+        let best = |of: &Thing| {
+            let tracks = situation.belief.tracks.iter();
+            tracks.max_by(|a, b| a.probability_of(&of.name).total_cmp(&b.probability_of(&of.name)))
+        };
+        let asked =
+            self.asked.iter().filter_map(|of| Some((of.symbol.clone(), (best(of)?.id, of.name.clone()))));
+        let things = things.into_iter().map(|(symbol, (id, name, _))| (symbol, (id, name)));
+        let things = things.chain(asked).collect();
+        Some(Listed { task, attachments: self.bind(&situation), things })
     }
 }

@@ -101,8 +101,7 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
     let mut carried = BTreeMap::new();
     let mut count = |event: &Event| {
         if let Event::Acted { call, .. } = event {
-            let action = call.trim_start_matches('(').split([' ', ')']).next().unwrap_or_default();
-            *carried.entry(action.to_string()).or_default() += 1;
+            *carried.entry(call.action.clone()).or_default() += 1;
         }
     };
     let watcher = Watcher { stop, tell: &mut count };

@@ -12,6 +12,11 @@ const shape = (parent, name, attributes, text) => {
 };
 const latest = (list, at) => list.filter(x => x.at_s <= at + 1e-6).at(-1);
 const seconds = s => `${s.toFixed(1)} s`;
+// Date and time of the place where the page is read, as ISO 8601 writes them.
+const isoDate = unix_s => {
+  const date = new Date(unix_s * 1000), two = n => String(n).padStart(2, "0");
+  return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${two(date.getHours())}:${two(date.getMinutes())}`;
+};
 
 // The top: what was asked, how it ended, and the figures.
 function head() {
@@ -36,7 +41,7 @@ function head() {
   const facts = [["in PDDL", story.pddl], ["on the body's clock", seconds(story.ends_s)], ["looks", story.looks.length], ["plans", story.plans.length]];
   if (story.wanted) facts.unshift(["wanted", story.wanted]);
   if (report) facts.push(["driven", `${report.distance_m.toFixed(1)} m`], ["asked for", report.threshold]);
-  if (story.begun_unix_s) facts.push(["begun", new Date(story.begun_unix_s * 1000).toLocaleString()]);
+  if (story.begun_unix_s) facts.push(["begun", isoDate(story.begun_unix_s)]);
   for (const [name, value] of facts) {
     const row = document.createElement("div"), dt = document.createElement("dt"), dd = document.createElement("dd");
     dt.textContent = name; dd.textContent = value;
@@ -81,7 +86,7 @@ function mapOf(at) {
   // Letters are 11 px high at least, however narrow the screen.
   const scale = Math.min(svg.clientWidth / box[2], (svg.clientHeight || Infinity) / box[3]);
   const em = Math.max(Math.max(box[2], box[3]) / 42, scale > 0 ? 11 / scale : 0);
-  const words = (x, y, text, more = {}) => shape(svg, "text", { x, y: -y, "text-anchor": "middle", style: `font-size:${em}px`, ...more }, text);
+  const words = (x, y, text, more) => shape(svg, "text", { x, y: -y, "text-anchor": "middle", style: `font-size:${em}px;fill:${more.fill}` }, text);
   const middle = points => [0, 1].map(k => points.reduce((sum, p) => sum + p[k], 0) / points.length);
   for (const room of story.map.rooms) {
     shape(svg, "polygon", { points: path(room.outline_m), fill: "none", stroke: "var(--wall)", "stroke-width": .22 * em });
@@ -110,7 +115,7 @@ function mapOf(at) {
   stood.forEach((s, n) => shape(svg, "circle", { cx: s.x_m, cy: -s.y_m, r: .22 * em, fill: n === stood.length - 1 ? "var(--now)" : "var(--done)" }));
   const body = stood.at(-1);
   if (body) {
-    const r = story.map.description.footprint?.disc?.radius_m ?? .25;
+    const r = story.body_radius_m;
     shape(svg, "circle", { cx: body.x_m, cy: -body.y_m, r, fill: "none", stroke: "var(--now)", "stroke-width": .14 * em });
     shape(svg, "line", { x1: body.x_m, y1: -body.y_m, x2: body.x_m + r * Math.cos(body.yaw_rad), y2: -body.y_m - r * Math.sin(body.yaw_rad), stroke: "var(--now)", "stroke-width": .18 * em });
   }
@@ -120,25 +125,24 @@ function mapOf(at) {
     const drawn = outline ? shape(svg, "polygon", { points: path(outline), fill: colour, "fill-opacity": .55, stroke: colour, "stroke-width": .07 * em })
       : shape(svg, "circle", { cx: o.position_m[0], cy: -o.position_m[1], r: Math.max(o.size_m[0], .04) / 2, fill: colour });
     drawn.append(titled(`${o.name ?? "unknown"} ${o.probability.toFixed(2)}`));
-    if (o.name) named.push({ x: o.position_m[0], y: o.position_m[1] + .6 * em, name: o.name, step: 1, more: { fill: colour, style: `font-size:${em * .9}px` } });
+    if (o.name) named.push({ x: o.position_m[0], y: o.position_m[1] + .6 * em, name: o.name, step: 1, more: { fill: colour } });
   }
   // Names of neighbours make room for each other: those of objects upwards, those of surfaces downwards.
   const set = [];
   for (const { x, y: from, name, step, more } of named.sort((a, b) => a.step - b.step || a.step * (a.y - b.y))) {
-    const half = name.length * .27 * em, within = Math.max(box[0] + half, Math.min(x, box[0] + box[2] - half));
+    const drawn = words(x, from, name, more), half = Math.max(drawn.getComputedTextLength?.() ?? 0, name.length * .5 * em) / 2;
+    const within = Math.max(box[0] + half, Math.min(x, box[0] + box[2] - half));
     let y = from;
-    while (set.some(o => Math.abs(o.x - within) < o.half + half && Math.abs(o.y - y) < .95 * em)) y += step * .2 * em;
+    while (set.some(o => Math.abs(o.x - within) < o.half + half && Math.abs(o.y - y) < 1.1 * em)) y += step * .2 * em;
     set.push({ x: within, y, half });
-    words(within, y, name, more);
+    drawn.setAttribute("x", within); drawn.setAttribute("y", -y);
+    // A name that had to go elsewhere is tied to its object.
+    if (step > 0 && y - from > .5 * em) shape(svg, "line", { x1: x, y1: -from + .5 * em, x2: within, y2: -y + .2 * em, stroke: more.fill, "stroke-width": .05 * em });
   }
 }
 const titled = text => { const title = document.createElementNS(SVG, "title"); title.textContent = text; return title; };
 
 // Plans: a line a step, as planned (pale) from the moment it was made, and as it happened (strong) below.
-const parsed = plan => plan.steps.map(line => {
-  const found = line.match(/^\s*([\d.]+):\s*(\(.*\))\s*(?:\[([\d.]+)\])?/);
-  return found ? { from_s: plan.at_s + +found[1], call: found[2], lasts_s: +(found[3] ?? 0) } : null;
-}).filter(step => step);
 const shortened = (text, most) => text.length > most ? text.slice(0, most - 1) + "\u2026" : text;
 function planOf(at) {
   const svg = $("plan"), plan = latest(story.plans, at);
@@ -147,7 +151,7 @@ function planOf(at) {
   if (!plan) return;
   const next = story.plans.find(p => p.at_s > plan.at_s + 1e-9 || p.round > plan.round);
   const until = next?.at_s ?? Infinity;
-  const steps = parsed(plan), done = story.deeds.filter(d => d.from_s >= plan.at_s - 1e-6 && d.from_s < until - 1e-6);
+  const steps = plan.steps, done = story.deeds.filter(d => d.from_s >= plan.at_s - 1e-6 && d.from_s < until - 1e-6);
   const ends = Math.max(plan.at_s + 1, ...steps.map(s => s.from_s + s.lasts_s), ...done.map(d => d.to_s));
   const wide = Math.max(300, svg.clientWidth), row = 44, x = s => (s - plan.at_s) / (ends - plan.at_s) * (wide - 2);
   const height = row * steps.length + 26;
@@ -156,7 +160,7 @@ function planOf(at) {
   const used = new Set();
   steps.forEach((step, n) => {
     const y = n * row;
-    shape(svg, "text", { x: 0, y: y + 12 }, shortened(story.calls[step.call] ?? step.call, wide / 6)).append(titled(step.call));
+    shape(svg, "text", { x: 0, y: y + 12 }, shortened(step.said, wide / 6.5)).append(titled(step.call));
     shape(svg, "rect", { x: x(step.from_s), y: y + 17, width: Math.max(2, x(step.from_s + step.lasts_s) - x(step.from_s)), height: 9, rx: 2, fill: "var(--planned)" });
     const deed = done.find(d => d.call === step.call && !used.has(d));
     if (!deed) return;
@@ -169,17 +173,19 @@ function planOf(at) {
   for (const s of [plan.at_s, (plan.at_s + ends) / 2, ends]) shape(svg, "text", { x: x(s), y: height - 6, "text-anchor": s === ends ? "end" : s === plan.at_s ? "start" : "middle", fill: "var(--faint)" }, seconds(s));
 }
 
-// How sure: the best probability of each known object after each look.
+// How sure: the numbers that the goal asks for, and the best probability of each known object, after each look.
 function sureOf(at) {
   // Several things may be asked for: of each, how it stands by now.
   const by = latest(story.known, at)?.at_s;
   $("known").textContent = story.known.filter(k => k.at_s === by).map(k => k.text).join(" ") || "Nothing was looked at yet.";
   $("known").hidden = !story.known.length;
-  const svg = $("sure"), names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
+  $("sought").textContent = story.sought.map((s, n) => `sought${story.sought.length > 1 ? ` ${n + 1}` : ""}: ${s.name}, ${s.wanted} is wanted`).join("; ");
+  const svg = $("sure"), lines = curves();
   svg.replaceChildren();
   // What is hidden has no width: this comes first.
-  svg.parentElement.hidden = story.looks.length > 0 && !names.length;
-  const wide = Math.max(320, svg.clientWidth), high = 300, left = 34, right = 115, low = high - 26;
+  svg.parentElement.hidden = story.looks.length > 0 && !lines.length;
+  const wide = Math.max(320, svg.clientWidth), longest = Math.max(0, ...lines.map(l => l.name.length));
+  const high = Math.max(300, 40 + 14 * lines.length), left = 34, right = Math.min(wide * .45, 26 + 6.6 * longest), low = high - 26;
   svg.setAttribute("viewBox", `0 0 ${wide} ${high}`);
   svg.style.height = `${high}px`;
   const x = s => left + s / Math.max(story.ends_s, 1e-9) * (wide - left - right), y = p => low - p * (low - 12);
@@ -187,21 +193,37 @@ function sureOf(at) {
     shape(svg, "line", { x1: left, x2: wide - right, y1: y(p), y2: y(p), stroke: "var(--line)" });
     shape(svg, "text", { x: left - 6, y: y(p) + 4, "text-anchor": "end" }, p);
   }
-  if (story.report) shape(svg, "line", { x1: left, x2: wide - right, y1: y(story.report.threshold), y2: y(story.report.threshold), stroke: "var(--known)", "stroke-dasharray": "5 4" });
+  const wanted = [...new Set([...story.sought.map(s => s.wanted), ...(story.report ? [story.report.threshold] : [])])];
+  for (const p of wanted.filter(p => p <= 1)) {
+    shape(svg, "line", { x1: left, x2: wide - right, y1: y(p), y2: y(p), stroke: "var(--known)", "stroke-dasharray": "5 4" });
+    shape(svg, "text", { x: left + 4, y: y(p) - 4, style: "fill:var(--known)" }, `wanted: ${p}`);
+  }
   const ends = [];
-  names.forEach((name, n) => {
-    const colour = `hsl(${n * 360 / names.length + 210} 60% 50%)`;
+  lines.forEach(({ name, values, is_sought }, n) => {
+    const colour = is_sought ? "var(--known)" : `hsl(${n * 360 / lines.length + 210} 60% 50%)`;
     let points = `${x(0)},${y(0)}`, last = 0;
-    for (const b of story.beliefs) { points += ` ${x(b.at_s)},${y(last)}`; last = b.best[name] ?? 0; points += ` ${x(b.at_s)},${y(last)}`; }
-    shape(svg, "polyline", { points: points + ` ${x(story.ends_s)},${y(last)}`, fill: "none", stroke: colour, "stroke-width": 2 });
-    ends.push({ name, colour, y: y(last) + 4 });
+    for (const [at_s, value] of values) { points += ` ${x(at_s)},${y(last)}`; last = Math.min(1, Math.max(0, value)); points += ` ${x(at_s)},${y(last)}`; }
+    shape(svg, "polyline", { points: points + ` ${x(story.ends_s)},${y(last)}`, fill: "none", stroke: colour, "stroke-width": is_sought ? 3 : 1.5 });
+    ends.push({ name, colour, from: y(last), y: y(last) + 4 });
   });
+  // Names stand at the ends of their lines; where they would cover each other they make room, and a thread leads back.
   ends.sort((a, b) => a.y - b.y);
   ends.forEach((e, n) => { if (n && e.y - ends[n - 1].y < 14) e.y = ends[n - 1].y + 14; });
   ends.forEach((e, n) => { e.y = Math.min(e.y, low + 4 - 14 * (ends.length - 1 - n)); });
-  ends.forEach(e => shape(svg, "text", { x: wide - right + 8, y: e.y, style: `fill:${e.colour}` }, e.name));
+  for (const e of ends) {
+    shape(svg, "line", { x1: wide - right, x2: wide - right + 12, y1: e.from, y2: e.y - 4, style: `stroke:${e.colour}` });
+    shape(svg, "text", { x: wide - right + 15, y: e.y, style: `fill:${e.colour}` }, shortened(e.name, (right - 15) / 6.2)).append(titled(e.name));
+  }
   shape(svg, "line", { x1: x(at), x2: x(at), y1: 12, y2: low, stroke: "var(--now)", "stroke-width": 1.5 });
   for (const s of [0, story.ends_s]) shape(svg, "text", { x: x(s), y: high - 6, "text-anchor": "middle" }, seconds(s));
+}
+
+// The lines of the curve, each with its values in time: what the goal asks for first.
+function curves() {
+  const many = story.sought.length > 1;
+  const sought = story.sought.map((s, n) => ({ name: many ? `sought ${n + 1}` : "sought", is_sought: true, values: s.values }));
+  const names = [...new Set(story.beliefs.flatMap(b => Object.keys(b.best)))];
+  return sought.concat(names.map(name => ({ name, is_sought: false, values: story.beliefs.map(b => [b.at_s, b.best[name] ?? 0]) })));
 }
 
 // What was seen, in three dimensions.
@@ -337,9 +359,9 @@ function said() {
     const item = document.createElement("li"), time = document.createElement("time"), text = document.createElement("pre");
     item.className = moment.what;
     time.textContent = seconds(moment.at_s);
-    const what = document.createElement("b"), found = moment.text.match(/^(plan \d+|\S*) +([^]*)$/);
-    what.textContent = found?.[1] ?? "";
-    text.textContent = (found?.[2] ?? moment.text).replace(/\n {1,10}/g, "\n");
+    const what = document.createElement("b");
+    what.textContent = moment.head;
+    text.textContent = moment.text;
     item.append(time, what, text);
     item.addEventListener("click", () => go(moment.at_s));
     return item;
@@ -417,4 +439,5 @@ async function tellNews(ended) {
   return next !== null;
 }
 beginSpace(); hands();
-if (live) follow(tellNews, () => filled); else tell(story);
+// The page has loaded before it waits for news.
+if (live) addEventListener("load", () => follow(tellNews, () => filled)); else tell(story);

@@ -6,16 +6,18 @@ use std::sync::Arc;
 use descry_memory::belief::Belief;
 use descry_memory::{Document, Query, Record};
 use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_planner::Step;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::points::{self, Near, Packed};
+use descry_agent::body::tape;
 use descry_agent::exit::CommandError;
-use descry_agent::explain;
-use descry_agent::explain::wording::{capital, reasons};
 use descry_agent::report::{Event, Report};
 use descry_agent::run::Beginning;
-use descry_agent::saying::Saying;
+use descry_agent::written::call_of;
+use descry_domains::saying::Saying;
+use descry_explain::wording::capital;
 
 /// How far around the outline of a surface, below it and above it its things are drawn densely, metres.
 const BESIDE_M: f64 = 0.15;
@@ -30,12 +32,12 @@ pub struct Story {
     pddl: String,
     /// What the goal asks for, as the domain says it.
     wanted: Option<String>,
-    /// How the domain says each step.
-    calls: BTreeMap<String, String>,
     report: Option<Report>,
     begun_unix_s: Option<u64>,
     ends_s: f64,
     map: Map,
+    /// Radius of the body, metres.
+    body_radius_m: f64,
     moments: Vec<Moment>,
     plans: Vec<Planned>,
     deeds: Vec<Deed>,
@@ -43,6 +45,8 @@ pub struct Story {
     stands: Vec<Stand>,
     beliefs: Vec<Believed>,
     known: Vec<Known>,
+    /// The numbers that the goal asks for.
+    sought: Vec<Sought>,
     lost: Vec<String>,
 }
 
@@ -68,7 +72,10 @@ struct Area {
 #[derive(Debug, Serialize)]
 struct Moment {
     at_s: f64,
+    /// What it is about: goal, plan, keep, do, failed or see.
     what: &'static str,
+    /// The word at its head; empty: it goes on from the one before.
+    head: String,
     text: String,
 }
 
@@ -78,7 +85,18 @@ struct Planned {
     at_s: f64,
     round: usize,
     because: String,
-    steps: Vec<String>,
+    steps: Vec<PlanStep>,
+}
+
+/// A step of a plan.
+#[derive(Debug, Serialize)]
+struct PlanStep {
+    /// The step in PDDL.
+    call: String,
+    /// The step as the domain says it.
+    said: String,
+    from_s: f64,
+    lasts_s: f64,
 }
 
 /// A step that was carried out, or tried.
@@ -140,6 +158,15 @@ struct Known {
     text: String,
 }
 
+/// A number that the goal asks for, over time.
+#[derive(Debug, Serialize)]
+struct Sought {
+    name: String,
+    wanted: f64,
+    /// Times in seconds, with the values from then on.
+    values: Vec<(f64, f64)>,
+}
+
 #[derive(Debug, Serialize)]
 struct Object {
     name: Option<String>,
@@ -163,13 +190,20 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
         .iter()
         .filter_map(|d| Some(believed(all.s(d.stamp_ns), &part(&d.body)?)))
         .collect();
-    let saying = Beginning::of(record).ok().flatten().map(|b| Saying::of_run(&b)).unwrap_or_default();
+    let saying =
+        Beginning::of(record).ok().flatten().map(|b| descry_explain::saying_of(&b)).unwrap_or_default();
     let said = |name: &str| heads.first().and_then(|d| d.body[name].as_str()).unwrap_or_default().to_owned();
     let pddl = said("pddl_goal");
     let (moments, plans) = told(&all, &events, &saying);
     let deeds = deeds(&all, &events);
-    let known = explain::after_looks(record, &pddl, &saying)?.into_iter();
+    let known = descry_explain::after_looks(record, &pddl, &saying)?.into_iter();
     let known = known.map(|(stamp_ns, text)| Known { at_s: all.s(stamp_ns), text: capital(&text) }).collect();
+    let in_time =
+        |values: Vec<(i64, f64)>| values.into_iter().map(|(ns, value)| (all.s(ns), value)).collect();
+    let sought = descry_explain::sought(record, &pddl, &saying)?.into_iter();
+    let sought =
+        sought.map(|s| Sought { name: s.name, wanted: s.wanted, values: in_time(s.values) }).collect();
+    let body = tape::known(record).ok().flatten();
     let clouds = all.find("cloud")?;
     looks.tell(&mut all, &clouds, &map)?;
     let stands = stands(&all, &map, &clouds);
@@ -177,12 +211,12 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
     Ok(Story {
         goal: said("goal"),
         wanted: Some(saying.say(&pddl)).filter(|wanted| *wanted != pddl),
-        calls: calls(&plans, &deeds, &saying),
         pddl,
         report: report.cloned(),
         begun_unix_s: heads.first().and_then(|d| d.body["started_unix_s"].as_u64()),
         ends_s: all.s(end_ns),
         map,
+        body_radius_m: body.map_or(0.0, |known| known.description.radius_m()),
         moments,
         plans,
         deeds,
@@ -190,6 +224,7 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
         stands,
         beliefs,
         known,
+        sought,
         lost: all.lost,
     })
 }
@@ -238,14 +273,12 @@ fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Ve
     for document in events {
         let at_s = all.s(document.stamp_ns);
         let Some(event) = part::<Event>(&document.body) else { continue };
-        let mut text = saying.say(&event.to_string());
+        let (head, text) = event.parts(saying);
         let what = match event {
             Event::Goal { .. } => "goal",
-            Event::Planned { round, because, steps, .. } => {
-                let because = because.split("; the search ended after ").next().unwrap_or_default();
-                let because = saying.say(&reasons::missed(because, "is", &|_| None));
-                text = format!("plan {round:<4} because {because}");
-                text.extend(steps.iter().map(|step| format!("\n          {}", planned(step, saying))));
+            Event::Planned { round, because, reason, steps, .. } => {
+                let because = reason.map_or(because, |reason| reason.told(saying));
+                let steps = steps.iter().map(|step| planned(step, at_s, saying)).collect();
                 plans.push(Planned { at_s, round, because, steps });
                 "plan"
             }
@@ -254,29 +287,16 @@ fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Ve
             Event::Failed { .. } => "failed",
             Event::Noted(_) => "see",
         };
-        moments.push(Moment { at_s, what, text });
+        moments.push(Moment { at_s, what, head, text });
     }
     (moments, plans)
 }
 
-/// A step of a plan: when it begins, how the domain says it, and how long it is to take.
-fn planned(step: &str, saying: &Saying) -> String {
-    let part = || {
-        let (from, rest) = step.split_once(": ")?;
-        let (call, takes) = rest.rsplit_once(" [")?;
-        let takes = takes.trim_end_matches(']');
-        let seconds = |text: &str| text.trim().parse::<f64>().ok();
-        Some(format!("{:.1} s: {}, {:.1} s", seconds(from)?, saying.say(call), seconds(takes)?))
-    };
-    part().unwrap_or_else(|| saying.say(step))
-}
-
-/// How the domain says each step of the plans, and each that was carried out.
-fn calls(plans: &[Planned], deeds: &[Deed], saying: &Saying) -> BTreeMap<String, String> {
-    let call = |step: &String| Some(step[step.find('(')?..=step.find(')')?].to_string());
-    let steps = plans.iter().flat_map(|plan| plan.steps.iter().filter_map(call));
-    let all = steps.chain(deeds.iter().map(|deed| deed.call.clone()));
-    all.map(|call| (call.clone(), saying.say(&call))).filter(|(call, said)| call != said).collect()
+/// A step of a plan that was made at a time.
+fn planned(step: &Step, at_s: f64, saying: &Saying) -> PlanStep {
+    let call = call_of(step).to_string();
+    let said = saying.say(&call);
+    PlanStep { call, said, from_s: at_s + step.start_s.unwrap_or(0.0), lasts_s: step.duration_s }
 }
 
 /// Each step that began, with the first thing after it that ended it: its failure, or the next event that is not about it.
@@ -296,7 +316,7 @@ fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
             _ => None,
         });
         let to_s = later[..until].iter().chain(later.get(until)).map(|(s, _)| *s).fold(*from_s, f64::max);
-        deeds.push(Deed { call: call.clone(), from_s: *from_s, to_s, failed });
+        deeds.push(Deed { call: call.to_string(), from_s: *from_s, to_s, failed });
     }
     deeds
 }

@@ -1,5 +1,7 @@
 //! Conditions, terms and expressions in a state.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::Answer;
 use crate::diagnostic::Span;
@@ -7,17 +9,34 @@ use crate::model::relation::{Relation, quotient};
 use crate::model::walk;
 use crate::plan::number_text;
 use crate::state::State;
-use crate::task::{Condition, Expression, Fluent, ObjectId, Quantified, Term};
+use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
 /// The part of a condition that does not hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Why {
     /// The part, with objects for its variables.
     pub condition: String,
+    /// Both sides, if the part compares two numbers.
+    pub compared: Option<Compared>,
     /// Values that it depends on, such as `(fuel r)` and `3`.
     pub values: Vec<(String, String)>,
     /// Where it stands.
     pub span: Span,
+}
+
+/// Two numbers that are compared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Compared {
+    /// Expression on the left, in PDDL.
+    pub left: String,
+    /// Its value; `None` if it is undefined.
+    pub left_value: Option<f64>,
+    /// How the left side should stand to the right one.
+    pub comparison: Comparison,
+    /// Expression on the right, in PDDL.
+    pub right: String,
+    /// Its value; `None` if it is undefined.
+    pub right_value: Option<f64>,
 }
 
 impl Semantics<'_> {
@@ -207,10 +226,25 @@ impl Semantics<'_> {
             Condition::Or(parts) if parts.len() == 1 => self.why_not(state, &parts[0], binding),
             other => Ok(Some(Why {
                 condition: self.condition_text(other, binding),
+                compared: self.compared(state, other, binding)?,
                 values: self.values_in(state, other, binding)?,
                 span: self.span_of(other),
             })),
         }
+    }
+
+    /// Both sides of a comparison.
+    fn compared(
+        &self,
+        state: &State,
+        condition: &Condition,
+        binding: &Binding,
+    ) -> Result<Option<Compared>, CallFailure> {
+        let Condition::Compare(comparison, sides, _) = condition else { return Ok(None) };
+        let side =
+            |side: &Expression| Ok((self.expression_text(side, binding), self.number(state, side, binding)?));
+        let ((left, left_value), (right, right_value)) = (side(&sides[0])?, side(&sides[1])?);
+        Ok(Some(Compared { left, left_value, comparison: *comparison, right, right_value }))
     }
 
     /// The values that a comparison, equation or call depends on.

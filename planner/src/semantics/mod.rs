@@ -20,8 +20,8 @@ use crate::plan::Step;
 use crate::state::State;
 use crate::task::{ActionId, ObjectId, Slot, Task};
 
-pub use conditions::Why;
 pub(crate) use conditions::value_text;
+pub use conditions::{Compared, Why};
 pub use effects::{Changes, Clash, Pending};
 pub use reads::{Together, Touched};
 

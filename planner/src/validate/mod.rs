@@ -5,6 +5,7 @@
 //! meet their bounds, timed literals happen by themselves.
 
 mod after;
+mod cause;
 mod endless;
 mod monitor;
 mod replay;
@@ -21,6 +22,7 @@ use crate::state::State;
 use crate::task::{Action, Task};
 
 pub use after::after;
+pub use cause::{Cause, Moment, Unmet};
 pub use endless::endless;
 pub use monitor::{Broken, monitor};
 
@@ -53,8 +55,7 @@ pub struct Verdict {
 pub(crate) struct Fault {
     pub reason: String,
     pub step: Option<usize>,
-    pub condition: String,
-    pub values: Vec<(String, String)>,
+    pub cause: Cause,
     pub finding: Diagnostic,
 }
 
@@ -138,7 +139,8 @@ fn whole(semantics: &Semantics<'_>, plan: &Plan) -> Result<Result<Replayed, Box<
     let goal = &semantics.task.goal;
     if let Some(why) = semantics.why_not(&replayed.state, &goal.body, &mut Binding::new(goal.slots))? {
         let message = format!("the goal {} is not reached", why.condition);
-        return Ok(Err(Box::new(replay::fault(message, None, why, "not reached", None))));
+        let cause = Cause::Goal(Unmet::of(&why));
+        return Ok(Err(Box::new(replay::fault(message, None, cause, &why, "not reached", None))));
     }
     Ok(match trajectory::broken_constraint(semantics, &replayed)? {
         Some(fault) => Err(Box::new(fault)),

@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::Cause;
 use super::{Fault, whole};
 use crate::attachment::Attachments;
 use crate::diagnostic::{Findings, Span};
@@ -18,12 +19,10 @@ pub struct Broken {
     pub step: Option<usize>,
     /// Why, in one sentence.
     pub reason: String,
-    /// The condition that does not hold, with objects for its variables; empty where it is not about a condition.
-    pub condition: String,
+    /// The same with the values that decide it.
+    pub cause: Cause,
     /// Where it stands in the task's texts.
     pub span: Span,
-    /// Values that it depends on.
-    pub values: Vec<(String, String)>,
     /// The same, to be drawn under the text of the task.
     #[serde(skip)]
     pub findings: Findings,
@@ -55,19 +54,18 @@ pub fn monitor(task: &Task, attachments: &Attachments, rest: &Plan) -> Result<()
 
 impl Broken {
     pub(super) fn of_fault(task: &Task, fault: Fault) -> Broken {
-        let Fault { reason, step, condition, values, finding } = fault;
+        let Fault { reason, step, cause, finding } = fault;
         let span = finding.labels.first().map_or(Span::default(), |label| label.span);
         let findings = Findings { sources: task.sources.to_vec(), list: vec![finding] };
-        Broken { step, reason, condition, span, values, findings }
+        Broken { step, reason, cause, span, findings }
     }
 
     pub(super) fn of_call(task: &Task, failure: &CallFailure) -> Broken {
         Broken {
             step: None,
             reason: failure.to_string(),
-            condition: failure.error.call.clone(),
+            cause: Cause::Other { reason: failure.to_string() },
             span: failure.span,
-            values: Vec::new(),
             findings: failure.findings(task),
         }
     }

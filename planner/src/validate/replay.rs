@@ -1,7 +1,7 @@
 //! One happening after the other, from the initial state to the end of a plan.
 
 use super::timeline::{Event, Happening, happenings, makespan_s};
-use super::{Fault, Replayed, SEPARATION_S};
+use super::{Cause, Fault, Moment, Replayed, SEPARATION_S, Unmet};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::between::telling_parts;
 use crate::model::relation::Relation;
@@ -63,8 +63,8 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed
                 let reason = format!("{}: {}", step_text(plan, index), misfit.reason);
                 let span = misfit.span.unwrap_or_default();
                 let finding = Diagnostic::error("plan", reason.clone(), span, "declared here");
-                let (step, condition) = (Some(index), String::new());
-                return Ok(Err(Box::new(Fault { reason, step, condition, values: Vec::new(), finding })));
+                let (step, cause) = (Some(index), Cause::Other { reason: misfit.reason });
+                return Ok(Err(Box::new(Fault { reason, step, cause, finding })));
             }
         }
     }
@@ -108,7 +108,7 @@ fn without_times(
     };
     let finding = Diagnostic::error("plan", reason.clone(), span, label)
         .with_help("write steps like `0.000: (move a b) [3.200]`");
-    Some(Fault { reason, step, condition: String::new(), values: Vec::new(), finding })
+    Some(Fault { cause: Cause::Other { reason: reason.clone() }, reason, step, finding })
 }
 
 /// A step for messages: its number, its text, its time.
@@ -123,7 +123,8 @@ fn step_text(plan: &Plan, index: usize) -> String {
 pub(super) fn fault(
     reason: String,
     step: Option<usize>,
-    why: Why,
+    cause: Cause,
+    why: &Why,
     label: &str,
     action: Option<(Span, String)>,
 ) -> Fault {
@@ -135,7 +136,7 @@ pub(super) fn fault(
         Some((span, text)) => finding.with_label(span, text),
         None => finding,
     };
-    Fault { reason, step, condition: why.condition, values: why.values, finding }
+    Fault { reason, step, cause, finding }
 }
 
 impl Replay<'_, '_> {
@@ -203,11 +204,11 @@ impl Replay<'_, '_> {
         };
         if let Some(why) = self.semantics.why_not(&self.state, condition, &mut binding)? {
             let when = match event {
-                Event::End(_) => "at its end",
-                Event::Start(_) => "at its start",
-                _ => "before it",
+                Event::End(_) => Moment::End,
+                Event::Start(_) => Moment::Start,
+                _ => Moment::Before,
             };
-            return Ok(Err(Box::new(self.unmet(step, why, when))));
+            return Ok(Err(Box::new(self.unmet(step, &why, when))));
         }
         attempt!(self.duration(step, at_end, &mut binding));
         if !at_end {
@@ -238,18 +239,20 @@ impl Replay<'_, '_> {
         Ok(Ok(Part { step: Some(step), touched }))
     }
 
-    fn unmet(&self, step: usize, why: Why, when: &str) -> Fault {
+    fn unmet(&self, step: usize, why: &Why, when: Moment) -> Fault {
         let text = step_text(self.plan, step);
-        let reason = format!("{text}: {} does not hold {when}", why.condition);
-        let label = format!("does not hold {when}");
-        fault(reason, Some(step), why, &label, Some((self.action(step).span, format!("in {text}"))))
+        let label = format!("does not hold {}", when.words());
+        let reason = format!("{text}: {} {label}", why.condition);
+        let cause = Cause::Condition { when, unmet: Unmet::of(why) };
+        fault(reason, Some(step), cause, why, &label, Some((self.action(step).span, format!("in {text}"))))
     }
 
     fn clash(&self, step: Option<usize>, clash: Clash) -> Fault {
         let text = step.map_or("a timed literal".to_string(), |step| step_text(self.plan, step));
         let reason = format!("{text}: {}", clash.reason);
+        let cause = Cause::Other { reason: clash.reason.clone() };
         let finding = Diagnostic::error("plan", reason.clone(), clash.span, clash.reason);
-        Fault { reason, step, condition: String::new(), values: Vec::new(), finding }
+        Fault { reason, step, cause, finding }
     }
 
     /// The duration meets its bounds, as far as they are evaluated now. Plans may be off by ε.
@@ -279,18 +282,12 @@ impl Replay<'_, '_> {
                     None => format!("{name} has no value"),
                 };
                 let reason = format!("{text} takes {}, {wanted}", value_text(Some(duration_s)));
+                let cause = match value.filter(|value| value.is_finite()) {
+                    Some(asked_s) => Cause::Duration { planned_s: duration_s, asked_s },
+                    None => Cause::Other { reason: wanted.clone() },
+                };
                 let finding = Diagnostic::error("plan", reason.clone(), bound.span, wanted);
-                let values = vec![
-                    (name.clone(), value_text(value)),
-                    ("?duration".into(), value_text(Some(duration_s))),
-                ];
-                return Ok(Err(Box::new(Fault {
-                    reason,
-                    step: Some(step),
-                    condition: name,
-                    values,
-                    finding,
-                })));
+                return Ok(Err(Box::new(Fault { reason, step: Some(step), cause, finding })));
             }
         }
         Ok(Ok(()))
@@ -304,19 +301,12 @@ impl Replay<'_, '_> {
             plain.proposals.clear();
             if !self.semantics.proposals(&self.state, call, &plain)?.contains(proposal) {
                 let text = step_text(self.plan, step);
-                let reason = format!(
-                    "{text}: `{proposal}` is not proposed by {}",
-                    self.semantics.call_text(call, &plain)
-                );
+                let why =
+                    format!("`{proposal}` is not proposed by {}", self.semantics.call_text(call, &plain));
+                let reason = format!("{text}: {why}");
                 let finding = Diagnostic::error("plan", reason.clone(), call.span, "not proposed by this");
-                let condition = self.semantics.call_text(call, &plain);
-                return Ok(Err(Box::new(Fault {
-                    reason,
-                    step: Some(step),
-                    condition,
-                    values: Vec::new(),
-                    finding,
-                })));
+                let cause = Cause::Other { reason: why };
+                return Ok(Err(Box::new(Fault { reason, step: Some(step), cause, finding })));
             }
         }
         Ok(Ok(()))
@@ -357,13 +347,8 @@ impl Replay<'_, '_> {
                 let finding = Diagnostic::error("plan", reason.clone(), span, format!("touches {what}")).with_help(
                     format!("what depends on each other must be at least {SEPARATION_S} s apart; planners keep {EPSILON_S}"),
                 );
-                return Ok(Err(Box::new(Fault {
-                    reason,
-                    step,
-                    condition: what,
-                    values: Vec::new(),
-                    finding,
-                })));
+                let cause = Cause::Other { reason: reason.clone() };
+                return Ok(Err(Box::new(Fault { reason, step, cause, finding })));
             }
         }
         Ok(Ok(()))
@@ -421,7 +406,7 @@ impl Replay<'_, '_> {
             }
         }
         Ok(match broken {
-            Some((step, why)) => Err(Box::new(self.unmet(step, why, "all the time"))),
+            Some((step, why)) => Err(Box::new(self.unmet(step, &why, Moment::OverAll))),
             None => Ok(()),
         })
     }

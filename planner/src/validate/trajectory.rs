@@ -1,5 +1,6 @@
 //! Constraints and preferences of PDDL3 (Gerevini and Long 2005) on the states that a plan goes through.
 
+use super::Cause;
 use super::{Fault, Replayed, replay};
 use crate::model::automaton::Automaton;
 use crate::semantics::{Binding, CallFailure, Semantics, Why};
@@ -22,8 +23,9 @@ pub(super) fn broken_constraint(
         })?;
         if let Some(text) = broken {
             let reason = format!("the constraint on {text} is broken");
-            let why = Why { condition: text, values: Vec::new(), span: constraint.span };
-            return Ok(Some(replay::fault(reason, None, why, "broken", None)));
+            let why = Why { condition: text, compared: None, values: Vec::new(), span: constraint.span };
+            let cause = Cause::Other { reason: reason.clone() };
+            return Ok(Some(replay::fault(reason, None, cause, &why, "broken", None)));
         }
     }
     Ok(None)

@@ -59,7 +59,12 @@ pub enum Place {
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Place::Pose(p) => write!(f, "({:.2} m, {:.2} m, {:.0}°)", p.x_m, p.y_m, p.yaw_rad.to_degrees()),
+            Place::Pose(p) => {
+                // Nothing reads as minus nothing.
+                let [x_m, y_m] = [p.x_m, p.y_m].map(|m| (1e2 * m).round() / 1e2 + 0.0);
+                let yaw_deg = p.yaw_rad.to_degrees().round() + 0.0;
+                write!(f, "({x_m:.2} m, {y_m:.2} m, {yaw_deg:.0}°)")
+            }
             Place::Station(name) => write!(f, "{name}"),
         }
     }

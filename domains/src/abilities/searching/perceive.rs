@@ -30,7 +30,7 @@ use super::vanished::{keep_unrefuted, set_aside_unseen, taken_away};
 use crate::abilities::learning::again;
 use crate::config::Thresholds;
 use crate::mind::{Laid, Look, Mind, Region};
-use crate::note::Note;
+use crate::note::{BeliefChange, LeftOut, Note};
 use crate::situation::{KnownSurface, Situation, Thing};
 use crate::world::WorldError;
 
@@ -124,11 +124,12 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
+    let _span = tracing::info_span!("perceive", on = %mind.known.surfaces[on].symbol).entered();
     let (options, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&options, &seeking.surface))?;
     if !keep_placed(&mut mind.regions[on].looks) {
         let because = format!("the {} cannot be made out in this view", mind.known.surfaces[on].name);
-        notes.push(Note::Nothing { because });
+        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true });
         return Ok(());
     }
     let views = restore(mind, eyes, on)?;
@@ -145,8 +146,9 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         Ok(seen) => seen,
         Err(because) => {
             // What to set otherwise is for who programs it.
-            mind.regions[on].nothing = because.split(": ").next().map(str::to_string);
-            notes.push(Note::Nothing { because });
+            let (because, advice) = because.split_once(": ").unwrap_or((&because, ""));
+            mind.regions[on].nothing = Some(because.to_string());
+            notes.push(Note::Nothing { because: because.into(), advice: advice.into(), is_left_out: false });
             return Ok(());
         }
     };
@@ -163,7 +165,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
             return perceive(mind, eyes, on, notes);
         }
         let because = format!("this view does not fit the others of the {}", mind.known.surfaces[on].name);
-        notes.push(Note::Nothing { because });
+        notes.push(Note::Nothing { because, advice: String::new(), is_left_out: true });
         return Ok(());
     }
     let merged = merging::without_walls(&mind.known.surfaces[on], merged);
@@ -425,19 +427,21 @@ fn believe(
     belief.tracks.extend(apart);
     belief.tracks.sort_by_key(|track| track.id);
     let after = confidences(mind, eyes);
-    let changed = mind.known.things.iter().zip(before.iter().zip(&after));
+    let changed = mind.known.things.iter().zip(before.iter().copied().zip(after.iter().copied()));
     let named = |thing: &Thing| match thing.track {
         Some(_) => format!("{} ({})", thing.name, thing.symbol.replace('-', " ")),
         None => thing.name.clone(),
     };
-    let changed =
-        changed.map(|(thing, (b, a))| format!("confidence in {}: {b:.2} -> {a:.2}", named(thing))).collect();
+    let changed = changed
+        .map(|(thing, (before, after))| BeliefChange::Confidence { of: named(thing), before, after })
+        .collect();
     let used: Vec<_> = merged.fits.iter().filter(|fit| fit.used).collect();
     let left_out = merged.fits.iter().zip(1..).filter(|(fit, _)| !fit.used);
+    tracing::info!(views = used.len(), objects = percepts.len(), "views are merged and looked through");
     let note = Note::Perceived {
         on: surface.name,
         merged: used.len(),
-        left_out: left_out.map(|(fit, n)| format!("view {n} {}", fit.why)).collect(),
+        left_out: left_out.map(|(fit, view)| LeftOut::View { view, why: fit.why.clone() }).collect(),
         points: merged.cloud.points.len(),
         residual_m: used.iter().map(|fit| fit.residual_m).fold(0.0, f64::max),
         objects: percepts.iter().map(in_a_line).collect(),

@@ -17,7 +17,7 @@ use super::poses;
 use crate::abilities::searching::perceive::Eyes;
 use crate::lexicon::symbol;
 use crate::mind::Mind;
-use crate::note::Note;
+use crate::note::{Note, OnTheFloor};
 use crate::situation::Situation;
 use crate::world::WorldError;
 
@@ -264,7 +264,8 @@ fn note(floor: &Floor, from: &str) -> Note {
             Some(_) => format!(", may reach {:.1} cm beyond what was met", 1e2 * t.looseness_m()),
             None => String::new(),
         };
-        format!("{} at ({:.2}, {:.2}) m: {}{loose}{why}", t.symbol, middle.x, middle.y, scans(t))
+        let text = format!("{} at ({:.2}, {:.2}) m: {}{loose}{why}", t.symbol, middle.x, middle.y, scans(t));
+        OnTheFloor::Thing { text, is_far: t.scans.is_empty() }
     };
     Note::Swept { things: floor.things.iter().map(line).collect() }
 }

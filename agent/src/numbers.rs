@@ -1,0 +1,44 @@
+//! Numbers as people read them.
+
+/// So many of something.
+pub fn count(n: usize, of: &str) -> String {
+    let all = if n == 1 { "" } else { "s" };
+    format!("{n} {of}{all}")
+}
+
+/// A share, a probability or a number of a domain: two digits, three below a tenth, four near 0 and 1.
+pub fn share(value: f64) -> String {
+    if (0.01..0.1).contains(&value) {
+        return format!("{value:.3}").trim_end_matches('0').to_string();
+    }
+    let near_an_end = (5e-5..0.01).contains(&value) || value > 0.99 && value < 1.0 - 5e-5;
+    if !near_an_end {
+        return format!("{:.2}", value + 0.0).replace("-0.00", "0.00");
+    }
+    format!("{value:.4}").trim_end_matches('0').to_string()
+}
+
+/// A share where another is wanted: with more digits where it is less and would read the same.
+pub fn share_of(value: f64, wanted: f64) -> String {
+    let said = share(value);
+    if value < wanted && said == share(wanted) { below(value) } else { said }
+}
+
+/// Four digits, never more than the number is.
+fn below(value: f64) -> String {
+    format!("{:.4}", (value * 1e4).floor() / 1e4)
+}
+
+/// Whether a number reads as a share: it lies between 0 and 1.
+pub fn is_share(value: f64) -> bool {
+    value > 0.0 && value < 1.0
+}
+
+/// A number of a domain: a share with the digits of shares, another one with at most three behind the point.
+pub fn number(value: f64) -> String {
+    if is_share(value) {
+        return share(value);
+    }
+    let digits = format!("{value:.3}");
+    digits.trim_end_matches('0').trim_end_matches('.').to_string()
+}

@@ -1,0 +1,203 @@
+//! Reasons of plans and failures, with the values that decide them. The record keeps them as values; sentences are made of them
+//! where people read.
+
+use std::fmt;
+
+use descry_domains::saying::Saying;
+use descry_planner::semantics::Compared;
+use descry_planner::task::Comparison;
+use descry_planner::{Broken, Cause, Moment, Plan, Unmet};
+use descry_skills::Call;
+use serde::{Deserialize, Serialize};
+
+use crate::numbers::{is_share, number, share_of};
+use crate::written;
+
+/// Why a plan was made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reason {
+    /// What made it necessary.
+    pub trigger: Trigger,
+    /// States after which the planner's search was ended without a proof; none: the search ended by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search_ended_after: Option<u64>,
+    /// Whether no plan reaches the goal in the time that is left.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_late: bool,
+}
+
+/// What makes a plan necessary.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Trigger {
+    /// The run begins.
+    Begin,
+    /// A step failed.
+    Failed {
+        /// The step.
+        #[serde(with = "written::call")]
+        call: Call,
+    },
+    /// The rest of the plan no longer reaches the goal.
+    Broken(Break),
+    /// The goal holds, but too little was seen to rely on it.
+    NotDenied,
+}
+
+/// What keeps steps from reaching the goal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Break {
+    /// The step at fault; none: the goal is missed.
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "written::maybe")]
+    pub step: Option<Call>,
+    /// Whether other steps come before: the values are those that they should leave.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_expected: bool,
+    /// Why, with the values.
+    pub cause: Cause,
+}
+
+impl Reason {
+    /// A reason without a limit of time or search.
+    pub fn of(trigger: Trigger) -> Self {
+        Reason { trigger, search_ended_after: None, is_late: false }
+    }
+
+    /// The reason in a sentence.
+    pub fn told(&self, saying: &Saying) -> String {
+        let mut said = match &self.trigger {
+            Trigger::Begin => "there is no plan yet".to_string(),
+            Trigger::Failed { call } => format!("{} failed", saying.say(&call.to_string())),
+            Trigger::Broken(broken) => broken.told(saying),
+            Trigger::NotDenied => "nothing that was seen speaks against it, and not enough was seen".into(),
+        };
+        if let Some(states) = self.search_ended_after {
+            said += &format!("; the search ended after {states} states");
+        }
+        if self.is_late {
+            said += "; no plan would do in the time that is left";
+        }
+        said
+    }
+}
+
+impl Break {
+    /// What the planner's monitor found in steps.
+    pub fn of(broken: &Broken, steps: &Plan) -> Self {
+        let step = broken.step.and_then(|at| steps.steps.get(at));
+        Break {
+            step: step.map(written::call_of),
+            is_expected: broken.step.unwrap_or(steps.steps.len()) > 0,
+            cause: broken.cause.clone(),
+        }
+    }
+
+    /// The step that counts for more or fewer seconds than in its plan, with those of the plan and those of now.
+    pub fn reckoned(&self) -> Option<(&Call, f64, f64)> {
+        match (&self.step, &self.cause) {
+            (Some(call), Cause::Duration { planned_s, asked_s }) => Some((call, *planned_s, *asked_s)),
+            _ => None,
+        }
+    }
+
+    /// The goal, or the part of it, that is missed.
+    pub fn missed_goal(&self) -> Option<&Unmet> {
+        match &self.cause {
+            Cause::Goal(unmet) => Some(unmet),
+            _ => None,
+        }
+    }
+
+    /// Whether a number is too small for what is left to do.
+    pub(crate) fn is_of_too_little(&self) -> bool {
+        let (Cause::Goal(unmet) | Cause::Condition { unmet, .. }) = &self.cause else { return false };
+        unmet.compared.as_ref().is_some_and(|compared| compared.comparison == Comparison::GreaterOrEqual)
+    }
+
+    /// The break in a sentence.
+    pub fn told(&self, saying: &Saying) -> String {
+        self.sentence(if self.is_expected { "would be only" } else { "is" }, saying)
+    }
+
+    /// The break of steps that nobody intends to do, in a sentence.
+    pub fn would_be(&self, saying: &Saying) -> String {
+        self.sentence("would be", saying)
+    }
+
+    /// The break in a sentence; `is` stands between a number and its value.
+    fn sentence(&self, is: &str, saying: &Saying) -> String {
+        let call = self.step.as_ref().map(|call| saying.say(&call.to_string()));
+        match (&self.cause, call) {
+            (Cause::Goal(unmet), _) | (Cause::Condition { unmet, .. }, None) => missed(unmet, is, saying),
+            (Cause::Condition { when, unmet }, Some(call)) => {
+                needs(&call, *when, unmet, if is == "is" { is } else { "would be" }, saying)
+            }
+            (Cause::Duration { planned_s, asked_s }, Some(call)) => {
+                format!("{call} is now reckoned at {asked_s:.1} s instead of {planned_s:.1} s")
+            }
+            (Cause::Duration { planned_s, asked_s }, None) => {
+                format!("{asked_s:.1} s are reckoned instead of {planned_s:.1} s")
+            }
+            (Cause::Other { reason }, Some(call)) => format!("{call}: {reason}"),
+            (Cause::Other { reason }, None) => reason.clone(),
+        }
+    }
+}
+
+impl fmt::Display for Break {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.told(&Saying::default()))
+    }
+}
+
+/// That a goal is missed, with the number that is too small or too large.
+fn missed(unmet: &Unmet, is: &str, saying: &Saying) -> String {
+    match &unmet.compared {
+        Some(compared) => {
+            let (number, found) = found(compared, saying);
+            format!("{number} {is} {found}, and {} is wanted", wanted(compared, saying))
+        }
+        None if is == "is" => saying.deny(&unmet.condition),
+        None => saying.would_deny(&unmet.condition),
+    }
+}
+
+/// What a step needs and does not have.
+fn needs(call: &str, when: Moment, unmet: &Unmet, is: &str, saying: &Saying) -> String {
+    if let (Some(compared), false) = (&unmet.compared, when == Moment::OverAll) {
+        let (number, found) = found(compared, saying);
+        return format!("{call} needs {number} to be {}, and it {is} {found}", wanted(compared, saying));
+    }
+    let condition = saying.say(&unmet.condition);
+    match when {
+        Moment::OverAll => format!("{call} asks that {condition} until it has ended, which would not be so"),
+        _ if is == "is" => format!("{call} asks that {condition}, which is not so"),
+        _ => format!("{call} asks that {condition}, which would not be so"),
+    }
+}
+
+/// The number that a comparison is about, said, and its value, said unlike what is wanted.
+fn found(compared: &Compared, saying: &Saying) -> (String, String) {
+    let value = match (compared.left_value, compared.right_value) {
+        (None, _) => "unknown".to_string(),
+        (Some(value), Some(wanted)) if is_share(value) => share_of(value, wanted),
+        (Some(value), _) => number(value),
+    };
+    (saying.say(&compared.left), value)
+}
+
+/// What a comparison wants of its number: `at least 0.80`.
+fn wanted(compared: &Compared, saying: &Saying) -> String {
+    let sign = match compared.comparison {
+        Comparison::Less => "less than ",
+        Comparison::LessOrEqual => "at most ",
+        Comparison::Equal => "",
+        Comparison::GreaterOrEqual => "at least ",
+        Comparison::Greater => "more than ",
+    };
+    let bound = match compared.right_value {
+        Some(wanted) => number(wanted),
+        None => saying.say(&compared.right),
+    };
+    format!("{sign}{bound}")
+}

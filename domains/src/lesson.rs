@@ -1,0 +1,54 @@
+//! What the failure of a step teaches.
+
+use descry_skills::Call;
+use serde::{Deserialize, Serialize};
+
+use crate::saying::Saying;
+
+/// What is concluded from the failure of a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Lesson {
+    /// What an ability concludes, in a sentence.
+    Said {
+        /// The sentence.
+        text: String,
+    },
+    /// Facts hold from then on, in PDDL.
+    Facts {
+        /// The facts.
+        facts: Vec<String>,
+    },
+    /// The step may be tried again.
+    Retry {
+        /// Failed tries so far.
+        tries: usize,
+        /// Tries in all.
+        most: usize,
+    },
+    /// The step is not tried any more; facts hold from then on, in PDDL.
+    GivenUp {
+        /// The facts.
+        facts: Vec<String>,
+    },
+}
+
+impl Lesson {
+    /// The lesson in a sentence.
+    pub fn told(&self, call: &Call, saying: &Saying) -> String {
+        let said =
+            |facts: &[String]| facts.iter().map(|fact| saying.say(fact)).collect::<Vec<_>>().join(", ");
+        match self {
+            Lesson::Said { text } => text.clone(),
+            Lesson::Facts { facts } => said(facts),
+            Lesson::Retry { tries, most } => format!("try {tries} of {most}"),
+            Lesson::GivenUp { facts } => {
+                let call = saying.say(&call.to_string());
+                match facts.is_empty() {
+                    true => format!("{call} is given up"),
+                    false => format!("{call} is given up: {}", said(facts)),
+                }
+            }
+        }
+    }
+}

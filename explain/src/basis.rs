@@ -1,0 +1,149 @@
+//! What the verdict of a finished run rests on, by the records that say it: how it ended, what was believed, the looks behind that.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use descry_memory::{Document, Query, Record, RecordId};
+use serde::Serialize;
+
+use crate::wording::{count, share};
+use descry_agent::exit::CommandError;
+use descry_agent::standing::{self, End, InDoubt, Of, Rests};
+
+/// See the module.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Basis {
+    /// The record of how it ended, and what that was.
+    pub ended: Option<(RecordId, End)>,
+    /// What is in doubt in the end.
+    pub in_doubt: Vec<InDoubt>,
+    /// The record of what was believed last.
+    pub belief: Option<RecordId>,
+    /// What was seen of each surface.
+    pub surfaces: Vec<Perceived>,
+    /// What of it is damaged or not in the record.
+    pub lost: Vec<String>,
+}
+
+/// What was seen of a surface in the end.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Perceived {
+    /// The surface's symbol.
+    pub on: String,
+    /// The record of what was recognised there.
+    pub record: RecordId,
+    /// The records of the views that were merged for it.
+    pub looks: Vec<RecordId>,
+}
+
+/// It, as far as the record says it.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn of(record: &Record) -> Result<Basis, CommandError> {
+    let mut lost = Vec::new();
+    let mut whole = |kind: &str| -> Result<Vec<Document>, CommandError> {
+        let (found, faults) = record.find_whole(&Query::of_kind(kind)).map_err(CommandError::broken)?;
+        lost.extend(faults.iter().map(ToString::to_string));
+        Ok(found)
+    };
+    let (ends, beliefs, percepts, clouds) =
+        (whole(standing::RESTS)?, whole("belief")?, whole("percepts")?, whole("cloud")?);
+    let end = ends.last().and_then(|d| Some((d.id, serde_json::from_value::<Rests>(d.body.clone()).ok()?)));
+    if end.is_none() {
+        lost.push("what the end of the run rests on is not in the record".into());
+    }
+    let mut surfaces: BTreeMap<String, Perceived> = BTreeMap::new();
+    for perceived in percepts.iter().filter_map(perceived) {
+        surfaces.insert(perceived.on.clone(), perceived);
+    }
+    let there: BTreeSet<RecordId> = clouds.iter().map(|d| d.id).collect();
+    for perceived in surfaces.values() {
+        let gone: Vec<String> =
+            perceived.looks.iter().filter(|id| !there.contains(id)).map(ToString::to_string).collect();
+        if !gone.is_empty() {
+            let (on, gone) = (&perceived.on, gone.join(", "));
+            lost.push(format!("what is believed of {on} rests on views that are not in the record: {gone}"));
+        }
+    }
+    // Where surfaces are not looked at, nothing is believed of what stands on them.
+    if beliefs.is_empty() && !surfaces.is_empty() {
+        lost.push("what was believed of the objects is not in the record".into());
+    }
+    let (ended, in_doubt) = match end {
+        Some((id, rests)) => (Some((id, rests.ended)), rests.in_doubt),
+        None => (None, Vec::new()),
+    };
+    let belief = beliefs.last().map(|d| d.id);
+    Ok(Basis { ended, in_doubt, belief, surfaces: surfaces.into_values().collect(), lost })
+}
+
+/// What a record of percepts says of its surface.
+fn perceived(document: &Document) -> Option<Perceived> {
+    let body = &document.body;
+    let views: Vec<RecordId> = serde_json::from_value(body["views"].clone()).ok()?;
+    let is_used = |n: usize| body["fits"][n]["used"].as_bool().unwrap_or(true);
+    let looks = views.into_iter().enumerate().filter(|(n, _)| is_used(*n)).map(|(_, id)| id).collect();
+    Some(Perceived { on: body["on"].as_str()?.into(), record: document.id, looks })
+}
+
+impl fmt::Display for Basis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut lines = Vec::new();
+        let ended = self.ended.as_ref().map(|(id, ended)| {
+            let ended = match ended {
+                End::Reached => "the goal held",
+                End::NoPlan => "no plan",
+                End::Undecided => "undecided",
+                End::Limit => "limit",
+                End::Failed => "failed",
+            };
+            format!("end {id} ({ended})")
+        });
+        let belief = self.belief.map(|id| format!("belief {id}"));
+        let records: Vec<String> = ended.into_iter().chain(belief).collect();
+        if !records.is_empty() {
+            lines.push(records.join(", "));
+        }
+        lines.extend(self.in_doubt.iter().map(chances));
+        lines.extend(self.surfaces.iter().map(|seen| {
+            let looks: Vec<String> = seen.looks.iter().map(ToString::to_string).collect();
+            let (views, looks) = (count(looks.len(), "view"), looks.join(", "));
+            format!("{}: percepts {} of {views}: {looks}", seen.on, seen.record)
+        }));
+        for (n, line) in lines.iter().enumerate() {
+            let head = if n == 0 { "rests on" } else { "" };
+            let end = if n + 1 < lines.len() { "\n" } else { "" };
+            write!(f, "{head:10}{line}{end}")?;
+        }
+        Ok(())
+    }
+}
+
+/// How sure it is of something, and what is left.
+fn chances(doubt: &InDoubt) -> String {
+    let about = match doubt.of {
+        Of::Thing => doubt.about.clone(),
+        Of::Kind => format!("all of {}{}", doubt.about, doubt.within),
+        Of::Surface => format!("all on the {}", doubt.about),
+    };
+    let sure =
+        doubt.sure.map_or("of an unknown certainty".into(), |sure| format!("sure with {}", share(sure)));
+    let seen = doubt.seen.iter().filter(|seen| seen.places > 0).filter_map(|seen| {
+        let places = count(seen.places, "place");
+        Some(format!("{:.0} % of the {} from {places}", (seen.share? * 100.0).floor(), seen.on))
+    });
+    let seen: Vec<String> = seen.collect();
+    let seen = if seen.is_empty() { "nothing of where it may be".into() } else { seen.join(", ") };
+    let (wanted, hidden) = (share(doubt.wanted), share(doubt.hidden));
+    // What hangs on the sides of what is known well enough is no doubt about it.
+    let open = match doubt.sure.is_some_and(|sure| sure >= doubt.wanted) {
+        true if doubt.of == Of::Thing => format!("{hidden} that it is where nothing was seen"),
+        true => format!("{hidden} that there is more where nothing was seen"),
+        false => format!(
+            "{} hangs on what no look has shown, {hidden} of it on places where nothing was seen",
+            share(doubt.left)
+        ),
+    };
+    format!("{about}: {sure} ({wanted} is wanted); {open}; seen: {seen}")
+}

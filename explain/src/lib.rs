@@ -1,0 +1,280 @@
+//! Why a run went as it did, from its record alone, in plain sentences: why each plan was made and why it was this one, what came of it,
+//! and what the verdict rests on. What the record does not say is said not to be known.
+
+pub mod basis;
+#[doc(hidden)]
+pub mod brief;
+#[doc(hidden)]
+pub mod chapters;
+mod domains;
+#[doc(hidden)]
+pub mod looks;
+#[doc(hidden)]
+pub mod numbers;
+#[doc(hidden)]
+pub mod outcomes;
+#[doc(hidden)]
+pub mod plans;
+#[doc(hidden)]
+pub mod rivals;
+#[doc(hidden)]
+pub mod standings;
+#[doc(hidden)]
+pub mod states;
+mod summary;
+mod verdict;
+pub mod wording;
+
+use descry_domains::abilities::searching::policies;
+use descry_domains::lexicon::Places;
+use descry_domains::saying::Saying;
+use descry_memory::Record;
+use descry_robots::sim::SceneSpec;
+use descry_skills::Call;
+use serde::Serialize;
+
+use descry_agent::compared;
+use descry_agent::exit::CommandError;
+use descry_agent::report::Report;
+use descry_agent::run::{Beginning, Header};
+use domains::Words;
+use states::States;
+use wording::wrapped;
+
+/// What a run is explained by.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explanation {
+    /// All of it in a few sentences: what was asked, what the answer is, what it rests on, the greatest trouble.
+    pub summary: Vec<String>,
+    /// What was wanted, and how to read what follows.
+    pub asked: Vec<String>,
+    /// How to read the figures.
+    pub reading: Vec<String>,
+    /// The plans, one after the other.
+    pub plans: Vec<Told>,
+    /// What the verdict rests on.
+    pub verdict: Vec<String>,
+    /// What of the record is lost.
+    pub lost: Vec<String>,
+}
+
+/// What is told of one plan.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Told {
+    /// Its number, from 1.
+    pub round: usize,
+    /// When it was made, seconds since the run began, on the body's clock.
+    pub at_s: f64,
+    /// What it was caused by.
+    pub cause: String,
+    /// What it is to do.
+    pub intent: Vec<String>,
+    /// Why this and nothing else.
+    pub why: Vec<String>,
+    /// The same with all figures: what each way to get further takes and gains.
+    pub figures: Vec<String>,
+    /// What came of it.
+    pub outcome: Vec<String>,
+    /// Which of its steps were carried out, and why the others were not.
+    pub done: String,
+}
+
+/// Explains a run, from its record, what it was started with, and its report, if it has one.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<Explanation, CommandError> {
+    let states = States::of(record)?;
+    let (chapters, mut lost) = chapters::of(record, &states, &header.resumed)?;
+    // The words of the domain of that time, if this version still understands it.
+    let beginning = Beginning::of(record).ok().flatten();
+    let domain = beginning.as_ref().and_then(|beginning| beginning.domain().ok());
+    let saying = beginning.as_ref().map(saying_of).unwrap_or_default();
+    let words = domain.as_ref().map(|domain| Words { domain, saying: &saying, chapters: &chapters });
+    let policy = Some(&header.settings.policy).filter(|policy| *policy != policies::PLAN).cloned();
+    let meanings = |call: &str| words.as_ref().and_then(|words| words.meaning(call));
+    let briefly = |about: String| about.split(';').next().unwrap_or_default().to_string();
+    let counts = |action: &str| words.as_ref().and_then(|words| words.counts(action, briefly));
+    let goal = header.pddl_goal.clone();
+    let is_more = chapters.iter().any(brief::counts_more);
+    let in_vain = words.as_ref().and_then(|words| {
+        let besides = words.besides_time().filter(|_| is_more);
+        besides.or_else(|| words.seconds())
+    });
+    let counts_in_vain = in_vain.is_some();
+    let asked =
+        Asked { goal, policy, counts: &counts, saying: &saying, has_ended: report.is_some(), counts_in_vain };
+    let plans = plans::told(&chapters, &asked);
+    let summary = summary::of(header, report, &chapters, states.left_s(), &saying);
+    let mut said = said(header, &asked, states.given_s(), &saying);
+    let mut reading = Vec::new();
+    if chapters.iter().any(|c| c.weighed.as_ref().is_some_and(|w| w.chosen.is_some())) {
+        said.extend(words.as_ref().and_then(Words::numbers));
+        said.extend(words.as_ref().and_then(|words| words.poses(&header.settings.robot)));
+        said.push(OTHERWISE.into());
+        said.extend(in_vain.as_ref().map(|_| COUNTED.to_string()));
+        reading.push(WAYS.into());
+        reading.extend(in_vain);
+    }
+    let not_there = domain.as_ref().map(|domain| domain.config.thresholds.not_there);
+    let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
+    let is_used = |call: &str| words.as_ref().is_none_or(|words| words.is_used(call));
+    let stood: Vec<&standings::Standing> = chapters.iter().flat_map(chapters::Chapter::stood).collect();
+    let known = verdict::Words {
+        meanings: &meanings,
+        is_used: &is_used,
+        saying: &saying,
+        stood: &stood,
+        not_there,
+        negligible,
+    };
+    let verdict = verdict::rests_on(record, report, &states, &known, &mut lost)?;
+    Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
+}
+
+/// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say. `goal` is in PDDL.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
+    let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
+    let all = chapters.iter().flat_map(|chapter| outcomes::of(chapter, goal, saying));
+    Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, outcome.said))).collect())
+}
+
+/// A number that the goal of a run asks for, over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sought {
+    /// The number, as the domain says it.
+    pub name: String,
+    /// What it has to be.
+    pub wanted: f64,
+    /// Its values with when they were so, on the body's clock.
+    pub values: Vec<(i64, f64)>,
+}
+
+/// The numbers that the goal of a run asks for, at each plan and look. `goal` is in PDDL.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn sought(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<Sought>, CommandError> {
+    let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
+    let mut all: Vec<Sought> = Vec::new();
+    for standing in chapters.iter().flat_map(|chapter| chapter.before.iter().chain(chapter.stood())) {
+        let asked = standing.doubts.iter().flat_map(|doubt| numbers::of(doubt, None, standing, goal, &[]));
+        for sure in asked {
+            let (name, at) = (saying.say(&sure.name), (standing.stamp_ns, sure.now));
+            match all.iter_mut().find(|sought| sought.name == name) {
+                Some(sought) if sought.values.last() == Some(&at) => {}
+                Some(sought) => sought.values.push(at),
+                None => all.push(Sought { name, wanted: sure.wanted, values: vec![at] }),
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// How the domain of a run says what is written in PDDL; of a domain that this version does not understand, as it is written.
+pub fn saying_of(beginning: &Beginning) -> Saying {
+    let Ok(domain) = beginning.domain() else { return Saying::default() };
+    let scene = beginning.scene.as_ref().and_then(|(name, text)| SceneSpec::parse(name, text).ok());
+    Saying::of(&domain, &scene.as_ref().map(Places::of_spec).unwrap_or_default())
+}
+
+/// What ways and their figures mean.
+const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
+                    what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
+                    seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
+                    is reckoned with if what is looked for is there: a look may show more, or less.";
+
+/// What other ways are told with.
+const OTHERWISE: &str = "What is hoped for is reckoned as if what is looked for were there. What a plan would come to that begins \
+                         otherwise is told with the rest of the plan behind it, as far as it can follow and is needed.";
+/// What seconds mean where more are counted than pass.
+const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
+                       earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \
+                       something and the farther it is, so that what is likely and near comes first (--figures says how).";
+
+/// What a run was asked, as far as plans depend on it.
+pub struct Asked<'a> {
+    /// The goal in PDDL.
+    pub goal: String,
+    /// Who chose where to look next, if not the planner.
+    pub policy: Option<String>,
+    /// What an action's seconds are besides those that are fixed.
+    pub counts: &'a dyn Fn(&str) -> Option<String>,
+    /// How the domain says what is written in PDDL.
+    pub saying: &'a Saying,
+    /// Whether there is a verdict.
+    pub has_ended: bool,
+    /// Whether seconds are counted that do not pass: for having looked in vain.
+    pub counts_in_vain: bool,
+}
+
+impl Asked<'_> {
+    /// A step, as the domain says it.
+    fn say(&self, call: &Call) -> String {
+        self.saying.say(&call.to_string())
+    }
+
+    /// Several steps, one after the other.
+    fn say_all(&self, calls: &[Call], then: &str) -> String {
+        calls.iter().map(|call| self.say(call)).collect::<Vec<_>>().join(then)
+    }
+
+    /// What the goal wants of a number: that with which it compares it, if it names it so.
+    fn wanted(&self, number: &str) -> Option<f64> {
+        compared::wanted(&self.goal, number)
+    }
+}
+
+fn said(header: &Header, asked: &Asked<'_>, given_s: Option<f64>, saying: &Saying) -> Vec<String> {
+    let (pddl, goal) = (&header.pddl_goal, saying.say(&header.pddl_goal));
+    let mut said = vec![match goal == *pddl {
+        true => format!("Wanted: {pddl}."),
+        false => format!("Wanted: {goal}. In PDDL: {pddl}."),
+    }];
+    said.extend(given_s.map(|given_s| format!("It was to be done within {given_s:.0} s.")));
+    if let Some(policy) = &asked.policy {
+        let rule = policies::about(policy).map(|about| format!(" It {about}.")).unwrap_or_default();
+        said.push(format!("Where to look next was chosen by the policy {policy}, not by the planner.{rule}"));
+    }
+    if !header.resumed.is_empty() {
+        let times = match header.resumed.len() {
+            1 => "once".into(),
+            n => format!("{n} times"),
+        };
+        said.push(format!("It was cut off {times}, and gone on with from its record."));
+    }
+    said
+}
+
+impl Explanation {
+    /// It as a text of lines of 80 letters, with all figures or in short.
+    pub fn text(&self, has_figures: bool) -> String {
+        const WIDTH: usize = 80;
+        let all = |lines: &[String], first: &str| -> String {
+            lines.iter().map(|line| wrapped(line, first, WIDTH) + "\n").collect()
+        };
+        let mut text = wrapped(&self.summary.join(" "), "", WIDTH) + "\n\n" + &all(&self.asked, "");
+        if has_figures {
+            text += &all(&self.reading, "");
+        }
+        for plan in &self.plans {
+            text += &format!("\nPlan {}, at {:.1} s\n", plan.round, plan.at_s);
+            text += &all(std::slice::from_ref(&plan.cause), "  because  ");
+            text += &all(&plan.intent, "  do       ");
+            text += &all(if has_figures { &plan.figures } else { &plan.why }, "  why      ");
+            text += &all(&plan.outcome, "  then     ");
+            text += &all(std::slice::from_ref(&plan.done), "  done     ");
+        }
+        text += &format!("\nWhat the verdict rests on\n{}", all(&self.verdict, "  - "));
+        text + &all(&self.lost, "lost: ")
+    }
+}
+
+impl std::fmt::Display for Explanation {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text(false))
+    }
+}

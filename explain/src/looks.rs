@@ -1,0 +1,346 @@
+//! What a look has brought: how sure it is now of what was asked for, why it is no surer, and what of the places has been seen.
+
+use descry_domains::lexicon::{self, plural, symbol};
+use descry_domains::note::{LeftOut, Note};
+use descry_domains::saying::Saying;
+use descry_memory::belief::Track;
+
+use super::numbers::{self, Sure};
+use super::standings::Standing;
+use super::wording::{by_share, listed, place, share, share_of};
+use descry_agent::standing::{InDoubt, Of, Seen};
+use descry_agent::weigh::Expected;
+
+/// What an object is not with more than this is not worth a word.
+pub const HARDLY: f64 = 0.005;
+/// An object that is it with more than this may be it.
+const MAY_BE: f64 = 0.05;
+/// What stands this near to where something stood is that, or has taken it in, metres: a mug's half width.
+const BESIDE_M: f64 = 0.06;
+/// An object that is it with more than this is taken for it.
+const TAKEN: f64 = 0.5;
+/// A place that is certain with more than this needs no word.
+const SURELY: f64 = 0.99;
+/// Doubts that are told of one by one.
+const MOST_DOUBTS: usize = 3;
+/// Places that are named; the rest are counted.
+const MOST_PLACES: usize = 4;
+
+/// What was asked, and what a plan hoped for.
+pub struct Asked<'a> {
+    /// The goal in PDDL.
+    pub goal: &'a str,
+    /// The numbers that the plan was to bring nearer to what is wanted.
+    pub hoped: &'a [Expected],
+    /// How the domain says what is written in PDDL.
+    pub saying: &'a Saying,
+}
+
+/// How things stand after looks, of each doubt in a few sentences.
+pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Asked<'_>) -> Vec<String> {
+    let told = |doubt: &InDoubt| {
+        let was = before.and_then(|before| before.same(doubt));
+        let sure = numbers::of(doubt, before, after, asked.goal, asked.hoped);
+        if sure.is_empty() {
+            return None;
+        }
+        let is_open = sure.iter().any(|sure| sure.now < sure.wanted);
+        let because = is_open.then(|| why_no_surer(doubt, before, after, looks, asked.saying)).flatten();
+        let because = because.map(|because| format!(" It is no more because {because}.")).unwrap_or_default();
+        Some(format!("{}.{because}{}", sureness(&sure, asked.saying), seen(doubt, was)))
+    };
+    after.doubts.iter().take(MOST_DOUBTS).filter_map(told).collect()
+}
+
+/// `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`; of several numbers the first, and those that are not enough.
+fn sureness(all: &[Sure], saying: &Saying) -> String {
+    let one = |sure: &Sure| {
+        let told = |value| share_of(value, sure.wanted);
+        let (now, wanted, certain) = (told(sure.now), share(sure.wanted), saying.say(&sure.name));
+        match sure.was.map(told) {
+            Some(was) if was == now => format!("{certain} is still {now} ({wanted} is wanted)"),
+            Some(was) => format!("{certain} is now {now} ({was} before, {wanted} is wanted)"),
+            None => format!("{certain} is now {now} ({wanted} is wanted)"),
+        }
+    };
+    let counts = |(n, sure): &(usize, &Sure)| *n == 0 || sure.now < sure.wanted;
+    let said: Vec<String> = all.iter().enumerate().filter(counts).map(|(_, sure)| one(sure)).collect();
+    listed(&said, said.len())
+}
+
+/// What has been seen of where it may be, and where nothing has.
+pub fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
+    let before = |seen: &Seen| was.and_then(|was| was.seen.iter().find(|s| s.on == seen.on));
+    let percent = |share: f64| format!("{:.0} %", (share * 100.0).floor());
+    let one = |seen: &Seen| {
+        let now = percent(seen.share?);
+        let was = before(seen).and_then(|was| was.share).map(percent);
+        let is_new = before(seen).is_none_or(|was| was.places != seen.places);
+        let changed = seen.places > 0 && (is_new || was.as_ref() != Some(&now));
+        let is_less = before(seen).and_then(|was| was.share) > seen.share;
+        let was = was.filter(|was| *was != now).map(|was| match is_less {
+            false => format!("{was} before"),
+            true => format!("{was} before: views of it lie otherwise than was thought, or no longer hold"),
+        });
+        let left = 100.0 - (seen.share? * 100.0).floor();
+        let left = (left > 0.0).then(|| format!("{left:.0} % are left"));
+        let beside: Vec<String> = was.into_iter().chain(left).collect();
+        let beside = if beside.is_empty() { String::new() } else { format!(" ({})", beside.join(", ")) };
+        changed.then(|| format!("{now} of the {}{beside}", seen.on))
+    };
+    let now: Vec<String> = doubt.seen.iter().filter_map(one).collect();
+    let open = |seen: &&Seen| seen.places == 0;
+    let open: Vec<String> = doubt.seen.iter().filter(open).map(|seen| format!("the {}", seen.on)).collect();
+    let now = match now.len() {
+        0 => String::new(),
+        n => format!(" Seen by now: {}.", listed(&now, n)),
+    };
+    match open.len() {
+        0 => now,
+        _ => format!("{now} Nothing was seen yet of {}.", listed(&open, MOST_PLACES)),
+    }
+}
+
+/// Why it is no surer than it is; none where nothing says it.
+fn why_no_surer(
+    doubt: &InDoubt,
+    before: Option<&Standing>,
+    after: &Standing,
+    looks: &[&Note],
+    saying: &Saying,
+) -> Option<String> {
+    let mut why: Vec<String> = looks.iter().filter_map(|note| in_vain(note)).collect();
+    match doubt.of {
+        Of::Thing => {
+            why.extend(before.and_then(|before| lost(&doubt.about, before, after)).map(|(_, lost)| lost));
+            why.push(may_be(doubt, after, saying).unwrap_or_else(|| none_may_be(doubt, after)));
+        }
+        Of::Kind => why.extend(unsure_of(doubt, after, saying)),
+        Of::Surface => why.extend(untold(doubt, after)),
+    }
+    let seen: f64 = seen_objects(doubt, after).map(|(_, p)| p).sum();
+    let others = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE).map_or(0.0, |(_, p)| seen - p);
+    if doubt.of == Of::Thing && others > HARDLY {
+        let p = best_seen(doubt, after).map_or(0.0, |(_, p)| p);
+        why.push(match others + p + doubt.hidden > 1.0 + HARDLY {
+            true => {
+                format!("others may be it as well, with {} in all: each is judged by itself", share(others))
+            }
+            false => format!("with {} it is another of the objects", share(others)),
+        });
+    }
+    why.extend(hidden(doubt, seen));
+    (!why.is_empty()).then(|| why.join("; "))
+}
+
+/// Why a look brought nothing.
+fn in_vain(note: &Note) -> Option<String> {
+    match note {
+        Note::Nothing { .. } => Some("the look showed no surface".into()),
+        Note::Perceived { on, merged, left_out, .. } => {
+            let newest = merged + left_out.len();
+            let is_newest = |left: &LeftOut| matches!(left, LeftOut::View { view, .. } if *view == newest);
+            left_out.iter().any(is_newest).then(|| format!("this view of the {on} could not be used"))
+        }
+        Note::Changed { .. } => Some("what was seen before the last look no longer holds".into()),
+        _ => None,
+    }
+}
+
+/// What was taken for a thing before and is not any more, and with how much it was.
+pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, String)> {
+    let (track, was) = before.best(thing).filter(|(_, was)| *was >= MAY_BE)?;
+    let now = after.belief.tracks.iter().find(|now| now.id == track.id);
+    let is = match now {
+        Some(now) if now.probability_of(thing) * 2.0 > was => return None,
+        Some(now) => {
+            let (other, p) = likeliest(now, thing);
+            format!("is {other} with {}", share(p))
+        }
+        // It may go on under another number, or as a part of what was made out better.
+        None => match there(track, after) {
+            Some(now) if now.probability_of(thing) * 2.0 > was => return None,
+            Some(now) => {
+                let (other, p) = likeliest(now, thing);
+                format!("is seen as {other} now, with {}", share(p))
+            }
+            None if after.belief.mislaid.iter().any(|touched| touched.id == track.id) => {
+                "was touched since, and where it stands has to be seen again".into()
+            }
+            None if counts_less(track, before, after) => {
+                "is not counted on any more: what was seen there before no longer holds".into()
+            }
+            None => "is not seen there any more".into(),
+        },
+    };
+    let taken = match was >= TAKEN {
+        true => format!("was taken for {thing} with {}", share(was)),
+        false => format!("might have been {thing}, with {},", share(was)),
+    };
+    Some((was, format!("what {taken} {is}")))
+}
+
+/// Whether of the surface where something stood less is seen than before.
+fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
+    let places = |standing: &Standing| -> usize {
+        let seen = standing.doubts.iter().flat_map(|doubt| &doubt.seen);
+        seen.filter(|seen| symbol(&seen.on) == track.on).map(|seen| seen.places).max().unwrap_or(0)
+    };
+    places(after) < places(before)
+}
+
+/// What stands now where an object stood, or beside it.
+pub fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
+    let apart_m = |other: &Track| (other.position_m - track.position_m).norm();
+    let nearest = after.belief.tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
+    (apart_m(nearest) < BESIDE_M).then_some(nearest)
+}
+
+/// The object that may be it; none if none may.
+pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
+    let thing = &doubt.about;
+    let (track, p) = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE)?;
+    let (other, q) = likeliest(track, thing);
+    let other = if q > HARDLY { format!(" (or {other} with {})", share(q)) } else { String::new() };
+    let percent = track.seen_fraction * 100.0;
+    let stands = where_it_is(track, saying);
+    let so_far = format!(
+        "what stands {stands} may be it with {}{other}; {percent:.0} % of its outside was seen",
+        share(p)
+    );
+    // How sure it is of where something stands is also how sure it is that this is the place.
+    let right = doubt.sure.unwrap_or(p) / p;
+    Some(match right < SURELY {
+        true => format!("{so_far}, and that this is the place is certain with {}", share(right)),
+        false => so_far,
+    })
+}
+
+/// The objects, each with how probably a thing is it; but for what was lost out of the hand.
+fn seen_objects<'s>(doubt: &'s InDoubt, after: &'s Standing) -> impl Iterator<Item = (&'s Track, f64)> {
+    let seen = after.belief.tracks.iter().filter(|track| !track.on.is_empty() || doubt.lost <= HARDLY);
+    seen.map(|track| (track, track.probability_of(&doubt.about)))
+}
+
+/// The one of them that a thing most likely is.
+pub fn best_seen<'s>(doubt: &'s InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
+    seen_objects(doubt, after).max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// That no object may be it, or hardly.
+pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
+    let p = best_seen(doubt, after).map(|(_, p)| p).filter(|p| *p > HARDLY);
+    match (after.belief.tracks.len(), p.map(share)) {
+        (0, _) => "no object was seen".into(),
+        (1, None) => "the one object that was seen is not it".into(),
+        (1, Some(p)) => format!("the one object that was seen is it with only {p}"),
+        (n, None) => format!("none of the {n} objects that were seen may be it"),
+        (n, Some(p)) => format!("none of the {n} objects that were seen is it with more than {p}"),
+    }
+}
+
+/// The objects that are not surely of a kind, or not, where all of it are wanted: how sure it is of all of them, and the least sure.
+fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
+    let p = |track: &Track| track.probability_of(&doubt.about);
+    let open = |track: &Track| p(track).min(1.0 - p(track));
+    let unsure: Vec<&Track> = after.asked_about(doubt).filter(|track| open(track) > HARDLY).collect();
+    let least = unsure.iter().max_by(|a, b| open(a).total_cmp(&open(b)))?;
+    let all: f64 = unsure.iter().map(|track| 1.0 - open(track)).product();
+    let kind = &doubt.about;
+    let one = format!(
+        "what stands {} is {} with {}",
+        where_it_is(least, saying),
+        lexicon::one(kind),
+        share(p(least))
+    );
+    (all < SURELY).then(|| match unsure.len() {
+        1 => one,
+        n => format!(
+            "which of {n} objects{} are {} is certain with {} for all together, least of one: {one}",
+            doubt.within,
+            plural(kind),
+            share(all)
+        ),
+    })
+}
+
+/// The object on a surface that is told least from others.
+fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
+    let on = symbol(&doubt.about);
+    let there = after.belief.tracks.iter().filter(|track| track.on == on);
+    // Where each is sure enough by itself, the least sure one still counts.
+    let is_open = |track: &&Track| track.certainty() < doubt.wanted.max(SURELY);
+    let mut open: Vec<&Track> = there.filter(is_open).collect();
+    if open.iter().any(|track| track.certainty() < doubt.wanted) {
+        open.retain(|track| track.certainty() < doubt.wanted);
+    }
+    let least = open.iter().min_by(|a, b| a.certainty().total_cmp(&b.certainty()))?;
+    let others = match open.len() {
+        1 => "the object".to_string(),
+        n => format!("the kinds of {n} objects are not sure, the least that of the one"),
+    };
+    let (percent, sure) = (least.seen_fraction * 100.0, share(least.certainty()));
+    let kind = least.kind().unwrap_or("none that is known");
+    Some(format!(
+        "{others} at {}, {kind}, is told with only {sure} ({percent:.0} % of its outside was seen)",
+        place(least)
+    ))
+}
+
+/// What hangs on the places where nothing was seen, and on none; objects that were seen are it with so much in all.
+pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
+    (doubt.hidden > HARDLY).then_some(())?;
+    let lost = match doubt.lost > HARDLY {
+        true => format!(
+            "with {} it was lost out of the hand, and lies where no look shows it; ",
+            share(doubt.lost)
+        ),
+        false => String::new(),
+    };
+    let hidden = share((doubt.hidden - doubt.lost).max(0.0));
+    let places = hidden_places(doubt);
+    let nowhere = 1.0 - doubt.hidden - seen;
+    let nowhere = if nowhere > HARDLY {
+        format!("; with {} it is not there at all", share(nowhere))
+    } else {
+        String::new()
+    };
+    Some(match doubt.of {
+        Of::Thing => format!("{lost}with {hidden} it stands where it could not be seen yet{places}{nowhere}"),
+        Of::Kind => format!("with {hidden} there are more where they could not be seen yet{places}"),
+        Of::Surface => format!("with {hidden} something stands there unseen{places}"),
+    })
+}
+
+/// On which surfaces that is, the likeliest first, and whether there is something.
+fn hidden_places(doubt: &InDoubt) -> String {
+    let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
+    places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
+    let is_measured = |seen: &&Seen| seen.measured > seen.hidden / 2.0;
+    if places.is_empty() || (doubt.seen.len() == 1 && !is_measured(&places[0])) {
+        return String::new();
+    }
+    let named = by_share(places.iter().map(|seen| {
+        let measured = if is_measured(seen) {
+            ", mostly where something was measured that no object explains"
+        } else {
+            ""
+        };
+        (seen.hidden, format!("on the {}{measured}", seen.on))
+    }));
+    format!(" ({named})")
+}
+
+/// What an object most likely is, besides something.
+fn likeliest(track: &Track, besides: &str) -> (String, f64) {
+    let names = track.probabilities.iter().filter(|(name, _)| name != besides);
+    let best = names.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > track.unknown);
+    best.cloned().unwrap_or_else(|| ("none of the known objects".into(), track.unknown))
+}
+
+fn where_it_is(track: &Track, saying: &Saying) -> String {
+    match track.on.as_str() {
+        "" => "in the hand".into(),
+        on => format!("on the {} at {}", saying.name_of(on), place(track)),
+    }
+}

@@ -1,0 +1,82 @@
+//! Which numbers of a domain say how sure it is of what was asked for: those that the goal compares, as the plans name them too.
+
+use descry_domains::lexicon::symbol;
+
+use super::standings::{Standing, certainty};
+use descry_agent::compared::{self, words};
+use descry_agent::standing::InDoubt;
+use descry_agent::weigh::Expected;
+
+/// A number that is less says nothing of where something is.
+const NEXT_TO_NOTHING: f64 = 0.05;
+
+/// A number that says how sure it is of something.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sure {
+    /// As it is written in PDDL, or said.
+    pub name: String,
+    /// What it was; none if that is not known.
+    pub was: Option<f64>,
+    /// What it is.
+    pub now: f64,
+    /// What it has to be.
+    pub wanted: f64,
+}
+
+/// The numbers that say how sure it is of a doubt: those that the goal compares; else those that the plan hopes for; else how
+/// sure it is said to be. None of a record that does not say.
+pub fn of(
+    doubt: &InDoubt,
+    before: Option<&Standing>,
+    after: &Standing,
+    goal: &str,
+    hoped: &[Expected],
+) -> Vec<Sure> {
+    let about = symbol(&doubt.about);
+    let sure = |name: &str, now: f64, wanted: f64| {
+        let was = before.and_then(|before| before.numbers.get(name)).copied();
+        Sure { name: name.to_owned(), was, now, wanted }
+    };
+    let asked =
+        compared::all(goal).filter(|compared| !compared.less && compared.of.contains(&about.as_str()));
+    let asked = asked.filter_map(|compared| {
+        let wanted = compared.wanted?;
+        let fitting = || after.numbers.iter().filter(|(name, _)| compared.fits(name));
+        let by_value = |a: &(&String, &f64), b: &(&String, &f64)| a.1.total_cmp(b.1);
+        let decisive = if compared.of_all { fitting().min_by(by_value) } else { fitting().max_by(by_value) }?;
+        // Of many that are next to nothing: the one that the plan was about.
+        let is_hoped = |(name, _): &(&String, &f64)| hoped.iter().any(|hoped| hoped.name == **name);
+        let (name, now) = if *decisive.1 < NEXT_TO_NOTHING {
+            fitting().find(is_hoped).unwrap_or(decisive)
+        } else {
+            decisive
+        };
+        Some(sure(name, *now, wanted))
+    });
+    let asked: Vec<Sure> = asked.collect();
+    if !asked.is_empty() {
+        return asked;
+    }
+    let is_about = |number: &&Expected| words(&number.name).skip(1).any(|word| word == about);
+    let hoped = hoped.iter().filter(is_about);
+    // Of what a plan hoped for in one place, that of the place where it is by now.
+    let alike = |number: &str| {
+        let word = words(number).next().unwrap_or_default().to_owned();
+        let all = after.numbers.iter().filter(move |(name, _)| words(name).next() == Some(&word));
+        all.filter(|(name, _)| words(name).skip(1).any(|word| word == about))
+    };
+    let decisive = |n: &Expected| {
+        let best = alike(&n.name).max_by(|a, b| a.1.total_cmp(b.1))?;
+        let own = after.numbers.get_key_value(&n.name);
+        let (name, now) = if *best.1 < NEXT_TO_NOTHING { own.unwrap_or(best) } else { best };
+        Some(sure(name, *now, doubt.wanted))
+    };
+    let mut all: Vec<Sure> = hoped.filter_map(decisive).collect();
+    all.dedup();
+    if all.is_empty() {
+        let was = before.and_then(|before| before.same(doubt)?.sure);
+        let name = certainty(doubt);
+        all.extend(doubt.sure.map(|now| Sure { name, was, now, wanted: doubt.wanted }));
+    }
+    all
+}

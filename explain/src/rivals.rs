@@ -1,0 +1,396 @@
+//! Why a plan was this one and not another: what each rival would have brought, what it would have taken to the end, or why the rest of
+//! the plan could not follow it.
+
+use descry_domains::lexicon::symbol;
+
+use descry_skills::Call;
+
+use super::Asked;
+use super::chapters::Chapter;
+use super::wording::{listed, share};
+use descry_agent::reason::Break;
+use descry_agent::standing::{FirstLook, Seen};
+use descry_agent::weigh::{MOST_STEPS, Way, Weighed};
+
+/// Rates nearer to each other than this share are alike.
+const ALIKE: f64 = 0.02;
+/// What takes less longer than this, seconds, takes as long.
+pub const LONGER_S: f64 = 0.05;
+/// As many ways as are kept in the order of their rates.
+const MOST_KEPT: usize = descry_agent::weigh::MOST_KEPT;
+
+/// Why this plan and not another, as far as the record says.
+pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
+    let Some(weighed) = &chapter.weighed else {
+        return vec!["what else could have been done, and at what cost, is not in the record.".into()];
+    };
+    let Some(chosen) = &weighed.chosen else {
+        if chapter.is_late() {
+            return vec![IN_TIME.into()];
+        }
+        if let Some(cut) = &chapter.cut() {
+            return vec![cut_short(cut)];
+        }
+        let why = match chapter.steps.len() <= MOST_STEPS {
+            true => "no step of it is there to learn more",
+            false => "none of its first steps is there to learn more",
+        };
+        return vec![format!("it does what the goal asks next. Nothing was compared: {why}.")];
+    };
+    let longer = longer(weighed, chosen, asked);
+    let through = weighed.through.as_ref().map(|way| {
+        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
+        format!("By another way, with a step more: {}{against}.", figures(way, asked))
+    });
+    let said = match (weighed.others.is_empty(), by_the_end(chapter, weighed, chosen, asked)) {
+        (true, _) => vec![format!("{} was the only way known to get further.", steps(chosen, asked))],
+        (false, Some(said)) => said,
+        (false, None) => by_the_second(chapter, weighed, chosen, asked),
+    };
+    let left = left(chapter, weighed, chosen, asked);
+    let first = first_looks(chapter).filter(|_| asked.counts_in_vain);
+    let late = chapter.is_late().then(|| IN_TIME.to_string());
+    late.into_iter().chain(said).chain(left).chain(longer).chain(through).chain(first).collect()
+}
+
+/// What is done where the planner's search was ended before it had a plan.
+pub fn cut_short(cut: &str) -> String {
+    format!(
+        "the planner's search was ended after {cut}, without a plan that it expected to reach the goal: what settles most a \
+         second of what is in doubt is done."
+    )
+}
+
+/// What is done where no plan ends in time.
+pub const IN_TIME: &str = "No plan would bring it about in the time that is left: the look that settles most a second, of those \
+                           that end in time, is taken all the same.";
+
+/// What the planner has missed: several of its steps could be one.
+pub fn longer(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+    let way = weighed.shorter.as_ref()?;
+    let (steps, takes_s, chosen_s) = (steps(way, asked), way.takes_s, chosen.takes_s);
+    Some(format!(
+        "{steps} would do the same in {takes_s:.1} s instead of {chosen_s:.1} s: the planner did not come upon that."
+    ))
+}
+
+/// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
+fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Vec<String>> {
+    let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    let rule = match &chapter.cut() {
+        Some(cut) => {
+            format!("the planner's search was ended after {cut}: this is the best that it had by then")
+        }
+        None => "the planner takes the quickest whole plan that it finds".to_string(),
+    };
+    let first = format!(
+        "{} is one of {} ways to get further. With the rest of the plan it takes {whole_s:.1} s, and {rule}.",
+        figures(chosen, asked),
+        weighed.open
+    );
+    let rivals = rivals(chapter, weighed, chosen).into_iter().map(|(way, roles)| {
+        let against = against(way, chosen, asked).map(|against| format!("; {against}")).unwrap_or_default();
+        format!("{} {}{against}.", figures(way, asked), listed(&roles, roles.len()))
+    });
+    Some(std::iter::once(first).chain(rivals).collect())
+}
+
+/// The others that stand out, each with what it stands out by.
+pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
+    let others = || weighed.others.iter();
+    let likeliest = likeliest_besides(chapter, chosen);
+    let rate = others().max_by(|a, b| a.rate().total_cmp(&b.rate()));
+    let quickest = others().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s));
+    let most = others().max_by(|a, b| a.gains.total_cmp(&b.gains));
+    let is_more = |o: &&Way, of: fn(&Way) -> f64| of(o) > of(chosen) * (1.0 + ALIKE);
+    let rate_role = match rate.map(|o| o.rate() / chosen.rate()) {
+        Some(ratio) if ratio > 1.0 + ALIKE => "gains most a second",
+        Some(ratio) if ratio > 1.0 - ALIKE => "gains about as much a second",
+        _ => "gains most a second of the others",
+    };
+    let cheapest = |of: &dyn Fn(Option<&str>) -> bool| {
+        let alike = others().filter(|o| of(o.about()));
+        let known = alike.clone().filter(|o| whole_s(o).is_some());
+        let cheapest =
+            known.min_by(|a, b| whole_s(a).unwrap_or(f64::MAX).total_cmp(&whole_s(b).unwrap_or(f64::MAX)));
+        cheapest.or_else(|| alike.max_by(|a, b| a.gains.total_cmp(&b.gains)))
+    };
+    let roles = [
+        (
+            cheapest(&|about| about == chosen.about()),
+            "is the best of the others that end with the same object",
+        ),
+        (cheapest(&|about| about != chosen.about()), "is the best of those that end with another object"),
+        (
+            likeliest.and_then(|on| cheapest(&|about| about == Some(&on))),
+            "is the best of those where it most likely stands else",
+        ),
+        (rate, rate_role),
+        (quickest.filter(|o| o.takes_s < chosen.takes_s - LONGER_S), "is the quickest"),
+        (most.filter(|o| is_more(o, |way| way.gains)), "gains most in all"),
+    ];
+    let mut rivals: Vec<(&Way, Vec<String>)> = Vec::new();
+    for (way, role) in roles.into_iter().filter_map(|(way, role)| Some((way?, role.to_string()))) {
+        match rivals.iter_mut().find(|(other, _)| other.steps == way.steps) {
+            Some((_, roles)) => roles.push(role),
+            None => rivals.push((way, vec![role])),
+        }
+    }
+    rivals
+}
+
+/// Where it most likely stands unseen, besides where a way looks.
+fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
+    let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
+    let seen = doubts.flat_map(|doubt| &doubt.seen).filter(|seen| seen.hidden > 0.0);
+    let besides =
+        seen.map(|seen| (symbol(&seen.on), seen.hidden)).filter(|(on, _)| chosen.about() != Some(on));
+    besides.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(on, _)| on)
+}
+
+/// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.
+pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+    let left = weighed.left.as_ref().filter(|_| chapter.is_reckoned())?;
+    let what = format!("what was left of plan {}", chapter.round - 1);
+    let Some(whole_s) = whole_s(left) else {
+        let why = left.blocked.as_ref().map(|blocked| would_be(blocked, asked));
+        return Some(format!(
+            "{what} would not do{}.",
+            why.map(|why| format!(": {why}")).unwrap_or_default()
+        ));
+    };
+    let chosen_s = self::whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    Some(format!("{what} would do, and takes {whole_s:.1} s{}.", more_than(whole_s, chosen_s)))
+}
+
+/// Why steps would not do that nobody has taken.
+pub fn would_be(blocked: &Break, asked: &Asked<'_>) -> String {
+    let said = blocked.would_be(asked.saying);
+    let counted = blocked.reckoned().and_then(|(call, ..)| (asked.counts)(&call.action));
+    match counted {
+        Some(counted) => format!("{said}; counted are the {counted}"),
+        None => said,
+    }
+}
+
+/// How much longer something takes than what was chosen, as both are told.
+fn more_than(whole_s: f64, chosen_s: f64) -> String {
+    let tenths = |s: f64| (s * 10.0).round() / 10.0;
+    let more_s = tenths(whole_s) - tenths(chosen_s);
+    match more_s.abs() {
+        off_s if off_s <= LONGER_S => ", which is as long".into(),
+        off_s if more_s > 0.0 => format!(", {off_s:.1} s more"),
+        off_s => format!(", {off_s:.1} s less: the planner did not come upon that"),
+    }
+}
+
+/// What a look has for it where seconds are counted for looking in vain.
+fn first_looks(chapter: &Chapter) -> Option<String> {
+    let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
+    let looks = doubts.flat_map(|doubt| &doubt.seen).filter_map(|seen| Some((seen, seen.first?)));
+    let mut all: Vec<(&Seen, FirstLook)> = Vec::new();
+    for (on, look) in looks {
+        if all.iter().all(|(known, _)| known.on != on.on) {
+            all.push((on, look));
+        }
+    }
+    all.sort_by(|a, b| b.1.finds.total_cmp(&a.1.finds));
+    let one = |(seen, look): &(&Seen, FirstLook)| {
+        let unseen = match seen.hidden > 0.0 {
+            true => format!("it stands there unseen with {}; ", share(seen.hidden)),
+            false => String::new(),
+        };
+        let finds = share(look.finds);
+        format!("{finds} for the {} ({unseen}going there and looking takes {:.1} s)", seen.on, look.takes_s)
+    };
+    let said: Vec<String> = all.iter().map(one).collect();
+    (!said.is_empty()).then(|| format!("p is {}.", listed(&said, said.len())))
+}
+
+/// Why a plan was made of which it is not known what others would have taken to their ends: what each gains a second.
+fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Vec<String> {
+    let mut named = Named::default();
+    let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
+    said.extend(quickest(chapter, weighed, chosen, asked, &mut named));
+    let most = weighed.others.iter().max_by(|a, b| a.gains.total_cmp(&b.gains));
+    if let Some(other) = most.filter(|o| o.gains > chosen.gains * (1.0 + ALIKE)) {
+        let more_s = other.takes_s - chosen.takes_s;
+        let more = match (more_s > 0.0, &chapter.cut(), &asked.policy) {
+            (true, ..) => format!(", but is reckoned at {more_s:.1} s more"),
+            (false, Some(cut), None) => format!(
+                ", and takes no longer: the planner's search was ended after {cut}, before it came upon that"
+            ),
+            (false, ..) => ", and takes no longer: what follows counts as well".to_string(),
+        };
+        said.push(format!("{} gains most{more}.", named.once(other, asked)));
+    }
+    said
+}
+
+/// What speaks for or against another way by what it comes to with the rest of the plan behind it; none where that is not known of
+/// both, and where nobody counted it.
+fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
+    let chosen_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
+    let Some(whole) = other.whole else {
+        let is_goal = other.blocked.as_ref().is_some_and(|blocked| blocked.missed_goal().is_some());
+        let but = match (is_goal, chosen.steps.len() == chosen.whole?.steps) {
+            (true, true) => "it would not be enough",
+            (true, false) => "with the rest of the plan, it would not be enough",
+            (false, _) => "the rest of the plan could not follow it",
+        };
+        let why = other.blocked.as_ref().map(|blocked| format!(": {}", would_be(blocked, asked)));
+        return Some(format!("{but}{}", why.unwrap_or_default()));
+    };
+    if !whole.reaches {
+        return Some("with the rest of the plan, it would not be enough".into());
+    }
+    let alone =
+        if whole.steps == other.steps.len() { "alone it would be enough, in" } else { "to its end it takes" };
+    Some(format!("{alone} {:.1} s{}", whole.takes_s, more_than(whole.takes_s, chosen_s)))
+}
+
+/// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.
+pub fn whole_s(way: &Way) -> Option<f64> {
+    way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
+}
+
+/// The ways of which the figures were given.
+#[derive(Default)]
+struct Named(Vec<Vec<Call>>);
+
+impl Named {
+    /// A way, the first time with its figures.
+    fn once(&mut self, way: &Way, asked: &Asked<'_>) -> String {
+        if self.0.contains(&way.steps) {
+            return asked.say_all(&way.steps, ", ");
+        }
+        self.0.push(way.steps.clone());
+        figures(way, asked)
+    }
+}
+
+/// A way with its figures.
+fn figures(way: &Way, asked: &Asked<'_>) -> String {
+    let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
+    format!("{} [+{gains} in {:.1} s, {} a second]", steps(way, asked), way.takes_s, rate(way.rate()))
+}
+
+/// The steps of a way, of several each with its seconds, if the record has them.
+fn steps(way: &Way, asked: &Asked<'_>) -> String {
+    if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
+        return asked.say_all(&way.steps, ", ");
+    }
+    let each = way.steps.iter().zip(&way.each_s);
+    each.map(|(step, takes_s)| format!("{} ({takes_s:.1} s)", asked.say(step))).collect::<Vec<_>>().join(", ")
+}
+
+/// Three digits that count.
+fn rate(rate: f64) -> String {
+    let digits = if rate > 0.0 { (2.0 - rate.log10().floor()).clamp(1.0, 8.0) as usize } else { 1 };
+    format!("{rate:.digits$}")
+}
+
+/// Where a plan's way stands among all, by what is gained a second.
+fn compared(
+    chapter: &Chapter,
+    weighed: &Weighed,
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> String {
+    let all = weighed.open;
+    let ratio = |o: &Way| o.rate() / chosen.rate();
+    let better: Vec<&Way> = weighed.others.iter().filter(|o| ratio(o) > 1.0 + ALIKE).collect();
+    let mine = named.once(chosen, asked);
+    if better.is_empty() {
+        let alike = weighed.others.iter().find(|o| ratio(o) >= 1.0 - ALIKE);
+        let next = weighed.others.iter().find(|o| ratio(o) < 1.0 - ALIKE);
+        let gains = match alike.filter(|o| ratio(o) > 1.0) {
+            Some(_) => "is among those that gain most a second",
+            None => "gains most a second",
+        };
+        let alike = alike.map(|o| format!(" About as good is {}.", named.once(o, asked))).unwrap_or_default();
+        let next = next.map(|o| format!(" Next comes {}.", named.once(o, asked))).unwrap_or_default();
+        return format!("of {all} ways to get further, {mine} {gains}.{alike}{next}");
+    }
+    let more = if better.len() >= MOST_KEPT { "at least " } else { "" };
+    let many = match better.len() {
+        1 => "1 gains more a second:".into(),
+        n => format!("{more}{n} gain more a second, most of all"),
+    };
+    let first = named.once(better[0], asked);
+    let plan_s = whole_s(chosen).unwrap_or(chapter.makespan_s);
+    let rule = match (&asked.policy, &chapter.cut()) {
+        (Some(policy), _) => format!("The policy {policy} goes by its own rule."),
+        (None, Some(cut)) => {
+            format!("The planner's search was ended after {cut}: this is the best that it had by then.")
+        }
+        (None, None) if chapter.is_late() => {
+            "It goes by all that is in doubt, not by these numbers alone.".into()
+        }
+        (None, None) => {
+            let alone = match enough(chapter, weighed, better[0], asked) {
+                Some(false) if chosen.reaches == Some(true) || better[0].takes_s < plan_s => {
+                    " By what is hoped of it, that one would not be enough by itself."
+                }
+                Some(true) if better[0].takes_s < plan_s => {
+                    " By what is hoped of it, that one would be enough, and sooner: the planner did not come upon it."
+                }
+                _ => "",
+            };
+            let whole = match plan_s {
+                // Nothing in the domain takes time.
+                s if s <= 0.0 => "a whole plan".to_string(),
+                s => format!("the quickest whole plan that it finds, here {s:.1} s"),
+            };
+            format!(
+                "The planner counts to the end: it takes {whole}, not what gains most a second at first.{alone}"
+            )
+        }
+    };
+    format!("{mine} is one of {all} ways to get further; {many} {first}. {rule}")
+}
+
+/// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
+fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
+    // That a part is not the whole says nothing of it: it is held against plans that end with such a step.
+    let last = |steps: &[Call]| steps.last().map(|step| step.action.clone());
+    let is_alike = || last(&way.steps) == last(&chapter.calls);
+    match way.reaches {
+        Some(true) => return Some(true),
+        Some(false) if is_alike() => return Some(false),
+        _ => {}
+    }
+    let [only] = weighed.numbers.as_slice() else { return None };
+    let wanted = asked.wanted(&only.name)?;
+    Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
+}
+
+/// The quickest way, if it is another, and why it was not taken.
+fn quickest(
+    chapter: &Chapter,
+    weighed: &Weighed,
+    chosen: &Way,
+    asked: &Asked<'_>,
+    named: &mut Named,
+) -> Option<String> {
+    let other = weighed.others.iter().min_by(|a, b| a.takes_s.total_cmp(&b.takes_s))?;
+    let is_whole_search = chapter.cut().is_none();
+    // Where what is done is not enough either, that says nothing against another.
+    let would_do = enough(chapter, weighed, other, asked).filter(|enough| *enough || is_whole_search);
+    // Of what was named as better and enough it has been said.
+    let is_said =
+        would_do == Some(true) && asked.policy.is_none() && is_whole_search && named.0.contains(&other.steps);
+    if other.takes_s > chosen.takes_s - 0.1 || is_said {
+        return None;
+    }
+    let but = match would_do {
+        Some(true) if asked.policy.is_none() && is_whole_search => {
+            ", and by what is hoped of it would be enough: the planner did not come upon it"
+        }
+        Some(false) => ", but by what is hoped of it would not be enough by itself",
+        _ if other.gains < chosen.gains => ", but gains less",
+        _ => ", and gains no less: the rest of the plan counts as well",
+    };
+    Some(format!("{} is the quickest{but}.", named.once(other, asked)))
+}

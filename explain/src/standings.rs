@@ -1,0 +1,99 @@
+//! How a run stood at each plan and whenever one was kept: what was in doubt, and what was believed.
+
+use std::collections::BTreeMap;
+
+use descry_domains::lexicon::{plural, symbol};
+use descry_memory::belief::{Belief, Track};
+use descry_memory::{Document, Query, Record, RecordId};
+
+use super::states::States;
+use descry_agent::exit::CommandError;
+use descry_agent::standing::{self, InDoubt, Of};
+
+/// How things stood.
+#[derive(Debug, Clone, Default)]
+pub struct Standing {
+    /// When that was recorded, on the body's clock.
+    pub stamp_ns: i64,
+    /// What was in doubt of what was asked for.
+    pub doubts: Vec<InDoubt>,
+    /// What was believed of the objects.
+    pub belief: Belief,
+    /// The numbers of the domain, as they are written in PDDL.
+    pub numbers: BTreeMap<String, f64>,
+}
+
+impl Standing {
+    /// The same doubt as another.
+    pub fn same(&self, other: &InDoubt) -> Option<&InDoubt> {
+        self.doubts.iter().find(|doubt| doubt.of == other.of && doubt.about == other.about)
+    }
+
+    /// The objects that stand where a kind is asked about.
+    pub fn asked_about<'a>(&'a self, doubt: &'a InDoubt) -> impl Iterator<Item = &'a Track> {
+        let is_there = |track: &Track| {
+            let mut asked = doubt.seen.iter().filter(|seen| seen.share.is_some());
+            doubt.within.is_empty() || asked.any(|seen| symbol(&seen.on) == track.on)
+        };
+        self.belief.tracks.iter().filter(move |track| is_there(track))
+    }
+
+    /// The object that a thing or one of a kind most likely is, with that probability.
+    pub fn best(&self, name: &str) -> Option<(&Track, f64)> {
+        let all = self.belief.tracks.iter().map(|track| (track, track.probability_of(name)));
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// All of them.
+pub struct Standings<'a> {
+    record: &'a Record,
+    states: &'a States,
+    beliefs: Vec<(RecordId, Belief)>,
+}
+
+impl<'a> Standings<'a> {
+    /// As far as the record has them.
+    ///
+    /// # Errors
+    /// [`CommandError::Broken`] if the record cannot be read.
+    pub fn of(record: &'a Record, states: &'a States) -> Result<Self, CommandError> {
+        let (found, _) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
+        let belief = |d: &Document| Some((d.id, serde_json::from_value(d.body.clone()).ok()?));
+        Ok(Standings { record, states, beliefs: found.iter().filter_map(belief).collect() })
+    }
+
+    /// How things stood at an event; none of a record of earlier versions, and of a part that is lost.
+    pub fn at(&self, event: &Document) -> Option<Standing> {
+        event.blobs.iter().find(|blob| blob.name == standing::BLOB)?;
+        let data = self.record.store().blob(event.id, standing::BLOB).ok()?;
+        Some(self.with(event, serde_json::from_slice(&data).ok()?))
+    }
+
+    /// How things stood in the end; none where the record does not say.
+    pub fn last(&self) -> Option<Standing> {
+        let rests = self.record.newest(standing::RESTS).ok()??;
+        let said: standing::Rests = serde_json::from_value(rests.body.clone()).ok()?;
+        let is_said = said.in_doubt.iter().all(|doubt| doubt.sure.is_some());
+        is_said.then(|| self.with(&rests, said.in_doubt))
+    }
+
+    fn with(&self, document: &Document, doubts: Vec<InDoubt>) -> Standing {
+        let belief = self.beliefs.iter().rev().find(|(believed, _)| *believed < document.id);
+        Standing {
+            stamp_ns: document.stamp_ns,
+            doubts,
+            belief: belief.map(|(_, belief)| belief.clone()).unwrap_or_default(),
+            numbers: self.states.numbers(document.id).cloned().unwrap_or_default(),
+        }
+    }
+}
+
+/// How sure it is of something, said as what that is sure of.
+pub fn certainty(doubt: &InDoubt) -> String {
+    match doubt.of {
+        Of::Thing => format!("the certainty of where {} stands", doubt.about),
+        Of::Kind => format!("the certainty that all {}{} are found", plural(&doubt.about), doubt.within),
+        Of::Surface => format!("the certainty of what stands on the {}", doubt.about),
+    }
+}

@@ -1,0 +1,95 @@
+//! Numbers, reasons and lines as people read them.
+
+use descry_memory::belief::Track;
+
+pub use descry_agent::numbers::{count, share, share_of};
+
+/// The first of some texts, in a sentence; the rest are counted.
+pub fn listed(all: &[String], most: usize) -> String {
+    let named = all[..all.len().min(most)].join(", ");
+    match (all, all.len().saturating_sub(most)) {
+        ([before @ .., last], 0) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        (_, 0) => named,
+        (_, more) => format!("{named} and {more} more"),
+    }
+}
+
+/// What shares are of, those with the same share as it reads together.
+pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
+    let mut alike: Vec<(String, Vec<String>)> = Vec::new();
+    for (value, of) in all {
+        let said = share(value);
+        match alike.last_mut().filter(|(last, _)| *last == said) {
+            Some((_, like)) => like.push(of),
+            None => alike.push((said, vec![of])),
+        }
+    }
+    let one = |(said, of): &(String, Vec<String>)| {
+        let each = if of.len() > 1 { " each" } else { "" };
+        format!("{said}{each} {}", listed(of, of.len()))
+    };
+    alike.iter().map(one).collect::<Vec<_>>().join("; ")
+}
+
+/// A sentence, which begins with a capital.
+pub fn capital(text: &str) -> String {
+    let mut signs = text.chars();
+    signs.next().map(|first| first.to_uppercase().chain(signs).collect()).unwrap_or_default()
+}
+
+/// Where an object stands, in the map.
+pub fn place(track: &Track) -> String {
+    let [x, y, z]: [f64; 3] = track.position_m.coords.into();
+    format!("({x:.2}, {y:.2}, {z:.2}) m")
+}
+
+/// A text in lines of at most so many letters, the first behind a sign, the others as far in.
+pub fn wrapped(text: &str, first: &str, most: usize) -> String {
+    let indent = " ".repeat(first.chars().count());
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = first.to_string();
+    let mut is_empty = true;
+    for word in words(text) {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > most {
+            lines.push(std::mem::replace(&mut line, indent.clone()));
+            is_empty = true;
+        }
+        if !is_empty {
+            line.push(' ');
+        }
+        line += &word;
+        is_empty = false;
+    }
+    lines.push(line);
+    lines.join("\n")
+}
+
+/// Words of a text; a call or figures in brackets are one word, where they are short, and so is a number of percent.
+fn words(text: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let mut open: Vec<&str> = Vec::new();
+    let mut depth = 0_i32;
+    for word in text.split_whitespace() {
+        let signs = |of: &[char]| word.matches(of).count() as i32;
+        depth += signs(&['(', '[']) - signs(&[')', ']']);
+        open.push(word);
+        if depth <= 0 {
+            take(&mut words, &std::mem::take(&mut open));
+            depth = 0;
+        }
+    }
+    take(&mut words, &open);
+    words
+}
+
+/// Takes what stands in brackets, or a word by itself, into the words of a text. What is said in passing is no call.
+fn take(words: &mut Vec<String>, open: &[&str]) {
+    const LONGEST_CALL: usize = 60;
+    let whole = open.join(" ");
+    let in_passing = whole.starts_with('(') && whole.contains(", ");
+    match words.last_mut() {
+        Some(last) if open.len() == 1 && whole.starts_with('%') => *last += &format!(" {whole}"),
+        _ if whole.chars().count() <= LONGEST_CALL && !in_passing && !whole.is_empty() => words.push(whole),
+        _ => words.extend(open.iter().map(|word| word.to_string())),
+    }
+}

@@ -1,0 +1,4 @@
+//! Tests of what is told of a run.
+
+mod reasons;
+mod unit;

@@ -1,0 +1,8 @@
+//! Tests of single modules.
+
+mod looks;
+mod numbers;
+mod outcomes;
+mod plans;
+mod states;
+mod wording;

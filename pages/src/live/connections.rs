@@ -1,0 +1,50 @@
+//! Connections that are open: so few that none starves, whoever opens them and says nothing.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tokio::sync::Notify;
+
+/// The open connections, the oldest first.
+#[derive(Debug, Default)]
+pub struct Connections(Mutex<Vec<Arc<Connection>>>);
+
+/// One connection.
+#[derive(Debug, Default)]
+pub struct Connection {
+    has_asked: AtomicBool,
+    eviction: Notify,
+}
+
+impl Connections {
+    /// Opens a connection among at most so many: where there is no room, the oldest that has asked for nothing is evicted, or else
+    /// the oldest.
+    pub fn open(&self, most: usize) -> Arc<Connection> {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        while all.len() >= most.max(1) {
+            let silent = all.iter().position(|one| !one.has_asked.load(Ordering::Relaxed));
+            all.remove(silent.unwrap_or(0)).eviction.notify_one();
+        }
+        let connection = Arc::new(Connection::default());
+        all.push(Arc::clone(&connection));
+        connection
+    }
+
+    /// Forgets a connection.
+    pub fn close(&self, connection: &Arc<Connection>) {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|one| !Arc::ptr_eq(one, connection));
+    }
+}
+
+impl Connection {
+    /// Notes that something was asked for.
+    pub fn has_asked(&self) {
+        self.has_asked.store(true, Ordering::Relaxed);
+    }
+
+    /// Waits until the connection is to give room to another.
+    pub async fn evicted(&self) {
+        self.eviction.notified().await;
+    }
+}

@@ -76,6 +76,7 @@ impl Disc {
                 frame: "camera".into(),
                 intrinsics: CAMERA,
                 range_m: (0.4, 6.0),
+                latency_s: 0.0,
                 colour: false,
             }),
             laser: None,

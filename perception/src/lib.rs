@@ -4,6 +4,7 @@ pub mod calibration;
 pub mod camera;
 pub mod cloud;
 pub mod cluster;
+pub mod consistency;
 #[doc(hidden)]
 pub mod draw;
 pub mod files;

@@ -83,7 +83,7 @@ pub enum SurfaceError {
         needed: usize,
     },
     /// No plane fits what was asked for.
-    #[error("{}: widen the height band, say which way is up, or look at the table", no_plane(wanted, *tried))]
+    #[error("{}: widen the height band, give or check the direction of up, or look at the table", no_plane(wanted, *tried))]
     NotFound {
         /// Planes that were looked at.
         tried: usize,

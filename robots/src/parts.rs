@@ -208,6 +208,10 @@ pub struct Camera {
     pub range_m: (f64, f64),
     /// True if frames may have a colour image.
     pub colour: bool,
+    /// Longest time by which a frame's stamp may lie before the request for it, seconds: drivers with a buffer answer with a frame
+    /// that is there already.
+    #[serde(default)]
+    pub latency_s: f64,
 }
 
 impl Camera {

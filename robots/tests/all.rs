@@ -2,6 +2,7 @@
 
 mod camera;
 mod conformance;
+mod consistency;
 mod flat;
 mod folders;
 mod home;

@@ -53,6 +53,10 @@ enum Lie {
     Greedy,
     ShortSweep,
     Blind,
+    Mirrored,
+    UpsideDown,
+    TenTimes,
+    Late,
 }
 
 #[async_trait]
@@ -107,6 +111,16 @@ impl Robot for Liar {
     }
     async fn sense(&self, watch: &Watch<'_>) -> Result<Sensed, Failure> {
         let mut sensed = self.honest.sense(watch).await?;
+        match self.lie {
+            Lie::Mirrored => shuffle(&mut sensed, |u, v, (width, _)| (width - 1 - u, v)),
+            Lie::UpsideDown => shuffle(&mut sensed, |u, v, (width, height)| (width - 1 - u, height - 1 - v)),
+            Lie::TenTimes => sensed.depth_m.iter_mut().for_each(|d| *d *= 10.0),
+            Lie::Late => sensed.stamp_ns -= 133_000_000,
+            _ => {}
+        }
+        if let Ok(cloud) = sensed.intrinsics.cloud_from_depth(&sensed.depth_m) {
+            sensed.cloud.points = cloud.points;
+        }
         if self.lie == Lie::WrongChain {
             sensed.transforms.reverse();
         }
@@ -138,6 +152,32 @@ impl Robot for Liar {
     }
 }
 
+/// Takes each pixel of a frame from elsewhere in it.
+fn shuffle(sensed: &mut Sensed, from: impl Fn(usize, usize, (usize, usize)) -> (usize, usize)) {
+    let size = (sensed.intrinsics.width, sensed.intrinsics.height);
+    let moved = |pixel: usize| {
+        let (u, v) = from(pixel % size.0, pixel / size.0, size);
+        sensed.depth_m[v * size.0 + u]
+    };
+    sensed.depth_m = (0..size.0 * size.1).map(moved).collect();
+}
+
+#[tokio::test]
+async fn images_that_lie_are_refused() {
+    let promise = "the camera shows the surfaces of the map where they are";
+    for lie in [Lie::Mirrored, Lie::UpsideDown, Lie::TenTimes] {
+        let breaches = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err().0;
+        assert!(breaches.iter().any(|b| b.promise == promise), "{lie:?}: {breaches:?}");
+    }
+}
+
+#[tokio::test]
+async fn all_broken_promises_are_told_at_once() {
+    let breaches = conformance::check(&Liar { honest: simulated(1), lie: Lie::Late }).await.unwrap_err().0;
+    let late = breaches.iter().filter(|b| b.promise == "a frame is of now").count();
+    assert_eq!(late, 3, "each frame of the check is late: {breaches:?}");
+}
+
 #[tokio::test]
 async fn broken_promises_are_found() {
     for (lie, promise) in [
@@ -151,7 +191,7 @@ async fn broken_promises_are_found() {
         (Lie::Numb, "a hand feels whether it holds something"),
         (Lie::Greedy, "a hand that closes on nothing says so"),
     ] {
-        let breach = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err();
-        assert_eq!(breach.promise, promise, "{lie:?}: {breach}");
+        let breaches = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err().0;
+        assert_eq!(breaches[0].promise, promise, "{lie:?}: {breaches:?}");
     }
 }

@@ -104,7 +104,8 @@ fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, pla
     };
     let own = known.map_or_else(unknown, |k| k.description.clone());
     let usual = (usual.range_m[0], usual.range_m[1]);
-    let as_made = Camera { frame: "camera".into(), intrinsics: camera, range_m: usual, colour: true };
+    let as_made =
+        Camera { frame: "camera".into(), intrinsics: camera, range_m: usual, colour: true, latency_s: 0.0 };
     let camera = Camera { intrinsics: camera, ..own.camera.unwrap_or(as_made) };
     Description { name: format!("record {place}"), simulated: false, camera: Some(camera), ..own }
 }

@@ -29,10 +29,13 @@ pub struct CheckArguments {
 struct Report {
     robot: String,
     kept: Vec<&'static str>,
+    /// The first failure.
     broken: Option<Broken>,
+    /// Every failure.
+    failed: Vec<Broken>,
 }
 
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 struct Broken {
     check: &'static str,
     promise: &'static str,
@@ -44,7 +47,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
     let body = body::open(&arguments.robot, None, 1, &domain)?;
     let runtime = input::runtime()?;
-    let mut report = Report { robot: body.robot.description().name.clone(), kept: Vec::new(), broken: None };
+    let mut report = Report {
+        robot: body.robot.description().name.clone(),
+        kept: Vec::new(),
+        broken: None,
+        failed: Vec::new(),
+    };
     input::narrate(&format!("checking \"{}\"", report.robot));
     for (check, begin) in conformance::CHECKS {
         match runtime.block_on(begin(&*body.robot)) {
@@ -57,11 +65,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
                     "{check} ... FAILED\n\n  every body: {}\n  this one:   {}\n",
                     breach.promise, breach.found
                 ));
-                report.broken = Some(Broken { check, promise: breach.promise, found: breach.found });
-                break;
+                report.failed.push(Broken { check, promise: breach.promise, found: breach.found });
             }
         }
     }
+    report.broken = report.failed.first().cloned();
     let (kept, all) = (report.kept.len(), conformance::CHECKS.len());
     let verdict = if report.broken.is_none() { "ok" } else { "FAILED" };
     input::narrate(&format!("{verdict}: {kept} of {all} checks passed"));

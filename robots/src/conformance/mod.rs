@@ -6,10 +6,13 @@
 mod doors;
 mod hand;
 mod laser;
+mod sight;
 
 pub use hand::check_carrying;
 
-use crate::body::{CancellationToken, Grasp, Place, Placing, Pose2, Progress, Push, Robot, Sensed, Watch};
+use crate::body::{
+    CancellationToken, Grasp, Place, Placing, Pose2, Progress, Push, Robot, Sensed, Stamp, Watch,
+};
 use crate::failure::Failure;
 use crate::parts::{Base, Camera, Description};
 use crate::request::{Answer, Request};
@@ -26,6 +29,11 @@ pub struct Breach {
     /// Observed behaviour.
     pub found: String,
 }
+
+/// All promises that a body did not keep, in the order of the checks.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+pub struct Breaches(pub Vec<Breach>);
 
 /// Transforms that should be equal may differ by this much (rounding), metres and radians.
 const ROUNDING: f64 = 1e-6;
@@ -48,7 +56,7 @@ type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>
 type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
 
 /// Every check by its name, in the order in which a body goes through them.
-pub const CHECKS: [(&str, Check); 11] = [
+pub const CHECKS: [(&str, Check); 12] = [
     ("what it is", |robot| Box::pin(async { check_description(robot).and_then(|()| check_stations(robot)) })),
     ("a frame", |robot| Box::pin(check_frame(robot))),
     ("routes and a drive", |robot| {
@@ -61,6 +69,7 @@ pub const CHECKS: [(&str, Check); 11] = [
         })
     }),
     ("a frame after the drive", |robot| Box::pin(check_frame(robot))),
+    ("the surfaces of its map", |robot| Box::pin(sight::check_sight(robot))),
     ("a sweep of the laser", |robot| Box::pin(laser::check_scan(robot))),
     ("its other senses", |robot| Box::pin(check_senses(robot))),
     ("what it refuses", |robot| Box::pin(check_refusals(robot))),
@@ -70,15 +79,16 @@ pub const CHECKS: [(&str, Check); 11] = [
     ("a frame after it was stopped", |robot| Box::pin(check_frame(robot))),
 ];
 
-/// Runs every check.
+/// Runs every check, also after one has failed.
 ///
 /// # Errors
-/// The first promise that is not kept, and how.
-pub async fn check(robot: &dyn Robot) -> Result<(), Breach> {
+/// The promises that are not kept, one a check at most, and how; in the order of the checks.
+pub async fn check(robot: &dyn Robot) -> Result<(), Breaches> {
+    let mut breaches = Vec::new();
     for (_, begin) in CHECKS {
-        begin(robot).await?;
+        breaches.extend(begin(robot).await.err());
     }
-    Ok(())
+    if breaches.is_empty() { Ok(()) } else { Err(Breaches(breaches)) }
 }
 
 fn check_description(robot: &dyn Robot) -> Result<(), Breach> {
@@ -164,8 +174,9 @@ async fn check_frame(robot: &dyn Robot) -> Result<(), Breach> {
     done(robot.look_at(&ahead, &watch).await, "a body can be told where to look")?;
     let before_ns = robot.now_ns();
     let sensed = done(robot.sense(&watch).await, "a body takes frames")?;
-    ensure(sensed.stamp_ns >= before_ns && sensed.stamp_ns <= robot.now_ns(), "a frame is of now", || {
-        format!("{} outside {before_ns} to {}", sensed.stamp_ns, robot.now_ns())
+    let earliest_ns = before_ns.saturating_sub((camera.latency_s * 1e9) as Stamp);
+    ensure(sensed.stamp_ns >= earliest_ns && sensed.stamp_ns <= robot.now_ns(), "a frame is of now", || {
+        format!("{} outside {earliest_ns} to {}", sensed.stamp_ns, robot.now_ns())
     })?;
     ensure(robot.now_ns() > before_ns, "taking a frame takes time", || "the clock stood still".into())?;
     check_pixels(camera, &sensed)?;

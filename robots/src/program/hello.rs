@@ -111,12 +111,18 @@ struct Camera {
     /// True if a colour image of the same pixels follows the depths.
     #[serde(default)]
     colour: bool,
+    /// Longest time by which a frame's stamp may lie before the request for it, seconds.
+    #[serde(default)]
+    latency_s: f64,
     /// Name of its frame in records.
     #[serde(default = "default_camera_frame")]
     frame: String,
     /// Pose of the camera on the base, if no head turns it; the base's own pose if left out.
     base_from_camera: Option<Isometry3<f64>>,
 }
+
+/// No driver buffers frames for longer, seconds: more is taken for milliseconds.
+const MOST_LATENCY_S: f64 = 2.0;
 
 fn default_unit_m() -> f64 {
     0.001
@@ -429,6 +435,9 @@ impl Camera {
         if !(self.range_m.0 >= 0.0 && self.range_m.0 < self.range_m.1 && self.range_m.1.is_finite()) {
             return Err(format!("camera.range_m is {:?}, expected least and greatest depth", self.range_m));
         }
+        if !(0.0..=MOST_LATENCY_S).contains(&self.latency_s) {
+            return Err(format!("camera.latency_s is {}, expected 0 to {MOST_LATENCY_S} s", self.latency_s));
+        }
         let fixed = self.base_from_camera.as_ref().map(message::transform).transpose();
         fixed.map(|_| ()).map_err(|e| format!("camera.base_from_camera: {e}"))
     }
@@ -436,7 +445,13 @@ impl Camera {
     fn part(self) -> parts::Camera {
         let Camera { width, height, fx, fy, cx, cy, .. } = self;
         let intrinsics = Intrinsics { width, height, fx, fy, cx, cy };
-        parts::Camera { frame: self.frame, intrinsics, range_m: self.range_m, colour: self.colour }
+        parts::Camera {
+            frame: self.frame,
+            intrinsics,
+            range_m: self.range_m,
+            colour: self.colour,
+            latency_s: self.latency_s,
+        }
     }
 }
 

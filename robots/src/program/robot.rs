@@ -155,7 +155,10 @@ impl ProgramRobot {
 
     fn sensed(&self, camera: &Camera, done: Done) -> Result<Sensed, String> {
         let said: message::SensedSaid = answer("sense", done.said)?;
-        let stamp_ns = stamp("a frame", said.stamp_ns, (done.before_ns, done.now_ns))?;
+        let earliest_ns = done.before_ns.saturating_sub((camera.latency_s * 1e9) as Stamp);
+        let stamp_ns = stamp("a frame", said.stamp_ns, (earliest_ns, done.now_ns)).map_err(|e| {
+            format!("{e}; a camera whose driver buffers frames says so with \"latency_s\" in its hello")
+        })?;
         let (map_from_base, base_from_camera) =
             (transform(&said.map_from_base)?, transform(&said.base_from_camera)?);
         let d = &self.known.description;

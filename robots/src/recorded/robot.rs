@@ -72,6 +72,7 @@ impl RecordedRobot {
                 intrinsics: recording.intrinsics,
                 range_m: (settings.range_m[0], settings.range_m[1]),
                 colour: recording.frames.iter().any(|f| f.colour.is_some()),
+                latency_s: 0.0,
             }),
             laser: None,
             senses: Vec::new(),

@@ -45,7 +45,13 @@ pub fn intrinsics() -> Intrinsics {
 
 /// The camera with its range.
 pub fn camera() -> Camera {
-    Camera { frame: "camera".into(), intrinsics: intrinsics(), range_m: (0.45, 5.0), colour: true }
+    Camera {
+        frame: "camera".into(),
+        intrinsics: intrinsics(),
+        range_m: (0.45, 5.0),
+        colour: true,
+        latency_s: 0.0,
+    }
 }
 
 /// Description of the simulated body.

@@ -2,7 +2,7 @@
 
 mod surface;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use descry_memory::belief::{Belief, Track};
@@ -161,6 +161,8 @@ type Departure = (usize, Vec<usize>);
 /// What is computed at the first question and kept.
 #[derive(Default)]
 struct Derived {
+    /// Candidates by their symbols.
+    candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
     travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
     cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
@@ -195,6 +197,7 @@ impl Situation {
             (0..n).map(|_| OnceLock::new()).collect()
         }
         let derived = Derived {
+            candidates: OnceLock::new(),
             travel_s: cells(known.candidates.len()),
             travel_past_s: Mutex::default(),
             cameras: cells(known.candidates.len() * known.surfaces.len()),
@@ -214,7 +217,12 @@ impl Situation {
     /// # Errors
     /// [`CallError::Failed`] if there is none.
     pub fn candidate(&self, name: &str) -> Result<usize, CallError> {
-        find(self.candidates.iter().map(|c| &c.symbol), name, "a pose to look from")
+        let symbols = self.derived.candidates.get_or_init(|| {
+            // Of two of one name the first is meant.
+            self.candidates.iter().enumerate().rev().map(|(n, c)| (c.symbol.clone(), n)).collect()
+        });
+        let found = symbols.get(name).copied();
+        found.ok_or_else(|| CallError::Failed(format!("`{name}` is not a pose to look from")))
     }
 
     /// The surface of a symbol.

@@ -36,7 +36,15 @@ pub fn crosses_a_wall<'a>(
         let is_met = turn != 0.0 && (0.0..=1.0).contains(&share) && (0.0..far).contains(&along);
         is_met.then(|| from + ahead * along)
     };
-    rooms.iter().filter(|room| room.outline_m.len() >= 3).any(|room| {
+    // Most rooms lie aside of the way, and their walls need not be asked.
+    let is_aside = |room: &Room| {
+        let beyond = |c: usize| {
+            let (low, high) = (from[c].min(to[c]), from[c].max(to[c]));
+            room.outline_m.iter().all(|p| p[c] < low) || room.outline_m.iter().all(|p| p[c] > high)
+        };
+        beyond(0) || beyond(1)
+    };
+    rooms.iter().filter(|room| room.outline_m.len() >= 3 && !is_aside(room)).any(|room| {
         let corners = &room.outline_m;
         let walls = (0..corners.len()).map(|n| (&corners[n], &corners[(n + 1) % corners.len()]));
         walls

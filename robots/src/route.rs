@@ -11,9 +11,9 @@ use crate::grid::OccupancyGrid;
 use crate::parts::Speeds;
 use nalgebra::Point2;
 use pathfinding::directed::dijkstra::dijkstra_all;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// Farthest that a start inside the inflated zone is moved to free floor, metres: localisation may well say that a base which stands
 /// beside a table stands in it.
@@ -23,6 +23,11 @@ const START_SLACK_M: f64 = 0.35;
 const ROUNDING: f64 = 1e-9;
 /// Points whose lines of sight are kept; beyond that all are found anew.
 const MOST_ACCESSES: usize = 4096;
+/// Pairs of poses whose ways are kept; beyond that all are found anew.
+const MOST_WAYS: usize = 1 << 20;
+
+/// The bits of the coordinates and the heading of a pose.
+type PoseBits = [u64; 3];
 
 /// A way to go.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,6 +51,8 @@ pub struct Router {
     rows: Vec<OnceLock<Vec<Option<Leg>>>>,
     /// Accesses by the bits of the coordinates.
     accesses: Mutex<BTreeMap<[u64; 2], Arc<Access>>>,
+    /// What going from one pose to another takes, found once a map; none where no way leads.
+    ways: Mutex<HashMap<(PoseBits, PoseBits), Option<(Travel, Via)>>>,
 }
 
 /// The shortest route from one corner to another: what the search for a pair of poses needs of it.
@@ -66,7 +73,7 @@ struct Access {
 }
 
 /// Corners of a route.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Via {
     Straight,
     Corners(u32, u32),
@@ -80,7 +87,8 @@ impl Router {
         Router {
             seen: corners.iter().map(|_| OnceLock::new()).collect(),
             rows: corners.iter().map(|_| OnceLock::new()).collect(),
-            accesses: Mutex::new(BTreeMap::new()),
+            accesses: Mutex::default(),
+            ways: Mutex::default(),
             map: map.clone(),
             blocked,
             radius_m,
@@ -236,7 +244,36 @@ impl Router {
         best.map(|(_, centre)| centre)
     }
 
+    /// The quickest way between two poses, looked up where it is known.
     fn best(&self, from: &Pose2, start: &Access, to: &Pose2, end: &Access) -> Result<(Travel, Via), Failure> {
+        let key = (bits(from), bits(to));
+        let known = self.known_ways().get(&key).copied();
+        let best = known.unwrap_or_else(|| {
+            let best = self.find_best(from, start, to, end);
+            let mut ways = self.known_ways();
+            if ways.len() >= MOST_WAYS {
+                ways.clear();
+            }
+            ways.insert(key, best);
+            best
+        });
+        best.ok_or_else(|| {
+            unreachable(format!(
+                "no passage {:.2} m wide leads from ({:.2}, {:.2}) to ({:.2}, {:.2})",
+                2.0 * self.radius_m,
+                from.x_m,
+                from.y_m,
+                to.x_m,
+                to.y_m
+            ))
+        })
+    }
+
+    fn known_ways(&self) -> MutexGuard<'_, HashMap<(PoseBits, PoseBits), Option<(Travel, Via)>>> {
+        self.ways.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn find_best(&self, from: &Pose2, start: &Access, to: &Pose2, end: &Access) -> Option<(Travel, Via)> {
         let seconds = |distance_m: f64, turned_rad: f64| {
             distance_m / self.speeds.linear_m_s + turned_rad / self.speeds.angular_rad_s
         };
@@ -261,18 +298,9 @@ impl Router {
             } else {
                 turn(heading_rad, to.yaw_rad)
             };
-            return Ok((total(distance_m, turned), Via::Straight));
+            return Some((total(distance_m, turned), Via::Straight));
         }
-        self.best_bent(heading_rad, start, to.yaw_rad, end, total).ok_or_else(|| {
-            unreachable(format!(
-                "no passage {:.2} m wide leads from ({:.2}, {:.2}) to ({:.2}, {:.2})",
-                2.0 * self.radius_m,
-                from.x_m,
-                from.y_m,
-                to.x_m,
-                to.y_m
-            ))
-        })
+        self.best_bent(heading_rad, start, to.yaw_rad, end, total)
     }
 
     /// The quickest way around corners, `total` of metres and radians; of those that take the same the one whose corners come first.
@@ -430,6 +458,10 @@ impl Router {
         }
         true
     }
+}
+
+fn bits(pose: &Pose2) -> PoseBits {
+    [pose.x_m, pose.y_m, pose.yaw_rad].map(f64::to_bits)
 }
 
 fn check_heading(pose: &Pose2) -> Result<(), Failure> {

@@ -71,6 +71,11 @@ pub struct Region {
     pub margin_m: f64,
 }
 
+/// Farthest coordinate of a return, metres. From: chosen, beyond what cameras and lasers of robots measure.
+const FARTHEST_M: f32 = 1000.0;
+/// Area of the largest surface, square metres. From: that of all that is in reach.
+const MOST_AREA_M2: f64 = 4.0 * (FARTHEST_M as f64) * (FARTHEST_M as f64);
+
 /// Why no surface was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
@@ -81,6 +86,16 @@ pub enum SurfaceError {
         found: usize,
         /// Needed.
         needed: usize,
+    },
+    /// The points lie where no sensor of a robot measures.
+    #[error(
+        "{far} of {found} points lie farther than {FARTHEST_M} m from the origin: the coordinates are damaged, or in another unit or order of bytes"
+    )]
+    TooFar {
+        /// Finite points in the cloud.
+        found: usize,
+        /// Those of them that are out of reach.
+        far: usize,
     },
     /// No plane fits what was asked for.
     #[error("{}: widen the height band, give or check the direction of up, or look at the table", no_plane(wanted, *tried))]
@@ -304,7 +319,10 @@ pub fn find_surfaces(
         let viewpoints = seen.viewpoints();
         let samples = sample(cloud, &viewpoints);
         if samples.len() < FEWEST {
-            return Err(SurfaceError::TooFew { found: cloud.count_finite(), needed: FEWEST });
+            let found = cloud.count_finite();
+            let far = cloud.points.iter().filter(|p| is_finite(p) && !is_in_reach(p)).count();
+            let too_few = SurfaceError::TooFew { found, needed: FEWEST };
+            return Err(if found < FEWEST { too_few } else { SurfaceError::TooFar { found, far } });
         }
         let way_up = match options.up {
             None if !viewpoints.is_empty() => {
@@ -321,7 +339,7 @@ pub fn find_surfaces(
         let is_level = |plane: &Plane| up.is_none_or(|up| plane.normal.dot(&up).abs() >= tilt_rad.cos());
         let faces_of = |plane: &Plane| {
             let mut faces = face::faces(&face_up(plane, up.as_deref(), &viewpoints), &samples, cloud, seen);
-            faces.retain(|face| face.area_m2 >= options.least_area_m2);
+            faces.retain(|face| face.area_m2 >= options.least_area_m2 && face.area_m2 <= MOST_AREA_M2);
             faces
         };
         let (teller, told) = mpsc::channel();
@@ -477,11 +495,16 @@ fn sample(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Vec<Sample> {
     };
     let half = (cloud.len() / 2).next_multiple_of(stride).min(cloud.len());
     let of = |points: &[Point3<f32>]| -> Vec<Sample> {
-        points.iter().step_by(stride).filter(|p| is_finite(p)).map(sample).collect()
+        points.iter().step_by(stride).filter(|p| is_in_reach(p)).map(sample).collect()
     };
     let (mut samples, more) = pool::join(|| of(&cloud.points[..half]), || of(&cloud.points[half..]));
     samples.extend(more);
     samples
+}
+
+/// True of a return that a sensor of a robot may have measured.
+fn is_in_reach(p: &Point3<f32>) -> bool {
+    p.iter().all(|c| c.abs() <= FARTHEST_M)
 }
 
 /// Up as people and robots hold cameras: against the images' downward axis.

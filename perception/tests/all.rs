@@ -3,6 +3,7 @@
 mod boxes;
 mod constants;
 mod corridor;
+mod damaged;
 mod dining_room;
 mod files;
 mod household;

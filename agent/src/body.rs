@@ -1,9 +1,11 @@
 //! Choice of the body that pursues a goal: simulator, recording or program.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use descry_domains::load::Domain;
 use descry_robots::Robot;
+use descry_robots::input::read_text;
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::Truth;
 
@@ -167,7 +169,7 @@ fn scene_text(scene: Option<&str>, domain: &Domain) -> Result<(String, String), 
     if let Some(text) = domain.scenes.get(name) {
         return Ok((name.into(), text.clone()));
     }
-    let text = std::fs::read_to_string(name).map_err(|e| {
+    let text = read_text(Path::new(name)).map_err(|e| {
         let known: Vec<&str> = domain.scenes.keys().map(String::as_str).collect();
         CommandError::BadInput(format!(
             "--scene {name}: {e}\n  expected a TOML file, or one of: {}",

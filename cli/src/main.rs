@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         ));
     }));
     warn_people();
+    commands::heed_limits();
     let outcome = std::panic::catch_unwind(|| {
         let command = commands::asked();
         let stop = Stop::default();

@@ -12,6 +12,7 @@ mod explain;
 mod hand;
 mod household;
 mod kills;
+mod limits;
 mod live;
 mod lsp;
 mod mcp;

@@ -332,8 +332,8 @@ fn every_run_has_a_folder_of_its_own() {
 fn the_world_around_a_run_is_as_it_is() {
     let folder = TempDir::new().expect("a folder can be made");
     let folder = folder.path();
-    check_refused(folder, &["recognise", "/dev/zero"], 2, &["/dev/zero", "more than 268 MB"]);
-    check_refused(folder, &["check", "/dev/zero"], 2, &["/dev/zero", "more than 268 MB"]);
+    check_refused(folder, &["recognise", "/dev/zero"], 2, &["/dev/zero", "it is a device"]);
+    check_refused(folder, &["check", "/dev/zero"], 2, &["/dev/zero", "it is a device"]);
     kill_after(folder, &["find", "cup A", "--run", "runs/one"], 8);
     let listed = outcome(folder, &["runs"]);
     let listed = String::from_utf8_lossy(&listed.stdout).into_owned();

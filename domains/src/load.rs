@@ -11,6 +11,7 @@ use std::sync::Arc;
 use descry_perception::laser::KnownShape;
 use descry_perception::recognise::{ObjectModel, check_models};
 use descry_planner::{Findings, Source};
+use descry_robots::input::{clipped, read_text};
 use include_dir::{Dir, include_dir};
 use serde::Deserialize;
 
@@ -208,7 +209,7 @@ fn read_folder(folder: &Path, key: &str, files: &mut Files) -> Result<(), LoadEr
 }
 
 fn read_file(path: &Path, key: String, files: &mut Files) -> Result<(), LoadError> {
-    let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
+    let text = read_text(path).map_err(|e| unreadable(path, &e))?;
     files.insert(key, (path.display().to_string(), text));
     Ok(())
 }
@@ -281,5 +282,8 @@ fn shape(path: &str, text: &str) -> Result<KnownShape, LoadError> {
 }
 
 fn parse<T: for<'de> Deserialize<'de>>(path: &str, text: &str) -> Result<T, LoadError> {
-    toml::from_str(text).map_err(|e| LoadError::Toml { path: path.into(), drawn: e.to_string() })
+    toml::from_str(text).map_err(|e| {
+        let drawn = e.to_string().lines().map(clipped).collect::<Vec<_>>().join("\n");
+        LoadError::Toml { path: path.into(), drawn }
+    })
 }

@@ -105,7 +105,7 @@ impl Source {
     /// # Errors
     /// [`ExperimentError::File`] if it is not there or no text.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let text = descry_robots::input::read_text(path).map_err(|e| {
             ExperimentError::file(
                 path,
                 &format!("{e}\n  expected an experiment: a TOML file, as those in domains/*/experiments"),

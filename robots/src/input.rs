@@ -1,7 +1,11 @@
 //! A mistake in a file that a person wrote or recorded: where, what was expected, how to mend it.
 
 use serde::de::DeserializeOwned;
+use std::fs::{File, FileType};
+use std::io::{Error, ErrorKind, Read};
 use std::ops::Range;
+use std::os::unix::fs::FileTypeExt;
+use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
 /// Fault in a file, drawn under its text.
@@ -14,8 +18,10 @@ pub struct InputError {
     pub line: usize,
     /// Column in characters, from 1; 0 with `line` 0.
     pub column: usize,
-    /// The line itself.
+    /// The line itself, as much of it as a person reads around the mistake.
     pub excerpt: String,
+    /// Column of the mistake within the excerpt, in characters, from 1.
+    caret: usize,
     /// Found and expected values.
     pub problem: String,
     /// Mend.
@@ -30,6 +36,7 @@ impl InputError {
             line: 0,
             column: 0,
             excerpt: String::new(),
+            caret: 0,
             problem: problem.into(),
             mend: mend.into(),
         }
@@ -50,9 +57,13 @@ impl InputError {
         let before = &text[..end];
         let line = before.matches('\n').count() + 1;
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-        let excerpt = text[line_start..].lines().next().unwrap_or("").to_string();
         let column = before[line_start..].chars().count() + 1;
-        InputError { file: file.into(), line, column, excerpt, problem: problem.into(), mend: mend.into() }
+        let hidden = column.saturating_sub(EXCERPT / 2);
+        let shown = text[line_start..].lines().next().unwrap_or("");
+        let excerpt = clipped(shown.char_indices().nth(hidden).map_or("", |(at, _)| &shown[at..]));
+        let problem = problem.into().lines().map(clipped).collect::<Vec<_>>().join("\n");
+        let caret = column - hidden;
+        InputError { file: file.into(), line, column, excerpt, caret, problem, mend: mend.into() }
     }
 
     fn drawn(&self) -> String {
@@ -61,11 +72,68 @@ impl InputError {
         }
         let number = self.line.to_string();
         let margin = " ".repeat(number.len());
-        let caret = " ".repeat(self.column.saturating_sub(1));
+        let caret = " ".repeat(self.caret.saturating_sub(1));
         format!(
             "{}:{}:{}: {}\n{margin} |\n{number} | {}\n{margin} | {caret}^ {}",
             self.file, self.line, self.column, self.problem, self.excerpt, self.mend
         )
+    }
+}
+
+/// Most characters of a line that an error shows. From: chosen, twice the width of a terminal.
+const EXCERPT: usize = 240;
+
+/// A line as an error shows it: the beginning, and a mark where more follows.
+pub fn clipped(line: &str) -> String {
+    match line.char_indices().nth(EXCERPT) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line.into(),
+    }
+}
+
+/// Bytes of the longest text that a person writes: a domain, a scene, settings. From: chosen.
+pub const MOST_TEXT_BYTES: u64 = 16 << 20;
+
+/// Reads a file of at most so many bytes. Named pipes, devices and sockets are refused before anything is awaited from them.
+///
+/// # Errors
+/// The system's, or the reason why it is not read.
+pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let metadata = std::fs::metadata(path)?;
+    if !metadata.is_file() {
+        let text = format!("it is {}, and a file was expected", kind_of(metadata.file_type()));
+        return Err(Error::new(ErrorKind::InvalidInput, text));
+    }
+    let mut bytes = Vec::new();
+    if metadata.len() <= most {
+        File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    if metadata.len() > most || bytes.len() as u64 > most {
+        let text = format!("it has more than {} MB, and a smaller file was expected", most / 1_000_000);
+        return Err(Error::new(ErrorKind::FileTooLarge, text));
+    }
+    Ok(bytes)
+}
+
+/// Reads a text that a person wrote.
+///
+/// # Errors
+/// As [`read_bytes`], and if it is no UTF-8.
+pub fn read_text(path: &Path) -> std::io::Result<String> {
+    String::from_utf8(read_bytes(path, MOST_TEXT_BYTES)?).map_err(|e| {
+        let at = e.utf8_error().valid_up_to();
+        Error::new(ErrorKind::InvalidData, format!("it is no text: byte {at} is not UTF-8"))
+    })
+}
+
+/// Kind of what is no file, in words.
+pub fn kind_of(file_type: FileType) -> &'static str {
+    match file_type {
+        kind if kind.is_dir() => "a folder",
+        kind if kind.is_fifo() => "a named pipe",
+        kind if kind.is_socket() => "a socket",
+        kind if kind.is_char_device() || kind.is_block_device() => "a device",
+        _ => "no file",
     }
 }
 

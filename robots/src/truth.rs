@@ -79,7 +79,7 @@ impl Truth {
     /// Names the file, and what is wrong with it.
     pub fn read(file: &Path) -> Result<Truth, String> {
         let place = file.display();
-        let text = std::fs::read_to_string(file).map_err(|e| format!("{place}: {e}"))?;
+        let text = crate::input::read_text(file).map_err(|e| format!("{place}: {e}"))?;
         serde_json::from_str(&text).map_err(|e| format!("{place}: this is no truth of a scene: {e}"))
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use descry_memory::{Draft, Record};
+use descry_robots::input::read_bytes;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -153,11 +154,14 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
 }
 
+/// Bytes of the longest such file. From: chosen.
+const MOST_BYTES: u64 = 1 << 30;
+
 /// Reads such a file; says why if it is not what was written.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
     let shown = path.display();
-    let text = std::fs::read_to_string(path).map_err(|e| format!("{shown}: {e}"))?;
-    let mut value: Value = serde_json::from_str(&text).map_err(|e| format!("{shown} is damaged: {e}"))?;
+    let bytes = read_bytes(path, MOST_BYTES).map_err(|e| format!("{shown}: {e}"))?;
+    let mut value: Value = serde_json::from_slice(&bytes).map_err(|e| format!("{shown} is damaged: {e}"))?;
     let written = value.as_object_mut().and_then(|fields| fields.shift_remove(CHECKSUM));
     if written != Some(checksum(&value).into()) {
         return Err(format!("{shown} is damaged: its content does not fit its checksum"));

@@ -1,6 +1,7 @@
 //! What several commands read and print in the same way.
 
 use std::io::{IsTerminal, Read, Write};
+use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,6 +14,7 @@ use descry_domains::program::ProgramAttachment;
 use descry_domains::saying::Saying;
 use descry_memory::Fault;
 use descry_planner::{Attachment, Attachments, Findings, Source};
+use descry_robots::input::{read_bytes, read_text};
 use serde::Serialize;
 
 use crate::commands::fitted;
@@ -115,26 +117,34 @@ fn shows_colours(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
 }
 
-/// So much is read of what does not say how long it is: a pipe or a device.
+/// So much is read of what does not say how long it is: standard input and its like.
 const MOST_STREAM_BYTES: u64 = 256 << 20;
 
-/// Reads a file of at most so many bytes; more, or an end that does not come, is an error.
+/// Reads a file of at most so many bytes, or what this process was given as an open pipe or terminal. A named pipe may have nobody
+/// who writes, and a device no end: they are refused.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
     let name = path.display();
     let refused = |e: std::io::Error| CommandError::BadInput(format!("{name}: {e}"));
+    let kind = std::fs::metadata(path).map_err(refused)?.file_type();
+    if kind.is_file() || !is_given(path, kind) {
+        return read_bytes(path, most).map_err(refused);
+    }
     let file = std::fs::File::open(path).map_err(refused)?;
-    let metadata = file.metadata().map_err(refused)?;
-    let most = if metadata.is_file() { most } else { most.min(MOST_STREAM_BYTES) };
+    let most = most.min(MOST_STREAM_BYTES);
     let too_much = || {
         let text = format!("{name}: it has more than {} MB, the most that is read", most / 1_000_000);
         CommandError::BadInput(text)
     };
-    if metadata.len() > most {
-        return Err(too_much());
-    }
     let mut bytes = Vec::new();
     file.take(most + 1).read_to_end(&mut bytes).map_err(refused)?;
     if bytes.len() as u64 > most { Err(too_much()) } else { Ok(bytes) }
+}
+
+/// Whether this is an open pipe of this process (`/dev/stdin`, `<(command)`), which has no place in a folder, or its terminal.
+fn is_given(path: &Path, kind: std::fs::FileType) -> bool {
+    let is_pipe = kind.is_fifo() && std::fs::canonicalize(path).is_err();
+    let is_terminal = || std::fs::File::open(path).is_ok_and(|file| file.is_terminal());
+    is_pipe || (kind.is_char_device() && is_terminal())
 }
 
 /// Where the programs behind a domain's attachments are named.
@@ -163,8 +173,8 @@ impl AttachmentArguments {
         let beside = domain.with_file_name("domain.toml");
         let file = self.attachments.clone().or_else(|| beside.is_file().then_some(beside));
         if let Some(file) = file {
-            let text = std::fs::read_to_string(&file)
-                .map_err(|e| CommandError::BadInput(format!("{}: {e}", file.display())))?;
+            let text =
+                read_text(&file).map_err(|e| CommandError::BadInput(format!("{}: {e}", file.display())))?;
             let programs: Programs = toml::from_str(&text)
                 .map_err(|e| CommandError::BadInput(format!("{}\n{e}", file.display())))?;
             let folder = file.parent().filter(|f| !f.as_os_str().is_empty()).map(Path::to_path_buf);

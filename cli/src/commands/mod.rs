@@ -11,6 +11,7 @@ mod goals;
 mod input;
 #[doc(hidden)]
 pub mod keeping;
+mod limits;
 #[doc(hidden)]
 pub mod line;
 mod live;
@@ -35,6 +36,7 @@ mod validate;
 use clap::Subcommand;
 
 pub use input::{is_coloured, narrate, narrate_fitted};
+pub use limits::heed_limits;
 pub use line::asked;
 
 use descry_agent::exit::{CommandError, Exit};

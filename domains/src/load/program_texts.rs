@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use descry_robots::input::{MOST_TEXT_BYTES, read_bytes};
+
 use super::Domain;
 
 impl Domain {
@@ -25,7 +27,7 @@ pub fn program_texts<'c>(command: impl Iterator<Item = &'c str>, folder: &Path) 
         let beside = beside.into_iter().flatten().flatten().map(|entry| entry.path());
         let alike = beside.filter(|path| path.extension() == Some(ending) && path.is_file());
         for path in alike.chain([named.clone()]) {
-            if let Ok(bytes) = std::fs::read(&path) {
+            if let Ok(bytes) = read_bytes(&path, MOST_TEXT_BYTES) {
                 texts.insert(path, String::from_utf8_lossy(&bytes).into_owned());
             }
         }

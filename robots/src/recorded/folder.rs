@@ -157,7 +157,7 @@ fn shown(path: &Path) -> String {
 }
 
 fn read(path: &Path) -> Result<String, InputError> {
-    fs::read_to_string(path).map_err(|e| {
+    crate::input::read_text(path).map_err(|e| {
         InputError::whole(shown(path), format!("cannot be read: {e}"), "a text file is expected here")
     })
 }
@@ -376,8 +376,12 @@ fn decode(path: &Path) -> Result<image::DynamicImage, InputError> {
     open(path)?.decode().map_err(|e| no_image(path, &e))
 }
 
-fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<fs::File>>, InputError> {
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+/// Bytes of the largest image of a camera. From: chosen.
+const MOST_IMAGE_BYTES: u64 = 256 << 20;
+
+fn open(path: &Path) -> Result<ImageReader<std::io::Cursor<Vec<u8>>>, InputError> {
+    let bytes = crate::input::read_bytes(path, MOST_IMAGE_BYTES).map(std::io::Cursor::new);
+    let reader = bytes.map(ImageReader::new).and_then(ImageReader::with_guessed_format);
     reader.map_err(|e| InputError::whole(shown(path), format!("cannot be read: {e}"), "an image is expected"))
 }
 

@@ -110,8 +110,9 @@ fn a_value_of_the_file_may_be_given_on_the_command_line() {
         std::fs::read_to_string(folder.path().join("job.yaml")).expect("it is written")
     };
     let plain = of(&[]);
-    let set = of(&["--set", "runs=5", "--set", "goal.0.targets=[\"cup B\"]"]);
-    let changed = plain.replace("runs = 2", "runs = 5").replace("[\\\"cup A\\\"]", "[\\\"cup B\\\"]");
+    let set =
+        of(&["--set", "runs=5", "--set", "goal.0.targets=[\"cup B\"]", "--set", "goal.0.say=\"find cup B\""]);
+    let changed = plain.replace("runs = 2", "runs = 5").replace("cup A", "cup B");
     assert_ne!(plain, set);
     assert_eq!(set, changed, "nothing else differs");
     for (wrong, words) in [

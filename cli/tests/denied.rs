@@ -45,7 +45,7 @@ means = "(exists (?s - surface) (and (not (= ?s <surface>)) (>= (presence <thing
 question = true
 
 [[goal]]
-say = "what is on <surface>"
+say = "what stands upon <surface>"
 means = "(>= (clarity <surface>) <threshold>)"
 answer.achieved = "cups: {(is ? cup)}; on the <surface>: {(on ? <surface>)}; cylinders: {(is ? cylinder)}"
 
@@ -102,7 +102,7 @@ fn what_was_not_looked_at_is_not_denied() {
 #[test]
 fn an_answer_of_ones_own_lists_what_was_seen() {
     let folder = own();
-    let report = check(&folder, "what is on the desk", 96501, "achieved", "cups: none; on the desk: ");
+    let report = check(&folder, "what stands upon the desk", 96501, "achieved", "cups: none; on the desk: ");
     let why = report["why"].as_str().unwrap_or_default();
     assert!(why.contains("mug") && !why.contains("on the desk: none"), "{report}");
 }

@@ -165,7 +165,7 @@ fn a_surface_that_is_not_there_is_refused() {
         folder.path(),
         &["do", "is cup A on the shelf", "--scene", "two.toml", "--run", "r"],
         2,
-        &["nothing is called \"shelf\"", "known: table, sideboard"],
+        &["\"shelf\"", "table, sideboard"],
     );
 }
 

@@ -226,7 +226,8 @@ pub fn check_robot(py: Python<'_>, robot: &str) -> PyResult<()> {
         let domain = Domain::load(DEFAULT).map_err(CommandError::bad_input)?;
         let body = body::open(robot, None, 1, &domain)?;
         let told = |breaches: conformance::Breaches| {
-            let each = breaches.0.iter().map(|b| format!("every body: {}\n  this one: {}", b.promise, b.found));
+            let each =
+                breaches.0.iter().map(|b| format!("every body: {}\n  this one: {}", b.promise, b.found));
             CommandError::Broken(each.collect::<Vec<_>>().join("\n"))
         };
         runtime()?.block_on(conformance::check(&*body.robot)).map_err(told)

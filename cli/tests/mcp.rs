@@ -212,7 +212,7 @@ fn a_run_tells_its_steps_and_is_explained() {
         steps.push(heard["params"]["message"].as_str().unwrap_or_default().to_string());
     };
     assert!(
-        run["verdict"] == "achieved" && steps.iter().any(|step| step.contains("observe")),
+        run["verdict"] == "achieved" && steps.iter().any(|step| step.contains("looking at")),
         "{run}\n{steps:?}"
     );
     let why = assistant.answer("explain", json!({ "run": run["run"] }));

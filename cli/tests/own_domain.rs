@@ -136,7 +136,7 @@ fn an_answer_is_about_the_goal_that_was_asked() {
         "domain.toml",
         "[[goal]]\nsay = \"look around\"\nmeans = \"(observed table-3 table)\"\nabout = \"look once\"",
     );
-    let holds = "achieved: it holds that (observed table-3 table)";
+    let holds = "achieved: it holds that the table has been looked at from table-3";
     check(&[look], "look around", 0, &[holds], &["identified"]);
 }
 

@@ -145,9 +145,9 @@ fn one_head_looks_at_one_surface_at_a_time() {
         if line.starts_with("plan") {
             last_end_s = f64::NEG_INFINITY;
         }
-        let Some((start, rest)) = line.split_once(": (observe") else { continue };
+        let Some((start, rest)) = line.split_once(" s  looking at ") else { continue };
         let Some(duration) =
-            rest.rsplit('[').next().and_then(|d| d.trim_end_matches(']').parse::<f64>().ok())
+            rest.rsplit(", ").next().and_then(|d| d.trim_end_matches(" s").parse::<f64>().ok())
         else {
             continue;
         };

@@ -73,7 +73,7 @@ pub struct Region {
 
 /// Farthest coordinate of a return, metres. From: chosen, beyond what cameras and lasers of robots measure.
 const FARTHEST_M: f32 = 1000.0;
-/// Area of the largest surface, square metres. From: that of all that is in reach.
+/// Area of the largest surface, square metres. From: derived, that of all that is in reach.
 const MOST_AREA_M2: f64 = 4.0 * (FARTHEST_M as f64) * (FARTHEST_M as f64);
 
 /// Why no surface was found.

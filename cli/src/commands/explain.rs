@@ -27,8 +27,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         Err(e) => (None, Some(e)),
     };
     let mut explained = descry_explain::of(&record, &header, report.as_ref())?;
-    // Sentences rest on few records; whether all are whole is asked of the record as a whole.
-    let faults = record.verify().map_err(CommandError::broken)?.faults;
+    let faults = &record.recovery().faults;
     let otherwise = faults.iter().map(ToString::to_string).chain(damaged.iter().map(ToString::to_string));
     for lost in otherwise.chain(descry_agent::run::lost_of_header(folder)) {
         if !explained.lost.contains(&lost) {

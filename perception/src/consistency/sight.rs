@@ -105,7 +105,7 @@ fn mode(heights_m: impl Iterator<Item = f64>) -> Option<f64> {
     }
     let most = (1..counts.len() - 1).max_by_key(|&n| counts[n - 1] + counts[n] + counts[n + 1])?;
     (counts[most - 1] + counts[most] + counts[most + 1] >= FEWEST)
-        .then(|| (most as f64 - 0.5) * STEP_M - BAND_M)
+        .then_some((most as f64 - 0.5) * STEP_M - BAND_M)
 }
 
 /// The plane nearest to some points by least squares of their heights over another one.

@@ -121,7 +121,7 @@ impl Measured {
             }
             (at, normal)
         };
-        let places: Vec<_> = pool::map(&chosen, 1, place);
+        let places: Vec<_> = pool::map(chosen, 1, place);
         cloud.points = places.iter().map(|p| p.0).collect();
         cloud.normals = Some(places.iter().map(|p| p.1).collect());
         Ok(cloud)

@@ -19,7 +19,13 @@ pub fn depth_mm(k: usize, column: u32, row: u32) -> u16 {
 fn write_depth(path: &Path, k: usize) {
     let image: ImageBuffer<Luma<u16>, Vec<u16>> =
         ImageBuffer::from_fn(SIZE.0, SIZE.1, |u, v| Luma([depth_mm(k, u, v)]));
-    image.save(path).unwrap();
+    if path.extension().is_some_and(|ending| ending == "pgm") {
+        let mut bytes = format!("P5\n{} {}\n65535\n", SIZE.0, SIZE.1).into_bytes();
+        image.pixels().for_each(|pixel| bytes.extend(pixel.0[0].to_be_bytes()));
+        fs::write(path, bytes).unwrap();
+    } else {
+        image.save(path).unwrap();
+    }
 }
 
 fn write(path: &Path, text: &str) {

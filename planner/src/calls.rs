@@ -20,7 +20,7 @@ use crate::task::{Module, ModuleId, Task};
 
 use self::terms::{Origin, Sources, Terms};
 
-/// A failed call on its way up to [`crate::plan`].
+/// A failed call on its way up to [`crate::plan()`].
 pub type Failure = Box<AttachmentError>;
 
 /// Data that all calls of a module share.

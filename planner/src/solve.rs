@@ -221,7 +221,9 @@ fn search_for(
         least.set(least.get().min(cost));
         Ok(better.then_some(plan))
     };
-    if grounded.goal_reachable && is_classical(&grounded) {
+    // Parameters that a module proposes are no part of the ground actions: only the search in time asks for them.
+    let proposes = task.actions.iter().any(|action| !action.grounding.is_empty());
+    if grounded.goal_reachable && !proposes && is_classical(&grounded) {
         // Violations are numbers that the original does not have.
         let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
         let outcome = plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan)?;

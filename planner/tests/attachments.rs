@@ -176,3 +176,19 @@ fn missing_and_failing_attachments_are_errors_at_their_place() {
     let drawn = error.findings().map(|findings| findings.render(false)).unwrap_or_default();
     assert!(drawn.contains("asked here, by `move`") && drawn.contains("(path-cost ?from ?to"), "{drawn}");
 }
+
+#[test]
+fn names_that_came_as_a_list_of_texts_are_proposals() {
+    let domain =
+        "(define (domain shelf) (:requirements :typing :negative-preconditions :modules :grounding-modules)
+      (:types book) (:modules (free-slot ?b - book grounding free_slot@x)) (:predicates (placed ?b - book))
+      (:action place :parameters (?b - book) :grounding ([free-slot ?b])
+        :precondition (not (placed ?b)) :effect (placed ?b)))";
+    let problem =
+        "(define (problem one) (:domain shelf) (:objects atlas - book) (:init) (:goal (placed atlas)))";
+    let task = Task::read(&Source::new("d", domain), &Source::new("p", problem)).expect("it is a task");
+    let mut attachments = Attachments::new();
+    // As any JSON list of texts is read.
+    attachments.insert("free_slot", |_: &Call| Ok(Answer::Writes(vec![FactValue::Object("left".into())])));
+    assert_eq!(names(&solved(&task, &attachments)), ["place atlas left"]);
+}

@@ -117,7 +117,6 @@ fn line_fits(expected: &str, found: &str) -> bool {
 }
 
 #[test]
-#[ignore = "slow: a dozen runs; its pages follow the narration one by one"]
 fn the_tutorial_holds_word_for_word() {
     if Command::new("python3").arg("--version").output().is_err() {
         eprintln!("skipped: there is no python3");

@@ -28,7 +28,7 @@ pub struct Reason {
 
 /// What makes a plan necessary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
+#[serde(rename_all = "snake_case", tag = "because")]
 pub enum Trigger {
     /// The run begins.
     Begin,

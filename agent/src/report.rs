@@ -95,8 +95,8 @@ impl Event {
         let said = |call: &Call| saying.say(&call.to_string());
         match self {
             Event::Goal { said, pddl, start, candidates } => {
-                let (wanted, poses) = (saying.say(pddl), count(*candidates, "pose"));
-                ("goal".into(), format!("{said}\n{wanted}\nfrom {start}; {poses} to look from"))
+                let (wanted, viewpoints) = (saying.say(pddl), count(*candidates, "viewpoint"));
+                ("goal".into(), format!("{said}\n{wanted}\nfrom {start}; {viewpoints}"))
             }
             Event::Planned { round, because, reason, steps, makespan_s, calls } => {
                 let because = reason.as_ref().map_or_else(|| because.clone(), |reason| reason.told(saying));

@@ -193,7 +193,7 @@ fn nouns() -> Vec<String> {
         nouns.extend(domain.objects.iter().map(|o| o.name.clone()));
     }
     // An object of a task and the confidence of an answer are nobody's own.
-    nouns.retain(|n| n != "object" && n != "confidence" && n != "kind");
+    nouns.retain(|n| n != "object" && n != "confidence");
     nouns.sort_unstable();
     nouns.dedup();
     nouns

@@ -1,8 +1,7 @@
 //! Tests of `stores::mongo::number`.
 
 use descry_memory::document::RecordId;
-use descry_memory::stores::mongo::number::*;
-use descry_memory::stores::mongo::number::{Name, RecordId};
+use descry_memory::stores::mongo::number::Name;
 
 #[test]
 fn own_numbers_are_short_and_all_are_told_apart() {

@@ -438,12 +438,13 @@ fn the_mugs_are_found_on_real_views() {
 }
 
 #[test]
+#[ignore = "data: reads ../shared"]
 fn everything_on_a_real_table_is_identified_where_it_stands() {
     check_real_table(2);
 }
 
 #[test]
-#[ignore = "slow: 16 looks at a whole kitchen: a minute"]
+#[ignore = "data: reads ../shared; 16 looks at a whole kitchen, a minute"]
 fn everything_on_a_real_table_is_identified_where_it_stands_from_all_its_views() {
     check_real_table(1);
 }

@@ -1,4 +1,5 @@
-//! What the verdict of a finished run rests on, by the records that say it: how it ended, what was believed, the looks behind that.
+//! Evidence behind the verdict of a finished run, by record ID: the end of the run, the last belief, and the
+//! views behind it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -10,22 +11,22 @@ use crate::wording::{count, share};
 use descry_agent::exit::CommandError;
 use descry_agent::standing::{self, End, InDoubt, Of, Rests};
 
-/// See the module.
+/// Evidence behind a verdict.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Basis {
-    /// The record of how it ended, and what that was.
+    /// The record of the run's end, with its content.
     pub ended: Option<(RecordId, End)>,
-    /// What is in doubt in the end.
+    /// Open doubts at the end.
     pub in_doubt: Vec<InDoubt>,
-    /// The record of what was believed last.
+    /// The record of the last belief.
     pub belief: Option<RecordId>,
-    /// What was seen of each surface.
+    /// Last percepts of each surface.
     pub surfaces: Vec<Perceived>,
-    /// What of it is damaged or not in the record.
+    /// Damaged or missing parts of the record, one message each.
     pub lost: Vec<String>,
 }
 
-/// What was seen of a surface in the end.
+/// Last percepts of a surface.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Perceived {
     /// The surface's symbol.
@@ -36,9 +37,10 @@ pub struct Perceived {
     pub looks: Vec<RecordId>,
 }
 
-/// It, as far as the record says it.
+/// Reads the evidence from a record, as far as the record holds it.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record) -> Result<Basis, CommandError> {
     let mut lost = Vec::new();
@@ -78,7 +80,7 @@ pub fn of(record: &Record) -> Result<Basis, CommandError> {
     Ok(Basis { ended, in_doubt, belief, surfaces: surfaces.into_values().collect(), lost })
 }
 
-/// What a record of percepts says of its surface.
+/// The surface, record ID and used views of a percepts document; none if it is malformed.
 fn perceived(document: &Document) -> Option<Perceived> {
     let body = &document.body;
     let views: Vec<RecordId> = serde_json::from_value(body["views"].clone()).ok()?;
@@ -120,7 +122,7 @@ impl fmt::Display for Basis {
     }
 }
 
-/// How sure it is of something, and what is left.
+/// One line of text: the certainty reached, the share seen of each place, and the remaining probability.
 fn chances(doubt: &InDoubt) -> String {
     let about = match doubt.of {
         Of::Thing => doubt.about.clone(),

@@ -1,4 +1,4 @@
-//! Why a plan was this one, in short: what it takes as the planner counts, and what each rival would have taken instead.
+//! Short justification of a plan: its total in the planner's metric, and the totals of its alternatives.
 
 use descry_planner::Unmet;
 
@@ -11,7 +11,8 @@ use descry_agent::reason::Break;
 use descry_agent::standing::{Of, Seen};
 use descry_agent::weigh::{Way, Weighed};
 
-/// Why this plan and not another, as far as the record says; where the planner did not count to the end, with all figures.
+/// Sentences that justify a plan over its alternatives, as far as the record allows; with all figures where
+/// the search was cut short.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     if chapter.is_late() {
         return vec![rivals::IN_TIME.into()];
@@ -52,13 +53,13 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     said
 }
 
-/// Whether a plan counts for more than the seconds that it takes.
+/// True if the planner's metric exceeds the makespan of the plan by more than [`LONGER_S`].
 pub fn counts_more(chapter: &Chapter) -> bool {
     let chosen = chapter.weighed.as_ref().and_then(|weighed| weighed.chosen.as_ref());
     chosen.and_then(whole_s).is_some_and(|whole_s| whole_s > chapter.makespan_s + LONGER_S)
 }
 
-/// What the others that stand out would have come to.
+/// One sentence with the total of each notable alternative; none without alternatives.
 fn instead(
     chapter: &Chapter,
     (weighed, chosen): (&Weighed, &Way),
@@ -75,7 +76,7 @@ fn instead(
     (!all.is_empty()).then(|| format!("begun otherwise: {}.", all.join("; ")))
 }
 
-/// A way by its last step, for which the others are; by all where that is another's last, too.
+/// Label of an alternative: its last step, or all its steps where another alternative has the same last step.
 fn called(way: &Way, chosen: &Way, rivals: &[&Way], asked: &Asked<'_>) -> String {
     let alike = rivals.iter().copied().chain([chosen]).filter(|other| other.steps.last() == way.steps.last());
     match way.steps.last() {
@@ -84,7 +85,8 @@ fn called(way: &Way, chosen: &Way, rivals: &[&Way], asked: &Asked<'_>) -> String
     }
 }
 
-/// What a way comes to with the rest of the plan behind it, beside what the plan counts for, which may be more than it takes.
+/// Total of an alternative with the rest of the plan behind it, relative to the chosen plan. `is_more` is
+/// true if the metric counts more than the time that passes.
 fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> String {
     let take = if is_more { "count" } else { "take" };
     match way.whole {
@@ -102,7 +104,7 @@ fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> St
     }
 }
 
-/// What keeps the rest of the plan from being done behind a way.
+/// The obstacle that keeps the rest of the plan from following an alternative.
 fn blocked_by(way: &Way, blocked: &Break, asked: &Asked<'_>) -> String {
     let why = rivals::would_be(blocked, asked);
     match (blocked.missed_goal(), &blocked.step) {
@@ -121,7 +123,7 @@ fn blocked_by(way: &Way, blocked: &Break, asked: &Asked<'_>) -> String {
     }
 }
 
-/// That a way would not be enough, with what is hoped of it.
+/// Clause for an alternative that would miss the goal, with its expected gain.
 fn not_enough(way: &Way) -> String {
     match way.gains > 0.0 {
         true => format!("would not be enough (+{} is hoped for)", share(way.gains)),
@@ -129,7 +131,8 @@ fn not_enough(way: &Way) -> String {
     }
 }
 
-/// Where a thing may be before anything was seen; later the looks say it.
+/// Prior probability of each place for the requested object; first plan only, since later plans are explained
+/// by the views.
 fn unseen(chapter: &Chapter) -> Option<String> {
     let before = chapter.before.as_ref().filter(|_| chapter.round == 1)?;
     let doubt = before.doubts.iter().find(|doubt| doubt.of == Of::Thing && doubt.seen.len() > 1)?;

@@ -18,66 +18,67 @@ use descry_agent::report::{Event, failed};
 use descry_agent::run::Resumed;
 use descry_agent::weigh::{self, Weighed};
 
-/// A plan and what came of it.
+/// A plan and its outcome.
 #[derive(Debug, Default)]
 pub struct Chapter {
-    /// Its number.
+    /// Number of the plan, from 1.
     pub round: usize,
     /// Seconds since the run began.
     pub at_s: f64,
-    /// Why the plan before no longer did; none: a record of an earlier version has a sentence alone.
+    /// Reason for replanning; none in records of earlier versions, which hold only a sentence.
     pub reason: Option<Reason>,
-    /// The same in a sentence.
+    /// Reason for replanning, as a sentence.
     pub because: String,
-    /// The greatest of the numbers of which one would do, and none does.
+    /// The greatest of the numbers of an unmet existential condition, with its name.
     pub most: Option<(String, f64)>,
     /// Its steps.
     pub steps: Vec<Step>,
     /// The calls of its steps.
     pub calls: Vec<Call>,
-    /// What it takes to its end, seconds.
+    /// Makespan, seconds.
     pub makespan_s: f64,
-    /// How things stood when it was made; none: the record does not say.
+    /// State of the run when the plan was made; none if the record does not hold it.
     pub before: Option<Standing>,
-    /// What it was weighed against; none: the record does not say.
+    /// Alternatives that the plan was compared with; none if the record does not hold them.
     pub weighed: Option<Weighed>,
-    /// What happened from then on.
+    /// Events from this plan until the next.
     pub deeds: Vec<Deed>,
 }
 
-/// Something that happened.
+/// An event of execution.
 #[derive(Debug)]
 pub enum Deed {
     /// A step began.
     Began(Call),
-    /// How things stand by then.
+    /// State of the run after a step.
     Stands(Standing),
-    /// What came of a step.
+    /// The outcome of a step, as a sentence.
     Ended(Call, String),
     /// A step failed.
     Failed {
         /// The call.
         call: Call,
-        /// Why, in a sentence.
+        /// Reason for the failure, as a sentence.
         because: String,
-        /// The condition in PDDL that should have held until the end, if that is what failed.
+        /// The violated invariant (`over all` condition) in PDDL, if a violation is the failure.
         unkept: Option<String>,
-        /// What was concluded, in a sentence.
+        /// Conclusion from the failure, as a sentence.
         therefore: String,
-        /// The same as a value; none of a record of an earlier version.
+        /// Conclusion from the failure; none in records of earlier versions.
         lesson: Option<Lesson>,
-        /// What is taken to be so from then on, and what no longer; none: the record does not say.
+        /// Difference in facts and numbers after the failure; none if the record does not hold it.
         changed: Option<Difference>,
     },
-    /// The run was cut off, and gone on with.
+    /// The run was interrupted and resumed.
     Resumed,
-    /// Something was learned.
+    /// A note of perception or of the belief.
     Noted(Note),
 }
 
-/// The plans of a run, which was gone on with so often, and what of them is lost.
+/// Reads the plans of a run, with a message for each lost part. `resumed` lists its resumptions.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(
     record: &Record,
@@ -147,7 +148,7 @@ pub fn of(
 }
 
 impl Chapter {
-    /// The calls that were carried out to their end, and the others.
+    /// The calls of completed steps, and those of all other steps.
     pub fn steps_done(&self) -> (Vec<&Call>, Vec<&Call>) {
         let mut done: Vec<&Call> = Vec::new();
         for deed in &self.deeds {
@@ -169,17 +170,17 @@ impl Chapter {
         (done, open)
     }
 
-    /// Whether a step of an action counts for more seconds in its plan than it takes.
+    /// True if a step of this action has a longer duration in the plan than `takes_s`.
     pub fn counts_more(&self, action: &str, takes_s: f64) -> bool {
         self.steps.iter().any(|step| step.action == action && step.duration_s > takes_s + 0.05)
     }
 
-    /// How things stood after each of its steps.
+    /// The state of the run after each step.
     pub fn stood(&self) -> impl Iterator<Item = &Standing> {
         self.deeds.iter().filter_map(|deed| if let Deed::Stands(now) = deed { Some(now) } else { None })
     }
 
-    /// The steps that failed, each with why.
+    /// The failed steps, each with the reason as a sentence.
     pub fn failures(&self, saying: &Saying) -> Vec<(&Call, String)> {
         let mut all = Vec::new();
         for deed in &self.deeds {
@@ -190,7 +191,7 @@ impl Chapter {
         all
     }
 
-    /// What no longer worked of the plan before.
+    /// The violation that ended the previous plan, if one did.
     pub fn broken(&self) -> Option<&Break> {
         match &self.reason.as_ref()?.trigger {
             Trigger::Broken(broken) => Some(broken),
@@ -198,23 +199,23 @@ impl Chapter {
         }
     }
 
-    /// Whether the plan before would have done, but counted for more or fewer seconds.
+    /// True if the previous plan stayed valid but its metric changed.
     pub fn is_reckoned(&self) -> bool {
         self.broken().is_some_and(|broken| broken.reckoned().is_some())
     }
 
-    /// States after which the planner's search was ended without a proof.
+    /// Number of states at which the planner's search was cut short without a proof, as text.
     pub fn cut(&self) -> Option<String> {
         self.reason.as_ref()?.search_ended_after.map(|states| format!("{states} states"))
     }
 
-    /// Whether no plan would have done in the time that was left.
+    /// True if no plan could reach the goal in the remaining time.
     pub fn is_late(&self) -> bool {
         self.reason.as_ref().is_some_and(|reason| reason.is_late)
     }
 }
 
-/// How the numbers begin of which one would do: `(f a ` of `(exists (?x) (>= (f a ?x) …`.
+/// Common prefix of the numbers under an existential comparison: `(f a ` of `(exists (?x) (>= (f a ?x) …`.
 fn one_of(condition: &str) -> Option<String> {
     let is_open = |compared: &Compared<'_>| {
         let last = compared.of.last();
@@ -224,7 +225,7 @@ fn one_of(condition: &str) -> Option<String> {
     Some(format!("({} ", [&[word], &of[..of.len() - 1]].concat().join(" ")))
 }
 
-/// What a plan was weighed against, if its document has it.
+/// The alternatives of a plan, if its document holds them; failures to read are added to `lost`.
 fn weighed(record: &Record, document: &Document, lost: &mut Vec<String>) -> Option<Weighed> {
     document.blobs.iter().find(|blob| blob.name == weigh::BLOB)?;
     let read = record.store().blob(document.id, weigh::BLOB).map_err(|e| e.to_string());

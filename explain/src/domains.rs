@@ -1,4 +1,4 @@
-//! What a domain says of its actions, calls and numbers, as far as an explanation speaks of them.
+//! Explanations of a domain's actions, calls and numbers, as far as the explanation of a run mentions them.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::wording::listed;
 use descry_agent::weigh::Expected;
 use descry_domains::saying::Saying;
 
-/// A domain, how it is said, and the run that is explained by it.
+/// The domain of a run, its wording, and the run's plans.
 pub struct Words<'a> {
     pub domain: &'a Domain,
     pub saying: &'a Saying,
@@ -20,12 +20,13 @@ pub struct Words<'a> {
 }
 
 impl Words<'_> {
-    /// What a call of the domain asks, if descry itself answers it.
+    /// Description of a call that is answered by descry itself; none for others.
     pub fn meaning(&self, call: &str) -> Option<String> {
         abilities::meaning(&self.domain.config, call)
     }
 
-    /// The calls that an action's duration asks, by what they ask, as it is told; none if it asks none that is known.
+    /// List of the calls in an action's duration, each description passed through `told`; none without a
+    /// known call.
     pub fn counts(&self, action: &str, told: impl Fn(String) -> String) -> Option<String> {
         let bounds = self.action(action)?.duration.as_ref()?;
         let all = self.asked(bounds.iter().flat_map(|bound| bound.value.calls()));
@@ -33,7 +34,7 @@ impl Words<'_> {
         (!all.is_empty()).then(|| listed(&all, all.len()))
     }
 
-    /// What counts beside the time that a plan takes, where plans are to make that small, too.
+    /// Sentence on the metric of the domain beyond total time; none if the metric is total time alone.
     pub fn besides_time(&self) -> Option<String> {
         let minimise = &self.domain.config.minimise;
         let task = &self.domain.vocabulary.task;
@@ -51,7 +52,8 @@ impl Words<'_> {
         })
     }
 
-    /// Which actions count for more than they take, and do so in this run.
+    /// Sentence on the actions of this run whose duration in the plan exceeds the time that they take; none
+    /// without one.
     pub fn seconds(&self) -> Option<String> {
         let one = |action: &Action| {
             let takes_s = fixed_s(action)?;
@@ -71,7 +73,7 @@ impl Words<'_> {
         })
     }
 
-    /// Whether an action of which a plan had a step asks a call.
+    /// True if an action of one of the plans makes this call.
     pub fn is_used(&self, call: &str) -> bool {
         let steps = self.chapters.iter().flat_map(|chapter| &chapter.steps);
         let actions: BTreeSet<&str> = steps.map(|step| step.action.as_str()).collect();
@@ -79,7 +81,7 @@ impl Words<'_> {
         asked.into_iter().any(|asked| self.name(asked) == call)
     }
 
-    /// How poses are called, where they are called after what is looked at.
+    /// Sentence on the naming of viewpoints; none if they are named otherwise.
     pub fn poses(&self, robot: &str) -> Option<String> {
         let text = match robot.starts_with("recorded:") {
             true => {
@@ -95,7 +97,7 @@ impl Words<'_> {
         is_searching.then(|| format!("{text} Places are x, y and height in the map, in metres."))
     }
 
-    /// What the numbers say that plans are to change.
+    /// Sentence on the meaning of the numbers that plans are to change; none if none is known.
     pub fn numbers(&self) -> Option<String> {
         let Words { domain, saying, chapters } = self;
         let expected = || chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
@@ -125,7 +127,7 @@ impl Words<'_> {
         &self.domain.vocabulary.task.module(call.module).name
     }
 
-    /// What calls ask, each once, if that is known.
+    /// Descriptions of known calls, without adjacent duplicates.
     fn asked<'c>(&self, calls: impl IntoIterator<Item = &'c Call>) -> Vec<String> {
         let mut all: Vec<String> =
             calls.into_iter().filter_map(|call| self.meaning(self.name(call))).collect();
@@ -133,7 +135,7 @@ impl Words<'_> {
         all
     }
 
-    /// The calls by whose answers actions change a number.
+    /// The calls by which actions change a number.
     fn grows_by(&self, number: &str) -> Vec<&Call> {
         let task = &self.domain.vocabulary.task;
         let effects =
@@ -146,7 +148,7 @@ impl Words<'_> {
     }
 }
 
-/// The seconds that are fixed where an action's duration adds to them.
+/// The constant term of an action's duration, if the duration is a sum, seconds.
 fn fixed_s(action: &Action) -> Option<f64> {
     let [bound] = action.duration.as_deref()? else { return None };
     let Expression::Add(parts) = &bound.value else { return None };

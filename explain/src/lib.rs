@@ -1,5 +1,5 @@
-//! Why a run went as it did, from its record alone, in plain sentences: why each plan was made and why it was this one, what came of it,
-//! and what the verdict rests on. What the record does not say is said not to be known.
+//! Explanation of a run from its record alone, in plain sentences: the reason and justification of each plan,
+//! its outcome, and the evidence behind the verdict. Facts missing from the record are reported as unknown.
 
 pub mod basis;
 #[doc(hidden)]
@@ -41,47 +41,48 @@ use domains::Words;
 use states::States;
 use wording::wrapped;
 
-/// What a run is explained by.
+/// Explanation of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explanation {
-    /// All of it in a few sentences: what was asked, what the answer is, what it rests on, the greatest trouble.
+    /// Summary in a few sentences: the goal, the answer, its evidence, and the worst failure.
     pub summary: Vec<String>,
-    /// What was wanted, and how to read what follows.
+    /// The goal, and notes on reading the text below.
     pub asked: Vec<String>,
-    /// How to read the figures.
+    /// Notes on reading the figures.
     pub reading: Vec<String>,
     /// The plans, one after the other.
     pub plans: Vec<Told>,
-    /// What the verdict rests on.
+    /// Evidence behind the verdict.
     pub verdict: Vec<String>,
-    /// What of the record is lost.
+    /// Lost parts of the record, one message each.
     pub lost: Vec<String>,
 }
 
-/// What is told of one plan.
+/// Explanation of one plan.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Told {
-    /// Its number, from 1.
+    /// Number of the plan, from 1.
     pub round: usize,
-    /// When it was made, seconds since the run began, on the body's clock.
+    /// Time of planning, seconds since the run began, on the body's clock.
     pub at_s: f64,
-    /// What it was caused by.
+    /// Trigger of the plan.
     pub cause: String,
-    /// What it is to do.
+    /// Purpose of the plan.
     pub intent: Vec<String>,
-    /// Why this and nothing else.
+    /// Justification of the plan over its alternatives.
     pub why: Vec<String>,
-    /// The same with all figures: what each way to get further takes and gains.
+    /// Justification with all figures: duration and gain of each alternative.
     pub figures: Vec<String>,
-    /// What came of it.
+    /// Outcome of the plan.
     pub outcome: Vec<String>,
-    /// Which of its steps were carried out, and why the others were not.
+    /// Steps carried out, and the reason for leaving out the others.
     pub done: String,
 }
 
-/// Explains a run, from its record, what it was started with, and its report, if it has one.
+/// Explains a run from its record, its header, and its report if it has one.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<Explanation, CommandError> {
     let states = States::of(record)?;
@@ -132,9 +133,11 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
 }
 
-/// How things stood after each look, with when that was on the body's clock; nothing of a record that does not say. `goal` is in PDDL.
+/// State of the run after each look, with its time on the body's clock in nanoseconds; empty if the record
+/// does not hold any. `goal` is in PDDL.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
@@ -142,20 +145,21 @@ pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(
     Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, outcome.said))).collect())
 }
 
-/// A number that the goal of a run asks for, over time.
+/// History of a number in the goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sought {
-    /// The number, as the domain says it.
+    /// The number, in the domain's wording.
     pub name: String,
-    /// What it has to be.
+    /// Threshold that the goal sets.
     pub wanted: f64,
-    /// Its values with when they were so, on the body's clock.
+    /// Values with their times on the body's clock, nanoseconds.
     pub values: Vec<(i64, f64)>,
 }
 
-/// The numbers that the goal of a run asks for, at each plan and look. `goal` is in PDDL.
+/// History of each number in the goal, at every plan and look. `goal` is in PDDL.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn sought(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<Sought>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
@@ -174,55 +178,55 @@ pub fn sought(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<Sought
     Ok(all)
 }
 
-/// How the domain of a run says what is written in PDDL; of a domain that this version does not understand, as it is written.
+/// Wording of a run's domain; the default wording, PDDL as written, if this version cannot read the domain.
 pub fn saying_of(beginning: &Beginning) -> Saying {
     let Ok(domain) = beginning.domain() else { return Saying::default() };
     let scene = beginning.scene.as_ref().and_then(|(name, text)| SceneSpec::parse(name, text).ok());
     Saying::of(&domain, &scene.as_ref().map(Places::of_spec).unwrap_or_default())
 }
 
-/// What ways and their figures mean.
+/// Note on the figures of an alternative.
 const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
                     what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
                     seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
                     is reckoned with if what is looked for is there: a look may show more, or less.";
 
-/// What other ways are told with.
+/// Note on the reading of alternatives.
 const OTHERWISE: &str = "What is hoped for is reckoned as if what is looked for were there. What a plan would come to that begins \
                          otherwise is told with the rest of the plan behind it, as far as it can follow and is needed.";
-/// What seconds mean where more are counted than pass.
+/// Note on a metric that counts more seconds than pass.
 const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
                        earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \
                        something and the farther it is, so that what is likely and near comes first (--figures says how).";
 
-/// What a run was asked, as far as plans depend on it.
+/// The question behind a run, as far as its plans depend on it.
 pub struct Asked<'a> {
     /// The goal in PDDL.
     pub goal: String,
-    /// Who chose where to look next, if not the planner.
+    /// The policy that chose the next look; none if the planner chose.
     pub policy: Option<String>,
-    /// What an action's seconds are besides those that are fixed.
+    /// Describes the computed part of an action's duration; none if the duration is constant.
     pub counts: &'a dyn Fn(&str) -> Option<String>,
-    /// How the domain says what is written in PDDL.
+    /// Wording of the domain.
     pub saying: &'a Saying,
-    /// Whether there is a verdict.
+    /// True if the run has a verdict.
     pub has_ended: bool,
-    /// Whether seconds are counted that do not pass: for having looked in vain.
+    /// True if the metric counts the expected cost of fruitless looks.
     pub counts_in_vain: bool,
 }
 
 impl Asked<'_> {
-    /// A step, as the domain says it.
+    /// Wording of a step.
     fn say(&self, call: &Call) -> String {
         self.saying.say(&call.to_string())
     }
 
-    /// Several steps, one after the other.
+    /// Wording of several steps, joined by `then`.
     fn say_all(&self, calls: &[Call], then: &str) -> String {
         calls.iter().map(|call| self.say(call)).collect::<Vec<_>>().join(then)
     }
 
-    /// What the goal wants of a number: that with which it compares it, if it names it so.
+    /// The threshold that the goal sets for a number; none if the goal does not name this number.
     fn wanted(&self, number: &str) -> Option<f64> {
         compared::wanted(&self.goal, number)
     }
@@ -250,7 +254,7 @@ fn said(header: &Header, asked: &Asked<'_>, given_s: Option<f64>, saying: &Sayin
 }
 
 impl Explanation {
-    /// It as a text of lines of 80 letters, with all figures or in short.
+    /// Renders the explanation as text of 80 columns, with all figures or in short.
     pub fn text(&self, has_figures: bool) -> String {
         const WIDTH: usize = 80;
         let all = |lines: &[String], first: &str| -> String {

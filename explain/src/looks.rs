@@ -1,4 +1,5 @@
-//! What a look has brought: how sure it is now of what was asked for, why it is no surer, and what of the places has been seen.
+//! Outcome of a look: the certainty reached, the reasons for remaining doubt, and the share seen of each
+//! place.
 
 use descry_domains::lexicon::{self, plural, symbol};
 use descry_domains::note::{LeftOut, Note};
@@ -11,32 +12,32 @@ use super::wording::{by_share, listed, place, share, share_of};
 use descry_agent::standing::{InDoubt, Of, Seen};
 use descry_agent::weigh::Expected;
 
-/// What an object is not with more than this is not worth a word.
+/// Probabilities up to this are not mentioned.
 pub const HARDLY: f64 = 0.005;
-/// An object that is it with more than this may be it.
+/// Minimum probability at which a detected object counts as a candidate for the requested one.
 const MAY_BE: f64 = 0.05;
-/// What stands this near to where something stood is that, or has taken it in, metres: a mug's half width.
+/// Maximum distance between two objects for one to be taken for the other, metres: half the width of a mug.
 const BESIDE_M: f64 = 0.06;
-/// An object that is it with more than this is taken for it.
+/// Minimum probability at which an object is identified as the requested one.
 const TAKEN: f64 = 0.5;
-/// A place that is certain with more than this needs no word.
+/// Minimum probability at which a place is certain and gets no mention.
 const SURELY: f64 = 0.99;
-/// Doubts that are told of one by one.
+/// Maximum number of doubts described one by one.
 const MOST_DOUBTS: usize = 3;
-/// Places that are named; the rest are counted.
+/// Maximum number of places listed by name; the rest are counted.
 const MOST_PLACES: usize = 4;
 
-/// What was asked, and what a plan hoped for.
+/// The goal, and the expectations of the plan.
 pub struct Asked<'a> {
     /// The goal in PDDL.
     pub goal: &'a str,
-    /// The numbers that the plan was to bring nearer to what is wanted.
+    /// The numbers that the plan was expected to improve.
     pub hoped: &'a [Expected],
-    /// How the domain says what is written in PDDL.
+    /// Wording of the domain.
     pub saying: &'a Saying,
 }
 
-/// How things stand after looks, of each doubt in a few sentences.
+/// Sentences on each doubt after some looks.
 pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Asked<'_>) -> Vec<String> {
     let told = |doubt: &InDoubt| {
         let was = before.and_then(|before| before.same(doubt));
@@ -52,7 +53,8 @@ pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked:
     after.doubts.iter().take(MOST_DOUBTS).filter_map(told).collect()
 }
 
-/// `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`; of several numbers the first, and those that are not enough.
+/// Certainty as a clause: `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`. Of
+/// several numbers, the first and those below their thresholds.
 fn sureness(all: &[Sure], saying: &Saying) -> String {
     let one = |sure: &Sure| {
         let told = |value| share_of(value, sure.wanted);
@@ -68,7 +70,7 @@ fn sureness(all: &[Sure], saying: &Saying) -> String {
     listed(&said, said.len())
 }
 
-/// What has been seen of where it may be, and where nothing has.
+/// Share seen of each place where the object may be, and the places without any view.
 pub fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     let before = |seen: &Seen| was.and_then(|was| was.seen.iter().find(|s| s.on == seen.on));
     let percent = |share: f64| format!("{:.0} %", (share * 100.0).floor());
@@ -101,7 +103,7 @@ pub fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     }
 }
 
-/// Why it is no surer than it is; none where nothing says it.
+/// Reasons for the remaining doubt; none if the record gives none.
 fn why_no_surer(
     doubt: &InDoubt,
     before: Option<&Standing>,
@@ -133,7 +135,7 @@ fn why_no_surer(
     (!why.is_empty()).then(|| why.join("; "))
 }
 
-/// Why a look brought nothing.
+/// Reason for which a look had no effect; none if it had one.
 fn in_vain(note: &Note) -> Option<String> {
     match note {
         Note::Nothing { .. } => Some("the look showed no surface".into()),
@@ -147,7 +149,8 @@ fn in_vain(note: &Note) -> Option<String> {
     }
 }
 
-/// What was taken for a thing before and is not any more, and with how much it was.
+/// The best candidate before a look, if the look ruled it out: its former probability, and a clause on the
+/// change.
 pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, String)> {
     let (track, was) = before.best(thing).filter(|(_, was)| *was >= MAY_BE)?;
     let now = after.belief.tracks.iter().find(|now| now.id == track.id);
@@ -180,7 +183,7 @@ pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, St
     Some((was, format!("what {taken} {is}")))
 }
 
-/// Whether of the surface where something stood less is seen than before.
+/// True if fewer places of the object's surface are counted as seen than before.
 fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
     let places = |standing: &Standing| -> usize {
         let seen = standing.doubts.iter().flat_map(|doubt| &doubt.seen);
@@ -189,14 +192,14 @@ fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
     places(after) < places(before)
 }
 
-/// What stands now where an object stood, or beside it.
+/// The object now at or beside the position of a former one; none if the nearest is farther than `BESIDE_M`.
 pub fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
     let apart_m = |other: &Track| (other.position_m - track.position_m).norm();
     let nearest = after.belief.tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
     (apart_m(nearest) < BESIDE_M).then_some(nearest)
 }
 
-/// The object that may be it; none if none may.
+/// Clause on the best candidate for the requested object; none without a candidate.
 pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
     let thing = &doubt.about;
     let (track, p) = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE)?;
@@ -216,18 +219,19 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Stri
     })
 }
 
-/// The objects, each with how probably a thing is it; but for what was lost out of the hand.
+/// The objects with their probabilities of being the requested one; without the object in the hand if it may
+/// have been dropped.
 fn seen_objects<'s>(doubt: &'s InDoubt, after: &'s Standing) -> impl Iterator<Item = (&'s Track, f64)> {
     let seen = after.belief.tracks.iter().filter(|track| !track.on.is_empty() || doubt.lost <= HARDLY);
     seen.map(|track| (track, track.probability_of(&doubt.about)))
 }
 
-/// The one of them that a thing most likely is.
+/// The object with the highest probability of being the requested one.
 pub fn best_seen<'s>(doubt: &'s InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
     seen_objects(doubt, after).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// That no object may be it, or hardly.
+/// Clause for the case without any candidate.
 pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
     let p = best_seen(doubt, after).map(|(_, p)| p).filter(|p| *p > HARDLY);
     match (after.belief.tracks.len(), p.map(share)) {
@@ -239,7 +243,8 @@ pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
     }
 }
 
-/// The objects that are not surely of a kind, or not, where all of it are wanted: how sure it is of all of them, and the least sure.
+/// Clause on the objects of uncertain kind, for a request for all of a kind: the overall certainty, and the
+/// least certain object.
 fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
     let p = |track: &Track| track.probability_of(&doubt.about);
     let open = |track: &Track| p(track).min(1.0 - p(track));
@@ -264,7 +269,7 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Strin
     })
 }
 
-/// The object on a surface that is told least from others.
+/// Clause on the least certainly identified object of a surface.
 fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     let on = symbol(&doubt.about);
     let there = after.belief.tracks.iter().filter(|track| track.on == on);
@@ -287,7 +292,8 @@ fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     ))
 }
 
-/// What hangs on the places where nothing was seen, and on none; objects that were seen are it with so much in all.
+/// Clause on the probability of unseen places and of absence. `seen` is the total probability of the seen
+/// objects.
 pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     (doubt.hidden > HARDLY).then_some(())?;
     let lost = match doubt.lost > HARDLY {
@@ -312,7 +318,7 @@ pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     })
 }
 
-/// On which surfaces that is, the likeliest first, and whether there is something.
+/// The surfaces behind that probability, most probable first, with a mention of unexplained measurements.
 fn hidden_places(doubt: &InDoubt) -> String {
     let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
     places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
@@ -331,7 +337,7 @@ fn hidden_places(doubt: &InDoubt) -> String {
     format!(" ({named})")
 }
 
-/// What an object most likely is, besides something.
+/// The most probable identity of an object besides one, with its probability.
 fn likeliest(track: &Track, besides: &str) -> (String, f64) {
     let names = track.probabilities.iter().filter(|(name, _)| name != besides);
     let best = names.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > track.unknown);

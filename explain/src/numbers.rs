@@ -1,4 +1,5 @@
-//! Which numbers of a domain say how sure it is of what was asked for: those that the goal compares, as the plans name them too.
+//! Numbers of a domain that express certainty of the answer: those that the goal compares, under the names
+//! used by the plans.
 
 use descry_domains::lexicon::symbol;
 
@@ -7,24 +8,24 @@ use descry_agent::compared::{self, words};
 use descry_agent::standing::InDoubt;
 use descry_agent::weigh::Expected;
 
-/// A number that is less says nothing of where something is.
+/// Values below this carry no information about the position of an object.
 const NEXT_TO_NOTHING: f64 = 0.05;
 
-/// A number that says how sure it is of something.
+/// A number that expresses certainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sure {
-    /// As it is written in PDDL, or said.
+    /// Its name in PDDL, or its wording.
     pub name: String,
-    /// What it was; none if that is not known.
+    /// Previous value; none if unknown.
     pub was: Option<f64>,
-    /// What it is.
+    /// Current value.
     pub now: f64,
-    /// What it has to be.
+    /// Threshold.
     pub wanted: f64,
 }
 
-/// The numbers that say how sure it is of a doubt: those that the goal compares; else those that the plan hopes for; else how
-/// sure it is said to be. None of a record that does not say.
+/// The numbers that express the certainty about a doubt: those that the goal compares; else those that the
+/// plan expects to improve; else the recorded certainty. Empty if the record holds none.
 pub fn of(
     doubt: &InDoubt,
     before: Option<&Standing>,

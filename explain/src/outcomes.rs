@@ -1,4 +1,4 @@
-//! What came of a plan's steps, and how things stood after each look.
+//! Outcomes of a plan's steps, and the state of the run after each look.
 
 use descry_agent::report::failed;
 use descry_domains::note::{BeliefChange, Note, OnTheFloor};
@@ -11,16 +11,16 @@ use super::standings::Standing;
 use super::wording::count;
 use descry_agent::weigh::Expected;
 
-/// What is told of a plan's steps; of how things stood after a look with when that was.
+/// Sentences on an outcome, or on the state of the run after a look.
 #[derive(Debug)]
 pub struct Outcome {
-    /// When it stood so; none of what a step has brought.
+    /// Time of that state on the body's clock, nanoseconds; none for the outcome of a step.
     pub stood_ns: Option<i64>,
     /// The sentences.
     pub said: String,
 }
 
-/// What came of a plan's steps, one after the other, and how things stood after each look; the goal is in PDDL.
+/// Outcomes of a plan's steps in their order, with the state of the run after each look. `goal` is in PDDL.
 pub fn of(chapter: &Chapter, goal: &str, saying: &Saying) -> Vec<Outcome> {
     let hoped: &[Expected] = chapter.weighed.as_ref().map_or(&[], |weighed| &weighed.numbers);
     let asked = looks::Asked { goal, hoped, saying };
@@ -57,8 +57,9 @@ pub fn of(chapter: &Chapter, goal: &str, saying: &Saying) -> Vec<Outcome> {
     said
 }
 
-/// What came of a step, in a sentence; none where nothing did that has not been said. `doing` is the only step under way; how sure
-/// it is after a look is said elsewhere where the record has how things stood.
+/// Sentence on an event; none if it adds nothing. `doing` is the step under way if it is the only one.
+/// `has_standings` is true if the record holds the state after each look, which then replaces the certainty
+/// here.
 fn outcome(deed: &Deed, doing: Option<&Call>, has_standings: bool, saying: &Saying) -> Option<String> {
     let say = |call: &Call| saying.say(&call.to_string());
     let by = doing.map(|call| format!("{}: ", say(call))).unwrap_or_default();
@@ -103,7 +104,7 @@ fn shown(objects: usize) -> String {
     if objects == 0 { "no object".into() } else { count(objects, "object") }
 }
 
-/// What a sweep of the laser shows; what is only seen from afar is counted.
+/// Clause on the objects in a laser sweep; distant ones are only counted.
 pub fn swept(things: &[OnTheFloor]) -> String {
     let is_far = |thing: &&OnTheFloor| matches!(thing, OnTheFloor::Thing { is_far: true, .. });
     let (far, near): (Vec<&OnTheFloor>, Vec<&OnTheFloor>) = things.iter().partition(is_far);

@@ -1,4 +1,4 @@
-//! Why each plan was made, what it was to do, and what came of it.
+//! Reason, purpose and outcome of each plan.
 
 use descry_agent::reason::{Break, Reason, Trigger};
 use descry_domains::lesson::Lesson;
@@ -11,12 +11,12 @@ use super::{Asked, Told, brief, outcomes, rivals};
 use descry_agent::standing::{InDoubt, Of};
 use descry_agent::weigh::Expected;
 
-/// Numbers that are named; the rest are counted.
+/// Maximum number of numbers listed by name; the rest are counted.
 const MOST_NAMED: usize = 3;
-/// Steps left out that are named; the rest are counted.
+/// Maximum number of skipped steps listed by name; the rest are counted.
 const MOST_LEFT_OUT: usize = 4;
 
-/// All plans of a run.
+/// Explanations of all plans of a run.
 pub fn told(chapters: &[Chapter], asked: &Asked<'_>) -> Vec<Told> {
     let at = |n: usize| chapters.get(n);
     let all = chapters.iter().enumerate();
@@ -39,7 +39,7 @@ pub fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>
     }
 }
 
-/// Which steps of a plan were carried out, which were not, and why.
+/// Sentence on the steps carried out, those left out, and the reason.
 fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let (_, open) = chapter.steps_done();
     let all = chapter.steps.len();
@@ -72,7 +72,8 @@ fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String
     format!("{done} of its {all} steps. Left out: {left_out}, because {because}.")
 }
 
-/// What a plan was caused by: the failure, or what was learned, that ended the one before; or that it had been done and was not enough.
+/// Trigger of a plan: the failure or the new knowledge that ended the previous plan, or its completion
+/// without reaching the goal.
 fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed | Deed::Stands(_)));
@@ -143,7 +144,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
-/// What was hoped of what was left of a plan before, of the numbers that are alike but for what comes last in them.
+/// The name, current and expected value of the best number among those that differ from `number` only in the
+/// last argument, as expected from the rest of the previous plan.
 fn hoped_of_left<'c>(chapter: &'c Chapter, number: &str) -> Option<(&'c str, f64, f64)> {
     let (begins, _) = number.rsplit_once(' ')?;
     let all = chapter.weighed.iter().flat_map(|weighed| &weighed.left_numbers);
@@ -152,7 +154,7 @@ fn hoped_of_left<'c>(chapter: &'c Chapter, number: &str) -> Option<(&'c str, f64
     Some((&most.name, most.now, most.then))
 }
 
-/// Why the plan before no longer did.
+/// Clause on the reason for which the previous plan became invalid.
 fn missed(chapter: &Chapter, asked: &Asked<'_>) -> String {
     match &chapter.reason {
         Some(Reason { trigger: Trigger::Broken(broken), .. }) => broken.told(asked.saying),
@@ -161,7 +163,7 @@ fn missed(chapter: &Chapter, asked: &Asked<'_>) -> String {
     }
 }
 
-/// What follows from a failure.
+/// Clause on the conclusion from a failure.
 fn follows(call: &Call, therefore: &str, lesson: Option<&Lesson>, asked: &Asked<'_>) -> String {
     match lesson {
         Some(Lesson::Retry { tries, most }) => {
@@ -175,13 +177,13 @@ fn follows(call: &Call, therefore: &str, lesson: Option<&Lesson>, asked: &Asked<
     }
 }
 
-/// Whether the step that counts differently comes after another like it in the plan before, about the same.
+/// True if the previous plan already carried out a step with the same action and the same last argument.
 fn is_first_now(step: &Call, before: &Chapter) -> bool {
     let is_like = |done: &&Call| done.action == step.action && done.arguments.last() == step.arguments.last();
     before.steps_done().0.iter().any(is_like)
 }
 
-/// What has come to be sure enough since the plan before was made.
+/// Sentences on the objects whose position became certain enough since the previous plan.
 fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
     let (Some(now), Some(then)) = (&chapter.before, &before.before) else { return String::new() };
     let is_new = |doubt: &&InDoubt| {
@@ -196,7 +198,7 @@ fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
     told.collect()
 }
 
-/// Where less counts as seen than after the last look of the plan before.
+/// Sentence on the surfaces of which less counts as seen than after the last look of the previous plan.
 fn seen_less(chapter: &Chapter, before: &Chapter) -> String {
     let Some(now) = &chapter.before else { return String::new() };
     // How things stood before what made them so as they are now.

@@ -1,5 +1,5 @@
-//! Why a plan was this one and not another: what each rival would have brought, what it would have taken to the end, or why the rest of
-//! the plan could not follow it.
+//! Comparison of a plan with its alternatives: gain of each, its total time to the goal, or the obstacle that
+//! keeps the rest of the plan from following it.
 
 use descry_domains::lexicon::symbol;
 
@@ -12,14 +12,14 @@ use descry_agent::reason::Break;
 use descry_agent::standing::{FirstLook, Seen};
 use descry_agent::weigh::{MOST_STEPS, Way, Weighed};
 
-/// Rates nearer to each other than this share are alike.
+/// Relative difference below which two rates of gain are equal.
 const ALIKE: f64 = 0.02;
-/// What takes less longer than this, seconds, takes as long.
+/// Difference below which two durations are equal, seconds.
 pub const LONGER_S: f64 = 0.05;
-/// As many ways as are kept in the order of their rates.
+/// Number of alternatives kept in the order of their rates.
 const MOST_KEPT: usize = descry_agent::weigh::MOST_KEPT;
 
-/// Why this plan and not another, as far as the record says.
+/// Sentences that justify a plan over its alternatives, as far as the record allows.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let Some(weighed) = &chapter.weighed else {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
@@ -53,7 +53,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     late.into_iter().chain(said).chain(left).chain(longer).chain(through).chain(first).collect()
 }
 
-/// What is done where the planner's search was ended before it had a plan.
+/// Sentence for a search that was cut short before it had a plan.
 pub fn cut_short(cut: &str) -> String {
     format!(
         "the planner's search was ended after {cut}, without a plan that it expected to reach the goal: what settles most a \
@@ -61,11 +61,11 @@ pub fn cut_short(cut: &str) -> String {
     )
 }
 
-/// What is done where no plan ends in time.
+/// Sentence for the case that no plan ends in time.
 pub const IN_TIME: &str = "No plan would bring it about in the time that is left: the look that settles most a second, of those \
                            that end in time, is taken all the same.";
 
-/// What the planner has missed: several of its steps could be one.
+/// Sentence on a shorter equivalent that the planner missed by not merging steps.
 pub fn longer(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let way = weighed.shorter.as_ref()?;
     let (steps, takes_s, chosen_s) = (steps(way, asked), way.takes_s, chosen.takes_s);
@@ -74,7 +74,8 @@ pub fn longer(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Stri
     ))
 }
 
-/// Why a plan was made that the planner counted to its end: what the others would take to theirs. None where that is not known.
+/// Justification of a plan that the planner evaluated to the goal, with the totals of its alternatives; none
+/// if that total is unknown.
 fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Vec<String>> {
     let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
     let rule = match &chapter.cut() {
@@ -95,7 +96,7 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
     Some(std::iter::once(first).chain(rivals).collect())
 }
 
-/// The others that stand out, each with what it stands out by.
+/// The notable alternatives, each with the criteria by which it is notable.
 pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
     let others = || weighed.others.iter();
     let likeliest = likeliest_besides(chapter, chosen);
@@ -139,7 +140,7 @@ pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<
     rivals
 }
 
-/// Where it most likely stands unseen, besides where a way looks.
+/// The most probable unseen place other than the one that `chosen` looks at.
 fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
     let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
     let seen = doubts.flat_map(|doubt| &doubt.seen).filter(|seen| seen.hidden > 0.0);
@@ -148,7 +149,7 @@ fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
     besides.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(on, _)| on)
 }
 
-/// Why what was left of the plan before was not gone on with, where all that ended it was that it counts differently.
+/// Sentence on the rest of the previous plan, where only its metric had changed.
 pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let left = weighed.left.as_ref().filter(|_| chapter.is_reckoned())?;
     let what = format!("what was left of plan {}", chapter.round - 1);
@@ -163,7 +164,7 @@ pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_
     Some(format!("{what} would do, and takes {whole_s:.1} s{}.", more_than(whole_s, chosen_s)))
 }
 
-/// Why steps would not do that nobody has taken.
+/// Clause on the obstacle to steps that were not taken.
 pub fn would_be(blocked: &Break, asked: &Asked<'_>) -> String {
     let said = blocked.would_be(asked.saying);
     let counted = blocked.reckoned().and_then(|(call, ..)| (asked.counts)(&call.action));
@@ -173,7 +174,7 @@ pub fn would_be(blocked: &Break, asked: &Asked<'_>) -> String {
     }
 }
 
-/// How much longer something takes than what was chosen, as both are told.
+/// Clause on the difference between a total and that of the chosen plan, in rounded seconds.
 fn more_than(whole_s: f64, chosen_s: f64) -> String {
     let tenths = |s: f64| (s * 10.0).round() / 10.0;
     let more_s = tenths(whole_s) - tenths(chosen_s);
@@ -184,7 +185,7 @@ fn more_than(whole_s: f64, chosen_s: f64) -> String {
     }
 }
 
-/// What a look has for it where seconds are counted for looking in vain.
+/// Probability that a first look at each surface finds something, where the metric counts fruitless looks.
 fn first_looks(chapter: &Chapter) -> Option<String> {
     let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
     let looks = doubts.flat_map(|doubt| &doubt.seen).filter_map(|seen| Some((seen, seen.first?)));
@@ -207,7 +208,7 @@ fn first_looks(chapter: &Chapter) -> Option<String> {
     (!said.is_empty()).then(|| format!("p is {}.", listed(&said, said.len())))
 }
 
-/// Why a plan was made of which it is not known what others would have taken to their ends: what each gains a second.
+/// Justification by gain per second, for plans whose alternatives were not evaluated to the goal.
 fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Vec<String> {
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
@@ -227,8 +228,8 @@ fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Ask
     said
 }
 
-/// What speaks for or against another way by what it comes to with the rest of the plan behind it; none where that is not known of
-/// both, and where nobody counted it.
+/// Clause that compares an alternative, with the rest of the plan behind it, to the chosen plan; none if the
+/// total of the chosen plan is unknown.
 fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let chosen_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
     let Some(whole) = other.whole else {
@@ -249,17 +250,17 @@ fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     Some(format!("{alone} {:.1} s{}", whole.takes_s, more_than(whole.takes_s, chosen_s)))
 }
 
-/// What a way takes with the rest of the plan behind it, if it is expected to be enough then, seconds.
+/// Total of an alternative with the rest of the plan behind it, if it is expected to reach the goal, seconds.
 pub fn whole_s(way: &Way) -> Option<f64> {
     way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
 }
 
-/// The ways of which the figures were given.
+/// Alternatives whose figures have been given.
 #[derive(Default)]
 struct Named(Vec<Vec<Call>>);
 
 impl Named {
-    /// A way, the first time with its figures.
+    /// An alternative, with figures at its first mention only.
     fn once(&mut self, way: &Way, asked: &Asked<'_>) -> String {
         if self.0.contains(&way.steps) {
             return asked.say_all(&way.steps, ", ");
@@ -269,13 +270,13 @@ impl Named {
     }
 }
 
-/// A way with its figures.
+/// An alternative with its figures.
 fn figures(way: &Way, asked: &Asked<'_>) -> String {
     let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
     format!("{} [+{gains} in {:.1} s, {} a second]", steps(way, asked), way.takes_s, rate(way.rate()))
 }
 
-/// The steps of a way, of several each with its seconds, if the record has them.
+/// The steps of an alternative; where there are several, each with its seconds if the record holds them.
 fn steps(way: &Way, asked: &Asked<'_>) -> String {
     if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
         return asked.say_all(&way.steps, ", ");
@@ -284,13 +285,13 @@ fn steps(way: &Way, asked: &Asked<'_>) -> String {
     each.map(|(step, takes_s)| format!("{} ({takes_s:.1} s)", asked.say(step))).collect::<Vec<_>>().join(", ")
 }
 
-/// Three digits that count.
+/// Formats a rate with three significant digits.
 fn rate(rate: f64) -> String {
     let digits = if rate > 0.0 { (2.0 - rate.log10().floor()).clamp(1.0, 8.0) as usize } else { 1 };
     format!("{rate:.digits$}")
 }
 
-/// Where a plan's way stands among all, by what is gained a second.
+/// Rank of the chosen alternative by gain per second.
 fn compared(
     chapter: &Chapter,
     weighed: &Weighed,
@@ -351,7 +352,8 @@ fn compared(
     format!("{mine} is one of {all} ways to get further; {many} {first}. {rule}")
 }
 
-/// Whether a way by itself would be enough if it brings what is hoped; none where nothing says so: it is only a part of what is to be done.
+/// True if an alternative alone is expected to reach the goal; none if unknown, as for one that is only part
+/// of the work.
 fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
     // That a part is not the whole says nothing of it: it is held against plans that end with such a step.
     let last = |steps: &[Call]| steps.last().map(|step| step.action.clone());
@@ -366,7 +368,7 @@ fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) ->
     Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
 }
 
-/// The quickest way, if it is another, and why it was not taken.
+/// Sentence on the quickest alternative, if it is not the chosen one, and on the reason against it.
 fn quickest(
     chapter: &Chapter,
     weighed: &Weighed,

@@ -1,4 +1,4 @@
-//! How a run stood at each plan and whenever one was kept: what was in doubt, and what was believed.
+//! State of a run at each plan and look: open doubts, and the belief over objects.
 
 use std::collections::BTreeMap;
 
@@ -10,26 +10,26 @@ use super::states::States;
 use descry_agent::exit::CommandError;
 use descry_agent::standing::{self, InDoubt, Of};
 
-/// How things stood.
+/// State of a run at one moment.
 #[derive(Debug, Clone, Default)]
 pub struct Standing {
-    /// When that was recorded, on the body's clock.
+    /// Time of the state on the body's clock, nanoseconds.
     pub stamp_ns: i64,
-    /// What was in doubt of what was asked for.
+    /// Open doubts about the goal.
     pub doubts: Vec<InDoubt>,
-    /// What was believed of the objects.
+    /// Belief over objects.
     pub belief: Belief,
-    /// The numbers of the domain, as they are written in PDDL.
+    /// Numbers of the domain, by their PDDL text.
     pub numbers: BTreeMap<String, f64>,
 }
 
 impl Standing {
-    /// The same doubt as another.
+    /// The doubt with the same subject as `other`.
     pub fn same(&self, other: &InDoubt) -> Option<&InDoubt> {
         self.doubts.iter().find(|doubt| doubt.of == other.of && doubt.about == other.about)
     }
 
-    /// The objects that stand where a kind is asked about.
+    /// The objects in the area of a doubt.
     pub fn asked_about<'a>(&'a self, doubt: &'a InDoubt) -> impl Iterator<Item = &'a Track> {
         let is_there = |track: &Track| {
             let mut asked = doubt.seen.iter().filter(|seen| seen.share.is_some());
@@ -38,14 +38,14 @@ impl Standing {
         self.belief.tracks.iter().filter(move |track| is_there(track))
     }
 
-    /// The object that a thing or one of a kind most likely is, with that probability.
+    /// The object with the highest probability of a name or kind, with that probability.
     pub fn best(&self, name: &str) -> Option<(&Track, f64)> {
         let all = self.belief.tracks.iter().map(|track| (track, track.probability_of(name)));
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-/// All of them.
+/// States of a run, read on demand.
 pub struct Standings<'a> {
     record: &'a Record,
     states: &'a States,
@@ -53,9 +53,10 @@ pub struct Standings<'a> {
 }
 
 impl<'a> Standings<'a> {
-    /// As far as the record has them.
+    /// Opens the states of a run, as far as the record holds them.
     ///
     /// # Errors
+    ///
     /// [`CommandError::Broken`] if the record cannot be read.
     pub fn of(record: &'a Record, states: &'a States) -> Result<Self, CommandError> {
         let (found, _) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;
@@ -63,14 +64,15 @@ impl<'a> Standings<'a> {
         Ok(Standings { record, states, beliefs: found.iter().filter_map(belief).collect() })
     }
 
-    /// How things stood at an event; none of a record of earlier versions, and of a part that is lost.
+    /// The state of the run at an event; none if the record holds none, as for earlier versions, or if it is
+    /// damaged.
     pub fn at(&self, event: &Document) -> Option<Standing> {
         event.blobs.iter().find(|blob| blob.name == standing::BLOB)?;
         let data = self.record.store().blob(event.id, standing::BLOB).ok()?;
         Some(self.with(event, serde_json::from_slice(&data).ok()?))
     }
 
-    /// How things stood in the end; none where the record does not say.
+    /// The state at the end of the run; none if the record does not hold it.
     pub fn last(&self) -> Option<Standing> {
         let rests = self.record.newest(standing::RESTS).ok()??;
         let said: standing::Rests = serde_json::from_value(rests.body.clone()).ok()?;
@@ -89,7 +91,7 @@ impl<'a> Standings<'a> {
     }
 }
 
-/// How sure it is of something, said as what that is sure of.
+/// Noun phrase for the certainty that a doubt is about.
 pub fn certainty(doubt: &InDoubt) -> String {
     match doubt.of {
         Of::Thing => format!("the certainty of where {} stands", doubt.about),

@@ -1,4 +1,4 @@
-//! What was taken to be so in each round of a run, and what changed of it from one to another.
+//! Initial states of the planning rounds of a run, and their differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,24 +8,25 @@ use descry_memory::{Query, Record, RecordId};
 use super::wording::{listed, share};
 use descry_agent::exit::CommandError;
 
-/// Changes of a kind that are named; the rest are counted.
+/// Maximum number of changed numbers listed by name; the rest are counted.
 const MOST_NAMED: usize = 4;
-/// Facts that are named; the rest are counted. That they hold no more of a surface is one for each look at it.
+/// Maximum number of changed facts listed by name; the rest are counted. A changed surface has one fact for
+/// each view of it.
 const MOST_FACTS: usize = 8;
-/// Numbers nearer to each other than this are the same.
+/// Difference below which two numbers are equal.
 const SAME: f64 = 5e-3;
 
-/// What a round began with.
+/// Initial state of a planning round.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     pub facts: BTreeSet<String>,
     numbers: BTreeMap<String, f64>,
-    /// When the first of what is to come by itself comes, seconds from then.
+    /// Delay of the first timed initial literal, seconds.
     pub comes_s: Option<f64>,
 }
 
 impl State {
-    /// The `:init` of a problem in PDDL.
+    /// Parses the `:init` section of a problem in PDDL.
     pub fn read(pddl: &str) -> Self {
         let mut state = State::default();
         let Some((_, init)) = pddl.split_once("(:init") else { return state };
@@ -62,7 +63,7 @@ impl State {
     }
 }
 
-/// What is so in one round and not in another.
+/// Difference between two states.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Difference {
     came: Vec<String>,
@@ -82,12 +83,12 @@ impl Difference {
         Difference { came: only(after, before), went: only(before, after), numbers }
     }
 
-    /// Whether all is as it was.
+    /// True if the states are equal.
     pub fn is_empty(&self) -> bool {
         self.came.is_empty() && self.went.is_empty() && self.numbers.is_empty()
     }
 
-    /// The difference in words.
+    /// The difference as a clause.
     pub fn told(&self, saying: &Saying) -> String {
         let facts =
             |all: &[String]| listed(&all.iter().map(|fact| saying.say(fact)).collect::<Vec<_>>(), MOST_FACTS);
@@ -103,14 +104,15 @@ impl Difference {
     }
 }
 
-/// The rounds of a run, in their order.
+/// Initial states of a run's rounds in their order.
 #[derive(Debug)]
 pub struct States(Vec<(RecordId, State)>);
 
 impl States {
-    /// As far as the record has them.
+    /// Reads the states, as far as the record holds them.
     ///
     /// # Errors
+    ///
     /// [`CommandError::Broken`] if the record cannot be read.
     pub fn of(record: &Record) -> Result<Self, CommandError> {
         let (problems, _) = record.find_whole(&Query::of_kind("problem")).map_err(CommandError::broken)?;
@@ -118,36 +120,37 @@ impl States {
         Ok(States(problems.iter().filter_map(of).collect()))
     }
 
-    /// The numbers of the round before something that was recorded under a number.
+    /// The numbers in the last round before a document.
     pub fn numbers(&self, id: RecordId) -> Option<&BTreeMap<String, f64>> {
         self.0.iter().rev().find(|(round, _)| *round < id).map(|(_, state)| &state.numbers)
     }
 
-    /// Seconds that there were in the first round until something came by itself.
+    /// Time in the first round until its first timed initial literal, seconds.
     pub fn given_s(&self) -> Option<f64> {
         self.0.first()?.1.comes_s
     }
 
-    /// Seconds that were left in the last round until something came by itself, as a deadline does: 0 after it; none if nothing did.
+    /// Time in the last round until its first timed initial literal, such as a deadline, seconds; 0 after it,
+    /// none if the run has none.
     pub fn left_s(&self) -> Option<f64> {
         let was_to_come = self.0.iter().any(|(_, state)| state.comes_s.is_some());
         was_to_come.then(|| self.0.last().and_then(|(_, state)| state.comes_s).unwrap_or(0.0))
     }
 
-    /// The greatest of the numbers that begin so, before something that was recorded under a number.
+    /// The greatest number with the prefix `begins` in the last round before a document.
     pub fn most(&self, id: RecordId, begins: &str) -> Option<(String, f64)> {
         let numbers = self.numbers(id)?.iter().filter(|(name, _)| name.starts_with(begins));
         let most = numbers.max_by(|a, b| a.1.total_cmp(b.1))?;
         Some((most.0.clone(), *most.1))
     }
 
-    /// What changed with something that was recorded under a number: from the round before it to the next.
+    /// Difference between the rounds before and after a document.
     pub fn across(&self, id: RecordId) -> Option<Difference> {
         let next = self.0.iter().position(|(round, _)| *round > id)?;
         Some(Difference::between(&self.0[next.checked_sub(1)?].1, &self.0[next].1))
     }
 
-    /// What changed from the round after something that was recorded to the last.
+    /// Difference between the first round after a document and the last round.
     pub fn since(&self, id: RecordId) -> Option<Difference> {
         let next = self.0.iter().find(|(round, _)| *round > id)?;
         Some(Difference::between(&next.1, &self.0.last()?.1))

@@ -1,4 +1,4 @@
-//! A run in a few sentences: what was asked, what the answer is, what it rests on, and what was the greatest trouble.
+//! Summary of a run in a few sentences: the goal, the answer, its evidence, and the worst failure.
 
 use descry_domains::answer::{Believed, Verdict};
 use descry_domains::lexicon::plural;
@@ -13,10 +13,10 @@ use descry_agent::report::{self, Report};
 use descry_agent::run::Header;
 use descry_agent::standing::{InDoubt, Of};
 
-/// Failures that are named; the rest are counted.
+/// Maximum number of failures listed by name; the rest are counted.
 const MOST_FAILURES: usize = 4;
 
-/// It; `left_s` is how long there was still time in the end, if there was not for ever.
+/// The summary, a sentence each. `left_s` is the time left until the deadline; none without a deadline.
 pub fn of(
     header: &Header,
     report: Option<&Report>,
@@ -62,13 +62,13 @@ fn answer(report: Option<&Report>, plans: usize) -> String {
     )
 }
 
-/// What the answer itself says of what it rests on.
+/// The evidence as stated in the answer itself.
 fn said_of(report: &Report) -> Option<String> {
     let (_, more) = report.why.split_once("; ")?;
     Some(format!("It rests on this: {more}."))
 }
 
-/// What an answer rests on, of the first thing that was asked for.
+/// Evidence behind the answer, for the first thing asked for.
 fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
     let doubt = last.doubts.first()?;
     let seen = seen(doubt);
@@ -121,7 +121,7 @@ fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
     Some(format!("It rests on this: {by}; {seen}{left}."))
 }
 
-/// How much of which surfaces was seen.
+/// Share seen of each surface.
 fn seen(doubt: &InDoubt) -> String {
     let looked_at = doubt.seen.iter().filter(|seen| seen.places > 0);
     let one = |seen: &descry_agent::standing::Seen| {
@@ -137,7 +137,7 @@ fn seen(doubt: &InDoubt) -> String {
     listed(&all, all.len()) + &open
 }
 
-/// What went wrong on the way, the gravest first; `short_s` is how long there was still time where that was too little.
+/// The failures on the way, worst first. `short_s` is the remaining time if it was too short.
 fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool, saying: &Saying) -> Option<String> {
     let deeds = || chapters.iter().flat_map(|chapter| &chapter.deeds);
     let notes = || deeds().filter_map(|deed| if let Deed::Noted(note) = deed { Some(note) } else { None });
@@ -193,14 +193,15 @@ fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool, saying: 
     })
 }
 
-/// Parts that have commas of their own.
+/// Joins parts that contain commas of their own.
 fn listed_apart(all: &[String], most: usize) -> String {
     let more = all.len().saturating_sub(most);
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     all[..all.len() - all.len().saturating_sub(most)].join("; ") + &more
 }
 
-/// How many plans were carried out and have not brought what was hoped of them, and what of all that was seen misled most; none if none.
+/// Sentence on the plans that were completed without the expected gain, and on the most misleading object;
+/// none without such plans.
 fn in_vain(chapters: &[Chapter]) -> Option<String> {
     let is_short = |chapter: &&Chapter| {
         let hoped = chapter.weighed.as_ref().is_some_and(|weighed| !weighed.numbers.is_empty());
@@ -219,7 +220,7 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
         .then(|| format!("{plans} came to {their} end without the certainty that was hoped for{misled}"))
 }
 
-/// What was taken for a thing that was asked for in a plan, and was not it, with how much it was.
+/// The objects mistaken for the requested one during a plan, each with its highest probability.
 fn misled(chapter: &Chapter) -> Vec<(f64, String)> {
     let all: Vec<&Standing> = chapter.before.iter().chain(chapter.stood()).collect();
     let lost = |pair: &[&Standing]| {

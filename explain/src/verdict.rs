@@ -1,5 +1,5 @@
-//! What the verdict of a run rests on: what is believed of what was asked for and by how many views, what was seen of where it may be,
-//! and what is left.
+//! Evidence behind the verdict of a run: the belief about the requested object and the number of its views,
+//! the share seen of each place, and the remaining probability.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,28 +19,29 @@ use descry_agent::exit::CommandError;
 use descry_agent::report::{self, Report};
 use descry_agent::standing::{self, End, InDoubt, Of, Rests, Seen};
 
-/// Objects that are described one by one; the rest are counted.
+/// Maximum number of objects described one by one; the rest are counted.
 const MOST_NAMED: usize = 12;
 
-/// The words of a run's domain.
+/// Wording of a run's domain.
 pub struct Words<'a> {
-    /// What a call asks.
+    /// Descriptions of calls.
     pub meanings: no_plan::Meanings<'a>,
-    /// Whether an action of the run's plans asks a call.
+    /// True for a call that an action of the run's plans makes.
     pub is_used: &'a dyn Fn(&str) -> bool,
-    /// How the domain says what is written in PDDL.
+    /// Wording of the domain.
     pub saying: &'a Saying,
-    /// How things stood after each step.
+    /// State of the run after each step.
     pub stood: &'a [&'a Standing],
-    /// A thing that is there with less is said not to be there.
+    /// Probability below which the object is reported as absent.
     pub not_there: Option<f64>,
-    /// What may settle less is not worth a look.
+    /// Probability below which a further look is not worthwhile.
     pub negligible: Option<f64>,
 }
 
-/// It, in sentences.
+/// Sentences on the evidence.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn rests_on(
     record: &Record,
@@ -96,7 +97,7 @@ pub fn rests_on(
     Ok(said)
 }
 
-/// The looks of a run: from where, and at what, by symbol.
+/// The looks of a run: viewpoint, and the surfaces shown, by symbol.
 struct Looks(Vec<(String, Vec<String>)>);
 
 impl Looks {
@@ -109,7 +110,7 @@ impl Looks {
         Ok(Looks(clouds.iter().filter_map(part).collect()))
     }
 
-    /// From how many places something was looked at.
+    /// The number of viewpoints that showed a surface.
     fn places(&self, on: &str) -> usize {
         let on = symbol(on);
         let from = self.0.iter().filter(|(_, shown)| shown.contains(&on)).map(|(from, _)| from);
@@ -117,7 +118,8 @@ impl Looks {
     }
 }
 
-/// What is believed of what was asked for; where that was not one thing, of every object, the least sure first.
+/// Belief about the requested object; about every object, least certain first, if the request was not for one
+/// object.
 fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> {
     let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
     let Some(name) = &report.object else {
@@ -151,7 +153,7 @@ fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> 
     said
 }
 
-/// That a known object may stand in several places: what is known is how it looks, and each that looks so is one.
+/// Sentence on known objects found in several places, since objects are recognised by appearance alone.
 fn several(tracks: &[&Track]) -> Option<String> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let taken = tracks.iter().flat_map(|track| track.probabilities.iter().filter(|(_, p)| *p > 0.5));
@@ -166,7 +168,7 @@ fn several(tracks: &[&Track]) -> Option<String> {
     })
 }
 
-/// Objects of which it is sure that they are none of the known ones, by where they are.
+/// Count of the objects that are certainly unknown, by surface.
 fn surely_none(strange: &[&Track], words: &Words<'_>) -> Option<String> {
     let mut on: BTreeMap<&str, usize> = BTreeMap::new();
     strange.iter().for_each(|track| *on.entry(&track.on).or_default() += 1);
@@ -179,7 +181,7 @@ fn surely_none(strange: &[&Track], words: &Words<'_>) -> Option<String> {
     (!all.is_empty()).then(|| format!("{} {are} surely none of the known objects.", listed(&all, all.len())))
 }
 
-/// An object: what it is taken for, and by what.
+/// Description of an object: its probable identities, and the evidence for them.
 fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
     let mut names: Vec<(&str, f64)> = track.probabilities.iter().map(|(n, p)| (n.as_str(), *p)).collect();
     names.push(("none of the known objects", track.unknown));
@@ -205,7 +207,7 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
     format!("what {on} at {at} is {} with a probability of {}{others}{seen}.", first.0, share(first.1))
 }
 
-/// Why there was nothing more to do, and what is left.
+/// The reason for which the run ended, and the remaining probability.
 fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
@@ -253,7 +255,8 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
     said
 }
 
-/// Why there is no plan. Calls that no step of the run's plans asks are left out where there are others.
+/// The reason for which there is no plan. Refusals of calls that no plan uses are left out if there are
+/// others.
 fn why_no_plan(rests: &Rests, words: &Words<'_>) -> String {
     if rests.no_plan.is_empty() {
         return rests.said.clone();
@@ -268,7 +271,7 @@ fn why_no_plan(rests: &Rests, words: &Words<'_>) -> String {
     no_plan::told(&counting, words.meanings)
 }
 
-/// What was seen of where something may be.
+/// Share seen of each place where the object may be.
 fn seen(doubt: &InDoubt, stood: &[&Standing], looks: &Looks) -> String {
     let percent = |part: f64| (part * 100.0).floor();
     let was = |seen: &Seen| {

@@ -1,10 +1,10 @@
-//! Numbers, reasons and lines as people read them.
+//! Text for people: numbers, lists and wrapped lines.
 
 use descry_memory::belief::Track;
 
 pub use descry_agent::numbers::{count, share, share_of};
 
-/// The first of some texts, in a sentence; the rest are counted.
+/// Joins the first `most` texts as a list; the rest are counted.
 pub fn listed(all: &[String], most: usize) -> String {
     let named = all[..all.len().min(most)].join(", ");
     match (all, all.len().saturating_sub(most)) {
@@ -14,7 +14,7 @@ pub fn listed(all: &[String], most: usize) -> String {
     }
 }
 
-/// What shares are of, those with the same share as it reads together.
+/// Joins texts by probability; those with the same rounded probability share one figure.
 pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
     let mut alike: Vec<(String, Vec<String>)> = Vec::new();
     for (value, of) in all {
@@ -31,19 +31,19 @@ pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
     alike.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// A sentence, which begins with a capital.
+/// Capitalises the first letter.
 pub fn capital(text: &str) -> String {
     let mut signs = text.chars();
     signs.next().map(|first| first.to_uppercase().chain(signs).collect()).unwrap_or_default()
 }
 
-/// Where an object stands, in the map.
+/// Position of an object in the map frame, as text.
 pub fn place(track: &Track) -> String {
     let [x, y, z]: [f64; 3] = track.position_m.coords.into();
     format!("({x:.2}, {y:.2}, {z:.2}) m")
 }
 
-/// A text in lines of at most so many letters, the first behind a sign, the others as far in.
+/// Wraps a text at `most` letters; the first line starts with `first`, the others are indented by its width.
 pub fn wrapped(text: &str, first: &str, most: usize) -> String {
     let indent = " ".repeat(first.chars().count());
     let mut lines: Vec<String> = Vec::new();
@@ -64,7 +64,7 @@ pub fn wrapped(text: &str, first: &str, most: usize) -> String {
     lines.join("\n")
 }
 
-/// Words of a text; a call or figures in brackets are one word, where they are short, and so is a number of percent.
+/// Words of a text for wrapping; a short call or figure in brackets, and a number with `%`, stay whole.
 fn words(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut open: Vec<&str> = Vec::new();
@@ -82,7 +82,8 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// Takes what stands in brackets, or a word by itself, into the words of a text. What is said in passing is no call.
+/// Adds a bracketed group, or a single word, to the words of a text. A group with a comma is prose and may be
+/// broken.
 fn take(words: &mut Vec<String>, open: &[&str]) {
     const LONGEST_CALL: usize = 60;
     let whole = open.join(" ");

@@ -1,4 +1,4 @@
-//! Tests of what is told of a run.
+//! Tests of explanations.
 
 mod reasons;
 mod unit;

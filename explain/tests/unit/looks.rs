@@ -8,7 +8,7 @@ use descry_explain::standings::Standing;
 use descry_memory::belief::Belief;
 use descry_memory::belief::Track;
 
-/// An object on the table, with what it may be.
+/// An object on the table that may be the ring or the stone.
 fn track(ring: f64, stone: f64) -> Track {
     serde_json::from_value(serde_json::json!({
         "id": 0, "on": "table", "position_m": [1.0, 2.0, 0.7], "position_sigma_m": 0.01, "size_m": [0.1, 0.1, 0.1],

@@ -21,7 +21,7 @@ fn way(step: &str, takes_s: f64, gains: f64, reaches: Option<bool>) -> Way {
     Way { steps: vec![call(step)], each_s: vec![takes_s], takes_s, gains, reaches, ..Way::default() }
 }
 
-/// The first plan of a run, which takes ten seconds to its end, and why it was this one.
+/// Checks the justification of a run's first plan, whose makespan is ten seconds.
 fn check(chosen: Option<Way>, others: &[Way], cut: Option<u64>, words: &[&str]) {
     let numbers = vec![Expected { name: "(sure)".into(), now: 0.0, then: 1.25 }];
     let open = others.len() + 1;

@@ -1,17 +1,17 @@
-//! A plan as a Gantt chart: a row a step, in the order in which they begin.
+//! Gantt chart of a plan: a row for each step, ordered by start time.
 
 use descry_planner::{Plan, Step};
 
 use crate::escaped;
 
-/// Width of the chart, of its names, and height of a row, pixels.
+/// Widths of the chart and of its name column, and height of a row, pixels.
 const WIDE: f64 = 1000.0;
 const NAMES: f64 = 300.0;
 const ROW: f64 = 22.0;
-/// Most letters of a name that find room.
+/// Maximum length of a step's label, letters.
 const LETTERS: usize = 42;
 
-/// The chart as SVG. A plan without times has a step a unit.
+/// Draws a plan as SVG. Steps of a plan without times last one unit each.
 pub fn svg(plan: &Plan) -> String {
     let timed = plan.makespan_s();
     let begins = |n: usize, step: &Step| step.start_s.unwrap_or(n as f64);

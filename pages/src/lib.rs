@@ -5,7 +5,7 @@ pub mod live;
 pub mod page;
 pub mod picture;
 
-/// Text for HTML and SVG.
+/// Escapes text for HTML and SVG.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

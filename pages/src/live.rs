@@ -1,7 +1,7 @@
-//! A page that shows something while it goes on: a thread of its own serves it to browsers on this machine, and to nobody else.
+//! Live page, served by its own thread to browsers on this machine alone.
 //!
-//! Readers ask and get; nothing that they send reaches what is shown. A page of another site that makes a browser ask is refused: by
-//! the `Host` that it names (a name of its own that leads here), by its `Origin`, and by what browsers are told in the answer.
+//! The server is read-only. It refuses requests that other sites' pages cause: by the `Host` and `Origin`
+//! headers (DNS rebinding and cross-site requests), and by restrictive response headers.
 
 #[doc(hidden)]
 pub mod answers;
@@ -22,61 +22,63 @@ use connections::Connections;
 use descry_agent::exit::CommandError;
 use news::News;
 
-/// The part of a page's script that hears of news.
+/// Script of a page that subscribes to updates.
 pub const FOLLOW: &str = include_str!("live/follow.js");
 
-/// How often it is looked whether there is something new, while somebody reads.
+/// Interval between checks for a new revision while a reader is connected.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
-/// How long readers are waited for that have not fetched the end yet.
+/// Maximum wait for readers to fetch the final state.
 const LINGER: Duration = Duration::from_secs(5);
-/// Most connections at a time; for a further one another is closed, first one that has not asked for anything.
+/// Maximum number of open connections; a further one evicts another, preferably one that has sent no request.
 const MOST_CONNECTIONS: usize = 64;
-/// Within this a reader must have said what it wants.
+/// Time within which a client must have sent its request.
 const ASK_WITHIN: Duration = Duration::from_secs(10);
 
-/// Something that goes on, and its page.
+/// Source of a live page.
 pub trait Shown: Send + Sync + 'static {
-    /// Another number whenever there is something new.
+    /// Revision of the content; changes with every update.
     fn revision(&self) -> u64;
 
-    /// What is found at a path, the page itself at `/`; none if nothing is.
+    /// Content at a path, the page itself at `/`; none if the path does not exist.
     ///
     /// # Errors
-    /// [`CommandError`] if it cannot be told now; it may be later.
+    ///
+    /// [`CommandError`] if the content is unavailable now; a later call may succeed.
     fn at(&self, path: &str) -> Result<Option<Found>, CommandError>;
 }
 
-/// What is found at a path.
+/// Content at a path.
 pub struct Found {
-    /// Its media type.
+    /// Media type.
     pub kind: &'static str,
-    /// Its text.
+    /// Body.
     pub text: String,
 }
 
 impl Found {
-    /// A page.
+    /// Content of type HTML.
     pub fn html(text: String) -> Self {
         Self { kind: "text/html; charset=utf-8", text }
     }
 
-    /// Something for the script of a page.
+    /// Content of type JSON.
     pub fn json(text: String) -> Self {
         Self { kind: "application/json", text }
     }
 }
 
-/// A port on this machine, taken before anything begins that is to be shown there.
+/// TCP port on the loopback interface, bound before the work to be shown begins.
 pub struct Port {
     listener: TcpListener,
     address: SocketAddr,
 }
 
 impl Port {
-    /// Takes a port; 0: any that is free.
+    /// Binds a port; 0 selects a free one.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] if it is not to be had.
+    ///
+    /// [`CommandError::BadInput`] if the port cannot be bound.
     pub fn take(port: u16) -> Result<Self, CommandError> {
         let refused = |e: std::io::Error| {
             CommandError::BadInput(format!(
@@ -89,15 +91,16 @@ impl Port {
         Ok(Self { listener, address })
     }
 
-    /// Where the page will be.
+    /// URL of the page.
     pub fn url(&self) -> String {
         format!("http://{}/", self.address)
     }
 
-    /// Begins to show something there.
+    /// Starts to serve a page on the port.
     ///
     /// # Errors
-    /// [`CommandError::Broken`] if the system gives no thread.
+    ///
+    /// [`CommandError::Broken`] if the system cannot start a thread.
     pub fn show(self, shown: Arc<dyn Shown>) -> Result<Live, CommandError> {
         let broken = |e: std::io::Error| CommandError::broken(format!("the page cannot be served: {e}"));
         let (end, ended) = watch::channel(false);
@@ -115,14 +118,14 @@ impl Port {
     }
 }
 
-/// A page that is served.
+/// Running server of a page.
 pub struct Live {
     end: watch::Sender<bool>,
     thread: JoinHandle<()>,
 }
 
 impl Live {
-    /// Says that nothing new will come, and waits a moment for readers to fetch the end.
+    /// Announces the end, and waits briefly for readers to fetch the final state.
     pub fn end(self) {
         let _ = self.end.send(true);
         let _ = self.thread.join();

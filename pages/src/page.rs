@@ -1,5 +1,5 @@
-//! A run as one page that needs nothing else: the map with route and views, the plans above what really happened, confidence after
-//! each look, what was seen in three dimensions, and all that was said; one moment in time moves all of them.
+//! Self-contained HTML page of a run: map with route and views, plans next to their execution, confidence
+//! after each look, point clouds in 3-D, and the narration, all synchronised by one time slider.
 
 mod live;
 #[doc(hidden)]
@@ -15,14 +15,15 @@ use descry_agent::report::Report;
 pub use live::Running;
 
 const HTML: &str = include_str!("page/page.html");
-/// Colours of every page, light and dark.
+/// Style sheet with the colours of every page, light and dark.
 pub const COLOURS: &str = include_str!("page/colours.css");
 const STYLE: &str = include_str!("page/page.css");
 const SCRIPT: &str = include_str!("page/page.js");
 
-/// The page of a run, from its record and, if it has finished, its report.
+/// Renders the page of a run from its record, with its report if the run has finished.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, CommandError> {
     let story = story::of(record, report, &mut story::Looks::default())?;
@@ -30,7 +31,7 @@ pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, Comman
     Ok(laid_out(&format!("descry: {}", story.goal), &told))
 }
 
-/// The page that tells a story, as JSON.
+/// Renders the page around a story in JSON.
 pub fn laid_out(title: &str, told: &str) -> String {
     let title = escaped(title);
     let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());

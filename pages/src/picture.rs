@@ -1,4 +1,5 @@
-//! A cloud as a picture: what the camera saw, or the cloud from above where there was none, with each object tinted and named.
+//! Picture of a segmented cloud with each object tinted and labelled: the camera image, or a view from above
+//! if the cloud is unorganised.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -10,19 +11,20 @@ use image::{ImageFormat, Rgb, RgbImage};
 use crate::escaped;
 use descry_agent::exit::CommandError;
 
-/// Side of a pixel where a cloud is drawn from above, metres, and most pixels along a side.
+/// Size of a pixel in a view from above, metres, and maximum number of pixels along a side.
 const PIXEL_M: f64 = 0.002;
 const MOST_PIXELS: f64 = 1200.0;
-/// How far around the surface it is drawn, metres.
+/// Margin drawn around the surface, metres.
 const BESIDE_M: f64 = 0.15;
-/// Colours of objects, one after the other.
+/// Colours of the objects, in turn.
 const TINTS: [[u8; 3]; 6] =
     [[230, 85, 30], [40, 120, 220], [30, 160, 80], [190, 60, 180], [215, 160, 0], [0, 160, 175]];
 
-/// The picture as SVG: the pixels, and over them names.
+/// Renders the picture as SVG: pixels, with labels over them.
 ///
 /// # Errors
-/// [`CommandError::Bug`] if the pixels cannot be packed.
+///
+/// [`CommandError::Bug`] if the pixels cannot be encoded.
 pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<String, CommandError> {
     let (width, height, places) = places(cloud, surface);
     let mut pixels = RgbImage::from_pixel(width, height, Rgb([24, 26, 30]));
@@ -64,7 +66,8 @@ pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<Str
     ))
 }
 
-/// The size of the picture, and the pixel of each point: its own in an organised cloud, else where it lies seen from above.
+/// The size of the picture, and the pixel of each point: its own in an organised cloud, its projection from
+/// above otherwise.
 fn places(cloud: &Cloud, surface: &Surface) -> (u32, u32, Vec<Option<(u32, u32)>>) {
     if let Some(grid) = cloud.grid {
         let at = |n: usize| {
@@ -87,7 +90,7 @@ fn places(cloud: &Cloud, surface: &Surface) -> (u32, u32, Vec<Option<(u32, u32)>
     (width as u32, height as u32, cloud.points.iter().map(at).collect())
 }
 
-/// The colour of each point; where the cloud has none, the nearer the lighter.
+/// The colour of each point; in a cloud without colours a grey, lighter for nearer points.
 fn shade(cloud: &Cloud) -> impl Fn(usize) -> [u8; 3] + '_ {
     let far = cloud.points.iter().map(|p| p.coords.norm()).filter(|m| m.is_finite()).fold(1e-3, f32::max);
     move |n| match &cloud.colours {

@@ -1,3 +1,3 @@
-//! What pages promise, from outside: one program, so that what all tests share is built and linked once.
+//! Integration tests of pages, in one binary.
 
 mod unit;

@@ -1,4 +1,4 @@
-//! What is answered to a request, and who is refused.
+//! Responses to HTTP requests, and refusals.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -16,10 +16,11 @@ use super::{Found, Shown};
 
 type Body = BoxBody<Bytes, std::io::Error>;
 
-/// Where readers listen for news.
+/// Path of the event stream.
 const NEWS: &str = "/news";
 
-/// What browsers are told with every answer: the page needs nothing from elsewhere, and nobody else may use or show it.
+/// Security headers of every response: the page loads nothing from elsewhere, and other sites may neither
+/// embed nor read it.
 const SAFETY: [(HeaderName, &str); 6] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -33,7 +34,7 @@ const SAFETY: [(HeaderName, &str); 6] = [
     (header::CACHE_CONTROL, "no-store"),
 ];
 
-/// Answers a request.
+/// Responds to a request.
 pub async fn answer(
     request: Request<Incoming>,
     port: u16,
@@ -80,7 +81,8 @@ fn said(status: StatusCode, why: &str) -> Response<Body> {
     response
 }
 
-/// Why a request is refused: it names another host than this machine, or a page from elsewhere makes it.
+/// The reason to refuse a request: a `Host` other than this machine, or a cross-site origin; none if it is
+/// allowed.
 pub fn refusal(headers: &HeaderMap, named: Option<&str>, port: u16) -> Option<&'static str> {
     let own = |host: &str| {
         let names = ["127.0.0.1", "localhost"];

@@ -1,4 +1,4 @@
-//! Connections that are open: so few that none starves, whoever opens them and says nothing.
+//! Bounded set of open connections; silent clients cannot exhaust it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,7 +9,7 @@ use tokio::sync::Notify;
 #[derive(Debug, Default)]
 pub struct Connections(Mutex<Vec<Arc<Connection>>>);
 
-/// One connection.
+/// An open connection.
 #[derive(Debug, Default)]
 pub struct Connection {
     has_asked: AtomicBool,
@@ -17,7 +17,7 @@ pub struct Connection {
 }
 
 impl Connections {
-    /// Opens a connection among at most so many: where there is no room, the oldest that has asked for nothing is evicted, or else
+    /// Opens a connection. If `most` are open already, evicts the oldest that has sent no request, or else
     /// the oldest.
     pub fn open(&self, most: usize) -> Arc<Connection> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -30,7 +30,7 @@ impl Connections {
         connection
     }
 
-    /// Forgets a connection.
+    /// Removes a connection.
     pub fn close(&self, connection: &Arc<Connection>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|one| !Arc::ptr_eq(one, connection));
@@ -38,12 +38,12 @@ impl Connections {
 }
 
 impl Connection {
-    /// Notes that something was asked for.
+    /// Marks the connection as having sent a request.
     pub fn has_asked(&self) {
         self.has_asked.store(true, Ordering::Relaxed);
     }
 
-    /// Waits until the connection is to give room to another.
+    /// Waits for the eviction of the connection.
     pub async fn evicted(&self) {
         self.eviction.notified().await;
     }

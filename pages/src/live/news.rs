@@ -1,4 +1,4 @@
-//! That there is something new, for readers who listen.
+//! Notification of readers about new revisions.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use tokio::sync::watch;
 
 use super::{LOOK_EVERY, Shown};
 
-/// How far what is shown has come.
+/// Progress of the shown content.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct News {
-    /// Another one whenever there is something new.
+    /// Current revision; changes with every update.
     pub revision: u64,
-    /// Whether nothing more will come.
+    /// True if no further update will come.
     pub ended: bool,
 }
 
-/// Looks for something new as long as somebody listens.
+/// Polls for new revisions while a reader is subscribed.
 pub async fn watch(shown: Arc<dyn Shown>, news: Arc<watch::Sender<News>>) {
     loop {
         tokio::time::sleep(LOOK_EVERY).await;
@@ -36,7 +36,7 @@ pub async fn watch(shown: Arc<dyn Shown>, news: Arc<watch::Sender<News>>) {
     }
 }
 
-/// The news as server-sent events: how it stands now, and whenever that changes, until the reader goes away.
+/// Updates as server-sent events: the current state, then each change, until the reader disconnects.
 pub fn events(news: watch::Receiver<News>) -> impl Stream<Item = Result<Frame<Bytes>, std::io::Error>> {
     let now = stream::once(async move { news }).flat_map(|mut news| {
         let first = *news.borrow_and_update();

@@ -1,4 +1,4 @@
-//! The points of a look, few enough to be drawn and small enough to be sent.
+//! Thinned and packed point clouds, small enough to send and to draw.
 
 use std::collections::HashSet;
 
@@ -8,44 +8,44 @@ use descry_perception::Cloud;
 use descry_perception::nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 
-/// Most points of one look, and of all looks together.
+/// Maximum number of points of one look, and of all looks together.
 const MOST_OF_A_LOOK: usize = 50_000;
 const MOST_OF_ALL: usize = 1_000_000;
-/// Side of the cells of which one point is kept: near surfaces to stand things on, metres; elsewhere so many times that.
+/// Side of a thinning cell near surfaces, metres, and factor on it elsewhere; each cell keeps one point.
 const CELL_M: f64 = 0.008;
 const COARSER: f64 = 5.0;
-/// How much larger cells become until the points are few enough.
+/// Growth factor of the cells, applied until the points are few enough.
 const GROWTH: f64 = 1.3;
-/// Points farther from the camera than this are not drawn, metres.
+/// Maximum distance of drawn points from the camera, metres.
 const FAR_M: f64 = 6.0;
 
-/// A cuboid in which points are kept more densely, in the map, metres.
+/// Axis-aligned box with dense points, map frame, metres.
 pub struct Near {
-    /// Its least corner.
+    /// Minimum corner.
     pub min_m: Point3<f64>,
-    /// Its greatest.
+    /// Maximum corner.
     pub max_m: Point3<f64>,
 }
 
-/// Points with colours, packed.
+/// Packed points with colours.
 #[derive(Debug, Serialize)]
 pub struct Packed {
-    /// Where the box of all points begins, in the map, metres.
+    /// Minimum corner of the bounding box, map frame, metres.
     min_m: [f64; 3],
-    /// How large it is, metres.
+    /// Size of the bounding box, metres.
     size_m: [f64; 3],
-    /// Three unsigned numbers of 16 bits a point, least byte first, in parts of that box; in base64.
+    /// Three `u16` a point, little-endian, base64: the position as a fraction of the bounding box.
     pub places: String,
-    /// Three bytes a point: red, green, blue; in base64.
+    /// Three bytes a point, base64: red, green, blue.
     pub colours: String,
 }
 
-/// Most points of each of so many looks.
+/// Maximum number of points of each look, for this number of looks.
 pub fn most(looks: usize) -> usize {
     MOST_OF_A_LOOK.min(MOST_OF_ALL / looks.max(1))
 }
 
-/// The points of a cloud whose camera stood there.
+/// Thins and packs a cloud taken at a camera pose.
 pub fn pack(cloud: &Cloud, map_from_camera: &Isometry3<f64>, near: &[Near], most: usize) -> Packed {
     let mut cell_m = CELL_M;
     let mut kept = thinned(cloud, map_from_camera, near, cell_m);
@@ -69,7 +69,8 @@ pub fn pack(cloud: &Cloud, map_from_camera: &Isometry3<f64>, near: &[Near], most
     Packed { min_m, size_m, places: STANDARD.encode(places), colours: STANDARD.encode(colours) }
 }
 
-/// The points in an order of which every beginning is spread over all of them: so few can stand for all while the picture turns.
+/// Permutes points such that every prefix is spread over the whole: a prefix can be drawn while the view
+/// turns.
 pub fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     const STRIDE: usize = 7919;
     let count = points.len();
@@ -80,7 +81,7 @@ pub fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     }
 }
 
-/// One point of each cell, the first.
+/// The first point of each cell.
 fn thinned(
     cloud: &Cloud,
     map_from_camera: &Isometry3<f64>,

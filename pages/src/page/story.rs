@@ -1,4 +1,4 @@
-//! What a page shows of a run, gathered from its record.
+//! Content of a run's page, gathered from its record.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,18 +19,19 @@ use descry_agent::written::call_of;
 use descry_domains::saying::Saying;
 use descry_explain::wording::capital;
 
-/// How far around the outline of a surface, below it and above it its things are drawn densely, metres.
+/// Margins of the dense box of a surface: around its outline, below and above it, metres.
 const BESIDE_M: f64 = 0.15;
 const BELOW_M: f64 = 0.05;
 const ABOVE_M: f64 = 0.6;
 
-/// Everything that the page shows. Times are seconds since the run began, on the body's clock; places are in the map, metres.
+/// Content of a run's page. Times are seconds since the run began, on the body's clock; positions are in the
+/// map frame, metres.
 #[derive(Debug, Serialize)]
 pub struct Story {
-    /// The words of the goal.
+    /// The goal as the user phrased it.
     pub goal: String,
     pddl: String,
-    /// What the goal asks for, as the domain says it.
+    /// The goal in the domain's wording.
     wanted: Option<String>,
     report: Option<Report>,
     begun_unix_s: Option<u64>,
@@ -45,7 +46,7 @@ pub struct Story {
     stands: Vec<Stand>,
     beliefs: Vec<Believed>,
     known: Vec<Known>,
-    /// The numbers that the goal asks for.
+    /// The numbers in the goal.
     sought: Vec<Sought>,
     lost: Vec<String>,
 }
@@ -68,13 +69,13 @@ struct Area {
     height_m: f64,
 }
 
-/// Something that was said.
+/// A message of the narration.
 #[derive(Debug, Serialize)]
 struct Moment {
     at_s: f64,
-    /// What it is about: goal, plan, keep, do, failed or see.
+    /// Kind: `goal`, `plan`, `keep`, `do`, `failed` or `see`.
     what: &'static str,
-    /// The word at its head; empty: it goes on from the one before.
+    /// Heading; empty if the message continues the previous one.
     head: String,
     text: String,
 }
@@ -93,13 +94,13 @@ struct Planned {
 struct PlanStep {
     /// The step in PDDL.
     call: String,
-    /// The step as the domain says it.
+    /// The step in the domain's wording.
     said: String,
     from_s: f64,
     lasts_s: f64,
 }
 
-/// A step that was carried out, or tried.
+/// A step that was carried out or attempted.
 #[derive(Debug, Serialize)]
 struct Deed {
     call: String,
@@ -108,21 +109,21 @@ struct Deed {
     failed: Option<String>,
 }
 
-/// A look: from where, and what it measured.
+/// A look: camera pose, and measured points.
 #[derive(Debug, Clone, Serialize)]
 struct Look {
-    /// Another one whenever it is placed elsewhere.
+    /// Key of the look; changes with its pose.
     key: String,
     at_s: f64,
     eye_m: [f64; 3],
-    /// Corners of the image two metres away.
+    /// Corners of the image at a depth of two metres.
     corners_m: Vec<[f64; 3]>,
     on: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     points: Option<Arc<Packed>>,
 }
 
-/// The looks of a run as they were told last: who tells it again need not read them again.
+/// Cache of a run's looks from one story to the next.
 #[derive(Debug, Default)]
 pub struct Looks(BTreeMap<String, Look>);
 
@@ -133,7 +134,7 @@ impl Looks {
     }
 }
 
-/// Where the body stood.
+/// Pose of the body at a time.
 #[derive(Debug, Serialize)]
 struct Stand {
     at_s: f64,
@@ -142,28 +143,28 @@ struct Stand {
     yaw_rad: f64,
 }
 
-/// What was believed after a look.
+/// Belief after a look.
 #[derive(Debug, Serialize)]
 struct Believed {
     at_s: f64,
     objects: Vec<Object>,
-    /// The best probability of each known object.
+    /// Highest probability of each known object.
     best: BTreeMap<String, f64>,
 }
 
-/// How things stood after a look: how sure it is of what was asked for, why it is no surer, and what is unseen.
+/// State of the run after a look: certainty, reasons for doubt, and unseen places.
 #[derive(Debug, Serialize)]
 struct Known {
     at_s: f64,
     text: String,
 }
 
-/// A number that the goal asks for, over time.
+/// History of a number in the goal.
 #[derive(Debug, Serialize)]
 struct Sought {
     name: String,
     wanted: f64,
-    /// Times in seconds, with the values from then on.
+    /// Pairs of a time, seconds, and the value from then on.
     values: Vec<(f64, f64)>,
 }
 
@@ -176,9 +177,10 @@ struct Object {
     footprint_m: Vec<[f64; 3]>,
 }
 
-/// Gathers it.
+/// Gathers the story of a run.
 ///
 /// # Errors
+///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result<Story, CommandError> {
     let mut all = All { record, lost: Vec::new(), first_ns: None };
@@ -230,7 +232,8 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
 }
 
 impl Story {
-    /// The same for who fetches the points of each look alone. What cannot be read of a run that is being written may be there soon.
+    /// The story for readers that fetch the points of each look separately. While the run is still writing,
+    /// unreadable parts of the record are not reported.
     pub fn under_way(mut self) -> Self {
         self.looks.iter_mut().for_each(|look| look.points = None);
         if self.report.is_none() {
@@ -240,7 +243,7 @@ impl Story {
     }
 }
 
-/// The record, the time at which it begins, and what of it is lost.
+/// The record, its lost parts, and the time at which it begins.
 struct All<'a> {
     record: &'a Record,
     lost: Vec<String>,
@@ -292,14 +295,14 @@ fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Ve
     (moments, plans)
 }
 
-/// A step of a plan that was made at a time.
+/// A step of a plan that was made at `at_s`.
 fn planned(step: &Step, at_s: f64, saying: &Saying) -> PlanStep {
     let call = call_of(step).to_string();
     let said = saying.say(&call);
     PlanStep { call, said, from_s: at_s + step.start_s.unwrap_or(0.0), lasts_s: step.duration_s }
 }
 
-/// Each step that began, with the first thing after it that ended it: its failure, or the next event that is not about it.
+/// The steps begun, each with its end: its failure, or the next event about something else.
 fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     let events: Vec<(f64, Event)> =
         events.iter().filter_map(|d| Some((all.s(d.stamp_ns), part(&d.body)?))).collect();
@@ -321,7 +324,7 @@ fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     deeds
 }
 
-/// Where the last merge that had it placed each look, by the number of its cloud.
+/// Pose of each look in the last merge that included it, by the record ID of its cloud.
 fn placed(all: &mut All<'_>) -> Result<BTreeMap<u64, Isometry3<f64>>, CommandError> {
     let mut placed = BTreeMap::new();
     for document in all.find("percepts")? {
@@ -334,7 +337,7 @@ fn placed(all: &mut All<'_>) -> Result<BTreeMap<u64, Isometry3<f64>>, CommandErr
 }
 
 impl Looks {
-    /// Takes in the looks of these clouds; those that stand where they stood are kept as they are.
+    /// Updates the looks from these clouds; those with an unchanged pose are kept.
     fn tell(&mut self, all: &mut All<'_>, clouds: &[Document], map: &Map) -> Result<(), CommandError> {
         let placed = placed(all)?;
         let frame = map.description["frames"]["map"].as_str().unwrap_or("map").to_owned();
@@ -367,7 +370,7 @@ impl Looks {
     }
 }
 
-/// Another one for another cloud, and for another place of it.
+/// Key of a look, from its cloud and its pose.
 fn key(document: &Document, map_from_camera: &Isometry3<f64>) -> String {
     let numbers = map_from_camera.to_homogeneous();
     let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -399,7 +402,7 @@ fn look(
     })
 }
 
-/// What is drawn densely about a surface.
+/// The dense box of a surface.
 fn near(surface: &Area) -> Near {
     let side = |axis: usize, of: fn(f64, f64) -> f64, from: f64| {
         surface.outline_m.iter().map(|p| p[axis]).fold(from, of)
@@ -412,7 +415,7 @@ fn near(surface: &Area) -> Near {
     }
 }
 
-/// Where the body stood at each look, and where it began.
+/// Start pose of the body, and its pose at each look.
 fn stands(all: &All<'_>, map: &Map, clouds: &[Document]) -> Vec<Stand> {
     let frames = &map.description["frames"];
     let [world, base] = ["map", "base"].map(|name| frames[name].as_str().unwrap_or(name).to_owned());

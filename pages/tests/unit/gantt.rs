@@ -7,7 +7,7 @@ fn step(start_s: Option<f64>, action: &str, duration_s: f64) -> Step {
     Step { start_s, action: action.into(), arguments: vec!["a".into(), "<b>".into()], duration_s }
 }
 
-/// A plan, and parts of its chart in their order.
+/// Checks that the chart of a plan has these parts in their order.
 fn check(steps: Vec<Step>, parts: &[&str]) {
     let drawn = svg(&Plan { steps, ..Plan::default() });
     let mut rest = drawn.as_str();

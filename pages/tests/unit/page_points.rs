@@ -15,7 +15,7 @@ fn mixing_keeps_every_point() {
     }
 }
 
-/// A wall of so many points, and how many are kept of at most so many.
+/// Checks how many points of a wall are kept, of at most `most`.
 fn check(side: u16, near: bool, most: usize, expected: std::ops::RangeInclusive<usize>) {
     let points = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
     let points = points.map(|(i, j)| Point3::new(f32::from(i) * 0.01, f32::from(j) * 0.01, 1.0)).collect();

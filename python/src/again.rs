@@ -1,4 +1,4 @@
-//! Runs that are there already: gone on with, or lived through again.
+//! Existing runs: resume and replay.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,7 +15,7 @@ use crate::agent::{Report, carried_out, runtime};
 use crate::convert::to_python;
 use crate::function::{self, Given, Raised};
 
-/// Goes on with a run that was cut off.
+/// Resumes an interrupted run.
 #[pyfunction]
 #[pyo3(signature = (run, *, robot, allow_programs, attachments, facts, actions, on_event))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -44,7 +44,7 @@ pub fn resume(
     carried_out(py, &raised, on_event.as_ref(), resumed).map(|inner| Report { inner })
 }
 
-/// What came of living through a run again.
+/// Result of a replay.
 #[pyclass(frozen, module = "descry")]
 pub struct Replay {
     inner: Replayed,
@@ -92,7 +92,7 @@ impl Replay {
     }
 }
 
-/// Lives through a run again from its record.
+/// Replays a run from its record.
 #[pyfunction]
 #[pyo3(signature = (run, *, speed, out, on_event))]
 pub fn replay(

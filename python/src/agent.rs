@@ -1,4 +1,4 @@
-//! The agent: a goal in words, pursued with a body.
+//! The agent: pursues a goal in words with a body.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,10 +22,10 @@ use crate::convert::to_python;
 use crate::failure;
 use crate::function::{self, Given, Raised};
 
-/// Ctrl-C is looked for this often while nothing happens.
+/// Interval between checks for Ctrl-C while no event arrives.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// What came of a run.
+/// Report of a run.
 #[pyclass(frozen, module = "descry")]
 pub struct Report {
     pub(crate) inner: report::Report,
@@ -77,7 +77,7 @@ impl Report {
     }
 }
 
-/// A domain that makes sense as a whole, with functions in the places of its programs.
+/// Loads a domain, checks it as a whole, and puts functions in the places of its programs.
 fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -> PyResult<Domain> {
     let mut domain = Domain::load(name).map_err(|error| match error {
         LoadError::Findings { findings } => failure::findings(py, &findings),
@@ -88,7 +88,7 @@ fn domain(py: Python<'_>, name: &str, given: [Given; 3], raised: &Arc<Raised>) -
     Ok(domain)
 }
 
-/// Everything a run needs but its body.
+/// Inputs of a run, except its body.
 struct Asked {
     said: String,
     domain: Domain,
@@ -97,7 +97,7 @@ struct Asked {
 }
 
 impl Asked {
-    /// Pursues the goal from beginning to end.
+    /// Pursues the goal from start to end.
     fn pursue(&self, stop: &Stop, tell: &mut dyn FnMut(&Event)) -> Result<report::Report, CommandError> {
         let started = Instant::now();
         let Settings { robot, scene, seed, policy, .. } = &self.settings;
@@ -145,10 +145,11 @@ pub fn pursue(
     carried_out(py, &raised, on_event.as_ref(), run).map(|inner| Report { inner })
 }
 
-/// Carries a run out while other threads of Python go on.
+/// Carries out a run while other Python threads proceed.
 ///
 /// # Errors
-/// What ended it: what a function has raised, Ctrl-C, or the run's own.
+///
+/// The cause of an early end: an exception of a function, Ctrl-C, or the error of the run.
 pub fn carried_out<T: Send>(
     py: Python<'_>,
     raised: &Raised,
@@ -163,7 +164,7 @@ pub fn carried_out<T: Send>(
     }
 }
 
-/// Lets a run go on in a thread of its own, so that this one can look for Ctrl-C and tell of events.
+/// Carries out a run on a thread of its own, while this one checks for Ctrl-C and delivers events.
 fn watched<T: Send>(
     run: impl FnOnce(&Stop, &mut dyn FnMut(&Event)) -> Result<T, CommandError> + Send,
     stop: &Stop,
@@ -199,13 +200,13 @@ fn told(py: Python<'_>, on_event: Option<&Py<PyAny>>, event: &Event) -> PyResult
     on_event.call1(py, (told,)).map(drop)
 }
 
-/// Where runs go on.
+/// Single-threaded runtime for runs.
 pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     runtime.map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))
 }
 
-/// The phrases that a domain understands.
+/// The goal phrases of a domain.
 #[pyfunction]
 #[pyo3(signature = (domain="tabletop"))]
 pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {
@@ -213,13 +214,13 @@ pub fn goals(py: Python<'_>, domain: &str) -> PyResult<Vec<String>> {
     Ok(domain.config.goal.iter().map(|goal| goal.say.clone()).collect())
 }
 
-/// Writes a small domain that runs into a folder, there to be changed.
+/// Writes a small working domain into a folder, as a starting point.
 #[pyfunction]
 pub fn new_domain(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
     write_domain(&folder).map_err(|error| failure::command(py, &error))
 }
 
-/// Holds a body to the promises of every body.
+/// Runs the conformance test on a body.
 #[pyfunction]
 pub fn check_robot(py: Python<'_>, robot: &str) -> PyResult<()> {
     let checked = py.detach(|| -> Result<(), CommandError> {

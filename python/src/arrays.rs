@@ -1,4 +1,4 @@
-//! Point clouds and poses as NumPy's arrays.
+//! Point clouds and poses as NumPy arrays.
 
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Cloud, Grid};
@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 
 use crate::failure;
 
-/// A cloud from an array: N x 3, or height x width x 3 for the pixels of an image, NaN where nothing returned.
+/// Converts an array to a cloud: N x 3, or height x width x 3 for the pixels of an image, metres, NaN without
+/// a return.
 pub fn cloud(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Cloud> {
     let wrong = |found: String| {
         let text = format!(
@@ -36,7 +37,7 @@ pub fn cloud(py: Python<'_>, points: &Bound<'_, PyAny>) -> PyResult<Cloud> {
     Ok(Cloud { points, grid, ..Cloud::default() })
 }
 
-/// The points of a cloud: N x 3, or height x width x 3.
+/// Converts the points of a cloud to an array, N x 3 or height x width x 3, metres.
 pub fn points<'py>(py: Python<'py>, cloud: &Cloud) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let values: Vec<f32> = cloud.points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     let shape = match cloud.grid {
@@ -46,19 +47,19 @@ pub fn points<'py>(py: Python<'py>, cloud: &Cloud) -> PyResult<Bound<'py, PyArra
     PyArray1::from_vec(py, values).reshape(shape)
 }
 
-/// Colours a point each: red, green, blue.
+/// Converts colours to an array, N x 3: red, green, blue.
 pub fn colours<'py>(py: Python<'py>, colours: &[[u8; 3]]) -> PyResult<Bound<'py, PyArray2<u8>>> {
     PyArray1::from_vec(py, colours.concat()).reshape([colours.len(), 3])
 }
 
-/// A transform as a matrix of 4 x 4.
+/// Converts a transform to a homogeneous matrix, 4 x 4.
 pub fn matrix<'py>(py: Python<'py>, transform: &Isometry3<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     // nalgebra keeps columns together, NumPy rows.
     let rows: Vec<f64> = transform.to_homogeneous().transpose().iter().copied().collect();
     PyArray1::from_vec(py, rows).reshape([4, 4])
 }
 
-/// A point or a direction.
+/// Converts a point or a direction to an array of 3.
 pub fn vector<'py>(py: Python<'py>, vector: &Vector3<f64>) -> Bound<'py, PyArray1<f64>> {
     PyArray1::from_slice(py, vector.as_slice())
 }

@@ -1,4 +1,4 @@
-//! Functions of Python behind the calls of a domain.
+//! Semantic attachments in Python.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,8 @@ use pyo3::types::{PyDict, PyTuple};
 
 use crate::watch::Watch;
 
-/// A function that answers the calls of a module, with what its answer depends on and a cheap answer for heuristics.
+/// Function that answers the calls of a module, with the facts that its answer depends on and a cheap
+/// estimate for heuristics.
 #[pyclass(frozen, module = "descry")]
 pub struct Attachment {
     function: Py<PyAny>,
@@ -36,7 +37,7 @@ impl Attachment {
     }
 }
 
-/// One question to an attachment.
+/// A call to an attachment.
 #[pyclass(frozen, module = "descry")]
 pub struct Call {
     inner: descry_planner::Call,
@@ -105,7 +106,7 @@ fn written<'py>(py: Python<'py>, value: &FactValue) -> PyResult<Bound<'py, PyAny
     })
 }
 
-/// The attachment as the planner asks it.
+/// Adapter of the attachment to the planner's trait.
 struct Asked {
     function: Py<PyAny>,
     reads: Vec<String>,
@@ -181,7 +182,7 @@ fn value(value: &Bound<'_, PyAny>) -> PyResult<FactValue> {
     Ok(FactValue::Object(value.extract::<String>()?.into()))
 }
 
-/// Functions by the names of their modules, to be asked while `watch` goes on.
+/// Binds functions to the modules of their names, for calls while `watch` is running.
 pub fn bind(py: Python<'_>, given: Option<BTreeMap<String, Py<PyAny>>>, watch: &Arc<Watch>) -> Attachments {
     let clock = Arc::clone(watch);
     let mut attachments = Attachments::new().with_clock(move || clock.elapsed_s());

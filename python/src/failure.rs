@@ -1,4 +1,4 @@
-//! What is wrong, as Python's exceptions: `descry/errors.py` declares them.
+//! Errors as the Python exceptions declared in `descry/errors.py`.
 
 use descry_agent::exit::CommandError;
 use descry_planner::{Diagnostic, Findings, PlanError, Severity};
@@ -6,7 +6,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// One thing that is wrong with a text, where, and how to mend it.
+/// A finding in a text, with its place and a suggested fix.
 #[pyclass(frozen, get_all, module = "descry", skip_from_py_object)]
 #[derive(Clone)]
 pub struct Finding {
@@ -53,7 +53,7 @@ impl Finding {
     }
 }
 
-/// An input that cannot be used, with its findings.
+/// `InputError` with its findings.
 pub fn findings(py: Python<'_>, findings: &Findings) -> PyErr {
     let all = Finding::all(findings);
     let fault = all.iter().find(|f| f.severity == "error").or(all.first()).cloned();
@@ -72,7 +72,7 @@ pub fn findings(py: Python<'_>, findings: &Findings) -> PyErr {
     told().map_or_else(|e| e, |told| raised(py, "InputError", &findings.render(false), Some(&told)))
 }
 
-/// An input that cannot be used, from a text whose further lines say what was expected and what to do.
+/// `InputError` from a text whose further lines give the expectation and the fix.
 pub fn input(py: Python<'_>, text: &str) -> PyErr {
     let told = PyDict::new(py);
     let set = || -> PyResult<()> {
@@ -87,17 +87,17 @@ pub fn input(py: Python<'_>, text: &str) -> PyErr {
     set().map_or_else(|e| e, |()| raised(py, "InputError", text, Some(&told)))
 }
 
-/// A body or a store that failed for good.
+/// `BrokenError`: a body or a store that failed permanently.
 pub fn broken(py: Python<'_>, text: &str) -> PyErr {
     raised(py, "BrokenError", text, None)
 }
 
-/// A fault of this package.
+/// `InternalError`: a bug of this package.
 pub fn bug(py: Python<'_>, text: &str) -> PyErr {
     raised(py, "InternalError", text, None)
 }
 
-/// Why planning gave no answer.
+/// The exception for a planning error.
 pub fn planning(py: Python<'_>, error: &PlanError) -> PyErr {
     match error.findings() {
         Some(found) => findings(py, found),
@@ -105,7 +105,7 @@ pub fn planning(py: Python<'_>, error: &PlanError) -> PyErr {
     }
 }
 
-/// Why a run could not do what it was asked.
+/// The exception for an error of a run.
 pub fn command(py: Python<'_>, error: &CommandError) -> PyErr {
     match error {
         CommandError::BadInput(text) => input(py, text),

@@ -1,4 +1,4 @@
-//! Functions of Python that stand in for the programs of a domain.
+//! Python functions in the places of a domain's programs.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,32 +13,32 @@ use serde_json::{Map, Value};
 use crate::convert::{from_python, to_python};
 use crate::failure;
 
-/// What functions have raised.
+/// Exceptions raised by functions.
 #[derive(Default)]
 pub struct Raised {
-    /// What ends the run: Ctrl-C, not a failure of a function.
+    /// The exception that ends the run, such as `KeyboardInterrupt`; ordinary failures of a function do not.
     ends: Mutex<Option<PyErr>>,
-    /// The last failure of a function, and its words.
+    /// The last ordinary failure of a function, with its message.
     failed: Mutex<Option<(String, PyErr)>>,
 }
 
 impl Raised {
-    /// Ends the run.
+    /// Ends the run with an exception; the first one counts.
     pub fn end(&self, error: PyErr) {
         locked(&self.ends).get_or_insert(error);
     }
 
-    /// Whether the run is to end.
+    /// True if the run is to end.
     pub fn is_end(&self) -> bool {
         locked(&self.ends).is_some()
     }
 
-    /// What ended the run, if anything did.
+    /// The exception that ended the run, if any; a second call returns none.
     pub fn ended(&self) -> Option<PyErr> {
         locked(&self.ends).take()
     }
 
-    /// An error of the run with the failure behind it, if it speaks of that.
+    /// The error of a run, with the failure of a function as its cause if its message quotes that failure.
     pub fn behind(&self, py: Python<'_>, error: PyErr) -> PyErr {
         if let Some((words, failed)) = locked(&self.failed).take()
             && error.to_string().contains(&words)
@@ -63,7 +63,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A function that is called with the parts of a question.
+/// Adapter that calls a Python function with the parts of a question.
 struct Called {
     function: Py<PyAny>,
     hear: fn(&Map<String, Value>) -> Vec<Value>,
@@ -90,23 +90,24 @@ impl Function for Called {
     }
 }
 
-/// The arguments of a call or an action, one by one.
+/// The arguments of a call or an action.
 fn arguments(question: &Map<String, Value>) -> Vec<Value> {
     question.get("arguments").and_then(Value::as_array).cloned().unwrap_or_default()
 }
 
-/// The objects that a fact may speak of, as one list.
+/// The objects that a fact may mention, as one list argument.
 fn objects(question: &Map<String, Value>) -> Vec<Value> {
     question.get("objects").cloned().into_iter().collect()
 }
 
-/// Functions by name, as they are given.
+/// Functions by name.
 pub type Given = Option<BTreeMap<String, Py<PyAny>>>;
 
-/// Puts functions in the places of the programs that a domain names.
+/// Replaces programs of a domain by functions.
 ///
 /// # Errors
-/// A name for which `domain.toml` names no program.
+///
+/// `InputError` for a name without a program in `domain.toml`.
 pub fn bind(
     py: Python<'_>,
     domain: &mut Domain,

@@ -1,4 +1,4 @@
-//! The extension module of the Python package `descry`: what Python calls, on the crates that the command line is made of.
+//! Extension module of the Python package `descry`, on top of the crates behind the command line.
 
 mod again;
 mod agent;
@@ -16,7 +16,7 @@ mod why_not;
 
 use pyo3::prelude::*;
 
-/// Loaded as `descry._descry`; people import `descry`.
+/// Native module `descry._descry`; users import `descry`.
 #[pymodule]
 mod _descry {
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! Planning and validating.
+//! Planning and validation.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -14,7 +14,7 @@ use crate::failure::{self, Finding};
 use crate::task::{Plan, Task};
 use crate::watch::Watch;
 
-/// How planning ended.
+/// Outcome of planning.
 #[pyclass(frozen, module = "descry")]
 pub struct Outcome {
     #[pyo3(get)]
@@ -48,7 +48,7 @@ impl Outcome {
     }
 }
 
-/// Plans.
+/// Plans a task.
 #[pyfunction]
 #[pyo3(signature = (task, *, time_limit_s=None, memory_limit_mb=None, anytime=false, seed=0, bound=None, threads=None, attachments=None, on_plan=None, stop=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -112,7 +112,7 @@ fn told(outcome: &descry_planner::Outcome, cut_short: bool, time_s: f64) -> Outc
     }
 }
 
-/// What the validator says of a plan.
+/// Verdict of the validator on a plan.
 #[pyclass(frozen, get_all, module = "descry")]
 pub struct Verdict {
     valid: bool,
@@ -138,7 +138,7 @@ impl Verdict {
     }
 }
 
-/// Says whether a plan reaches the goal of its task.
+/// Checks whether a plan is valid and reaches the goal of its task.
 #[pyfunction]
 #[pyo3(signature = (task, plan, *, attachments=None))]
 pub fn validate(

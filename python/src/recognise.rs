@@ -1,4 +1,4 @@
-//! Recognition on point clouds, perception alone.
+//! Object recognition in point clouds, without the agent.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use crate::arrays;
 use crate::convert::to_python;
 use crate::failure;
 
-/// What stands in a cloud.
+/// Recognition result for a cloud.
 #[pyclass(frozen, module = "descry")]
 pub struct Recognition {
     scene: Option<Scene>,
@@ -44,7 +44,7 @@ impl Recognition {
     }
 }
 
-/// The surface that things stand on.
+/// The surface that supports the objects.
 #[pyclass(frozen, module = "descry")]
 pub struct Surface {
     inner: descry_perception::surface::Surface,
@@ -148,7 +148,7 @@ impl Percept {
     }
 }
 
-/// Finds the surface in a cloud and recognises what stands on it.
+/// Finds the surface in a cloud and recognises the objects on it.
 #[pyfunction]
 #[pyo3(signature = (points, *, viewpoint_m=[0.0; 3], up=None, objects=None, recogniser="descry", seed=1))]
 pub fn recognise(
@@ -203,10 +203,10 @@ fn models(py: Python<'_>, folder: Option<PathBuf>) -> PyResult<Vec<ObjectModel>>
     loaded.map_err(|error| failure::input(py, &error.to_string()))
 }
 
-/// The points of a file, and where its sensor stood.
+/// The points of a file, and the position of its sensor.
 type Loaded<'py> = (Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArray1<f64>>);
 
-/// Reads a PCD or PLY file: its points, and where its sensor stood.
+/// Reads a PCD or PLY file: its points, and the position of its sensor.
 #[pyfunction]
 pub fn read_cloud<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Loaded<'py>> {
     let shown = path.display();

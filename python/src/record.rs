@@ -1,4 +1,4 @@
-//! Records of runs, read by themselves.
+//! Read access to the records of runs.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use crate::arrays;
 use crate::convert::to_python;
 use crate::failure;
 
-/// A record: what was sensed, done and believed in a run.
+/// Record of a run: data, events and beliefs.
 #[pyclass(frozen, module = "descry")]
 pub struct Record {
     place: PathBuf,
@@ -144,7 +144,7 @@ fn nanoseconds(seconds: f64) -> i64 {
     (seconds * 1e9).round() as i64
 }
 
-/// One entry of a record.
+/// A document of a record.
 #[pyclass(frozen, module = "descry")]
 pub struct Document {
     inner: descry_memory::Document,

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 
 use crate::failure::{self, Finding};
 
-/// A PDDL domain and problem, read and checked.
+/// PDDL domain and problem, parsed and checked.
 #[pyclass(frozen, module = "descry")]
 pub struct Task {
     pub inner: descry_planner::Task,
@@ -75,7 +75,7 @@ pub fn source(py: Python<'_>, path: &Path) -> PyResult<Source> {
     Ok(Source::new(path.display().to_string(), text))
 }
 
-/// Every finding in a domain, and in a problem of it.
+/// All findings in a domain, and in a problem of it.
 #[pyfunction]
 #[pyo3(signature = (domain, problem=None))]
 pub fn check(domain: &str, problem: Option<&str>) -> Vec<Finding> {
@@ -126,7 +126,7 @@ impl From<&Step> for descry_planner::Step {
     }
 }
 
-/// What to do, and when.
+/// A plan: steps with their start times.
 #[pyclass(frozen, eq, module = "descry", skip_from_py_object)]
 #[derive(Clone, PartialEq)]
 pub struct Plan {

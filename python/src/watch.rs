@@ -1,4 +1,4 @@
-//! Long work is watched: Ctrl-C, a time limit, and whoever wants it to stop.
+//! Cancellation of long work by Ctrl-C, a time limit, or a stop function.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 
-/// Python is asked no more often than this: it takes the interpreter's lock.
+/// Minimum interval between calls into Python, which take the interpreter's lock, milliseconds.
 const ASKED_EVERY_MS: u64 = 20;
 
-/// Watches over work that runs without the interpreter's lock.
+/// Watch over work that runs without the interpreter's lock.
 pub struct Watch {
     started: Instant,
     limit: Option<Duration>,
@@ -20,7 +20,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Over after `limit`, or once `stop()` is true.
+    /// Watch that ends the work after `limit`, or once `stop()` returns true.
     pub fn new(limit: Option<Duration>, stop: Option<Py<PyAny>>) -> Self {
         Self {
             started: Instant::now(),
@@ -37,7 +37,8 @@ impl Watch {
         self.started.elapsed().as_secs_f64()
     }
 
-    /// Whether the work is to end now. Asked often, from any thread that does not hold the interpreter's lock.
+    /// True if the work is to end now. Cheap; call often, from any thread that does not hold the
+    /// interpreter's lock.
     pub fn is_over(&self) -> bool {
         if self.over.load(Ordering::Relaxed) {
             return true;
@@ -68,16 +69,17 @@ impl Watch {
         }
     }
 
-    /// Ends the work because of an exception, which [`Watch::end`] hands on.
+    /// Ends the work with an exception, which [`Watch::end`] returns.
     pub fn raise(&self, error: PyErr) {
         self.over.store(true, Ordering::Relaxed);
         self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
 
-    /// Whether the work was ended before its time.
+    /// True if the work was ended early.
     ///
     /// # Errors
-    /// The exception that ended it.
+    ///
+    /// The exception that ended the work.
     pub fn end(&self, py: Python<'_>) -> PyResult<bool> {
         py.check_signals()?;
         match self.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {

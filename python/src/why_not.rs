@@ -1,4 +1,4 @@
-//! Why an action is not in a plan.
+//! Explanation of an action's absence from a plan.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::failure;
 use crate::task::{Plan, Task};
 use crate::watch::Watch;
 
-/// What is said of an action that is asked about.
+/// Answer to a why-not question about an action.
 #[pyclass(frozen, module = "descry")]
 pub struct WhyNot {
     inner: Answer,
@@ -52,7 +52,7 @@ impl WhyNot {
     }
 }
 
-/// Says why an action is not in the plan of a task.
+/// Explains the absence of an action from the plan of a task.
 #[pyfunction]
 #[pyo3(signature = (task, action, *, plan=None, time_limit_s=None, memory_limit_mb=None, seed=0, attachments=None))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]

@@ -1,15 +1,15 @@
-//! `align`: brings scans of one thing together. Nothing moves.
+//! `align`: registers scans of one object. The body does not move.
 
 use async_trait::async_trait;
 use descry_robots::perception::laser::{PosedScan, SolverOptions, align_consistent};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Brings scans together into the shape of the thing.
+/// Registers scans of one object into its outline.
 pub struct Align {
-    /// The scans as localisation posed them.
+    /// The scans, with their localised poses.
     pub scans: Vec<PosedScan>,
-    /// Beyond an error so long the scans contradict each other, metres.
+    /// Maximum residual before the scans count as contradictory, metres.
     pub longest_m: f64,
     /// Options of the solver.
     pub options: SolverOptions,

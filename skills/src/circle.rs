@@ -1,13 +1,13 @@
-//! `circle`: drives around something, place after place.
+//! `circle`: drives around an object through waypoints.
 
 use async_trait::async_trait;
 use descry_robots::{Driven, Place};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Drives to each of these places, the last one the goal.
+/// Drives through waypoints; the last is the destination.
 pub struct Circle {
-    /// The way, without the place where the body stands.
+    /// The waypoints, without the current pose.
     pub way: Vec<Place>,
 }
 

@@ -1,4 +1,4 @@
-//! `model`: brings looks at one thing together and grows a model of it. Nothing moves.
+//! `model`: registers views of one object and learns a model of it. The body does not move.
 
 use std::sync::Arc;
 
@@ -9,15 +9,15 @@ use descry_robots::perception::learning::{Keyframe, LearnOptions, LearnedModel, 
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Brings looks together into a model of what the first shows.
+/// Learns a model of the object in the first view.
 pub struct Model {
-    /// The looks, as localisation placed them.
+    /// The views, with their localised poses.
     pub views: Vec<Arc<View>>,
-    /// The pixels of the thing in the first.
+    /// Mask of the object's pixels in the first view.
     pub mask: Vec<bool>,
-    /// Up in the map, if it is known.
+    /// Upward direction in the map frame; none if unknown.
     pub up: Option<Unit<Vector3<f64>>>,
-    /// Returns farther than this are not used, metres.
+    /// Maximum range of measurements, metres.
     pub range_m: f64,
     /// Options of learning.
     pub options: LearnOptions,
@@ -26,9 +26,9 @@ pub struct Model {
 /// Result of learning a model.
 #[derive(Debug)]
 pub struct Modelled {
-    /// Pose and contents of each look; those that do not fit the others are left out.
+    /// Pose and content of each view; inconsistent views are left out.
     pub keyframes: Vec<Keyframe>,
-    /// The model, or why there is none.
+    /// The model, or the reason for having none.
     pub model: Result<LearnedModel, String>,
 }
 

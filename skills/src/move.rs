@@ -5,7 +5,7 @@ use descry_robots::Place;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Drives somewhere.
+/// Drives to a destination.
 pub struct Move {
     /// Destination.
     pub to: Place,

@@ -5,9 +5,9 @@ use descry_robots::nalgebra::Point3;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Takes a view from where the body stands.
+/// Takes a view from the current pose.
 pub struct Observe {
-    /// Point in the map that the head turns to; none: no head motion.
+    /// Point for the head to turn to, map frame, metres; none: the head stays.
     pub at: Option<Point3<f64>>,
 }
 

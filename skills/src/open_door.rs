@@ -6,7 +6,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Opens a door.
 pub struct OpenDoor {
-    /// The door, as the map calls it.
+    /// Name of the door in the map.
     pub door: String,
 }
 

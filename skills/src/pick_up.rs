@@ -1,13 +1,13 @@
-//! `pick-up`: takes an object into the hand, lifts it, and feels whether it is there.
+//! `pick-up`: grasps and lifts an object, and verifies the grasp.
 
 use async_trait::async_trait;
 use descry_robots::{Failure, Grasp};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Takes an object into the hand.
+/// Grasps and lifts an object.
 pub struct PickUp {
-    /// Grasp.
+    /// The grasp.
     pub grasp: Grasp,
 }
 

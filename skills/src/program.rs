@@ -1,4 +1,4 @@
-//! An action that a program carries out, in any language.
+//! Action carried out by an external program, in any language.
 
 use std::sync::Arc;
 
@@ -7,13 +7,12 @@ use descry_robots::Failure;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Answer of a program: done, with a word about it, or failed, with the reason and with a hint on
-/// retrying.
+/// Answer of a program: done, with a message; or failed, with the reason and a hint on retrying.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Asked {
-    /// It is done.
+    /// Success, with the program's message.
     Done(String),
-    /// It could not.
+    /// Failure.
     Failed {
         /// Reason of the failure.
         because: String,
@@ -22,9 +21,10 @@ pub enum Asked {
     },
 }
 
-/// Lets a program do something. The question blocks until there is an answer or the time is up; it is asked on a thread of its own.
+/// Runs an external program. The question blocks until an answer or the time limit; it is asked on a thread
+/// of its own.
 pub struct Program {
-    /// Asks the program and waits.
+    /// Asks the program and waits for its answer.
     pub ask: Arc<dyn Fn() -> Asked + Send + Sync>,
 }
 

@@ -1,4 +1,4 @@
-//! `push-aside`: pushes an object out of the way of what it hides.
+//! `push-aside`: pushes an object away from the objects that it occludes.
 
 use async_trait::async_trait;
 use descry_robots::Push;
@@ -7,7 +7,7 @@ use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Pushes an object aside.
 pub struct PushAside {
-    /// Push.
+    /// The push.
     pub push: Push,
 }
 

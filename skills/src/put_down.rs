@@ -1,13 +1,13 @@
-//! `put-down`: puts what the hand holds down.
+//! `put-down`: places the held object.
 
 use async_trait::async_trait;
 use descry_robots::{Failure, Placing};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Puts down what the hand holds.
+/// Places the held object.
 pub struct PutDown {
-    /// Placing.
+    /// The placement.
     pub placing: Placing,
 }
 

@@ -1,12 +1,12 @@
-//! `read`: reads a sensor that is neither camera nor laser.
+//! `read`: reads a sensor other than camera and laser.
 
 use async_trait::async_trait;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Reads one of the body's senses.
+/// Reads a sensor of the body.
 pub struct Read {
-    /// Its name.
+    /// Name of the sensor.
     pub sense: String,
 }
 

@@ -1,10 +1,10 @@
-//! `scan`: sweeps the laser.
+//! `scan`: takes a sweep of the laser.
 
 use async_trait::async_trait;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Sweeps the laser once from where the body stands.
+/// Takes one sweep of the laser at the current pose.
 pub struct Scan;
 
 #[async_trait]

@@ -1,4 +1,4 @@
-//! Trait of all skills: arguments in the units of the body, cancellation, a time limit.
+//! Trait of all skills: arguments in SI units, cancellation, a time limit.
 
 use async_trait::async_trait;
 use descry_robots::perception::laser::Alignment;
@@ -9,12 +9,12 @@ use descry_robots::{
 
 use crate::model::Modelled;
 
-/// One action of a plan, with the names of its objects.
+/// Grounded action of a plan.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Call {
-    /// The action's name.
+    /// Name of the action.
     pub action: String,
-    /// Its objects.
+    /// Names of its arguments.
     pub arguments: Vec<String>,
 }
 
@@ -32,16 +32,16 @@ impl std::fmt::Display for Call {
 pub struct Context<'a> {
     /// The body.
     pub robot: &'a dyn Robot,
-    /// Stops the skill.
+    /// Token that stops the skill.
     pub cancel: CancellationToken,
-    /// Time for it, on the body's clock.
+    /// Time limit, seconds on the body's clock.
     pub time_limit_s: f64,
-    /// Called now and then while it goes on.
+    /// Receives progress reports.
     pub progress: &'a (dyn Fn(&Progress) + Send + Sync),
 }
 
 impl Context<'_> {
-    /// The watch that the body is given.
+    /// The watch to pass to the body.
     pub fn watch(&self) -> Watch<'_> {
         Watch { cancel: self.cancel.clone(), time_limit_s: self.time_limit_s, progress: self.progress }
     }
@@ -50,62 +50,62 @@ impl Context<'_> {
 /// Result of a skill.
 #[derive(Debug)]
 pub enum Outcome {
-    /// The body stands somewhere else.
+    /// The body has moved.
     Driven(Driven),
     /// A view was taken.
     Seen(Box<Sensed>),
-    /// The laser has swept.
+    /// The laser took a sweep.
     Scanned(Box<Scanned>),
-    /// A sense has said something.
+    /// A sensor was read.
     Read(Reading),
-    /// Scans were brought together.
+    /// Scans were registered.
     Aligned(Box<Alignment>),
-    /// Looks at a thing were brought together.
+    /// Views of an object were registered, and a model learned.
     Modelled(Box<Modelled>),
-    /// Something was moved.
+    /// An object was pushed.
     Pushed(Pushed),
-    /// A door is open.
+    /// A door was opened.
     Opened(Opened),
-    /// Something was lifted, and what the hand then felt.
+    /// An object was lifted, with the state of the hand.
     Grasped(Grasped, Hand),
-    /// Something was put down.
+    /// An object was placed.
     Placed(Placed),
-    /// A program says that it has done its work.
+    /// An external program succeeded, with its message.
     Told(String),
 }
 
 /// Failure of a skill.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SkillFailure {
-    /// The body could not.
+    /// The body failed.
     #[error(transparent)]
     Body(#[from] Failure),
-    /// A program could not, and says why.
+    /// An external program failed.
     #[error("{because}")]
     Program {
-        /// In its words.
+        /// Reason, as the program states it.
         because: String,
         /// True if a retry may succeed.
         passing: bool,
     },
-    /// The job has no meaning for the body in the present situation.
+    /// The request makes no sense for the body in its current state.
     #[error("{because}")]
     Meaningless {
         /// Reason.
         because: String,
     },
-    /// It was carried out, but not as the domain describes it.
+    /// The action was carried out, but its execution violates the action as the domain describes it.
     #[error("it has ended, but not as the domain says: {because}")]
     Unkept {
-        /// What the domain's description says instead.
+        /// Reason: the part of the description that was violated.
         because: String,
-        /// The condition that should have held until the end, in PDDL.
+        /// The violated invariant (`over all` condition), in PDDL.
         condition: Option<String>,
     },
-    /// It was carried out, and what it should bring about did not come about.
+    /// The action was carried out, but an expected effect is missing.
     #[error("it was done, but {condition} does not hold")]
     Unmet {
-        /// The condition that should hold afterwards.
+        /// The missing effect, in PDDL.
         condition: String,
     },
 }
@@ -121,8 +121,7 @@ impl SkillFailure {
         }
     }
 
-    /// One word for what kind of failure it is: that of the body ([`Failure::kind`]), `program`, `meaningless` or
-    /// `unmet`.
+    /// Name of the failure's kind: that of the body ([`Failure::kind`]), `program`, `meaningless` or `unmet`.
     pub fn kind(&self) -> &'static str {
         match self {
             SkillFailure::Body(failure) => failure.kind(),
@@ -133,12 +132,13 @@ impl SkillFailure {
     }
 }
 
-/// A way to bring something about, with its arguments.
+/// Executable action with its arguments.
 #[async_trait]
 pub trait Skill: Send + Sync {
-    /// Carries it out. Ends within the context's time limit and soon after its token is cancelled.
+    /// Carries out the action. Ends within the context's time limit, and soon after its token is cancelled.
     ///
     /// # Errors
-    /// [`SkillFailure`] says what the body could not do; the world may have changed nevertheless.
+    ///
+    /// [`SkillFailure`] if the action failed; the world may have changed nevertheless.
     async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure>;
 }

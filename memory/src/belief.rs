@@ -1,5 +1,5 @@
-//! Belief about objects: number, places, classes, and the viewpoints behind them. Tracks keep
-//! identity: percepts of later merges are associated with earlier objects.
+//! Belief over objects: number, positions, classes, and the viewpoints behind them. Tracks keep identity:
+//! percepts of later merges are associated with earlier objects.
 
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Evidence, Percept};
@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 
 use crate::document::RecordId;
 
-/// A percept farther from an object than this is another object.
+/// Gate of the association: a percept farther from a track than this is another object, metres.
 const GATE_M: f64 = 0.10;
-/// Greatest distance at which an object that was touched is still the same, metres: it may have
-/// slid, and the hand may have pushed it.
+/// Maximum distance at which a touched object is associated with its former track, metres: the object may
+/// have slid, or the hand may have pushed it.
 pub const MISLAID_M: f64 = 0.25;
-/// An unknown thing of this many times the volume of a known object is not that object.
+/// Volume ratio from which an unknown object cannot be a known one.
 const MUCH_LARGER: f64 = 3.0;
 
-/// An object that is believed to be there.
+/// Track of an object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Track {
-    /// Its number, never used again.
+    /// Number of the track; never reused.
     pub id: u64,
-    /// The symbol of the surface that it stands on; empty: in the hand.
+    /// Symbol of the supporting surface; empty while in the hand.
     #[serde(default)]
     pub on: String,
     /// Position: centre of its body's footprint, world frame, metres.
@@ -30,67 +30,70 @@ pub struct Track {
     pub position_sigma_m: f64,
     /// Longer and shorter side of its footprint and its height, metres.
     pub size_m: [f64; 3],
-    /// Convex outline of what was measured of it, seen from above, world frame, metres; empty where only its size is known.
+    /// Convex hull of the measured points, seen from above, world frame, metres; empty if only the size is
+    /// known.
     #[serde(default)]
     pub footprint_m: Vec<Point3<f64>>,
     /// Probability of each known object; with `unknown` they sum to one.
     pub probabilities: Vec<(String, f64)>,
     /// Probability of each kind.
     pub kinds: Vec<(String, f64)>,
-    /// Probability that it is none of the known objects.
+    /// Probability of being none of the known objects.
     pub unknown: f64,
-    /// Share of its visible hull that some view saw or looked past.
+    /// Share of the visible hull that some view measured or looked past, 0 to 1.
     pub seen_fraction: f64,
-    /// Viewpoints from which it was seen.
+    /// Positions of the cameras that saw it, world frame, metres.
     pub viewpoints_m: Vec<Point3<f64>>,
     /// Evidence for and against, as of the last merge.
     pub evidence: Evidence,
-    /// The records that the belief rests on.
+    /// Records behind the belief.
     pub cites: Vec<RecordId>,
-    /// When it was first and last seen.
+    /// Time of the first sighting, nanoseconds.
     pub first_ns: i64,
-    /// When it was last seen.
+    /// Time of the last sighting, nanoseconds.
     pub last_ns: i64,
 }
 
-/// A percept with where it was seen from.
+/// A percept with the cameras that saw it.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighted<'a> {
     /// Percept.
     pub percept: &'a Percept,
-    /// Cameras that saw it.
+    /// Positions of the cameras that saw it, world frame, metres.
     pub viewpoints_m: &'a [Point3<f64>],
-    /// Convex outline of what was measured of it, seen from above, world frame, metres.
+    /// Convex hull of the measured points, seen from above, world frame, metres.
     pub footprint_m: &'a [Point3<f64>],
 }
 
-/// Everything that is believed of the objects.
+/// Belief over all objects.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    /// The objects, in the order in which they were first seen.
+    /// Tracks, ordered by first sighting.
     pub tracks: Vec<Track>,
-    /// Objects that were believed in and are no longer seen: gone, or never there.
+    /// Former tracks that are no longer seen: removed, or false detections.
     pub gone: Vec<Track>,
-    /// Objects that were touched and have not been seen since: what is first seen like one, near where it stood, is that one.
+    /// Tracks that were touched and not seen since; a new detection of the same kind nearby continues such a
+    /// track.
     #[serde(default)]
     pub mislaid: Vec<Track>,
     next_id: u64,
 }
 
 impl Track {
-    /// Probability that it is the known object, or of the kind, called `name`; 0 for names that no model has.
+    /// Probability of being the known object, or of being of the kind, called `name`; 0 for a name without a
+    /// model.
     pub fn probability_of(&self, name: &str) -> f64 {
         let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
         of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)
     }
 
-    /// The known object that it most likely is; none: unknown.
+    /// The most probable known object; none: unknown.
     pub fn label(&self) -> Option<&str> {
         let best = self.probabilities.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
-    /// The kind that it most likely is; none: unknown.
+    /// The most probable kind; none: unknown.
     pub fn kind(&self) -> Option<&str> {
         let best = self.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         (best.1 > self.unknown).then_some(best.0.as_str())
@@ -111,11 +114,13 @@ impl Track {
 }
 
 impl Belief {
-    /// Takes in what the merge of all views of a surface shows. A percept is the object there that was believed nearest to it, at
-    /// the least sum of distances; what no percept is taken for is gone. What stands elsewhere stays as it is.
+    /// Updates the tracks of a surface from the merge of all its views. Percepts are assigned to tracks at
+    /// the least sum of distances within the gate; tracks without a percept are gone. Tracks on other
+    /// surfaces stay unchanged.
     ///
-    /// The percepts rest on every view of the surface so far, so that their probabilities replace the earlier ones. A known object that a
-    /// larger unknown thing has swallowed, since the last view blurs the two, is still believed in as before.
+    /// Percepts rest on every view of the surface so far, so their probabilities replace the earlier ones. A
+    /// known object that a larger unknown one has absorbed, because the last view blurs the two, keeps its
+    /// track.
     pub fn update(&mut self, on: &str, sighted: &[Sighted<'_>], stamp_ns: i64, cites: &[RecordId]) {
         let (here, elsewhere) = std::mem::take(&mut self.tracks).into_iter().partition(|t| t.on == on);
         self.tracks = here;
@@ -146,7 +151,7 @@ impl Belief {
         self.tracks = kept;
     }
 
-    /// Begins with objects that are remembered of earlier.
+    /// Adds the tracks of earlier runs, with new numbers.
     pub fn adopt(&mut self, remembered: impl IntoIterator<Item = Track>) {
         for track in remembered {
             self.tracks.push(Track { id: self.next_id, ..track });
@@ -154,14 +159,14 @@ impl Belief {
         }
     }
 
-    /// The object of a number was touched: it is no longer believed in where it was, and where it is has to be seen.
+    /// Marks a track as mislaid: the object was touched, so its position is unknown until it is seen again.
     pub fn mislay(&mut self, id: u64) {
         if let Some(at) = self.tracks.iter().position(|t| t.id == id) {
             self.mislaid.push(self.tracks.remove(at));
         }
     }
 
-    /// The mislaid object that one which is seen for the first time is.
+    /// Removes and returns the mislaid track that a new detection continues, if any.
     fn found_again(&mut self, new: &Track) -> Option<Track> {
         let apart_m = |old: &Track| (old.position_m - new.position_m).norm();
         let may_be = |old: &Track| old.kind() == new.kind() && apart_m(old) < MISLAID_M;
@@ -170,7 +175,8 @@ impl Belief {
         Some(self.mislaid.remove(nearest))
     }
 
-    /// The percept of each track, and the percepts of none: the assignment of least distance within the gate.
+    /// Assignment of percepts to tracks at the least total distance within the gate, with the unassigned
+    /// percepts.
     fn associate(&self, sighted: &[Sighted<'_>]) -> Association {
         let (rows, columns) = (self.tracks.len(), sighted.len());
         let mut tracks = vec![None; rows];

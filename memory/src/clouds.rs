@@ -1,4 +1,4 @@
-//! Clouds as bytes and back, bit for bit.
+//! Lossless encoding of clouds as bytes.
 
 use crate::document::{Blob, BlobInfo, Form};
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -10,7 +10,7 @@ use std::borrow::Cow;
 /// The name of a cloud's blob.
 pub(crate) const CLOUD: &str = "cloud";
 
-/// The sensor behind a cloud, and how well its pose is known.
+/// The sensor behind a cloud, and the uncertainty of its pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sensing {
     /// The camera, if known.
@@ -44,7 +44,7 @@ struct LayoutField {
     kind: String,
 }
 
-/// Names, type and bytes a value of the parts of a point, in their order; colours take four bytes, the last always 255.
+/// Names, type and size of each part of a point, in order; colours take four bytes, the last always 255.
 const POSITION: (&[&str], &str, usize) = (&["x", "y", "z"], "f32", 4);
 const COLOUR: (&[&str], &str, usize) = (&["red", "green", "blue", "alpha"], "u8", 1);
 const NORMAL: (&[&str], &str, usize) = (&["normal_x", "normal_y", "normal_z"], "f32", 4);
@@ -68,7 +68,7 @@ pub fn layout(cloud: &Cloud, sensing: &Sensing) -> Layout {
     Layout { points: cloud.len(), stride, fields, grid: cloud.grid, sensing: *sensing }
 }
 
-/// A cloud as a blob; one of bare points is not copied.
+/// Encodes a cloud as a blob; a cloud of bare points is not copied.
 pub fn encode<'a>(cloud: &'a Cloud, sensing: &Sensing) -> Blob<'a> {
     let layout = layout(cloud, sensing);
     let bare = layout.fields.len() == 3 && cfg!(target_endian = "little");
@@ -97,19 +97,21 @@ pub fn pack(cloud: &Cloud, stride: usize) -> Vec<u8> {
     out
 }
 
-/// The sensor behind a cloud.
+/// Decodes the sensor behind a cloud.
 ///
 /// # Errors
-/// What of the layout does not fit, in words.
+///
+/// A description of the mismatch in the layout.
 pub fn sensing(info: &BlobInfo) -> Result<Sensing, String> {
     let layout = Layout::deserialize(&info.layout);
     layout.map(|l| l.sensing).map_err(|e| format!("its layout cannot be read: {e}"))
 }
 
-/// A cloud from its blob.
+/// Decodes a cloud from its blob.
 ///
 /// # Errors
-/// What of the layout does not fit, in words.
+///
+/// A description of the mismatch in the layout.
 pub fn decode(info: &BlobInfo, data: &[u8]) -> Result<(Cloud, Sensing), String> {
     let layout: Layout =
         Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;

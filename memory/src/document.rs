@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::borrow::Cow;
 
-/// The number of a record, unique in its store and never used again.
+/// The number of a record, unique in its store; never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct RecordId(pub u64);
@@ -32,7 +32,7 @@ impl Bounds {
     }
 }
 
-/// An object that a record speaks of, and how sure it is (0 to 1).
+/// An object mentioned by a record, with the confidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sighting {
     /// The object's name.
@@ -46,11 +46,11 @@ pub struct Sighting {
 pub struct Meta {
     /// Position of the sensor, world frame, metres.
     pub seen_from_m: Option<[f64; 3]>,
-    /// The part of the world that it shows or speaks of, metres.
+    /// Extent of the world that the record shows or mentions, metres.
     pub covers_m: Option<Bounds>,
-    /// Objects that it speaks of.
+    /// Objects that the record mentions.
     pub objects: Vec<Sighting>,
-    /// Anything else, of any shape.
+    /// Content in any other form.
     pub body: Value,
 }
 
@@ -76,7 +76,7 @@ pub enum Form {
     Grid,
     /// Projection of a camera (`foxglove.CameraCalibration`).
     CameraCalibration,
-    /// Bytes without a form that viewers know (`descry.Blob`).
+    /// Bytes in no format that viewers know (`descry.Blob`).
     Bytes,
 }
 
@@ -94,7 +94,7 @@ pub struct BlobInfo {
     pub layout: Value,
 }
 
-/// A record as it is kept, without the bytes of its blobs.
+/// A record as stored, without the bytes of its blobs.
 ///
 /// Fields that a newer format adds are ignored by older readers, fields that an older format lacked take their default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,27 +103,27 @@ pub struct Document {
     pub id: RecordId,
     /// Kind: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
-    /// When, nanoseconds in the clock of the recording.
+    /// Time stamp, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
-    /// When it ends, for what lasts, nanoseconds.
+    /// End of the time span, for records of a span, nanoseconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end_ns: Option<i64>,
-    /// The coordinate frame that it is given in; for transforms the child frame.
+    /// The coordinate frame of the content; for transforms the child frame.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub frame: String,
-    /// Who recorded it, where several write into one store.
+    /// Robot that recorded it, where several write into one store.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub robot: String,
     /// Position of the sensor, world frame, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen_from_m: Option<[f64; 3]>,
-    /// The part of the world that it shows or speaks of, metres.
+    /// Extent of the world that the record shows or mentions, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covers_m: Option<Bounds>,
-    /// Objects that it speaks of.
+    /// Objects that the record mentions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Sighting>,
-    /// True if it is never pruned: the record cannot be understood without it.
+    /// True if it is never pruned, because the recording cannot be understood without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kept: bool,
     /// Its content.
@@ -147,14 +147,14 @@ pub struct Blob<'a> {
     pub data: Cow<'a, [u8]>,
 }
 
-/// A record to be made.
+/// A record to be stored.
 #[derive(Clone, Debug)]
 pub struct Draft<'a> {
     /// Kind.
     pub kind: String,
-    /// When, nanoseconds; not negative.
+    /// Time stamp, nanoseconds; not negative.
     pub stamp_ns: i64,
-    /// When it ends, for what lasts, nanoseconds.
+    /// End of the time span, for records of a span, nanoseconds.
     pub end_ns: Option<i64>,
     /// The coordinate frame, or "".
     pub frame: String,
@@ -167,7 +167,7 @@ pub struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// A record of that kind and time with nothing in it.
+    /// An empty record of a kind and time.
     pub fn new(kind: &str, stamp_ns: i64) -> Self {
         Draft {
             kind: kind.into(),
@@ -180,20 +180,20 @@ impl Draft<'_> {
         }
     }
 
-    /// Its end, for what lasts; otherwise its stamp.
+    /// End of the time span, or the stamp of a record without one.
     pub(crate) fn until_ns(&self) -> i64 {
         self.end_ns.unwrap_or(self.stamp_ns)
     }
 
-    /// True if it says what is pinned: such a record is written however little room there is, since
-    /// it may make room.
+    /// True if the record changes pins: it is written even without room, since it may free some.
     pub(crate) fn is_of_pins(&self) -> bool {
         [crate::stores::PIN, crate::stores::UNPIN].contains(&self.kind.as_str())
     }
 
-    /// The document under which it will be kept.
+    /// The document as it will be stored.
     ///
     /// # Errors
+    ///
     /// [`Error::Input`] if a part of it could not be found or read again.
     pub(crate) fn document(&self, id: RecordId, robot: &str) -> Result<Document, Error> {
         self.check()?;
@@ -278,35 +278,34 @@ pub enum Order {
 /// Conditions of a query; all that are given must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Query {
-    /// Kind of the records.
+    /// Kind of the records; none: any.
     pub kind: Option<String>,
-    /// In this frame.
+    /// Coordinate frame; none: any.
     pub frame: Option<String>,
     /// Robot that recorded them.
     pub robot: Option<String>,
-    /// At or after this stamp, nanoseconds; what lasts counts until its end.
+    /// Earliest stamp, nanoseconds; a span counts until its end.
     pub from_ns: Option<i64>,
-    /// At or before this stamp, nanoseconds.
+    /// Latest stamp, nanoseconds.
     pub to_ns: Option<i64>,
-    /// Seen from near here.
+    /// Ball that holds the sensor.
     pub seen_from: Option<Near>,
-    /// Showing this spot.
+    /// Ball that the covered extent meets.
     pub covers: Option<Near>,
-    /// Speaking of this object…
+    /// Object that the records mention.
     pub object: Option<String>,
-    /// …or of any, with at least this confidence.
+    /// Minimum confidence in that object, or in any object if none is given.
     pub min_confidence: Option<f64>,
     /// Order of the results.
     pub order: Order,
-    /// At most so many.
+    /// Maximum number of results.
     pub limit: Option<usize>,
-    /// Stamp and number after which results begin in that order: pages through more than fits into
-    /// memory.
+    /// Stamp and number of the record after which results begin, in the query's order: for reading in pages.
     pub after: Option<(i64, RecordId)>,
 }
 
 impl Query {
-    /// All of one kind.
+    /// Query for all records of a kind.
     pub fn of_kind(kind: &str) -> Self {
         Query { kind: Some(kind.into()), ..Query::default() }
     }

@@ -1,4 +1,4 @@
-//! Errors of records, with the place and a mend.
+//! Errors of records, each with the place and a remedy.
 
 use crate::stores::Fault;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 /// A record that cannot be read or written as asked.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The disk has no room. What was acknowledged is safe, the record stays readable and goes on once there is room.
+    /// The disk is full. Acknowledged data is safe; the record stays readable, and recording continues once
+    /// there is room.
     #[error(
         "no room left on the disk of {place}: free some, or bound the record by age, bytes or free space; nothing that was acknowledged is lost"
     )]
@@ -14,8 +15,8 @@ pub enum Error {
         /// The file that was being written.
         place: PathBuf,
     },
-    /// Refuses data that does not fit into the bound of the record, since too little can be pruned.
-    /// Nothing of the data was recorded.
+    /// The data does not fit within the size limit of the record, since too little can be pruned. None of it
+    /// was recorded.
     #[error(
         "{place} is bounded to {}, and {} more do not fit: {} are pinned{} or of this very moment; allow {} or more (`--max-bytes`), or pin less",
         megabytes(*bound), megabytes(*coming), megabytes(*staying), held_text(held), megabytes(staying + coming)
@@ -29,7 +30,7 @@ pub enum Error {
         coming: u64,
         /// Size of data that cannot be pruned, bytes.
         staying: u64,
-        /// Who pins it: name, records, bytes.
+        /// Holders of the pins: name, records, bytes.
         held: Vec<(String, u64, u64)>,
     },
     /// The system refused a file.
@@ -64,7 +65,7 @@ pub enum Error {
         /// The folder.
         place: PathBuf,
     },
-    /// Reports bytes on the disk that differ from those that were written.
+    /// Bytes on the disk differ from those written.
     #[error("{place}, byte {at}: {what}; `descry memory verify` lists what is whole")]
     Damaged {
         /// The file.
@@ -74,7 +75,7 @@ pub enum Error {
         /// Found and expected bytes.
         what: String,
     },
-    /// A record of which something is lost must not be gone on with: what is left would be taken for all there was.
+    /// A record with losses must not be continued: the rest would be mistaken for the whole.
     #[error(
         "{place} is damaged, so that it can be read as far as it is whole and not be gone on with{}",
         listed(faults)
@@ -85,7 +86,7 @@ pub enum Error {
         /// Losses.
         faults: Vec<Fault>,
     },
-    /// The index refused.
+    /// The index failed.
     #[error("the index of {place}: {because}")]
     Index {
         /// The folder of the record.
@@ -93,7 +94,7 @@ pub enum Error {
         /// SQLite's reason.
         because: rusqlite::Error,
     },
-    /// A remote store refused.
+    /// A remote store failed.
     #[error("the store at {place}: {because}")]
     Remote {
         /// Its address.
@@ -101,12 +102,12 @@ pub enum Error {
         /// Its reason.
         because: String,
     },
-    /// Refuses data that cannot be recorded.
+    /// The data cannot be recorded.
     #[error("{what}: {mend}")]
     Input {
         /// Fault of the data.
         what: String,
-        /// Mend.
+        /// Remedy.
         mend: String,
     },
     /// No such record, or one that was pruned.

@@ -1,4 +1,4 @@
-//! One MCAP file of everything, or of what a query finds, in the order of time: what viewers like best.
+//! Export of a query, or of a whole store, as one MCAP file ordered by time, the preferred input of viewers.
 
 use crate::document::{Document, Order, Query};
 use crate::error::Error;
@@ -6,7 +6,7 @@ use crate::stores::local::segment::{Encoded, Segment};
 use crate::stores::{Fault, Store};
 use std::path::Path;
 
-/// Records are written as one chunk once they are so many, or have this many bytes.
+/// Limits of a chunk: number of records, and bytes.
 const CHUNK_RECORDS: usize = 256;
 const CHUNK_BYTES: usize = 4 << 20;
 
@@ -17,11 +17,11 @@ pub struct Exported {
     pub records: u64,
     /// Length of the file, bytes.
     pub bytes: u64,
-    /// Records that were not exported, since they are not what was written.
+    /// Damaged records, which were not exported.
     pub faults: Vec<Fault>,
 }
 
-/// Writes what a query finds and is whole, oldest first whatever its order, into a new MCAP file.
+/// Writes the undamaged results of a query, oldest first whatever its order, into a new MCAP file.
 ///
 /// # Errors
 /// If the file exists or cannot be written, or the store cannot be read.
@@ -44,7 +44,7 @@ pub fn export(store: &dyn Store, query: &Query, path: &Path) -> Result<Exported,
     Ok(exported)
 }
 
-/// Records that will make one chunk.
+/// Records of the next chunk.
 #[derive(Default)]
 struct Batch {
     records: Vec<(Document, Vec<Vec<u8>>)>,

@@ -1,4 +1,4 @@
-//! Brings groups of transforms to the store in the background, so that who measures never waits for the disk.
+//! Background writer of grouped transforms; callers that record measurements do not wait for the disk.
 
 use crate::document::{Blob, Draft, Form, Meta};
 use crate::error::Error;
@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Transforms of one link over some time.
+/// Transforms of one link over a time span.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
     pub parent: String,
@@ -20,7 +20,7 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// The document that it becomes: in the child's frame, from its first stamp to its last.
+    /// Converts the group to a document in the child's frame, from its first stamp to its last.
     pub fn draft(&self, kind: &str) -> Draft<'static> {
         let first = self.samples.iter().map(|s| s.stamp_ns).min().unwrap_or(0);
         let last = self.samples.iter().map(|s| s.stamp_ns).max().unwrap_or(0);
@@ -51,14 +51,14 @@ enum Job {
     Drain(SyncSender<()>),
 }
 
-/// Batches that the thread could not write, with the reason. Nothing of them is dropped.
+/// Batches that could not be written, with the reason; they are kept for a retry.
 #[derive(Default)]
 struct Failed {
     groups: Vec<Group>,
     because: Option<Error>,
 }
 
-/// The thread that writes.
+/// The writing thread.
 pub(crate) struct Flusher {
     jobs: Option<SyncSender<Job>>,
     failed: Arc<Mutex<Failed>>,
@@ -81,7 +81,7 @@ impl Flusher {
         }
     }
 
-    /// Hands over groups; waits only if several batches wait already.
+    /// Enqueues groups; blocks only if `WAITING` batches are queued.
     pub fn send(&self, groups: Vec<Group>) {
         if groups.is_empty() {
             return;
@@ -100,10 +100,11 @@ impl Flusher {
         lock(&self.failed).because.is_some()
     }
 
-    /// Waits until everything is written, and tries again what could not be.
+    /// Waits until everything is written, and retries failed batches.
     ///
     /// # Errors
-    /// Why it cannot be written; it is kept for the next time.
+    ///
+    /// The failure of a write; its batch is kept for the next attempt.
     pub fn drain(&self) -> Result<(), Error> {
         if let Some(jobs) = &self.jobs {
             let (done, wait) = sync_channel(1);
@@ -148,7 +149,7 @@ fn run(queue: &Receiver<Job>, store: &dyn Store, failed: &Mutex<Failed>) {
     }
 }
 
-/// Writes what failed before and these groups, as one batch.
+/// Writes the failed batches and these groups, as one batch.
 fn write(store: &dyn Store, failed: &Mutex<Failed>, groups: Vec<Group>) {
     let mut failed = lock(failed);
     failed.groups.extend(groups);

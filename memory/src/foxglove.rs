@@ -1,4 +1,5 @@
-//! The messages that robotics viewers know (schemas of the `foxglove` package), in the wire format of protocol buffers.
+//! Messages known to robotics viewers (schemas of the `foxglove` package), in the wire format of protocol
+//! buffers.
 //!
 //! Fields may stand in any order on that wire. The bytes of a blob are always written last, so that what stands before
 //! them follows from the document alone and the bytes themselves lie in the file as one piece.
@@ -13,25 +14,25 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::Value;
 use wire::{Field, Wire, WireReader};
 
-/// A schema as a segment declares it.
+/// A message schema, as declared by a segment.
 pub(crate) struct Schema {
     pub name: &'static str,
     pub encoding: &'static str,
     pub data: Vec<u8>,
 }
 
-/// How messages of a form are encoded, in the words of MCAP.
+/// MCAP's name for the encoding of blob messages.
 pub const PROTOBUF: &str = "protobuf";
-/// How documents are encoded.
+/// MCAP's name for the encoding of documents.
 pub(crate) const JSON: &str = "json";
 
-/// The schema of documents. It says what every document has and leaves the rest open.
+/// The JSON schema of documents: the common fields, open to others.
 pub(crate) fn document_schema() -> Schema {
     let text = r#"{"title":"descry.Document","type":"object","required":["id","kind","stamp_ns"],"properties":{"id":{"type":"integer"},"kind":{"type":"string"},"stamp_ns":{"type":"integer"},"end_ns":{"type":"integer"},"frame":{"type":"string"},"robot":{"type":"string"},"seen_from_m":{"type":"array","items":{"type":"number"}},"covers_m":{"type":"object","properties":{"min_m":{"type":"array","items":{"type":"number"}},"max_m":{"type":"array","items":{"type":"number"}}}},"objects":{"type":"array","items":{"type":"object","properties":{"object":{"type":"string"},"confidence":{"type":"number"}}}},"body":{},"blobs":{"type":"array","items":{"type":"object","properties":{"name":{"type":"string"},"form":{"type":"string"},"bytes":{"type":"integer"},"layout":{"type":"object"}}}}}}"#;
     Schema { name: "descry.Document", encoding: "jsonschema", data: text.as_bytes().to_vec() }
 }
 
-/// The schema of blobs of a form.
+/// The schema for blobs of a form.
 pub(crate) fn schema(form: Form) -> Schema {
     let name = match form {
         Form::PointCloud => "foxglove.PointCloud",
@@ -70,7 +71,7 @@ pub(crate) fn document_topic(kind: &str) -> String {
     format!("/document/{kind}")
 }
 
-/// The part of a blob's message that stands before its bytes.
+/// The part of a blob's message before its bytes.
 pub(crate) fn prefix(document: &Document, blob: &BlobInfo) -> Vec<u8> {
     let mut out = Wire::default();
     let number = |key: &str| blob.layout.get(key).and_then(Value::as_u64).unwrap_or(0) as u32;
@@ -138,13 +139,13 @@ fn numeric_type(name: &str) -> u64 {
 /// Severity of a line of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LogLevel {
-    /// For who mends the program.
+    /// For developers.
     Debug = 1,
-    /// News.
+    /// Information.
     Info = 2,
-    /// Something to look at.
+    /// Warning.
     Warning = 3,
-    /// Something went wrong.
+    /// Error.
     Error = 4,
 }
 
@@ -174,7 +175,7 @@ pub(crate) fn frame_transforms(parent: &str, child: &str, samples: &[Sample]) ->
     out.0
 }
 
-/// Reads `foxglove.FrameTransforms` back: the samples, bit for bit. `None` if the bytes are no such message.
+/// Decodes `foxglove.FrameTransforms`, losslessly. `None` if the bytes are not such a message.
 pub(crate) fn read_frame_transforms(bytes: &[u8]) -> Option<Vec<Sample>> {
     let mut samples = Vec::new();
     let mut reader = WireReader(bytes);

@@ -10,33 +10,33 @@ use crate::packed;
 /// Static structure of a place, from all visits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Visited {
-    /// The waypoint from which it was looked at.
+    /// The waypoint of the observations.
     pub waypoint: String,
     /// Pose of the place in the map: x and y, metres, and the heading, radians.
     pub at: [f64; 3],
-    /// When it was visited last, seconds since 1970.
+    /// Time of the last visit, seconds since 1970.
     pub last_unix_s: f64,
     /// Its static structure.
     #[serde(serialize_with = "write_room", deserialize_with = "read_room")]
     pub room: MetaRoom,
 }
 
-/// A thing that was learned.
+/// A learned object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LearnedThing {
-    /// As it is called.
+    /// Its name.
     pub name: String,
-    /// When it was learned, seconds since 1970.
+    /// Time of learning, seconds since 1970.
     pub learned_unix_s: f64,
-    /// Its surface about its middle, upright as it stood, metres.
+    /// Its surface, relative to its centre and upright as it stood, metres.
     #[serde(with = "packed")]
     pub cloud: Cloud,
     /// Share of the directions around it from which it was seen, 0 to 1.
     pub sides: f64,
-    /// Those directions: of 36 around it, counted from its own x anticlockwise, a bit each.
+    /// Bit set of these directions: 36 sectors, counted anticlockwise from its x axis.
     #[serde(default)]
     pub directions: u64,
-    /// Number of encounters with looks from all around; the cloud holds what each showed.
+    /// Number of encounters with views from all around; the cloud merges them.
     #[serde(default = "once")]
     pub meetings: u32,
     /// Place of the last sighting.
@@ -50,15 +50,15 @@ fn once() -> u32 {
 /// Place and time of a sighting.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// When, seconds since 1970.
+    /// Time of the sighting, seconds since 1970.
     pub unix_s: f64,
-    /// Its middle, in the map, metres.
+    /// Its centre, map frame, metres.
     pub at_m: Point3<f64>,
-    /// The surface that it stood on, by its symbol.
+    /// Symbol of the supporting surface.
     pub on: String,
 }
 
-/// A static structure as it is written.
+/// Serialised form of a static structure.
 #[derive(Serialize, Deserialize)]
 struct Room {
     visits: usize,

@@ -1,4 +1,5 @@
-//! Clouds as short text: whole numbers of a unit from the lowest corner, in base64. What is read back packs to the same text.
+//! Compact text encoding of clouds: integer multiples of a unit from the minimum corner, in base64. A decoded
+//! cloud encodes to the same text.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -7,9 +8,9 @@ use nalgebra::{Point3, Vector3};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A tenth of a millimetre for what is small, a millimetre for what is not, metres.
+/// Candidate units: a tenth of a millimetre for small clouds, a millimetre for large ones, metres.
 const UNITS_M: [f64; 2] = [1e-4, 1e-3];
-/// Stands for an unknown component of a normal.
+/// Marks an unknown component of a normal.
 const UNKNOWN: i8 = i8::MIN;
 
 /// Packed form of a cloud.
@@ -17,11 +18,11 @@ const UNKNOWN: i8 = i8::MIN;
 #[serde(deny_unknown_fields)]
 pub struct Packed {
     pub unit_m: f64,
-    /// The lowest corner, in units.
+    /// The minimum corner, in units.
     low: [i64; 3],
-    /// Three numbers of two bytes a point, the lower first.
+    /// Three `u16` a point, little-endian.
     pub points: String,
-    /// Three numbers of a byte a point, in parts of 127.
+    /// Three `i8` a point, in units of 1/127.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     normals: Option<String>,
     /// Red, green, blue.
@@ -29,18 +30,21 @@ pub struct Packed {
     pub colours: Option<String>,
 }
 
-/// Writes a cloud of finite points, without grid and labels. Points farther than 65 m from its lowest corner are left out.
+/// Serialises the finite points of a cloud, without grid and labels. Points farther than 65 m from its
+/// minimum corner are left out.
 ///
 /// # Errors
-/// Those of the writer.
+///
+/// Those of the serialiser.
 pub fn serialize<S: Serializer>(cloud: &Cloud, writer: S) -> Result<S::Ok, S::Error> {
     pack(&cloud.finite()).serialize(writer)
 }
 
-/// Reads it back.
+/// Deserialises a cloud.
 ///
 /// # Errors
-/// What is no such text.
+///
+/// Malformed text.
 pub fn deserialize<'de, D: Deserializer<'de>>(reader: D) -> Result<Cloud, D::Error> {
     unpack(&Packed::deserialize(reader)?).map_err(D::Error::custom)
 }

@@ -1,5 +1,4 @@
-//! Record: the handle by which the rest of descry writes and reads what was sensed, done and
-//! believed.
+//! Record: the handle for writing and reading sensor data, actions and beliefs.
 
 mod recall;
 
@@ -24,7 +23,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The kinds that have a form of their own; any other word is a kind, too.
+/// Kinds of documents with a special form; any other word is a kind as well.
 pub mod kind {
     /// A point cloud.
     pub const CLOUD: &str = "cloud";
@@ -34,7 +33,7 @@ pub mod kind {
     pub const IMAGE: &str = "image";
     /// Transforms of one child frame over some time.
     pub const TRANSFORMS: &str = "transforms";
-    /// A transform that holds always.
+    /// A static transform.
     pub const STATIC_TRANSFORM: &str = "static_transform";
     /// A line of the log.
     pub const LOG: &str = "log";
@@ -43,19 +42,19 @@ pub mod kind {
 /// Options for writing and reading a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// When a record counts as acknowledged.
+    /// Condition for acknowledging a write.
     pub durability: Durability,
     /// Limits beyond which old data is pruned.
     pub retention: Retention,
     /// Length of a segment, bytes.
     pub segment_bytes: u64,
-    /// Who records, where several write into one store.
+    /// Name of the recording robot, where several write into one store.
     pub robot: String,
-    /// Transforms of a child frame are grouped over so long, nanoseconds (paper 004's recorder: 2 s).
+    /// Time span of a group of transforms, nanoseconds (paper 004's recorder: 2 s).
     pub group_ns: i64,
-    /// Greatest distance in time over which transforms are extrapolated.
+    /// Limits of interpolating and extrapolating transforms.
     pub reach: Reach,
-    /// Greatest time between a cloud and the time asked for, nanoseconds.
+    /// Maximum difference between the stamp of a cloud and the requested time, nanoseconds.
     pub view_tolerance_ns: i64,
 }
 
@@ -100,32 +99,33 @@ pub enum Image<'a> {
         width: u32,
         /// Rows.
         height: u32,
-        /// As viewers name it: `rgb8`, `mono8`, `16UC1` (depth in millimetres), `32FC1` (depth in metres).
+        /// Encoding, as viewers name it: `rgb8`, `mono8`, `16UC1` (depth in millimetres), `32FC1` (depth in
+        /// metres).
         encoding: &'a str,
         /// The pixels.
         data: &'a [u8],
     },
 }
 
-/// A record: everything that was sensed, done and believed, in order of time.
+/// A record: all sensor data, actions and beliefs, ordered by time.
 ///
-/// What `put_cloud`, `put_image`, `put_document` and `put_log` return is acknowledged: it is on the disk as far as
-/// [`Options::durability`] promises. Transforms come thousands a second and are grouped; they are acknowledged by the
-/// next [`Record::sync`], or when their group is written in the background.
+/// The results of `put_cloud`, `put_image`, `put_document` and `put_log` are acknowledged: they are on the
+/// disk as far as [`Options::durability`] promises. Transforms arrive thousands a second and are grouped;
+/// they are acknowledged by the next [`Record::sync`], or once their group is written in the background.
 pub struct Record {
     store: Arc<dyn Store>,
     recovery: Recovery,
     options: Options,
     groups: Mutex<Groups>,
-    /// Drafts that are written together with the next one.
+    /// Drafts to be written together with the next one.
     soon: Mutex<Vec<Draft<'static>>>,
     flusher: Flusher,
     retrace: Option<Retrace>,
-    /// Whether something did not fit into the record's bound.
+    /// True once data did not fit within the size limit.
     is_at_bound: AtomicBool,
 }
 
-/// Transforms on their way into a document, by child and parent.
+/// Transforms not yet in a document, by child and parent.
 #[derive(Default)]
 struct Groups {
     open: BTreeMap<(String, String), Vec<Sample>>,
@@ -134,7 +134,7 @@ struct Groups {
 }
 
 impl Record {
-    /// Makes a record in a folder.
+    /// Creates a record in a folder.
     ///
     /// # Errors
     /// [`Error::Exists`], or what the system refuses.
@@ -142,7 +142,7 @@ impl Record {
         Ok(Self::local(LocalStore::create(dir, &options.robot, options.local())?, options))
     }
 
-    /// Opens a record to go on with it; what a crash has left is mended.
+    /// Opens a record for writing; repairs the traces of a crash.
     ///
     /// # Errors
     /// [`Error::NoRecord`], [`Error::InUse`], or what the system refuses.
@@ -150,25 +150,28 @@ impl Record {
         Ok(Self::local(LocalStore::open(dir, &options.robot, options.local())?, options))
     }
 
-    /// Opens a record so that its maker lives through it again and goes on where it was cut off: a single document, cloud, image or
-    /// transform that is put as it stands in the record, in the order of its kind, is taken for the one there and not written twice.
+    /// Opens an interrupted record whose writer replays it from the start: each document, cloud, image or
+    /// transform that equals the next recorded one of its kind is identified with that one, and not written
+    /// again.
     ///
     /// # Errors
+    ///
     /// As [`Record::open`].
     pub fn resume(dir: &Path, options: Options) -> Result<Self, Error> {
         Self::open(dir, options)?.retracing()
     }
 
-    /// The same on any store; see [`Record::resume`].
+    /// Starts retracing on a record of any store; see [`Record::resume`].
     ///
     /// # Errors
+    ///
     /// If the store cannot be read.
     pub fn retracing(mut self) -> Result<Self, Error> {
         self.retrace = Some(Retrace::of(&*self.store, &self.options.robot)?);
         Ok(self)
     }
 
-    /// Opens a record to read it, beside a process that may be writing.
+    /// Opens a record for reading, while another process may be writing it.
     ///
     /// # Errors
     /// [`Error::NoRecord`], or what the system refuses.
@@ -183,7 +186,7 @@ impl Record {
         record
     }
 
-    /// A record on any store.
+    /// A record on a given store.
     pub fn on(store: Arc<dyn Store>, options: Options) -> Self {
         Record {
             flusher: Flusher::start(store.clone()),
@@ -197,12 +200,12 @@ impl Record {
         }
     }
 
-    /// Damage that opening found and mended.
+    /// Damage that opening found and repaired.
     pub fn recovery(&self) -> &Recovery {
         &self.recovery
     }
 
-    /// The store beneath.
+    /// The underlying store.
     pub fn store(&self) -> &dyn Store {
         &*self.store
     }
@@ -225,10 +228,11 @@ impl Record {
         self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::CLOUD, stamp_ns) })
     }
 
-    /// Records a sweep of a laser, in `frame`; where it was taken from, the transforms of its time say.
+    /// Records a laser sweep in `frame`; the transforms of its time give its pose.
     ///
     /// # Errors
-    /// [`Error::Input`] if it is unsound, or its angles are not at even steps; [`Error::Full`].
+    ///
+    /// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced; [`Error::Full`].
     pub fn put_scan(&self, stamp_ns: i64, frame: &str, scan: &Scan, meta: Meta) -> Result<RecordId, Error> {
         let blobs = vec![scans::encode(scan)?];
         self.put(Draft { frame: frame.into(), meta, blobs, ..Draft::new(kind::SCAN, stamp_ns) })
@@ -242,9 +246,10 @@ impl Record {
         self.put(image_draft(stamp_ns, frame, image, meta)?)
     }
 
-    /// The same together with what is put next: see [`Record::put_soon`].
+    /// Enqueues an image to be written with the next record; see [`Record::put_soon`].
     ///
     /// # Errors
+    ///
     /// As [`Record::put_image`].
     pub fn put_image_soon(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<(), Error> {
         let Draft { kind, end_ns, frame, kept, meta, blobs, .. } = image_draft(stamp_ns, frame, image, meta)?;
@@ -253,10 +258,13 @@ impl Record {
         self.put_soon(Draft { kind, stamp_ns, end_ns, frame, kept, meta, blobs })
     }
 
-    /// Records where a frame stood. It is there for lookups at once, on the disk when its group is full or at [`Record::sync`].
+    /// Records a transform. Lookups see it at once; it reaches the disk when its group is full or at
+    /// [`Record::sync`].
     ///
     /// # Errors
-    /// [`transforms::TransformError::Invalid`], or the failure of an earlier group to reach the disk; then this one was not taken.
+    ///
+    /// [`transforms::TransformError::Invalid`], or the failure of an earlier group to reach the disk; then
+    /// this transform was not accepted.
     pub fn put_transform(
         &self,
         stamp_ns: i64,
@@ -282,9 +290,10 @@ impl Record {
         Ok(())
     }
 
-    /// Records where a frame stood together with what is put next: see [`Record::put_soon`].
+    /// Enqueues a transform to be written with the next record; see [`Record::put_soon`].
     ///
     /// # Errors
+    ///
     /// As [`Record::put_transform`].
     pub fn put_transform_soon(
         &self,
@@ -303,10 +312,11 @@ impl Record {
         Ok(())
     }
 
-    /// True if a measured transform is not in the record yet.
+    /// True if a transform is not yet in the record.
     ///
     /// # Errors
-    /// If it is unsound, or contradicts what is there.
+    ///
+    /// If it is invalid, or contradicts a recorded one.
     fn is_news(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
         let stamp_ns = sample.stamp_ns;
         transforms::check(stamp_ns, parent, child, &sample.parent_from_child)?;
@@ -319,7 +329,7 @@ impl Record {
         Ok(!self.is_measured(parent, child, sample)?)
     }
 
-    /// Records a transform that holds at all times for which nothing was measured.
+    /// Records a static transform, valid whenever no measured one is.
     ///
     /// # Errors
     /// [`transforms::TransformError::Invalid`], [`Error::Full`].
@@ -335,10 +345,11 @@ impl Record {
         self.put(group.draft(kind::STATIC_TRANSFORM))
     }
 
-    /// Records a document of any kind, with blobs beside it.
+    /// Records a document of any kind, with its blobs.
     ///
     /// # Errors
-    /// [`Error::Input`] for what could not be found again; [`Error::Full`].
+    ///
+    /// [`Error::Input`] for content that could not be found again; [`Error::Full`].
     pub fn put_document(
         &self,
         kind: &str,
@@ -349,9 +360,10 @@ impl Record {
         self.put(Draft { meta: Meta { body, ..Meta::default() }, blobs, ..Draft::new(kind, stamp_ns) })
     }
 
-    /// Records a line of the log; `name` says whose.
+    /// Records a line of the log from the source `name`.
     ///
     /// # Errors
+    ///
     /// [`Error::Full`].
     pub fn put_log(
         &self,
@@ -368,7 +380,7 @@ impl Record {
         self.put(Draft { meta, blobs, ..Draft::new(kind::LOG, stamp_ns) })
     }
 
-    /// Records a draft as it is.
+    /// Records a draft unchanged.
     ///
     /// # Errors
     /// As [`Store::append`].
@@ -386,10 +398,11 @@ impl Record {
         ids.last().copied().ok_or(Error::Missing { id: 0 })
     }
 
-    /// Records a draft together with what is put next, so that many small ones cost one wait for the disk. It is acknowledged with
-    /// that one, or by [`Record::sync`].
+    /// Enqueues a draft to be written with the next record, so that many small drafts share one wait for the
+    /// disk. It is acknowledged with that record, or by [`Record::sync`].
     ///
     /// # Errors
+    ///
     /// If the store cannot be read.
     pub fn put_soon(&self, draft: Draft<'static>) -> Result<(), Error> {
         if let Some(retrace) = &self.retrace
@@ -420,7 +433,7 @@ impl Record {
         appended
     }
 
-    /// Whether something did not fit into the bound of the record, so that nothing more can be recorded.
+    /// True once data did not fit within the size limit; nothing more can be recorded.
     pub fn is_at_bound(&self) -> bool {
         self.is_at_bound.load(Ordering::Relaxed)
     }
@@ -433,17 +446,18 @@ impl Record {
         self.append(drafts)
     }
 
-    /// Brings everything to the disk, open groups of transforms included.
+    /// Flushes everything to the disk, open groups of transforms included.
     ///
     /// # Errors
-    /// If it cannot be brought there; it is kept and tried again.
+    ///
+    /// If a write fails; the data is kept for another attempt.
     pub fn sync(&self) -> Result<(), Error> {
         self.flush_open()?;
         self.flush_soon()?;
         self.store.sync()
     }
 
-    /// Documents that meet a query.
+    /// Documents that match a query.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -451,8 +465,7 @@ impl Record {
         self.store.find(query)
     }
 
-    /// Documents that meet a query and are whole to the last byte of their blobs, and the faults of
-    /// the others.
+    /// Documents that match a query and are undamaged, blobs included, and the faults of the others.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -465,7 +478,7 @@ impl Record {
         Ok((whole, faults))
     }
 
-    /// The newest of a kind.
+    /// The newest document of a kind.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -474,7 +487,7 @@ impl Record {
         Ok(self.store.find(&query)?.pop())
     }
 
-    /// The record of a kind nearest in time, within a tolerance.
+    /// The document of a kind nearest in time, within a tolerance.
     ///
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
@@ -482,7 +495,7 @@ impl Record {
         self.nearest_of(&self.own(kind), stamp_ns, tolerance_ns)
     }
 
-    /// Document nearest in time among those that meet a query, within a tolerance.
+    /// The document nearest in time among those that match a query, within a tolerance.
     ///
     /// # Errors
     /// [`Error::NotNear`] with the nearest there is.
@@ -496,19 +509,21 @@ impl Record {
         })
     }
 
-    /// Keeps records from being pruned, in the name of `by` (a belief, a model, a plan); clouds with the transforms of their time.
+    /// Pins records on behalf of `by` (a belief, a model, a plan), so that they are never pruned; clouds
+    /// together with the transforms of their time.
     ///
     /// # Errors
-    /// [`Error::Missing`] if one is not there; then none is pinned.
+    ///
+    /// [`Error::Missing`] if a record does not exist; then none is pinned.
     pub fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
         self.store.pin(&self.with_their_place(ids)?, by)
     }
 
-    /// Pins these records as [`Record::pin`] does, and no others, in the name of `by`: what it cites now, in place of what it cited
-    /// before.
+    /// Replaces the pins of `by` by these records, pinned as by [`Record::pin`].
     ///
     /// # Errors
-    /// [`Error::Missing`] if one is not there; then what it held before stays pinned.
+    ///
+    /// [`Error::Missing`] if a record does not exist; then the former pins stay.
     pub fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
         let ids = self.with_their_place(ids)?;
         match &self.retrace {
@@ -517,7 +532,7 @@ impl Record {
         }
     }
 
-    /// Takes back every pin in the name of `by`.
+    /// Removes all pins of `by`.
     ///
     /// # Errors
     /// If the store cannot be written.
@@ -525,7 +540,7 @@ impl Record {
         self.store.unpin(by)
     }
 
-    /// Writes what a query finds, in the order of time, into one MCAP file.
+    /// Exports the results of a query, ordered by time, as one MCAP file.
     ///
     /// # Errors
     /// As [`crate::export`].
@@ -533,7 +548,7 @@ impl Record {
         crate::export::export(&*self.store, query, path)
     }
 
-    /// Reads every record and says what is whole.
+    /// Reads every record and reports damage.
     ///
     /// # Errors
     /// If the store itself cannot be read.
@@ -550,7 +565,7 @@ impl Record {
     }
 }
 
-/// An image as it is recorded.
+/// The draft of an image record.
 fn image_draft<'a>(stamp_ns: i64, frame: &str, image: Image<'a>, meta: Meta) -> Result<Draft<'a>, Error> {
     let (form, layout, data) = match image {
         Image::Compressed { format, data } => (Form::CompressedImage, json!({ "format": format }), data),
@@ -585,7 +600,7 @@ impl Groups {
 }
 
 impl Drop for Record {
-    /// Writes what is open. Who must know whether that succeeded calls [`Record::sync`] first.
+    /// Writes pending data. Callers that need to know of failures call [`Record::sync`] first.
     fn drop(&mut self) {
         if let Err(e) = self.flush_open().and_then(|()| self.flush_soon()) {
             tracing::warn!("something was lost at the end of the record: {e}");

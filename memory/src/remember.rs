@@ -1,5 +1,5 @@
-//! Persistent belief between runs: the last sighting of each thing and its time. A later run begins
-//! with it, as far as age allows.
+//! Persistent belief across runs: the last sighting of each object and its time. A later run starts from it,
+//! discounted by age.
 
 #[doc(hidden)]
 pub mod joined;
@@ -16,37 +16,37 @@ use crate::error::Error;
 use crate::learned::{LearnedThing, Visited};
 use crate::record::Record;
 
-/// The kind under which it is kept.
+/// Kind of the document that holds the memory.
 const KIND: &str = "remembered";
-/// Time in which the probability that a thing still stands where it was seen falls by a half, seconds: a day.
+/// Half-life of the probability that an object is still at its last known place, seconds: a day.
 pub const HALF_LIFE_S: f64 = 86_400.0;
-/// So many things that are gone are remembered; the oldest are forgotten.
+/// Maximum number of vanished objects in memory; the oldest are forgotten first.
 pub const MOST_GONE: usize = 500;
 
-/// An object as it was seen last.
+/// Last sighting of an object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recollection {
-    /// When, seconds since 1970.
+    /// Time of the sighting, seconds since 1970.
     pub seen_unix_s: f64,
     /// Belief about it at that time.
     pub track: Track,
 }
 
-/// The map that a body has made itself.
+/// Map that a body has built itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surveyed {
-    /// All that was seen, by cubes: what a later run adds to.
+    /// Voxel survey, extended by later runs.
     pub survey: Survey,
-    /// Viewpoints, by the content of the views.
+    /// Corrected viewpoints, from registering the views.
     pub stood: Vec<Isometry2<f64>>,
-    /// Stated poses of the body, in its own map.
+    /// Poses as stated by the body, in its own map.
     pub believed: Vec<Isometry2<f64>>,
-    /// Level surfaces to put things on, by the names that they were given.
+    /// Horizontal support surfaces with their given names.
     pub surfaces: Vec<(String, Level)>,
-    /// Straight lines that it has driven, and places where it does not fit though the map shows nothing there: in its own map.
+    /// Straight segments that the body has driven, in its own map, metres.
     #[serde(default)]
     pub driven: Vec<[Point2<f64>; 2]>,
-    /// See above.
+    /// Places where the body does not fit although the map shows free space, in its own map.
     #[serde(default)]
     pub barred: Vec<Point2<f64>>,
 }
@@ -54,31 +54,32 @@ pub struct Surveyed {
 /// Memory of all earlier runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Remembered {
-    /// Things as of the last look at their surface.
+    /// Objects as of the last look at their surface.
     pub present: Vec<Recollection>,
-    /// Things that had vanished when their place was looked at again, the oldest first.
+    /// Objects that had vanished at a later look at their place, oldest first.
     pub gone: Vec<Recollection>,
-    /// Surfaces that were looked at; of an older store, those since it is kept.
+    /// Symbols of surfaces that were looked at; incomplete for older stores.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub looked_at: Vec<String>,
-    /// Shapes that were learned, the oldest first.
+    /// Learned shapes, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shapes: Vec<KnownShape>,
-    /// The map, if one was made.
+    /// The map that the body built, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surveyed: Option<Surveyed>,
     /// Static structure of visited places.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visited: Vec<Visited>,
-    /// Things that were learned, the oldest first.
+    /// Learned objects, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<LearnedThing>,
 }
 
 impl Remembered {
-    /// Memory that a store holds; empty for a new store.
+    /// Reads the memory from a store; empty for a new store.
     ///
     /// # Errors
+    ///
     /// [`Error`] if it cannot be read.
     pub fn recall(store: &Record) -> Result<Self, Error> {
         let Some(document) = store.newest(KIND)? else { return Ok(Self::default()) };
@@ -88,10 +89,11 @@ impl Remembered {
         })
     }
 
-    /// Keeps it in a store.
+    /// Writes the memory to a store.
     ///
     /// # Errors
-    /// [`Error`] if it cannot be kept.
+    ///
+    /// [`Error`] if it cannot be written.
     pub fn keep(&self, store: &Record, now_unix_s: f64) -> Result<(), Error> {
         let body = serde_json::to_value(self).map_err(|e| Error::Input {
             what: format!("what is to be remembered cannot be written: {e}"),
@@ -102,8 +104,8 @@ impl Remembered {
         store.sync()
     }
 
-    /// Memory after a run: its belief about the surfaces that it looked at, the earlier memory of
-    /// all others.
+    /// Memory after a run: its belief about the surfaces that it looked at, and the earlier memory of all
+    /// others.
     pub fn after(self, belief: &Belief, looked_at: &[String], now_unix_s: f64) -> Self {
         let is_here = |r: &Recollection| looked_at.contains(&r.track.on);
         let (before, elsewhere): (Vec<_>, Vec<_>) = self.present.into_iter().partition(is_here);
@@ -123,18 +125,18 @@ impl Remembered {
         Self { present, gone, looked_at: all, ..self }
     }
 
-    /// True if a surface was looked at: it is kept, or something was seen there.
+    /// True if a surface was ever looked at, or an object was seen on it.
     pub fn has_looked_at(&self, surface: &str) -> bool {
         let mut seen = self.present.iter().chain(&self.gone);
         self.looked_at.iter().any(|s| s == surface) || seen.any(|r| r.track.on == surface)
     }
 
-    /// Gives a thing that was learned another name, wherever it was seen.
+    /// Renames a learned object in all sightings.
     pub fn rename(&mut self, old: &str, new: &str) {
         self.call(|name| (name == old).then(|| new.to_owned()));
     }
 
-    /// Gives things other names, those that there are for them.
+    /// Renames objects for which `other` gives a name.
     fn call(&mut self, other: impl Fn(&str) -> Option<String>) {
         let rename = |name: &mut String| {
             if let Some(new) = other(name) {
@@ -148,8 +150,8 @@ impl Remembered {
         }
     }
 
-    /// Present belief about it: probabilities decay with time and stay below `most`, so nothing is
-    /// certain without a new look.
+    /// Tracks discounted by age: probabilities decay and stay below `most`, so nothing is certain without a
+    /// new look.
     pub fn aged(&self, now_unix_s: f64, most: f64) -> Vec<Track> {
         let aged = |r: &Recollection| {
             let worn = 0.5_f64.powf((now_unix_s - r.seen_unix_s).max(0.0) / HALF_LIFE_S);
@@ -171,8 +173,8 @@ impl Remembered {
         self.present.iter().map(aged).collect()
     }
 
-    /// Last sighting of a name, and whether the thing was still there at the next look; none if
-    /// never seen.
+    /// Last sighting of a name, and true if the object was still there at the next look; none if it was never
+    /// seen.
     pub fn last_seen(&self, name: &str) -> Option<(&Recollection, bool)> {
         let is = |r: &&Recollection| r.track.probability_of(name) > 0.5;
         let newest = |list: &'_ [Recollection]| -> Option<usize> {
@@ -185,5 +187,5 @@ impl Remembered {
     }
 }
 
-/// An object nearer than this to where one was is that one, metres.
+/// Maximum distance between the old and new positions of one object, metres.
 pub const SAME_M: f64 = 0.10;

@@ -1,4 +1,4 @@
-//! Going on with a record: what its maker puts again as it stands there is recognised and not written twice.
+//! Continuing a record: data that its writer repeats is recognised and not written again.
 
 use crate::document::{Document, Draft, Query, RecordId};
 use crate::error::Error;
@@ -9,18 +9,18 @@ use std::sync::{Mutex, PoisonError};
 
 /// Progress of a retraced run, by kind of document.
 pub(crate) struct Retrace {
-    /// Whose record it is; "" where robots have no names.
+    /// Name of the robot; "" where robots have no names.
     robot: String,
-    /// Nothing later than this was in the record when it was opened.
+    /// Newest stamp in the record when it was opened, nanoseconds.
     pub newest_ns: i64,
     steps: Mutex<BTreeMap<String, Step>>,
 }
 
 #[derive(Clone, Copy)]
 enum Step {
-    /// The next in the record is that behind this stamp and number.
+    /// The next recorded document is the one after this stamp and number.
     Behind(Option<(i64, RecordId)>),
-    /// From here on everything is new.
+    /// All further documents are new.
     New,
 }
 
@@ -30,13 +30,14 @@ impl Retrace {
         Ok(Retrace { robot: robot.into(), newest_ns, steps: Mutex::default() })
     }
 
-    /// The record that a draft is already, if the next of its kind is like it. From the first that is not, all of that kind is new.
+    /// The record that equals a draft, if it is the next of its kind. After the first mismatch, all drafts of
+    /// that kind are new.
     pub fn next(&self, store: &dyn Store, draft: &Draft) -> Result<Option<RecordId>, Error> {
         let same = |found: &Document| Ok(draft.document(found.id, &found.robot)? == *found);
         self.next_like(store, &draft.kind, same)
     }
 
-    /// True if the next pins in the record are these.
+    /// True if the next recorded pins equal these.
     pub fn next_pins(&self, store: &dyn Store, ids: &[RecordId], by: &str) -> Result<bool, Error> {
         let wanted = pinned(0, ids, by, true).meta.body;
         Ok(self.next_like(store, PIN, |found| Ok(found.body == wanted))?.is_some())

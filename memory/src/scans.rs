@@ -1,4 +1,4 @@
-//! Sweeps of a laser as bytes and back, ranges bit for bit.
+//! Lossless encoding of laser sweeps as bytes.
 
 use crate::document::{Blob, BlobInfo, Form};
 use crate::error::Error;
@@ -9,10 +9,10 @@ use serde_json::json;
 
 /// The name of a sweep's blob.
 pub(crate) const SCAN: &str = "scan";
-/// Angles may be off from even steps by so much, radians.
+/// Tolerance on the even spacing of angles, radians.
 const EVEN_RAD: f64 = 1e-6;
 
-/// Memory layout of a sweep: ranges as f64, at even steps between two angles.
+/// Memory layout of a sweep: ranges as f64, evenly spaced between two angles.
 #[derive(Serialize, Deserialize)]
 struct Layout {
     first_rad: f64,
@@ -27,10 +27,11 @@ impl Layout {
     }
 }
 
-/// A sweep as a blob; its pose is not part of it.
+/// Encodes a sweep as a blob, without its pose.
 ///
 /// # Errors
-/// [`Error::Input`] if it is unsound, or its angles are not at even steps.
+///
+/// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced.
 pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
     let fail = |what: String| Error::Input { what, mend: "give one range an angle, at even steps".into() };
     scan.check().map_err(|e| fail(e.to_string()))?;
@@ -47,10 +48,11 @@ pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
     Ok(Blob { name: SCAN.into(), form: Form::LaserScan, layout: json!(layout), data: data.into() })
 }
 
-/// A sweep from its blob, taken from a pose.
+/// Decodes a sweep taken at a pose.
 ///
 /// # Errors
-/// What of the layout does not fit, in words.
+///
+/// A description of the mismatch in the layout.
 pub fn decode(info: &BlobInfo, data: &[u8], map_from_laser: Isometry2<f64>) -> Result<Scan, String> {
     let layout: Layout =
         Layout::deserialize(&info.layout).map_err(|e| format!("its layout cannot be read: {e}"))?;

@@ -1,8 +1,8 @@
 //! Free, occupied and unobserved space: a sparse voxel map.
 //!
-//! Paper 004's outlook asks for an octree (OctoMap); blocks of voxels behind one hash serve the same with flat access.
-//! Each view is compared with the voxels in its field of view, as a depth image is fused: what lies in front of the
-//! measured surface is free, what lies on it is occupied, what lies behind it stays as it was.
+//! Paper 004's outlook asks for an octree (OctoMap); blocks of voxels in a hash map serve the same purpose
+//! with flat access. Each view updates the voxels in its field of view as in depth fusion: voxels in front of
+//! the measured surface become free, voxels on it occupied, voxels behind it stay unchanged.
 
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
@@ -14,11 +14,11 @@ const SIDE: i32 = 16;
 const BLOCK: usize = (SIDE * SIDE * SIDE) as usize;
 /// Voxels along the side of a brick, of which a block has 64.
 const BRICK: i32 = 4;
-/// Viewpoints that are nearer to each other than this are one place, metres.
+/// Distance below which two viewpoints are the same, metres.
 const SAME_PLACE_M: f64 = 0.1;
-/// A voxel of which nothing is known.
+/// Marks an unobserved voxel.
 const UNSEEN: i8 = i8::MIN;
-/// Log-odds update of a voxel: increment on a surface, decrement before one, and bounds.
+/// Log-odds update of a voxel: increment on a surface, decrement in front of one, and limit.
 const HIT: i8 = 3;
 const MISS: i8 = 1;
 const SURE: i8 = 12;
@@ -26,7 +26,7 @@ const SURE: i8 = 12;
 /// State of a voxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Cell {
-    /// No view has shown it.
+    /// Not observed by any view.
     Unseen,
     /// A camera looked through it.
     Free,
@@ -45,8 +45,7 @@ pub struct Space {
     seen_from: Vec<Point3<f64>>,
 }
 
-/// Occlusion index for lines of sight: bricks with an occupied voxel, by block, over their bounding
-/// box.
+/// Occlusion index for lines of sight: bricks with an occupied voxel, by block, over their bounding box.
 #[derive(Debug, Clone, Default)]
 struct Opaque {
     low: [i32; 3],
@@ -84,7 +83,7 @@ impl Opaque {
         (within(x, sx) && within(y, sy) && within(z, sz)).then(|| ((x * sy + y) * sz + z) as usize)
     }
 
-    /// The steps from `first` to `last` of a way at which it is within the box; none if it passes by. In voxels.
+    /// The first and last step of a line of sight within the box; none if the line misses the box. In voxels.
     fn clip(&self, from: &Vector3<f64>, step: &Vector3<f64>, last: f64) -> Option<(i64, i64)> {
         let (mut enters, mut leaves) = (0.0_f64, last);
         for axis in 0..3 {
@@ -104,8 +103,7 @@ impl Opaque {
     }
 }
 
-/// Voxels of a cube, and those of its bricks that hold an occupied one: lines of sight skip the
-/// others.
+/// Voxels of a block, and the set of its bricks with an occupied voxel; lines of sight skip all others.
 #[derive(Debug, Clone)]
 struct Block {
     levels: [i8; BLOCK],
@@ -115,7 +113,7 @@ struct Block {
 impl Block {
     const UNSEEN: Self = Self { levels: [UNSEEN; BLOCK], occupied_bricks: 0 };
 
-    /// Finds the bricks that hold an occupied voxel; to be called after levels have changed.
+    /// Updates the set of bricks with an occupied voxel; required after any change of levels.
     fn find_bricks(&mut self) {
         let mut bricks = 0;
         for (row, levels) in self.levels.chunks_exact(BRICK as usize).enumerate() {
@@ -133,21 +131,21 @@ impl Block {
 /// Number of known voxels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Extent {
-    /// Voxels seen free.
+    /// Free voxels.
     pub free: usize,
-    /// Voxels seen occupied.
+    /// Occupied voxels.
     pub occupied: usize,
 }
 
 impl Default for Space {
-    /// Voxels of 2 cm, looked at up to 3.5 m.
+    /// Voxels of 2 cm, integrated up to a range of 3.5 m.
     fn default() -> Self {
         Self::new(0.02, 3.5)
     }
 }
 
 impl Space {
-    /// A map of which nothing is known: the side of its voxels, and how far from a camera a view counts, metres.
+    /// An unobserved map with this voxel size and maximum range of views, metres.
     pub fn new(voxel_m: f64, range_m: f64) -> Self {
         Self {
             voxel_m,
@@ -158,7 +156,7 @@ impl Space {
         }
     }
 
-    /// The places from which views were taken in. What is nearer to one than a hand's breadth is the same.
+    /// The viewpoints integrated so far, merged where nearer than `SAME_PLACE_M`.
     pub fn seen_from(&self) -> &[Point3<f64>] {
         &self.seen_from
     }
@@ -177,8 +175,8 @@ impl Space {
         }
     }
 
-    /// True if nothing seen lies between two points, except in places that are taken to be `gone`.
-    /// The last two voxels before `to` do not count, so that a surface does not hide itself.
+    /// True if no occupied voxel lies between two points, except in places that are taken to be `gone`. The
+    /// last two voxels before `to` do not count, so that a surface does not hide itself.
     pub fn line_of_sight(
         &self,
         from: &Point3<f64>,
@@ -217,7 +215,7 @@ impl Space {
         true
     }
 
-    /// Unobserved length within the last `last_m` metres of the way between two points, metres.
+    /// Unobserved length within the last `last_m` metres of the segment between two points, metres.
     pub fn unseen_m(&self, from: &Point3<f64>, to: &Point3<f64>, last_m: f64) -> f64 {
         let way = to - from;
         let steps = (last_m.min(way.norm()) / self.voxel_m).floor();
@@ -226,8 +224,8 @@ impl Space {
         (0..steps.max(0.0) as u32).filter(unseen).count() as f64 * self.voxel_m
     }
 
-    /// Forgets what was seen in an upright cylinder, where something may have changed: the foot of its axis, the unit vector
-    /// up, its radius and its height in metres.
+    /// Resets an upright cylinder to unobserved, where the scene may have changed: the foot of its axis, the
+    /// unit vector up, its radius and its height in metres.
     pub fn forget(&mut self, foot: &Point3<f64>, up: &Vector3<f64>, radius_m: f64, height_m: f64) {
         let voxel_m = self.voxel_m;
         for (key, block) in &mut self.blocks {
@@ -246,7 +244,7 @@ impl Space {
         self.opaque = Opaque::of(&self.blocks);
     }
 
-    /// Takes in what a camera saw.
+    /// Integrates a depth image.
     pub fn integrate(&mut self, map: &DepthMap) {
         let reach_m = map.depths_m.iter().filter(|d| d.is_finite()).fold(0.0_f32, |most, &d| most.max(d));
         let reach_m = f64::from(reach_m).min(self.range_m) + self.voxel_m;
@@ -285,7 +283,7 @@ impl Space {
         extent
     }
 
-    /// Share of the voxels of a box that no view has shown, 0 to 1.
+    /// Share of unobserved voxels in a box, 0 to 1.
     pub fn unseen_share(&self, low: &Point3<f64>, high: &Point3<f64>) -> f64 {
         let (low, high) = (self.voxel(low), self.voxel(high));
         let (mut all, mut unseen) = (0_usize, 0_usize);
@@ -309,7 +307,7 @@ impl Space {
         self.blocks.get(&key).map_or(UNSEEN, |block| block.levels[index(voxel)])
     }
 
-    /// The blocks that touch the camera's field of view, in a fixed order.
+    /// The blocks that meet the camera's field of view, in a fixed order.
     fn blocks_in_view(
         &self,
         map: &DepthMap,
@@ -346,8 +344,9 @@ impl Space {
         keys
     }
 
-    /// The voxels in which a depth image has a surface, by block, where depth is surer than a voxel. A camera that looks along a
-    /// surface is far behind the middle of its voxels, and would else take them for free.
+    /// The voxels with a measured surface, by block, where the depth is more certain than a voxel. They must
+    /// not become free: at a grazing angle, the depth measured at a voxel's centre may be far behind the
+    /// voxel.
     fn measured(
         &self,
         map: &DepthMap,
@@ -372,7 +371,8 @@ impl Space {
         blocks
     }
 
-    /// Compares the voxels of a block with a depth image, and with the voxels in which that has a surface. True if any was seen.
+    /// Updates the voxels of a block from a depth image, given the voxels with a measured surface. True if
+    /// any voxel was observed.
     fn look_at_block(
         &self,
         map: &DepthMap,
@@ -419,16 +419,15 @@ impl Space {
     }
 }
 
-/// The whole number below, of what 32 bits can hold. The standard one is a call where the processor's oldest instruction set is aimed at,
-/// and lines of sight ask for little else.
+/// Rounds down to an integer within 32 bits. `f64::floor` is a function call on the baseline instruction set,
+/// and lines of sight spend most of their time here.
 #[inline(always)]
 fn floor(value: f64) -> i32 {
     let toward_zero = value as i32;
     toward_zero - i32::from(f64::from(toward_zero) > value)
 }
 
-/// Number of steps back along a line of sight that leave the cube around a voxel; samples within
-/// are skipped.
+/// Number of steps along a line of sight that leave the cube around a voxel; the samples within are skipped.
 fn steps_out_of(
     side: i32,
     voxel: [i32; 3],
@@ -449,19 +448,19 @@ fn steps_out_of(
     (least - 1e-6).clamp(0.0, 1e9) as i64 + 1
 }
 
-/// Number of a voxel's brick within its block.
+/// Index of a voxel's brick within its block.
 fn brick(voxel: [i32; 3]) -> u32 {
     let [x, y, z] = voxel.map(|v| (v.rem_euclid(SIDE) / BRICK) as u32);
     (x * 4 + y) * 4 + z
 }
 
-/// Number of a voxel within its block.
+/// Index of a voxel within its block.
 fn index(voxel: [i32; 3]) -> usize {
     let [x, y, z] = voxel.map(|v| v.rem_euclid(SIDE) as usize);
     (x * SIDE as usize + y) * SIDE as usize + z
 }
 
-/// True if a ball may lie in the camera's field of view.
+/// True if a ball may intersect the camera's field of view.
 fn touches_view(map: &DepthMap, centre: &Point3<f64>, radius_m: f64, reach_m: f64) -> bool {
     let c = &map.intrinsics;
     let p = map.camera_from_world * centre;

@@ -10,21 +10,21 @@ use crate::error::Error;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The kinds under which pins are recorded.
+/// Kinds of the documents that record pins.
 pub(crate) const PIN: &str = "pin";
 pub(crate) const UNPIN: &str = "unpin";
-/// In whose name a record is pinned that is never pruned.
+/// Holder of the pins on records that are never pruned.
 pub(crate) const KEPT: &str = "record";
 
 /// Limits of a store; data beyond them is pruned oldest first, pinned records excepted. The default
 /// keeps everything.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Retention {
-    /// Greatest age against the newest record, nanoseconds of the recording's clock.
+    /// Maximum age relative to the newest record, nanoseconds of the recording's clock.
     pub max_age_ns: Option<i64>,
-    /// Greatest size of the whole record on the disk, bytes.
+    /// Maximum size of the whole record on the disk, bytes.
     pub max_bytes: Option<u64>,
-    /// Least room to be left free on the disk, bytes.
+    /// Minimum free room on the disk, bytes.
     pub min_free_bytes: Option<u64>,
 }
 
@@ -37,7 +37,7 @@ pub struct Stats {
     pub bytes: u64,
     /// Records and the bytes of their messages, by kind.
     pub kinds: BTreeMap<String, Count>,
-    /// Records that are pinned.
+    /// Number of pinned records.
     pub pinned: u64,
     /// Oldest stamp, nanoseconds.
     pub oldest_ns: Option<i64>,
@@ -47,7 +47,7 @@ pub struct Stats {
     pub segments: u64,
 }
 
-/// Records and the bytes of their messages.
+/// Count of records, and the bytes of their messages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Count {
     /// Records.
@@ -56,10 +56,10 @@ pub struct Count {
     pub bytes: u64,
 }
 
-/// The outcome of reading every record.
+/// Result of verifying every record.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// Records that are whole.
+    /// Number of undamaged records.
     pub whole: u64,
     /// Bytes of documents and blobs read.
     pub bytes: u64,
@@ -67,10 +67,10 @@ pub struct Report {
     pub faults: Vec<Fault>,
 }
 
-/// Something that is not whole.
+/// Damage to a record or to the store.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// The record, where it is known.
+    /// The damaged record, if known.
     pub record: Option<RecordId>,
     /// The file or collection.
     pub place: String,
@@ -79,10 +79,11 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Turns the error of a damaged record into a fault.
+    /// Converts the error of a damaged record to a fault.
     ///
     /// # Errors
-    /// Any other error as it is.
+    ///
+    /// Any other error, unchanged.
     pub(crate) fn of(record: RecordId, error: Error) -> Result<Self, Error> {
         match error {
             Error::Damaged { place, what, .. } => {
@@ -103,16 +104,16 @@ impl std::fmt::Display for Fault {
 }
 
 impl Report {
-    /// True if everything is whole.
+    /// True if nothing is damaged.
     pub fn is_whole(&self) -> bool {
         self.faults.is_empty()
     }
 }
 
-/// Takes a record with the bytes of its blobs.
+/// Receiver of a record with the bytes of its blobs.
 pub type Take<'a> = dyn FnMut(Document, Vec<Vec<u8>>) -> Result<(), Error> + 'a;
 
-/// Goes through what meets a query, a part at a time.
+/// Iteration over the results of a query in pages.
 pub(crate) struct Pages {
     query: Query,
     left: usize,
@@ -125,24 +126,24 @@ impl Pages {
         Pages { query: query.clone(), left: query.limit.unwrap_or(usize::MAX) }
     }
 
-    /// The query for the next part, if there is one.
+    /// The query for the next page, if there is one.
     pub fn next(&self) -> Option<Query> {
         let limit = Some(self.left.min(Self::AT_ONCE));
         (self.left > 0).then(|| Query { limit, ..self.query.clone() })
     }
 
-    /// Counts the records that were found, and keeps the stamp and number of the last.
+    /// Counts the results of a page, and stores the stamp and number of the last.
     pub fn was(&mut self, found: usize, last: Option<(i64, RecordId)>) {
         self.query.after = last;
         self.left = if last.is_some() { self.left - found } else { 0 };
     }
 }
 
-/// Keeps records and finds them again.
+/// Storage for records, with queries.
 ///
-/// What [`Store::append`] has returned is on the disk as far as the store's durability promises.
+/// Data for which [`Store::append`] has returned is on the disk as far as the store's durability promises.
 pub trait Store: Send + Sync {
-    /// Records all of them or, on an error, none.
+    /// Records all drafts or, on an error, none.
     ///
     /// # Errors
     /// [`Error::Full`] without room, [`Error::Input`] for what cannot be recorded.
@@ -160,14 +161,15 @@ pub trait Store: Send + Sync {
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
     fn blob(&self, id: RecordId, name: &str) -> Result<Vec<u8>, Error>;
 
-    /// Documents that meet a query, in its order.
+    /// Documents that match a query, in its order.
     ///
     /// # Errors
-    /// [`Error::Damaged`] if any of it is not what was written; if the store cannot be read.
+    ///
+    /// [`Error::Damaged`] if any of them is damaged; if the store cannot be read.
     fn find(&self, query: &Query) -> Result<Vec<Document>, Error>;
 
-    /// Hands over, in the order of the query, what meets it and is whole to the last byte, with the bytes of its blobs; returns what
-    /// of it is not.
+    /// Passes the undamaged results of a query to `take` in order, with the bytes of their blobs; returns the
+    /// faults of the others.
     ///
     /// # Errors
     /// If the store cannot be read, or what `take` returns.
@@ -189,53 +191,57 @@ pub trait Store: Send + Sync {
         Ok(faults)
     }
 
-    /// Document nearest in stamp among those that meet a query (order and limit aside); the earlier
-    /// of two as near, of one stamp the newest.
+    /// The document nearest in stamp among those that match a query (order and limit aside); the earlier of
+    /// two at the same distance, the newest of one stamp.
     ///
     /// # Errors
     /// If the store cannot be read.
     fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Document>, Error>;
 
-    /// The frames in which there are records of a kind, sorted.
+    /// The frames of the records of a kind, sorted.
     ///
     /// # Errors
     /// If the store cannot be read.
     fn frames(&self, kind: &str) -> Result<Vec<String>, Error>;
 
-    /// Keeps records from being pruned, in the name of `by`. Durable when it returns.
+    /// Pins records on behalf of `by`, so that they are never pruned. Durable on return.
     ///
     /// # Errors
-    /// [`Error::Missing`] if one of them is not there; then none is pinned.
+    ///
+    /// [`Error::Missing`] if one does not exist; then none is pinned.
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
-    /// Pins these records, and no others, in the name of `by`: at no moment is less held than before or after. Durable when it
-    /// returns.
+    /// Replaces the pins of `by` by these records; at no moment is less pinned than before or after. Durable
+    /// on return.
     ///
     /// # Errors
-    /// [`Error::Missing`] if one of them is not there; then nothing changes.
+    ///
+    /// [`Error::Missing`] if one does not exist; then nothing changes.
     fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
-    /// Takes back every pin in the name of `by`.
+    /// Removes all pins of `by`.
     ///
     /// # Errors
     /// If the store cannot be written.
     fn unpin(&self, by: &str) -> Result<(), Error>;
 
-    /// Pinned records, and who pins them.
+    /// Pinned records, with the holders of the pins.
     ///
     /// # Errors
     /// If the store cannot be read.
     fn pins(&self) -> Result<BTreeMap<RecordId, BTreeSet<String>>, Error>;
 
-    /// Returns when everything recorded is on the disk.
+    /// Returns once everything recorded is on the disk.
     ///
     /// # Errors
-    /// If it cannot be brought there.
+    ///
+    /// If a write fails.
     fn sync(&self) -> Result<(), Error>;
 
-    /// Drops what is over the limits now; recording does so by itself. Returns how many records went.
+    /// Prunes down to the limits now; recording does so by itself. Returns the number of removed records.
     ///
     /// # Errors
+    ///
     /// If the store cannot be written.
     fn prune(&self, retention: &Retention) -> Result<u64, Error>;
 
@@ -245,14 +251,15 @@ pub trait Store: Send + Sync {
     /// If the store cannot be read.
     fn stats(&self) -> Result<Stats, Error>;
 
-    /// Reads every record.
+    /// Verifies every record.
     ///
     /// # Errors
-    /// If the store itself cannot be read; what is not whole is no error but a fault in the report.
+    ///
+    /// If the store itself cannot be read; damaged records are faults in the report instead.
     fn verify(&self) -> Result<Report, Error>;
 }
 
-/// A record has no blob of that name.
+/// The error for a blob that a record does not have.
 pub(crate) fn no_blob(document: &Document, name: &str) -> Error {
     let has: Vec<_> = document.blobs.iter().map(|b| format!("`{}`", b.name)).collect();
     Error::NoBlob {

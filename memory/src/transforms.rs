@@ -1,22 +1,22 @@
-//! The tree of frames through time: transforms as they were measured, interpolated for the moment asked for.
+//! Transform tree over time: measured transforms, interpolated at the requested time.
 
 use nalgebra::{Isometry3, Translation3};
 use petgraph::algo::astar;
 use petgraph::graphmap::UnGraphMap;
 use std::collections::BTreeMap;
 
-/// A transform that cannot be given, or taken in.
+/// A transform that cannot be looked up or inserted.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TransformError {
-    /// No transform ever named that frame.
+    /// No transform mentions that frame.
     #[error("no transform names the frame `{frame}`; known are: {known}")]
     UnknownFrame {
         /// The frame asked for.
         frame: String,
-        /// Frames that are known.
+        /// The known frames.
         known: String,
     },
-    /// Two frames hang in different trees at that time.
+    /// Two frames are in different trees at that time.
     #[error(
         "at {stamp_ns} ns no chain links `{target}` to `{origin}`: `{origin}` ends at `{origin_root}` and `{target}` at `{target_root}`; record the transform between those two"
     )]
@@ -32,7 +32,7 @@ pub enum TransformError {
         /// The time, nanoseconds.
         stamp_ns: i64,
     },
-    /// A link was not measured near that time.
+    /// A link has no measurement near that time.
     #[error("the link `{parent}` <- `{child}` was not measured near {stamp_ns} ns: {}", gap_text(*stamp_ns, *before_ns, *after_ns, *max_gap_ns))]
     Gap {
         /// Its parent frame.
@@ -45,20 +45,20 @@ pub enum TransformError {
         before_ns: Option<i64>,
         /// First measurement after, nanoseconds.
         after_ns: Option<i64>,
-        /// Widest gap that is bridged, nanoseconds.
+        /// Maximum gap that is interpolated, nanoseconds.
         max_gap_ns: i64,
     },
-    /// Following the parents comes round to the start.
+    /// The parents form a cycle.
     #[error(
         "at {stamp_ns} ns the frames {frames} are each other's parents: one of these links is the wrong way round"
     )]
     Loop {
-        /// The frames on the round.
+        /// The frames of the cycle.
         frames: String,
         /// The time, nanoseconds.
         stamp_ns: i64,
     },
-    /// A transform that is none.
+    /// An invalid transform.
     #[error("the transform `{parent}` <- `{child}` at {stamp_ns} ns {what}")]
     Invalid {
         /// Its parent frame.
@@ -92,10 +92,11 @@ fn gap_text(stamp_ns: i64, before_ns: Option<i64>, after_ns: Option<i64>, max_ga
     }
 }
 
-/// Limits of extrapolating transforms in time.
+/// Limits of interpolating and extrapolating transforms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reach {
-    /// Widest gap between two measurements that is bridged by interpolation, nanoseconds. Paper 004's recorder restores 4 s around a stamp.
+    /// Maximum gap between two measurements for interpolation, nanoseconds. Paper 004's recorder restores 4 s
+    /// around a stamp.
     pub max_gap_ns: i64,
     /// Time for which the first or last measurement holds beyond its stamp, nanoseconds.
     pub hold_ns: i64,
@@ -146,7 +147,8 @@ impl Link {
         }
     }
 
-    /// Orders the links of a child: the one in force at a time is the last begun, or else the first to come.
+    /// Precedence among the links of a child: the link in force at a time is the last begun, or else the next
+    /// to begin.
     fn precedence(&self, stamp_ns: i64) -> (u8, i64) {
         let before = self.samples.range(..=stamp_ns).next_back().map(|(&b, _)| b);
         let after = self.samples.range(stamp_ns..).next().map(|(&a, _)| a);
@@ -159,7 +161,8 @@ impl Link {
     }
 }
 
-/// The transform a share `t` (0 to 1) of the way between two: straight in position, the shorter arc in orientation.
+/// Interpolates between two transforms at `t` (0 to 1): linearly in position, along the shorter arc in
+/// orientation.
 pub fn interpolate(from: &Isometry3<f64>, to: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
     let position = from.translation.vector.lerp(&to.translation.vector, t);
     // Opposite orientations have no shorter arc; any is as good, as long as it is always the same.
@@ -179,10 +182,12 @@ pub struct Transforms {
 }
 
 impl Transforms {
-    /// Takes in a measurement; a second one of the same link and stamp replaces the first.
+    /// Inserts a measurement; a second one of the same link and stamp replaces the first.
     ///
     /// # Errors
-    /// [`TransformError::Invalid`] for numbers that are not finite, a rotation that is none, or a frame that is its own parent.
+    ///
+    /// [`TransformError::Invalid`] for numbers that are not finite, an invalid rotation, or a frame that is
+    /// its own parent.
     pub fn insert(
         &mut self,
         stamp_ns: i64,
@@ -195,7 +200,7 @@ impl Transforms {
         Ok(())
     }
 
-    /// Takes in a transform that holds at all times for which nothing was measured.
+    /// Inserts a static transform, valid whenever no measured one is.
     ///
     /// # Errors
     /// As [`Transforms::insert`].
@@ -222,7 +227,7 @@ impl Transforms {
         self.links.is_empty()
     }
 
-    /// Every frame that is named, sorted.
+    /// All frames, sorted.
     pub fn frames(&self) -> Vec<&str> {
         let mut all: Vec<&str> = self
             .links
@@ -327,7 +332,7 @@ impl Transforms {
     }
 }
 
-/// Refuses what is no rigid transform between two frames.
+/// Rejects anything but a rigid transform between two frames.
 pub(crate) fn check(
     stamp_ns: i64,
     parent: &str,

@@ -1,5 +1,5 @@
-//! Contents for robotics viewers beside the sensed data: labelled boxes, merged clouds, map, camera
-//! projection, plan, log. Each is a blob beside the record whose content it shows.
+//! Content for robotics viewers besides sensor data: labelled boxes, merged clouds, map, camera projection,
+//! plan, log. Each is a blob of the record whose content it shows.
 
 use crate::clouds::{self, Sensing};
 use crate::document::{Blob, Form};
@@ -12,11 +12,11 @@ use serde_json::Value;
 /// A box with a label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelled {
-    /// The same for the same object, from one set of boxes to the next.
+    /// Stable ID of the object across sets of boxes.
     pub id: String,
     /// Label above the box.
     pub text: String,
-    /// The middle of the box, in the frame of all.
+    /// Pose of the box centre in the common frame.
     pub frame_from_box: Isometry3<f64>,
     /// Its sides, metres.
     pub size_m: Vector3<f64>,
@@ -44,17 +44,17 @@ pub fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Blob<'s
     blob("log", Form::Log, line(stamp_ns, level, name, message))
 }
 
-/// A plan, in the words in which it is shown: a log of its own.
+/// The steps of a plan as a log line, in a log of its own.
 pub fn plan(stamp_ns: i64, steps: &str) -> Blob<'static> {
     blob("plan", Form::Log, line(stamp_ns, LogLevel::Info, "plan", steps))
 }
 
-/// A cloud that no sensor gave, in the frame of its document: `merged`, for one.
+/// A derived cloud, such as `merged`, in the frame of its document.
 pub fn cloud<'a>(name: &str, cloud: &'a Cloud) -> Blob<'a> {
     Blob { name: name.into(), ..clouds::encode(cloud, &Sensing::default()) }
 }
 
-/// All boxes that there are now, in a frame: those of before are no longer shown.
+/// The set of boxes in a frame, which replaces the previous set in viewers.
 pub fn boxes(stamp_ns: i64, frame: &str, name: &str, boxes: &[Labelled]) -> Blob<'static> {
     const ALL: u64 = 1;
     let mut out = Wire::default();
@@ -101,7 +101,8 @@ pub fn calibration(stamp_ns: i64, frame: &str, camera: &Intrinsics) -> Blob<'sta
     blob("calibration", Form::CameraCalibration, out.0)
 }
 
-/// Cells of a map, row by row (x fastest), one byte each; `origin_m` is the outer corner of the first, in the frame.
+/// Cells of a map, row by row (x fastest), one byte each; `origin_m` is the outer corner of the first cell,
+/// in the frame.
 pub fn grid(
     stamp_ns: i64,
     frame: &str,

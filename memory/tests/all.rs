@@ -1,4 +1,4 @@
-//! What records promise, from outside: one program, so that what all tests share is built and linked once.
+//! Integration tests of records, in one binary.
 
 mod crash;
 mod damage;

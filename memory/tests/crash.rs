@@ -1,4 +1,4 @@
-//! A store after the worst: cut files, damaged bytes, a lost index, no room.
+//! Recovery of a store: truncated files, damaged bytes, a lost index, a full disk.
 
 use descry_memory::stores::Store;
 use descry_memory::{
@@ -26,7 +26,7 @@ fn assert_whole(store: &dyn Store, id: RecordId, i: u64, bytes: usize) {
     assert_eq!(store.blob(id, "data").unwrap(), draft(i, bytes).blobs[0].data.as_ref());
 }
 
-/// What of a kind is whole, and which records are not.
+/// The undamaged records of a kind, and the faults of the others.
 fn whole(store: &dyn Store) -> (Vec<RecordId>, Vec<Fault>) {
     let mut whole = Vec::new();
     let faults = store.each_whole(&Query::of_kind("scan"), &mut |document, _| {
@@ -52,10 +52,12 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Bytes of the message index behind a chunk of one record with one blob: one message on each of two channels.
+/// Size of the message index behind a chunk of one record with one blob, bytes: one message on each of two
+/// channels.
 const MESSAGE_INDEX: u64 = 2 * (9 + 2 + 4 + 16);
 
-/// A store as a killed process leaves it: five records, nothing finished. Also where the data of each record's chunk ends.
+/// A store as a killed process leaves it, with five records and nothing finished; also the end of each
+/// record's chunk data.
 fn killed(dir: &Path) -> (Vec<RecordId>, Vec<u64>) {
     let live = dir.join("live");
     let store = LocalStore::create(&live, "", options()).unwrap();
@@ -176,7 +178,7 @@ fn an_index_that_is_none_is_made_again_with_its_pins() {
     (0..5).for_each(|i| assert_whole(&store, ids[i], i as u64, 1000));
 }
 
-/// Damage to what a closed store consists of, and what is left of its records then, by their place.
+/// Checks which records survive damage to a closed store, by their place.
 fn check_damage(what: &str, spoil: impl Fn(&Path), left: &[usize]) {
     let dir = tempfile::tempdir().unwrap();
     let store =
@@ -316,7 +318,7 @@ fn readers_are_in_nobodys_way() {
     assert_eq!(store.find(&Query::default()).unwrap().len(), 100);
 }
 
-/// Of several that make a store in one folder one has it, and nothing of it is written over.
+/// Only one of several concurrent creators of a store in one folder succeeds, and none overwrites it.
 #[test]
 fn one_of_several_makes_a_store() {
     for _ in 0..20 {
@@ -355,7 +357,8 @@ fn one_writes_and_many_read() {
     assert_eq!(LocalStore::open_shared(dir.path()).unwrap().find(&Query::default()).unwrap().len(), 3);
 }
 
-/// Records ten times what a bound allows: it holds at every moment, give or take a segment, and what is pinned stays.
+/// Records ten times the size limit: the limit holds at every moment, within a segment, and pinned records
+/// stay.
 #[test]
 fn a_bound_in_bytes_holds_while_recording() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
-//! Damaged records of every kind: nothing that is whole is lost, and every loss is named.
+//! Damaged records of every kind: no undamaged record is lost, and every loss is reported.
 //!
-//! A generator damages a store in places that a seed chooses. Which records the damage spares follows from the layout of the
-//! undamaged file; each of them must be found again, byte for byte, with the index and without it.
+//! A generator damages a store at places chosen by a seed. The layout of the undamaged file tells which
+//! records are spared; each of them must be found again, byte for byte, with the index and without it.
 
 use descry_memory::stores::Store;
 use descry_memory::{Blob, Draft, Durability, Error, Form, LocalOptions, LocalStore, Query, RecordId};
@@ -11,7 +11,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Numbers drawn by a seed (SplitMix64).
+/// Seeded random numbers (SplitMix64).
 struct Draw(u64);
 
 impl Draw {
@@ -31,9 +31,9 @@ impl Draw {
 /// A kind of damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
-    /// A flipped bit in a field that says how long a chunk is.
+    /// A flipped bit in a length field of a chunk.
     Length,
-    /// A flipped bit in the head of a chunk, the length aside.
+    /// A flipped bit in the head of a chunk, except its lengths.
     Head,
     /// A flipped bit in the records of a chunk.
     Body,
@@ -41,15 +41,15 @@ enum Kind {
     MessageIndex,
     /// A flipped bit in the header of the file.
     Header,
-    /// A file cut anywhere.
+    /// A file truncated anywhere.
     Torn,
     /// A block of zeros.
     Zeroed,
-    /// A block of rubbish.
+    /// A block of random bytes.
     Rubbish,
-    /// Bytes that are gone from the middle.
+    /// Bytes removed from the middle.
     Removed,
-    /// A second segment that is none.
+    /// A second segment file without valid content.
     Segment,
     /// A damaged index.
     Index,
@@ -69,23 +69,23 @@ const KINDS: [Kind; 11] = [
     Kind::Index,
 ];
 
-/// How the store was left.
+/// State in which the writer left the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// By a process that was killed.
+    /// Left by a killed process.
     Killed,
-    /// The same, and the index is gone.
+    /// Left by a killed process, and the index is missing.
     KilledWithoutIndex,
     /// Closed.
     Closed,
-    /// Closed, and the index is gone.
+    /// Closed, and the index is missing.
     ClosedWithoutIndex,
 }
 
 const STATES: [State; 4] =
     [State::Killed, State::KilledWithoutIndex, State::Closed, State::ClosedWithoutIndex];
 
-/// A chunk: where its head, its data and its message index lie, and its records.
+/// A chunk: the ranges of its head, data and message index, and its records.
 struct Chunk {
     head: Range<usize>,
     data: Range<usize>,
@@ -170,15 +170,15 @@ fn touches(a: &Range<usize>, b: &Range<usize>) -> bool {
     a.start < b.end && b.start < a.end
 }
 
-/// What a damage left.
+/// Expected remains after damage.
 struct Left {
     records: BTreeSet<RecordId>,
-    /// Whether what an interrupted write leaves explains it.
+    /// True if an interrupted write explains the damage.
     is_torn: bool,
 }
 
 impl Original {
-    /// Records of all chunks whose head and data meet none of these bytes.
+    /// Records of all chunks whose head and data lie outside these bytes.
     fn beside(&self, hit: &Range<usize>) -> BTreeSet<RecordId> {
         let spared = self.chunks.iter().filter(|c| !touches(&(c.head.start..c.data.end), hit));
         spared.flat_map(|c| c.records.iter().copied()).collect()
@@ -188,7 +188,7 @@ impl Original {
         self.beside(&(0..0))
     }
 
-    /// Damages the store in a folder and says what must be left of it.
+    /// Damages the store in a folder and returns the expected remains.
     fn damage(&self, here: &Path, kind: Kind, draw: &mut Draw) -> Left {
         let path = segment(here);
         let mut bytes = fs::read(&path).unwrap();
@@ -277,7 +277,7 @@ impl Original {
         assert!(found.is_superset(left), "{what}: {left:?} are whole, {found:?} are found");
     }
 
-    /// Damages a copy, reads it, verifies it, and opens it to go on.
+    /// Damages a copy, reads it, verifies it, and opens it for writing.
     fn check(&self, kind: Kind, state: State, seed: u64) {
         let mut draw = Draw(seed);
         let what = format!("{kind:?}, {state:?}, seed {seed}");
@@ -344,7 +344,7 @@ fn no_damage_of_many_costs_what_is_whole() {
     check_kinds(200);
 }
 
-/// Of a batch that is hit, the records that are not hit are whole, as the checksums in the index tell.
+/// In a damaged batch, the checksums in the index prove the undamaged records.
 #[test]
 fn records_beside_a_damaged_one_are_proven_by_the_index() {
     let original = original();
@@ -364,7 +364,8 @@ fn records_beside_a_damaged_one_are_proven_by_the_index() {
     assert_eq!(store.verify().unwrap().whole, left.len() as u64);
 }
 
-/// Three segments behind each other, the middle one damaged and the first torn: opening to write refuses before it cuts anything.
+/// Three segments in a row, the middle one damaged and the first torn: opening for writing refuses before any
+/// truncation.
 #[test]
 fn nothing_is_cut_where_anything_is_damaged() {
     let original = original();

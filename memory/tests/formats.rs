@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Point3};
 use serde_json::json;
 use std::path::Path;
 
-/// Makes the record that is kept for later formats, in the present one.
+/// Writes a record in the current format, as a sample for later versions.
 #[test]
 #[ignore = "makes the file of a new format: name its folder in DESCRY_FORMAT_DIR"]
 fn make() {
@@ -21,7 +21,7 @@ fn make() {
     record.pin(&[id], "belief").unwrap();
 }
 
-/// Opens a record of which only the segment is left, as an earlier version wrote it, and goes on with it.
+/// Opens a record of an earlier version, of which only the segment is left, and continues it.
 #[test]
 fn format_1_is_read_and_continued() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The store in MongoDB does what every store must do, and what only it can.
+//! The store in MongoDB: the common requirements, and its own.
 
 mod server;
 mod suite;
@@ -41,7 +41,7 @@ fn does_what_every_store_does() {
     assert_eq!(reader.find(&Query::default()).unwrap(), nameless.find(&Query::default()).unwrap());
 }
 
-/// One among others in a store sees, counts, verifies and prunes its own, as if it were alone.
+/// A name in a shared store sees, counts, verifies and prunes only its own records.
 #[test]
 fn one_name_does_not_touch_another() {
     let Some(server) = Server::shared() else { return };
@@ -100,7 +100,7 @@ fn keeps_within_its_limits_while_recording() {
     assert!(matches!(refused.map(|_| ()), Err(Error::Input { .. })));
 }
 
-/// Nothing is in a database but whole records and their files.
+/// Checks that a database holds only complete records and their files.
 fn check_no_remains(server: &Server, database: &str, records: u64) {
     let database = server.database(database);
     let all = |name: &str| -> Vec<Fields> {
@@ -125,7 +125,7 @@ fn camera(x: f32) -> Cloud {
     Cloud::from_points((0..1000).map(|i| Point3::new(x, i as f32 * 0.1, f32::NAN)).collect())
 }
 
-/// Robots at the same times in the same frames, each finds its own again.
+/// Robots that record at the same times in the same frames each find their own records.
 #[test]
 fn several_robots_write_into_one() {
     let Some(server) = Server::shared() else { return };
@@ -164,10 +164,10 @@ fn several_robots_write_into_one() {
     assert!(store.verify().unwrap().is_whole());
 }
 
-/// Says whose recording process this is, where it is one.
+/// Environment variable that turns this test binary into the recording process; holds the address.
 const RECORDING: &str = "DESCRY_TEST_RECORDS_INTO";
 
-/// A process that records is killed, again and again: what it had acknowledged is there, and of the rest nothing.
+/// A recording process is killed repeatedly: acknowledged records remain, and no partial ones.
 #[test]
 fn a_kill_loses_nothing_and_leaves_nothing() {
     if let Ok(address) = std::env::var(RECORDING) {

@@ -1,4 +1,4 @@
-//! Recording and recalling through the handle that the rest of descry uses.
+//! Recording and reading through [`Record`].
 
 use descry_memory::perception::{Cloud, Grid, Intrinsics};
 use descry_memory::transforms::TransformError;
@@ -260,7 +260,7 @@ fn what_is_held_follows_what_is_cited() {
     assert_eq!(held, ids[1..]);
 }
 
-/// A bound that forgets everything else: a cloud that is held can still be placed.
+/// A pinned cloud can still be placed after a size limit has pruned everything else.
 #[test]
 fn a_cloud_that_is_held_keeps_its_place() {
     let dir = tempfile::tempdir().unwrap();
@@ -292,8 +292,8 @@ fn a_cloud_that_is_held_keeps_its_place() {
     );
 }
 
-/// Reads every message with the packages `mcap` and `mcap-protobuf-support` of a Python that has them, if there is one:
-/// `python3`, or what `DESCRY_MCAP_PYTHON` names.
+/// Reads every message with the packages `mcap` and `mcap-protobuf-support`, if `python3`, or the Python in
+/// `DESCRY_MCAP_PYTHON`, has them.
 #[test]
 fn segments_are_mcap_to_python() {
     let python = std::env::var("DESCRY_MCAP_PYTHON").unwrap_or_else(|_| "python3".into());

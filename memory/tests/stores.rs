@@ -1,4 +1,4 @@
-//! The store on the disk does what every store must do.
+//! The local store meets the requirements of every store.
 
 use crate::suite;
 use descry_memory::{LocalOptions, LocalStore, Retention};

@@ -1,8 +1,8 @@
-//! Schemas of the messages, as every MCAP file declares them (`descriptor.proto`).
+//! Schemas of the messages (`descriptor.proto`), as declared by every MCAP file.
 
 use super::wire::Wire;
 
-/// Messages and their fields, in the words of `.proto` files. A field of another message needs that message's file.
+/// Messages and their fields in `.proto` syntax. A field of message type refers to another file.
 pub const MESSAGES: [(&str, &str); 22] = [
     ("google.protobuf.Timestamp", "int64 seconds = 1; int32 nanos = 2"),
     ("foxglove.Vector3", "double x = 1; double y = 2; double z = 3"),
@@ -95,7 +95,7 @@ pub struct Field {
     name: &'static str,
     kind: u64,
     repeated: bool,
-    /// The message or enumeration that it is of; none for scalars.
+    /// Name of its message or enumeration type; none for scalars.
     of: Option<&'static str>,
 }
 
@@ -120,7 +120,7 @@ pub fn field(text: &'static str) -> Option<Field> {
     })
 }
 
-/// The messages that a message has fields of.
+/// Message types of the fields of a message.
 fn needs(message: &str) -> Vec<&'static str> {
     fields(message).into_iter().filter(|f| f.kind == MESSAGE).filter_map(|f| f.of).collect()
 }
@@ -132,7 +132,7 @@ fn file_name(message: &str) -> String {
     }
 }
 
-/// The `FileDescriptorSet` of a message and all that it needs, what is needed first.
+/// The `FileDescriptorSet` of a message and its dependencies, dependencies first.
 pub fn set(message: &'static str) -> Vec<u8> {
     fn visit(message: &'static str, done: &mut Vec<&'static str>) {
         for needed in needs(message) {

@@ -1,6 +1,6 @@
 //! The wire format of protocol buffers.
 
-/// Writes protocol buffers.
+/// Protocol buffer writer.
 #[derive(Default)]
 pub(crate) struct Wire(pub Vec<u8>);
 
@@ -35,7 +35,7 @@ impl Wire {
         self.0.extend_from_slice(&value.to_le_bytes());
     }
 
-    /// Every one, zeros too.
+    /// Writes packed doubles, zeros included.
     pub fn doubles(&mut self, number: u32, values: &[f64]) {
         self.bytes_header(number, 8 * values.len() as u64);
         values.iter().for_each(|value| self.0.extend_from_slice(&value.to_le_bytes()));
@@ -69,7 +69,7 @@ impl Wire {
     }
 }
 
-/// Reads protocol buffers, field by field.
+/// Protocol buffer reader, field by field.
 pub(super) struct WireReader<'a>(pub &'a [u8]);
 
 pub(super) enum Field<'a> {
@@ -98,7 +98,7 @@ impl<'a> WireReader<'a> {
         None
     }
 
-    /// The next field; `Some(None)` at the end, `None` if the bytes are no message.
+    /// Reads the next field; `Some(None)` at the end, `None` if the bytes are malformed.
     #[expect(clippy::option_option, reason = "the end of a message and a broken one are different things")]
     pub fn next(&mut self) -> Option<Option<(u32, Field<'a>)>> {
         if self.0.is_empty() {

@@ -1,4 +1,4 @@
-//! Reading back what was sensed: clouds, and where everything stood at their time.
+//! Reading recorded sensor data: clouds and scans, with the poses of their time.
 
 use super::{Record, kind};
 use crate::clouds::{self, CLOUD, Sensing};
@@ -15,7 +15,7 @@ use serde_json::Value;
 use std::sync::PoisonError;
 
 impl Record {
-    /// A cloud that was recorded, and its sensor.
+    /// Reads a cloud and its sensor.
     ///
     /// # Errors
     /// [`Error::Missing`], [`Error::NoBlob`], [`Error::Damaged`].
@@ -30,7 +30,7 @@ impl Record {
         })
     }
 
-    /// The sensor behind a cloud that was recorded, without reading the cloud.
+    /// Reads the sensor behind a cloud, without the cloud.
     ///
     /// # Errors
     /// [`Error::NoBlob`], [`Error::Damaged`].
@@ -54,7 +54,7 @@ impl Record {
         self.view(&document, world)
     }
 
-    /// The sweep of a laser at a time, and where the laser stood in `world` then.
+    /// The laser sweep at a time, with the laser's pose in `world`.
     ///
     /// # Errors
     /// [`Error::NotNear`] without a sweep of that very time; a missing link or gap of the transforms of that time; [`Error::Damaged`].
@@ -74,7 +74,7 @@ impl Record {
         })
     }
 
-    /// The view that a recorded cloud is, with the transforms of its time.
+    /// The view of a recorded cloud, with the camera's pose in `world`.
     ///
     /// # Errors
     /// As [`Record::view_at`].
@@ -109,7 +109,7 @@ impl Record {
         Ok(self.transforms_around(stamp_ns)?.lookup(target, origin, stamp_ns, self.options.reach)?)
     }
 
-    /// The transforms that say something about a time: what was measured around it and what holds always.
+    /// The transforms relevant at a time: those measured around it, and the static ones.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -117,7 +117,7 @@ impl Record {
         self.transforms_of(&self.options.robot, stamp_ns)
     }
 
-    /// The transforms of a robot, of whichever if it has no name.
+    /// The transforms of a robot, or of all robots if `robot` is empty.
     fn transforms_of(&self, robot: &str, stamp_ns: i64) -> Result<Transforms, Error> {
         self.flusher.drain()?;
         let of = |kind: &str| Query { robot: named(robot), ..Query::of_kind(kind) };
@@ -157,8 +157,8 @@ impl Record {
         Ok(around)
     }
 
-    /// These records, and for clouds and sweeps among them the transforms up to their time and the images of their moment: what it takes to
-    /// place and to colour them again.
+    /// These records, and for each cloud or sweep also the transforms up to its time and the images of its
+    /// moment, which are needed to place and to colour it.
     pub(super) fn with_their_place(&self, ids: &[RecordId]) -> Result<Vec<RecordId>, Error> {
         let mut all = ids.to_vec();
         for id in ids {
@@ -205,10 +205,12 @@ impl Record {
         Ok((parent.to_owned(), samples))
     }
 
-    /// True if a record that is retraced holds a transform already.
+    /// True if the retraced record holds this transform already.
     ///
     /// # Errors
-    /// [`Error::Input`] if it holds another of that moment: what is placed by the one is not placed by the other.
+    ///
+    /// [`Error::Input`] if it holds a different one at that time: data placed by one would be misplaced by
+    /// the other.
     pub(super) fn is_measured(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
         let stamp_ns = sample.stamp_ns;
         if self.retrace.as_ref().is_none_or(|r| stamp_ns > r.newest_ns) {
@@ -238,10 +240,10 @@ impl Record {
     }
 }
 
-/// Transforms whose matrices differ by no more in any entry are the same, written and read again.
+/// Maximum difference between entries of equal transform matrices, after writing and reading.
 const SAME_TRANSFORM: f64 = 1e-6;
 
-/// The robot that a query asks for: none if it has no name.
+/// The robot condition of a query; none for an empty name.
 pub(super) fn named(robot: &str) -> Option<String> {
     (!robot.is_empty()).then(|| robot.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Joins the memory of a run with those that other runs have written into the same store since it
+//! Merges the memory of a run with the memory that other runs have written into the same store since the run
 //! began.
 
 use std::collections::BTreeMap;
@@ -8,13 +8,13 @@ use descry_perception::laser::KnownShape;
 use super::{MOST_GONE, Recollection, Remembered, SAME_M};
 use crate::learned::{LearnedThing, Visited};
 
-/// Who has changed something since a run began.
+/// Author of a change since a run began.
 enum Changed {
-    /// Nobody, or the run alone.
+    /// None, or the run alone.
     Here,
-    /// Others alone.
+    /// Other runs alone.
     Elsewhere,
-    /// Others and the run.
+    /// Both the run and others.
     Both,
 }
 
@@ -27,10 +27,10 @@ fn changed<T: PartialEq>(before: &T, others: &T, after: &T) -> Changed {
 }
 
 impl Remembered {
-    /// Joins this memory of a store with that of a run, which began with `before` at a time and leaves
-    /// `after`. Memory that other runs wrote meanwhile and given names stay; the run adds what it learned
-    /// and saw. A surface is remembered as of its last look; of two maps made meanwhile the one of more
-    /// looks stays, with what was seen on it.
+    /// Merges this memory of a store with that of a run, which began with `before` at `began_unix_s` and ends
+    /// with `after`. Memory that other runs wrote meanwhile and given names stay; the run adds what it
+    /// learned and saw. A surface keeps the memory of its last look. Of two maps made meanwhile, the one from
+    /// more looks stays, with the objects seen on it.
     pub fn joined(&self, before: &Self, mut after: Self, began_unix_s: f64) -> Self {
         self.give_names(&mut after);
         let looks = |of: &Self| of.surveyed.as_ref().map_or(0, |map| map.stood.len());
@@ -51,7 +51,8 @@ impl Remembered {
         }
     }
 
-    /// Calls the things of a run as they are called here, and those that only the run has learned so that each has a name of its own.
+    /// Renames the objects of a run to their names in the store, and gives objects learned only by the run
+    /// unique names.
     fn give_names(&self, after: &mut Self) {
         let here = marked(&self.things);
         let mut names: BTreeMap<String, String> = BTreeMap::new();
@@ -71,7 +72,7 @@ impl Remembered {
         after.call(|name| names.get(name).cloned());
     }
 
-    /// Learned things of both. Of two models of one thing the later encounter's stays.
+    /// Learned objects of both. Of two models of one object, that of the later encounter stays.
     fn learned(&self, before: &Self, after: &Self) -> Vec<LearnedThing> {
         let (earlier, ours) = (marked(&before.things), marked(&after.things));
         let here = marked(&self.things);
@@ -111,7 +112,8 @@ impl Remembered {
         theirs.chain(after.visited.iter().filter(|v| is_ours(&v.waypoint))).cloned().collect()
     }
 
-    /// Places of things: each surface as of its last look, vanished things; all else as it is here.
+    /// Merges the objects: each surface as of its last look, then the vanished objects; everything else from
+    /// `self`.
     fn places(&self, before: &Self, after: &Self, began_unix_s: f64) -> Self {
         let on = |all: &Self, surface: &str| -> Vec<Recollection> {
             all.present.iter().filter(|r| r.track.on == surface).cloned().collect()
@@ -150,8 +152,8 @@ impl Remembered {
     }
 }
 
-/// Identity of a learned thing whatever its name: time of learning, and index among those learned
-/// then.
+/// Identity of a learned object independent of its name: time of learning, and index among those learned at
+/// that time.
 type Mark = (u64, usize);
 
 fn marks(things: &[LearnedThing]) -> Vec<Mark> {

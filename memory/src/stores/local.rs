@@ -1,8 +1,9 @@
-//! The store on this machine's disk: segments that any MCAP reader opens, and an index beside them.
+//! Store on the local disk: segments that any MCAP reader opens, with an index.
 //!
-//! A folder holds `segments/NNNNNNNN.mcap`, `index.sqlite`, `closed.json` while nobody writes, and two locks. A batch of records
-//! is one chunk of a segment, and what the index says follows from the segments: after a crash it is made again from them, so
-//! that a crash costs what was not acknowledged and nothing else. Every byte that is read is held against its checksum.
+//! A folder holds `segments/NNNNNNNN.mcap`, `index.sqlite`, `closed.json` while no process writes, and two
+//! lock files. A batch of records is one chunk of a segment. The index follows from the segments and is
+//! rebuilt from them after a crash, so that a crash loses unacknowledged data only. All data is verified
+//! against its checksum when read.
 
 mod closed;
 mod index;
@@ -29,25 +30,25 @@ use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// When a record counts as acknowledged.
+/// Condition for acknowledging a write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Durability {
-    /// It is on the disk (`fdatasync`) before recording returns: it survives a power cut.
+    /// The data is on the disk (`fdatasync`) before recording returns; it survives a power cut.
     #[default]
     Disk,
-    /// The system has it before recording returns: it survives the end of the process in any way, and a power cut from
-    /// the next [`Store::sync`] or change of segment on.
+    /// The operating system has the data before recording returns; it survives any end of the process, and a
+    /// power cut from the next [`Store::sync`] or change of segment on.
     Process,
 }
 
-/// How a local store keeps.
+/// Options of a local store.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalOptions {
-    /// When a record counts as acknowledged.
+    /// Condition for acknowledging a write.
     pub durability: Durability,
-    /// What goes when it is too much.
+    /// Limits beyond which old data is pruned.
     pub retention: Retention,
-    /// A segment is followed by another once it is so long, bytes; where sizes are bounded, at most a sixteenth of that bound.
+    /// Length at which a segment is followed by another, bytes; with a size limit, at most a sixteenth of it.
     pub segment_bytes: u64,
 }
 
@@ -61,32 +62,33 @@ impl Default for LocalOptions {
     }
 }
 
-/// What opening found and mended.
+/// Damage that opening found and repaired.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recovery {
-    /// Records that were whole in a segment and not yet in the index.
+    /// Number of undamaged records in segments that were missing in the index.
     pub regained: u64,
-    /// Bytes behind the last whole record that were dropped.
+    /// Bytes dropped behind the last complete record.
     pub dropped_bytes: u64,
-    /// Records that the index knew and that never reached the disk: a power cut under [`Durability::Process`].
+    /// Number of records in the index that never reached the disk, after a power cut under
+    /// [`Durability::Process`].
     pub lost: u64,
-    /// Whether the index was damaged, and made again from the segments.
+    /// True if the index was damaged and rebuilt from the segments.
     pub index_rebuilt: bool,
-    /// What is missing, cut or damaged. Whoever writes is not given such a store.
+    /// Missing, truncated or damaged parts. A store with faults cannot be opened for writing.
     pub faults: Vec<Fault>,
 }
 
-/// What only the process that writes has.
+/// State of the writing process.
 struct WriteState {
     segment: Segment,
-    /// Takes in what is pinned when its segment goes.
+    /// Segment that receives the pinned records of pruned segments.
     kept: Option<Segment>,
     next_id: RecordId,
     next_segment: u64,
-    /// Bytes of all finished segments.
+    /// Total length of all finished segments, bytes.
     sealed_bytes: u64,
     newest_ns: i64,
-    /// What was written since the last sync.
+    /// True if data was written since the last sync.
     unsynced: bool,
     _writing: Writing,
 }
@@ -102,11 +104,11 @@ pub struct LocalStore {
     files: Mutex<BTreeMap<u64, Arc<File>>>,
 }
 
-/// How many segments are kept open for reading.
+/// Maximum number of segments kept open for reading.
 const OPEN_FILES: usize = 64;
 
 impl LocalStore {
-    /// Makes a store in a folder that holds none.
+    /// Creates a store in a folder that holds none.
     ///
     /// # Errors
     /// [`Error::Exists`], or what the system refuses.
@@ -125,19 +127,23 @@ impl LocalStore {
         Self::to_write(dir, robot, options, writing)
     }
 
-    /// Opens a store (its folder, or that of the run that holds it as `record`) and mends what a crash has left.
+    /// Opens a store for writing (by its folder, or by that of a run that holds it as `record`) and repairs
+    /// the traces of a crash.
     ///
     /// # Errors
-    /// [`Error::NoRecord`], [`Error::InUse`], [`Error::Faulty`] if something of it is lost, or what the system refuses.
+    ///
+    /// [`Error::NoRecord`], [`Error::InUse`], [`Error::Faulty`] if anything is lost, or what the system
+    /// refuses.
     pub fn open(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
         let dir = &folder(dir)?;
         Self::to_write(dir, robot, options, lock::lock(dir)?)
     }
 
-    /// Opens a store for reading, whether or not a process is writing it. Nothing in the folder is changed or locked; what is
-    /// damaged is told by [`LocalStore::recovery`].
+    /// Opens a store for reading, whether or not a process is writing it. Nothing in the folder is changed or
+    /// locked; [`LocalStore::recovery`] reports damage.
     ///
     /// # Errors
+    ///
     /// [`Error::NoRecord`], or what the system refuses.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
         let dir = folder(dir)?;
@@ -182,7 +188,7 @@ impl LocalStore {
         })
     }
 
-    /// What opening found and mended.
+    /// Damage that opening found and repaired.
     pub fn recovery(&self) -> &Recovery {
         &self.recovery
     }
@@ -204,7 +210,7 @@ impl LocalStore {
         unpoisoned(&self.index)
     }
 
-    /// Writes a batch whose numbers are given, without regard to limits.
+    /// Writes an already numbered batch, regardless of limits.
     fn write(&self, writer: &mut WriteState, batch: &[Encoded]) -> Result<(), Error> {
         if writer.segment.is_long(self.options.segment_bytes) {
             self.roll(writer)?;
@@ -240,7 +246,7 @@ impl LocalStore {
         self.index().seal(number, bytes)
     }
 
-    /// The bytes of a record that lie there, as they were written.
+    /// Reads and verifies the bytes at a spot in a record.
     fn read(&self, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
         let path = segment_path(&self.dir, place.segment);
         read_at(&*self.file(place, &path)?, &path, place, spot, length)
@@ -268,7 +274,7 @@ impl LocalStore {
         document_at(&*self.file(place, &path)?, &path, place)
     }
 
-    /// Pins records, beside those that `by` holds or instead of them.
+    /// Pins records, in addition to the pins of `by` or instead of them.
     fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
         let mut writer = self.writer()?;
         for id in ids {
@@ -283,7 +289,7 @@ impl LocalStore {
         self.index().place(id)?.ok_or(Error::Missing { id: id.0 })
     }
 
-    /// Reads what lies at a place; none if it is pruned in between.
+    /// Reads at a place, following the record if it was moved; none if it was pruned in between.
     fn at<T>(&self, place: &Place, read: impl Fn(&Place) -> Result<T, Error>) -> Result<Option<T>, Error> {
         match read(place) {
             Err(Error::Missing { id }) => match self.index().place(RecordId(id))? {
@@ -304,7 +310,7 @@ impl LocalStore {
         documents.filter_map(Result::transpose).collect()
     }
 
-    /// A document and the bytes of its blobs.
+    /// Reads a document and the bytes of its blobs.
     fn whole(&self, place: &Place) -> Result<(Document, Vec<Vec<u8>>), Error> {
         let document = self.document(place)?;
         let blobs = document.blobs.iter().zip(&place.located.blobs);
@@ -313,7 +319,7 @@ impl LocalStore {
         Ok((document, blobs))
     }
 
-    /// Records a batch of drafts with what else is to go into the index with it.
+    /// Records a batch of drafts, in a segment and in the index.
     fn record(&self, writer: &mut WriteState, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
         let mut batch = Vec::with_capacity(drafts.len());
         for (id, draft) in (writer.next_id.0..).zip(drafts) {
@@ -444,8 +450,8 @@ impl Store for LocalStore {
 }
 
 impl Drop for LocalStore {
-    /// Finishes the segment, so that any viewer finds its way in it, and writes down what there is. Without room that is done when
-    /// the store is next opened.
+    /// Finishes the segment, so that viewers can seek in it, and writes `closed.json`. Without room on the
+    /// disk, the next opening does this.
     fn drop(&mut self) {
         let Ok(mut writer) = self.writer() else { return };
         if let Err(e) = self.close(&mut writer) {
@@ -474,7 +480,7 @@ impl LocalStore {
     }
 }
 
-/// The bytes of a record that lie there in its segment, as they were written.
+/// Reads and verifies the bytes at a spot in a segment.
 fn read_at(file: &File, path: &Path, place: &Place, spot: Spot, length: u64) -> Result<Vec<u8>, Error> {
     let damaged = |what: String| Error::Damaged {
         place: path.to_owned(),
@@ -495,7 +501,7 @@ fn read_at(file: &File, path: &Path, place: &Place, spot: Spot, length: u64) -> 
     Ok(bytes)
 }
 
-/// The document that lies there in its segment.
+/// Reads the document at a place in a segment.
 fn document_at(file: &File, path: &Path, place: &Place) -> Result<Document, Error> {
     let spot = place.located.document;
     let bytes = read_at(file, path, place, spot, place.located.document_bytes)?;
@@ -508,7 +514,7 @@ fn document_at(file: &File, path: &Path, place: &Place) -> Result<Document, Erro
     Ok(document)
 }
 
-/// A lock whose holder panicked guards data that is checked on the disk anyway.
+/// Acquires a lock whose holder may have panicked; the guarded data is verified on the disk anyway.
 fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -521,13 +527,13 @@ fn segment_path(dir: &Path, number: u64) -> PathBuf {
     segment_dir(dir).join(format!("{number:08}.mcap"))
 }
 
-/// The folder of a record: the one that is named, or `record` in the folder of a run.
+/// The folder of a record: the given one, or `record` in the folder of a run.
 fn folder(named: &Path) -> Result<PathBuf, Error> {
     let found = [named.to_owned(), named.join("record")].into_iter().find(|dir| segment_dir(dir).is_dir());
     found.ok_or_else(|| Error::NoRecord { place: named.to_owned(), expected: "segments" })
 }
 
-/// Starts a segment whose name is on the disk before anything in it is acknowledged.
+/// Creates a segment; its directory entry is on the disk before anything in it is acknowledged.
 fn new_segment(dir: &Path, number: u64) -> Result<Segment, Error> {
     let path = segment_path(dir, number);
     let made = Segment::create(&path, number).and_then(|segment| {

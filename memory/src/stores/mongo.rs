@@ -31,22 +31,22 @@ use std::io::Read;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
-/// A server that does not answer for so long is not there.
+/// Timeout for an answer of the server.
 const SERVER_WAIT: Duration = Duration::from_secs(5);
-/// The database, where the address names none.
+/// Default database name.
 const DATABASE: &str = "descry";
 
-/// In whose name a store in MongoDB is opened, and how it keeps.
+/// Options of a store in MongoDB.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MongoOptions {
-    /// Whose records these are: one process at a time writes under a name. What a query does not say otherwise, counts, limits and
-    /// verification are about the records of that name; about everything in the store if it is "".
+    /// Name of the robot: one process at a time writes under a name. Queries without a robot, counts, limits
+    /// and verification concern the records of that name; all records if it is "".
     pub robot: String,
-    /// When a record counts as acknowledged: in the journal of most of the servers, or in the memory of one.
+    /// Condition for acknowledging a write: in the journal of a majority of servers, or in the memory of one.
     pub durability: Durability,
     /// Limits beyond which old data is pruned.
     pub retention: Retention,
-    /// Name and password, where the server asks for them.
+    /// User name and password, if the server requires them.
     pub login: Option<(String, String)>,
 }
 
@@ -59,15 +59,16 @@ pub struct MongoStore {
     records: Collection<Fields>,
     names: Collection<Fields>,
     files: GridFsBucket,
-    /// Bytes written since the limits were looked at.
+    /// Bytes written since the limits were checked.
     unchecked: AtomicU64,
 }
 
 impl MongoStore {
-    /// Opens the store at an address such as `mongodb://host:27017/database` to write. What a killed process of that name left
-    /// unfinished is removed.
+    /// Opens the store at an address such as `mongodb://host:27017/database` for writing. Unfinished data of
+    /// a killed process of that name is removed.
     ///
     /// # Errors
+    ///
     /// [`Error::Remote`] if no server answers there, [`Error::Input`] for a limit that no server can keep.
     pub fn open(address: &str, options: &MongoOptions) -> Result<Self, Error> {
         if options.retention.min_free_bytes.is_some() {
@@ -88,7 +89,7 @@ impl MongoStore {
         })
     }
 
-    /// Opens the store at an address to read it.
+    /// Opens the store at an address for reading.
     ///
     /// # Errors
     /// [`Error::Remote`] if no server answers there.
@@ -100,7 +101,7 @@ impl MongoStore {
         })
     }
 
-    /// In whose names there are records, sorted.
+    /// Names of the robots with records, sorted.
     ///
     /// # Errors
     /// If the store cannot be read.
@@ -166,7 +167,7 @@ impl MongoStore {
 
     /// Translates errors of the driver into those of this crate.
     fn said<T>(&self, answer: mongodb::error::Result<T>) -> Result<T, Error> {
-        /// `OutOfDiskSpace`.
+        /// Error code `OutOfDiskSpace`.
         const NO_ROOM: i32 = 14031;
         answer.map_err(|refusal| match &*refusal.kind {
             ErrorKind::Command(c) if c.code == NO_ROOM => Error::Full { place: self.place.clone().into() },
@@ -185,7 +186,7 @@ impl MongoStore {
         Error::Remote { place: self.place.clone(), because: because.to_string() }
     }
 
-    /// The records that this store is about, and that are whole.
+    /// Filter for the complete records in the scope of this store.
     fn own(&self) -> Fields {
         query::filter(&Query::default(), &self.name)
     }
@@ -206,7 +207,7 @@ impl MongoStore {
         self.said(self.records.find_one(this).run())?.ok_or(Error::Missing { id: id.0 })
     }
 
-    /// The bytes of a record's blob of that place, as they were written.
+    /// Reads and verifies the `n`-th blob of a record.
     fn whole_blob(
         &self,
         document: &Document,
@@ -226,7 +227,7 @@ impl MongoStore {
         Ok(bytes)
     }
 
-    /// The first in an order of time of what meets a query and a further condition.
+    /// The first document in time order that matches a query and a further condition.
     fn first(&self, query: &Query, side: Fields, sign: i32) -> Result<Option<Document>, Error> {
         let filter = doc! { "$and": [query::filter(query, &self.name), side] };
         let mut find = self.records.find(filter).sort(doc! { "stamp_ns": sign, "_id": sign });
@@ -261,7 +262,7 @@ impl MongoStore {
     }
 }
 
-/// Acknowledged once it is in the journal of most of the servers.
+/// Write concern for data in the journal of a majority of servers.
 fn journalled() -> WriteConcern {
     WriteConcern::builder().w(Acknowledgment::Majority).journal(true).build()
 }
@@ -270,14 +271,14 @@ fn number_of(fields: &Fields) -> Option<i64> {
     fields.get_i64("_id").ok()
 }
 
-/// The file of a record's blob of that place, and its checksum.
+/// File ID and checksum of the `n`-th blob of a record.
 fn file_of(fields: &Fields, n: usize) -> Option<(ObjectId, Option<u32>)> {
     let blob = fields.get_array("blobs").ok()?.get(n)?.as_document()?;
     let crc32 = blob.get_i64("crc32").ok().and_then(|c| u32::try_from(c).ok());
     Some((blob.get_object_id("file").ok()?, crc32))
 }
 
-/// A whole number, however the server wrote it.
+/// Converts any BSON integer.
 fn whole(value: &Bson) -> Option<i64> {
     match value {
         Bson::Int32(n) => Some(i64::from(*n)),
@@ -287,7 +288,7 @@ fn whole(value: &Bson) -> Option<i64> {
     }
 }
 
-/// Does something on a thread of its own: the driver waits in a way that no asynchronous task may.
+/// Runs work on a thread of its own: the driver blocks, which is not allowed in asynchronous tasks.
 fn apart<T: Send>(work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
     std::thread::scope(|scope| scope.spawn(work).join()).unwrap_or_else(|_| {
         Err(Error::Remote { place: "MongoDB".into(), because: "the driver failed".into() })
@@ -388,7 +389,7 @@ impl Store for MongoStore {
         })
     }
 
-    /// Makes earlier writes durable: a write that has reached the journal implies all before it.
+    /// Makes earlier writes durable: a journalled write implies the durability of all before it.
     fn sync(&self) -> Result<(), Error> {
         apart(|| {
             let touch = doc! { "$inc": { "synced": 1_i64 } };

@@ -1,4 +1,4 @@
-//! A server that speaks MongoDB's protocol, for the length of the tests that share it.
+//! Server with MongoDB's protocol, shared by concurrent tests.
 
 pub mod process;
 
@@ -6,20 +6,20 @@ use process::{Process, skipped};
 use std::process::Command;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-/// The address of a server that runs already, as `mongodb://127.0.0.1:27017`.
+/// Environment variable for the address of a running server, such as `mongodb://127.0.0.1:27017`.
 const ADDRESS: &str = "DESCRY_MONGODB_URL";
 
-/// A server, and the databases that tests have made in it.
+/// A server, and the databases made by tests.
 pub struct Server {
     address: String,
-    /// Sets the databases of these tests apart from others in the server.
+    /// Prefix of the databases of this test run.
     prefix: String,
     used: Mutex<Vec<String>>,
     process: Option<Process>,
 }
 
 impl Server {
-    /// The server of these tests, started if none runs; where there is none to be started, says so and returns none.
+    /// The shared server, started if none runs; none, with a message, if none can be started.
     pub fn shared() -> Option<Arc<Server>> {
         static RUNNING: Mutex<Weak<Server>> = Mutex::new(Weak::new());
         let mut running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
@@ -63,7 +63,7 @@ impl Server {
         client.default_database().unwrap()
     }
 
-    /// What a Python program with pymongo prints; none where there is no pymongo.
+    /// Output of a Python program with pymongo; none without pymongo.
     pub fn python(&self, program: &str, arguments: &[&str]) -> Option<String> {
         let beside = self.process.as_ref().map(|p| p.program.with_file_name("python3"));
         let python = beside.filter(|p| p.exists()).unwrap_or_else(|| "python3".into());

@@ -7,19 +7,20 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The program of a server, where it is not on the search path.
+/// Environment variable for the program of a server outside the search path.
 const PROGRAM: &str = "DESCRY_MONGOD";
-/// Programs that are looked for, the real one first.
+/// Names of known server programs, the real one first.
 const KNOWN: [&str; 2] = ["mongod", "secantusd-py"];
-/// So long a server may take to begin.
+/// Maximum time for a server to start.
 const STARTS: Duration = Duration::from_secs(60);
 
-/// Says that a test is skipped, past the harness that keeps back what passing tests print.
+/// Reports a skipped test on the standard error directly, since the harness hides the output of passing
+/// tests.
 pub fn skipped(why: &str) {
     drop(writeln!(std::io::stderr(), "skipped: {why}"));
 }
 
-/// A server that runs until this goes.
+/// A server process, stopped on drop.
 pub struct Process {
     child: Child,
     port: u16,
@@ -29,7 +30,7 @@ pub struct Process {
 }
 
 impl Process {
-    /// Starts one, or says why none can be started.
+    /// Starts a server, or returns the reason for failing.
     pub fn start() -> Result<Process, String> {
         let program = std::env::var_os(PROGRAM).map(PathBuf::from).or_else(on_path).ok_or_else(|| {
             format!(

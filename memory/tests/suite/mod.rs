@@ -1,4 +1,4 @@
-//! What every store must do.
+//! Requirements of every store.
 
 use descry_memory::stores::Store;
 use descry_memory::{
@@ -11,7 +11,7 @@ pub fn blob(name: &str, data: Vec<u8>) -> Blob<'static> {
     Blob { name: name.into(), form: Form::Bytes, layout: Value::Null, data: data.into() }
 }
 
-/// So many bytes that follow from a seed.
+/// `length` pseudo-random bytes from a seed.
 pub fn bytes(seed: u64, length: usize) -> Vec<u8> {
     let mut x = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     let mut next = || {
@@ -23,7 +23,8 @@ pub fn bytes(seed: u64, length: usize) -> Vec<u8> {
     (0..length).map(|_| next()).collect()
 }
 
-/// Forty records: every second a `scan` in one of two frames, seen from along a line, showing a box ahead of it.
+/// Forty records: every second one a `scan` in one of two frames, seen from points along a line, covering a
+/// box ahead of it.
 pub fn fill(store: &dyn Store) -> Vec<RecordId> {
     let mut ids = Vec::new();
     for i in 0..40_i64 {
@@ -51,7 +52,7 @@ fn stamps(store: &dyn Store, query: Query) -> Vec<i64> {
     store.find(&query).unwrap().iter().map(|d| d.stamp_ns / 1000).collect()
 }
 
-/// Everything that an empty store must do.
+/// Checks all requirements on an empty store.
 pub fn check(store: &dyn Store) {
     let ids = fill(store);
     check_content(store, &ids);
@@ -70,7 +71,7 @@ pub fn check(store: &dyn Store) {
     check_twins(store);
 }
 
-/// Of records of one stamp the newest is the nearest, and they stand in the order of their numbers.
+/// Among records of one stamp, the newest is the nearest, and results are ordered by number.
 fn check_twins(store: &dyn Store) {
     let twins = store.append(&[Draft::new("twin", 7000), Draft::new("twin", 7000)]).unwrap();
     let of_kind = Query::of_kind("twin");
@@ -193,7 +194,7 @@ fn check_pins(store: &dyn Store, ids: &[RecordId]) {
     assert!(store.pins().unwrap().is_empty());
 }
 
-/// Pruned by age: what is old goes, what is pinned stays, and the counts stay true.
+/// Pruning by age removes old records, keeps pinned ones, and keeps the counts correct.
 pub fn check_prune(store: &dyn Store) {
     let ids = fill(store);
     store.pin(&ids[2..4], "belief").unwrap();
@@ -214,8 +215,8 @@ pub fn check_prune(store: &dyn Store) {
     assert!(next > ids[39], "{next}");
 }
 
-/// In a store that is bounded to 4 MiB: what is pinned, and what is of one moment with what comes, is not pushed out; where that leaves
-/// too little room it is said, and nothing is lost.
+/// In a store limited to 4 MiB, pinned records and those of the same moment as new data are not pruned; where
+/// that leaves too little room, recording fails without a loss.
 pub fn check_bounded(store: &dyn Store) {
     let scan = |i: i64, kilobytes: usize| Draft {
         blobs: vec![blob("points", bytes(i as u64, kilobytes * 1000))],

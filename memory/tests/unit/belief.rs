@@ -5,7 +5,7 @@ use descry_memory::document::RecordId;
 use descry_perception::nalgebra::Point3;
 use descry_perception::recognise::{Evidence, Percept};
 
-/// What is cup A with this chance, so far along x, metres.
+/// A percept at `x` metres that is cup A with probability `cup`.
 pub fn percept(x: f64, cup: f64) -> Percept {
     Percept {
         label: None,
@@ -24,7 +24,7 @@ pub fn percept(x: f64, cup: f64) -> Percept {
     }
 }
 
-/// The numbers of the tracks after merges that show percepts at the given places.
+/// Checks the numbers of the tracks after merges with percepts at the given places.
 fn check(merges: &[&[f64]], expected: &[u64], gone: &[u64]) {
     let mut belief = Belief::default();
     for (places, stamp_ns) in merges.iter().zip(1..) {

@@ -2,7 +2,7 @@
 
 use descry_memory::document::*;
 
-/// What an older format lacked takes its default; what a newer one adds does no harm.
+/// Fields missing in older formats take their defaults; fields added by newer ones are ignored.
 #[test]
 fn documents_of_other_formats_are_read() {
     let old: Document = serde_json::from_str(r#"{"id":3,"kind":"scan","stamp_ns":5}"#).unwrap();

@@ -1,6 +1,6 @@
 //! Tests of `foxglove::descriptor`.
 
-/// Segments of an earlier format go on with the schemas that they declare.
+/// The schemas equal those in segments of earlier formats.
 #[test]
 fn schemas_are_those_of_earlier_segments() {
     let segment = include_bytes!("../../tests/formats/1.mcap");

@@ -21,7 +21,7 @@ fn named(name: &str, learned_unix_s: f64, seen_unix_s: f64) -> LearnedThing {
     }
 }
 
-/// What a run remembers that began at a time with `before` and has seen one thing, of which it says this name, at these places.
+/// Memory after a run that began at `unix_s` with `before`, looked at these surfaces, and saw these objects.
 fn looked(before: &Remembered, unix_s: f64, looked_at: &[&str], things: &[(&str, f64, &str)]) -> Remembered {
     let mut belief = Belief::default();
     for surface in looked_at {
@@ -35,7 +35,7 @@ fn looked(before: &Remembered, unix_s: f64, looked_at: &[&str], things: &[(&str,
     before.clone().after(&belief, &looked_at, unix_s)
 }
 
-/// What is of this name, most likely.
+/// A percept that is most likely this object.
 fn called(x: f64, name: &str) -> Percept {
     let likely = vec![(name.into(), 0.9)];
     Percept { probabilities: likely.clone(), kinds: likely, ..percept(x, 0.9) }
@@ -70,7 +70,7 @@ fn a_surface_is_remembered_as_it_was_looked_at_last() {
         &["desk", "shelf"],
         &[("desk", 0.0, "cup"), ("shelf", 1.0, "mug")],
     );
-    /// When others looked at which surfaces, and the things that they saw there.
+    /// The looks of other runs: their time, the surfaces, and the objects seen there.
     type Looks<'a> = (f64, &'a [&'a str], &'a [(&'a str, f64, &'a str)]);
     let check = |others: Looks, present: &[(&str, f64, &str, f64)], gone: &[(&str, f64, &str, f64)]| {
         let here = looked(&before, others.0, others.1, others.2);

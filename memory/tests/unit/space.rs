@@ -5,7 +5,7 @@ use descry_perception::Intrinsics;
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::visibility::DepthMap;
 
-/// A camera at the origin that looks along z at a wall at 1 m with a step at 2 m to its right.
+/// Space after a view from the origin along z, of a wall at 1 m on the left and at 2 m on the right.
 fn seen() -> Space {
     let intrinsics = Intrinsics { width: 160, height: 120, fx: 130.0, fy: 130.0, cx: 80.0, cy: 60.0 };
     let depths_m = (0..160 * 120).map(|i| if i % 160 < 80 { 1.0 } else { 2.0 }).collect();

@@ -10,7 +10,8 @@ fn iso(x: f64, y: f64, yaw: f64) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, 0.0), UnitQuaternion::from_scaled_axis(Vector3::z() * yaw))
 }
 
-/// A robot that drives 1 m/s along x and turns .1 rad/s, its camera fixed .5 m ahead, and an island of frames.
+/// A robot that drives 1 m/s along x and turns 0.1 rad/s, its camera fixed 0.5 m ahead, and an unconnected
+/// tree of frames.
 fn drive() -> Transforms {
     let mut t = Transforms::default();
     for i in 0..=4 {

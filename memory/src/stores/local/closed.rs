@@ -1,4 +1,4 @@
-//! What a store was when it was last closed: by it damage to the index, and to whole files, is known.
+//! State of a store at its last closing, which reveals damage to the index and the loss of files.
 
 use super::index::INDEX;
 use crate::error::Error;
@@ -8,23 +8,23 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-/// The file name. It is there while nobody writes, and absent after a crash.
+/// File name. The file exists while no process writes, and not after a crash.
 const CLOSED: &str = "closed.json";
 
-/// What was there at the end.
+/// State of the store when it was closed.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Closed {
-    /// The index and its log.
+    /// Sizes and checksums of the index and its write-ahead log.
     index: [Sum; 2],
-    /// The length of each segment, bytes, by its number.
+    /// Length of each segment, bytes, by number.
     pub segments: BTreeMap<u64, u64>,
-    /// How many records there are.
+    /// The number of records.
     pub records: u64,
-    /// The number of the next.
+    /// Number of the next record.
     pub next: u64,
 }
 
-/// What a file is known by.
+/// Size and checksum of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 struct Sum {
     bytes: u64,
@@ -32,7 +32,7 @@ struct Sum {
 }
 
 impl Closed {
-    /// Writes down what is there; the index must be closed.
+    /// Writes the state to the folder; the index must be closed.
     pub fn write(dir: &Path, segments: BTreeMap<u64, u64>, records: u64, next: u64) -> Result<(), Error> {
         let path = dir.join(CLOSED);
         let fail = |e| Error::file("cannot write", &path, e);
@@ -43,7 +43,7 @@ impl Closed {
         fs::rename(&fresh, &path).map_err(fail)
     }
 
-    /// What was written at the last closing; none if somebody writes, or wrote until a crash, or if it is damaged.
+    /// Reads the state; none during writing, after a crash, or if it is damaged.
     pub fn read(dir: &Path) -> Option<Self> {
         let said = fs::read_to_string(dir.join(CLOSED)).ok()?;
         let (text, sum) = said.strip_suffix('\n')?.split_once('\n')?;
@@ -51,12 +51,12 @@ impl Closed {
         serde_json::from_str(text).ok()
     }
 
-    /// Whether the index is still what it was.
+    /// True if the index is unchanged.
     pub fn has_index(&self, dir: &Path) -> bool {
         sums(dir).is_ok_and(|found| found == self.index)
     }
 
-    /// From now on somebody writes.
+    /// Removes the state, as a process starts to write.
     pub fn remove(dir: &Path) -> Result<(), Error> {
         let path = dir.join(CLOSED);
         match fs::remove_file(&path) {
@@ -66,7 +66,7 @@ impl Closed {
     }
 }
 
-/// The index and its log; a log that is not there is an empty one.
+/// Sums of the index and its write-ahead log; a missing log counts as empty.
 fn sums(dir: &Path) -> std::io::Result<[Sum; 2]> {
     let log = match sum(&dir.join(format!("{INDEX}-wal"))) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Sum::default(),

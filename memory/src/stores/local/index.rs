@@ -1,5 +1,5 @@
-//! The index: where each record lies and by what it is found. Everything in it follows from the segments, so that it
-//! need not be synced with every record and can be made again from nothing.
+//! Index of the records, by location and by query criteria. It follows entirely from the segments, so that it
+//! need not be synced with every record and can be rebuilt.
 
 use super::pins;
 use super::segment::{Located, Spot};
@@ -14,9 +14,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The file name.
+/// File name.
 pub(super) const INDEX: &str = "index.sqlite";
-/// What readers of the file expect; an older one is made again, a newer one is refused.
+/// Version of the file format; an older index is rebuilt, a newer one is refused.
 const FORMAT: i64 = 2;
 
 const TABLES: &str = "
@@ -39,7 +39,7 @@ CREATE TABLE pins(record INTEGER, holder TEXT, PRIMARY KEY(record, holder)) WITH
 CREATE INDEX pins_holder ON pins(holder);
 ";
 
-/// Where a record lies.
+/// Location of a record.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub id: RecordId,
@@ -48,13 +48,13 @@ pub(super) struct Place {
     pub located: Located,
 }
 
-/// A segment as the index knows it.
+/// A segment in the index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SegmentRow {
     pub number: u64,
     pub bytes: u64,
     pub sealed: bool,
-    /// It was being deleted.
+    /// True if its deletion was under way.
     pub going: bool,
 }
 
@@ -65,9 +65,9 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// Opens or makes the index of a folder for writing.
+    /// Opens or creates the index of a folder for writing.
     ///
-    /// `log_bytes` bounds the file beside it that holds what is new.
+    /// `log_bytes` limits the write-ahead log.
     pub fn open(dir: &Path, log_bytes: u64) -> Result<Self, Error> {
         let index = Self::connect(dir, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE)?;
         let run = |sql: &str| index.db.execute_batch(sql).map_err(|e| index.err(e));
@@ -85,19 +85,19 @@ impl Index {
         Ok(index)
     }
 
-    /// Opens the index of a folder for reading, beside a process that may be writing.
+    /// Opens the index of a folder for reading, while another process may be writing it.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
         Self::connect(dir, OpenFlags::SQLITE_OPEN_READ_ONLY)
     }
 
-    /// An index that is on no disk.
+    /// Creates an index in memory.
     pub fn in_memory(dir: &Path) -> Result<Self, Error> {
         let db = Connection::open_in_memory().map_err(|e| Error::index(dir, e))?;
         db.execute_batch(TABLES).map_err(|e| Error::index(dir, e))?;
         Ok(Index { db, dir: dir.to_owned(), names: BTreeMap::new() })
     }
 
-    /// Lets go of the file: what is asked from now on finds nothing.
+    /// Closes the file; later queries find nothing.
     pub fn close(&mut self) -> Result<(), Error> {
         let none = Connection::open_in_memory().map_err(|e| self.err(e))?;
         std::mem::replace(&mut self.db, none).close().map_err(|(_, e)| self.err(e))
@@ -111,10 +111,11 @@ impl Index {
         Ok(Index { db, dir: dir.to_owned(), names: BTreeMap::new() })
     }
 
-    /// Whether it is of the format that is written now. An older one has to be made again.
+    /// True if the index has the current format. An older one has to be rebuilt.
     ///
     /// # Errors
-    /// [`Error::Damaged`] for a newer one, which must not be written over.
+    ///
+    /// [`Error::Damaged`] for a newer one, which must not be overwritten.
     pub fn is_current(&self) -> Result<bool, Error> {
         let format: i64 =
             self.db.query_row("PRAGMA user_version", [], |r| r.get(0)).map_err(|e| self.err(e))?;
@@ -142,7 +143,7 @@ impl Index {
         Error::index(&self.dir, e)
     }
 
-    /// Takes in the records of a chunk and how far its segment is indexed, together.
+    /// Inserts the records of a chunk together with the indexed length of its segment.
     pub fn insert(&mut self, segment: u64, end: u64, records: &[(&Document, &Located)]) -> Result<(), Error> {
         let mut fresh = BTreeMap::new();
         let dir = self.dir.clone();
@@ -161,7 +162,7 @@ impl Index {
         Ok(())
     }
 
-    /// Says that a segment is complete.
+    /// Marks a segment as complete.
     pub fn seal(&mut self, segment: u64, bytes: u64) -> Result<(), Error> {
         let sql = "INSERT INTO segments(number, bytes, sealed) VALUES(?1, ?2, 1) ON CONFLICT DO UPDATE SET bytes = ?2, sealed = 1";
         self.db.execute(sql, params![segment as i64, bytes as i64]).map(|_| ()).map_err(|e| self.err(e))
@@ -179,7 +180,8 @@ impl Index {
         })
     }
 
-    /// Of the complete segments whose records are not all pinned the one whose newest record is oldest, and that stamp.
+    /// The oldest complete segment, by its newest record, among those with any unpinned record; and that
+    /// record's stamp.
     pub fn oldest_segment(&self) -> Result<Option<(u64, i64)>, Error> {
         let sql = "SELECT s.number, coalesce((SELECT max(stamp) FROM records WHERE segment = s.number), -1) AS newest FROM segments s
             WHERE s.sealed AND NOT s.going AND (
@@ -190,13 +192,13 @@ impl Index {
         statement.query_row([], |r| Ok((unsigned(r, 0)?, r.get(1)?))).optional().map_err(|e| self.err(e))
     }
 
-    /// Until when the records of a segment last.
+    /// Latest end of the records of a segment, nanoseconds.
     pub fn lasts_until(&self, segment: u64) -> Result<Option<i64>, Error> {
         let sql = "SELECT max(coalesce(ends, stamp)) FROM records WHERE segment = ?1";
         self.db.query_row(sql, [segment as i64], |r| r.get(0)).map_err(|e| self.err(e))
     }
 
-    /// Says, durably, that a segment is about to be deleted.
+    /// Marks a segment, durably, as about to be deleted.
     pub fn mark_going(&mut self, segment: u64) -> Result<(), Error> {
         self.durably(|db| {
             db.execute("UPDATE segments SET going = 1 WHERE number = ?1", [segment as i64]).map(|_| ())
@@ -210,7 +212,7 @@ impl Index {
         result.and(back).map_err(|e| self.err(e))
     }
 
-    /// Forgets a segment and what lay in it; returns the number of records.
+    /// Removes a segment and its records; returns the number of records.
     pub fn forget(&mut self, segment: u64) -> Result<u64, Error> {
         const GOING: &str = "SELECT id FROM records WHERE segment = ?1";
         self.keep_numbers(self.next_id()?)?;
@@ -240,13 +242,13 @@ impl Index {
         result.map_err(|e| Error::index(&dir, e))
     }
 
-    /// Says that no record gets a number below this one: none is used again, even when every record is gone.
+    /// Reserves all record numbers below `next`: none is reused, even when every record is gone.
     pub fn keep_numbers(&self, next: RecordId) -> Result<(), Error> {
         let sql = "INSERT INTO meta VALUES('next', ?1) ON CONFLICT DO UPDATE SET value = max(value, ?1)";
         self.db.execute(sql, [next.0 as i64]).map(|_| ()).map_err(|e| self.err(e))
     }
 
-    /// Pins what these records say, which are all that say something of pins, in the order of their numbers.
+    /// Rebuilds the pins from these records, which are all that concern pins, ordered by number.
     pub fn pin_again(&mut self, said: &[Document]) -> Result<(), Error> {
         let dir = self.dir.clone();
         let result = (|| -> rusqlite::Result<()> {
@@ -258,33 +260,33 @@ impl Index {
         result.map_err(|e| Error::index(&dir, e))
     }
 
-    /// Number and segment of every record, in the order of their numbers.
+    /// Number and segment of every record, ordered by number.
     pub fn numbers(&self) -> Result<Vec<(RecordId, u64)>, Error> {
         let read = |r: &Row| Ok((RecordId(unsigned(r, 0)?), unsigned(r, 1)?));
         self.rows("SELECT id, segment FROM records ORDER BY id", [], read)
     }
 
-    /// The number that the next record gets.
+    /// Number of the next record.
     pub fn next_id(&self) -> Result<RecordId, Error> {
         let sql = "SELECT max(coalesce((SELECT max(id) + 1 FROM records), 1), coalesce((SELECT value FROM meta WHERE key = 'next'), 1))";
         self.db.query_row(sql, [], |r| unsigned(r, 0)).map(RecordId).map_err(|e| self.err(e))
     }
 
-    /// Where a record lies.
+    /// Location of a record.
     pub fn place(&self, id: RecordId) -> Result<Option<Place>, Error> {
         let sql = format!("SELECT {PLACE} FROM records WHERE id = ?1");
         let mut statement = self.db.prepare_cached(&sql).map_err(|e| self.err(e))?;
         statement.query_row([id.0 as i64], place).optional().map_err(|e| self.err(e))
     }
 
-    /// Where the records of a segment lie, those that are pinned only if asked.
+    /// Locations of the records of a segment, or of the pinned ones alone.
     pub fn places(&self, segment: u64, pinned_only: bool) -> Result<Vec<Place>, Error> {
         let pinned = if pinned_only { "AND id IN (SELECT record FROM pins)" } else { "" };
         let sql = format!("SELECT {PLACE} FROM records WHERE segment = ?1 {pinned} ORDER BY id");
         self.rows(&sql, [segment as i64], place)
     }
 
-    /// Where lies what meets a query.
+    /// Locations of the records that match a query.
     pub fn find(&self, query: &Query) -> Result<Vec<Place>, Error> {
         let (mut sql, mut values) = self.select(query);
         if let Some((stamp, id)) = query.after {
@@ -303,7 +305,7 @@ impl Index {
         self.rows(&sql, params_from_iter(values), place)
     }
 
-    /// Where lies the record nearest in time.
+    /// Location of the record nearest in time.
     pub fn nearest(&self, query: &Query, stamp_ns: i64) -> Result<Option<Place>, Error> {
         let (select, values) = self.select(query);
         let one = |end: &str| -> Result<Option<Place>, Error> {
@@ -325,7 +327,7 @@ impl Index {
         })
     }
 
-    /// The conditions of a query as SQL, without its order and limit.
+    /// SQL for the conditions of a query, without its order and limit.
     fn select(&self, query: &Query) -> (String, Vec<Sql>) {
         let mut sql = format!("SELECT {PLACE} FROM records WHERE 1");
         let mut values = Vec::new();
@@ -373,13 +375,13 @@ impl Index {
         (sql, values)
     }
 
-    /// The frames of a kind, sorted.
+    /// The frames of the records of a kind, sorted.
     pub fn frames(&self, kind: &str) -> Result<Vec<String>, Error> {
         let sql = "SELECT f.name FROM kinds JOIN names f ON f.id = frame WHERE kind = (SELECT id FROM names WHERE name = ?1) ORDER BY f.name";
         self.rows(sql, [kind], |r| r.get(0))
     }
 
-    /// Puts records elsewhere.
+    /// Updates the locations of moved records.
     pub fn relocate(
         &mut self,
         segment: u64,
@@ -407,7 +409,7 @@ impl Index {
         result.map_err(|e| Error::index(&dir, e))
     }
 
-    /// What is held, and by whom.
+    /// The pinned records, with the holders of the pins.
     pub fn pins(&self) -> Result<BTreeMap<RecordId, BTreeSet<String>>, Error> {
         let mut pins: BTreeMap<RecordId, BTreeSet<String>> = BTreeMap::new();
         let mut read = || -> rusqlite::Result<()> {
@@ -422,19 +424,19 @@ impl Index {
         Ok(pins)
     }
 
-    /// Who holds how many records of how many bytes, the most first.
+    /// The holders of pins with the number and bytes of their records, largest first.
     pub fn holders(&self) -> Result<Vec<(String, u64, u64)>, Error> {
         let sql = "SELECT holder, count(*), sum(bytes) FROM pins JOIN records ON id = record GROUP BY holder ORDER BY 3 DESC, 1";
         self.rows(sql, [], |r| Ok((r.get(0)?, unsigned(r, 1)?, unsigned(r, 2)?)))
     }
 
-    /// The bytes of everything that is pinned.
+    /// Total bytes of pinned records.
     pub fn pinned_bytes(&self) -> Result<u64, Error> {
         let sql = "SELECT coalesce(sum(bytes), 0) FROM records WHERE id IN (SELECT record FROM pins)";
         self.db.query_row(sql, [], |r| unsigned(r, 0)).map_err(|e| self.err(e))
     }
 
-    /// Counts; sizes on the disk are the caller's to add.
+    /// Counts of the store; the caller adds sizes on the disk.
     pub fn stats(&self) -> Result<Stats, Error> {
         let mut stats = Stats::default();
         let mut read = || -> rusqlite::Result<()> {
@@ -460,13 +462,13 @@ impl Index {
         Ok(stats)
     }
 
-    /// Brings what is new into the index proper and empties the file that held it.
+    /// Merges the write-ahead log into the index and truncates it.
     pub fn empty_log(&mut self) -> Result<(), Error> {
         let run = |r: &Row| r.get::<_, i64>(0);
         self.db.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], run).map(|_| ()).map_err(|e| self.err(e))
     }
 
-    /// What SQLite itself finds wrong with the file.
+    /// Faults that SQLite's integrity check reports.
     pub fn check(&self) -> Result<Vec<String>, Error> {
         let found: Vec<String> = self.rows("PRAGMA integrity_check", [], |r| r.get(0))?;
         Ok(found.into_iter().filter(|line| line != "ok").collect())
@@ -474,13 +476,13 @@ impl Index {
 }
 
 const PLACE: &str = "id, segment, chunk, document, document_bytes, blobs, bytes, document_crc, stamp";
-/// Its bytes are the same wherever it lies.
+/// Updates the location of a record, whose bytes stay the same.
 const MOVE: &str = "UPDATE records SET segment = ?2, chunk = ?3, document = ?4, blobs = ?5 WHERE id = ?1";
 const WITHIN: &str = "x1 >= ? AND x0 <= ? AND y1 >= ? AND y0 <= ? AND z1 >= ? AND z0 <= ?";
 const FROM_DISTANCE: &str = "(x-?)*(x-?) + (y-?)*(y-?) + (z-?)*(z-?)";
 const COVER_DISTANCE: &str = "max(ax-?, ?-bx, 0)*max(ax-?, ?-bx, 0) + max(ay-?, ?-by, 0)*max(ay-?, ?-by, 0) + max(az-?, ?-bz, 0)*max(az-?, ?-bz, 0)";
 
-/// The values for [`WITHIN`] and a squared distance that names each coordinate so many times.
+/// SQL values for [`WITHIN`] and for a squared distance that uses each coordinate `times` times.
 fn ball(near: Near, times: usize) -> Vec<Sql> {
     let around =
         near.place_m.iter().flat_map(|p| [Sql::Real(p - near.radius_m), Sql::Real(p + near.radius_m)]);
@@ -504,7 +506,7 @@ fn place(row: &Row) -> rusqlite::Result<Place> {
     Ok(Place { id: RecordId(unsigned(row, 0)?), stamp_ns: row.get(8)?, segment: unsigned(row, 1)?, located })
 }
 
-/// Offset and checksum of a blob, as they stand in the index.
+/// Decodes the offset and checksum of a blob.
 fn spot(bytes: &[u8; 12]) -> Spot {
     let [a, b, c, d, e, f, g, h, crc32 @ ..] = *bytes;
     Spot { at: u64::from_le_bytes([a, b, c, d, e, f, g, h]), crc32: u32::from_le_bytes(crc32) }
@@ -515,7 +517,7 @@ fn spots(blobs: &[Spot]) -> Vec<u8> {
     blobs.iter().flat_map(bytes).collect()
 }
 
-/// The number of a name, given one where it is new.
+/// The ID of a name; a new name is inserted.
 fn name_id(
     tx: &Transaction,
     known: &BTreeMap<String, i64>,

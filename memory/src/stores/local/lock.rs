@@ -1,4 +1,4 @@
-//! One process writes. Readers never touch the lock by which writers keep each other out.
+//! Locks of a store: one process writes. Readers never touch the lock by which writers exclude each other.
 
 use crate::error::Error;
 use std::fs::{File, TryLockError};
@@ -6,24 +6,25 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
-/// What a writer holds as long as it writes.
+/// Locks that a writer holds.
 pub(super) struct Writing {
     _lock: File,
-    /// By which readers see that somebody writes.
+    /// Lock that readers test for a writer.
     _alive: Option<File>,
 }
 
-/// Keeps other writers out.
+/// Lock that excludes other writers.
 const LOCK: &str = "lock";
-/// Held by the writer as well; a reader tries it for a moment.
+/// Lock that the writer holds as well; a reader tries it briefly.
 const ALIVE: &str = "alive";
-/// A reader's moment is over after so many tries of a millisecond.
+/// Maximum number of tries of the lock, a millisecond apart: a reader holds it only for a moment.
 const TRIES: usize = 1000;
 
-/// Becomes the one that writes.
+/// Acquires the locks of the writer.
 ///
 /// # Errors
-/// [`Error::InUse`] if another does.
+///
+/// [`Error::InUse`] if another process holds them.
 pub(super) fn lock(dir: &Path) -> Result<Writing, Error> {
     let path = dir.join(LOCK);
     let file = open(&path).map_err(|e| Error::file("cannot open", &path, e))?;
@@ -45,7 +46,7 @@ pub(super) fn lock(dir: &Path) -> Result<Writing, Error> {
     Ok(Writing { _lock: file, _alive: alive })
 }
 
-/// Whether somebody writes.
+/// True if a process is writing the store.
 pub(super) fn is_written(dir: &Path) -> bool {
     let Ok(alive) = File::open(dir.join(ALIVE)) else { return false };
     matches!(alive.try_lock_shared(), Err(TryLockError::WouldBlock))

@@ -1,30 +1,30 @@
-//! What is held, and by whom: said by records of their own, and known to the index with them.
+//! Pins of records: stored as documents, and in the index.
 
 use crate::document::{Document, Draft, RecordId};
 use crate::stores::{KEPT, PIN, UNPIN};
 use rusqlite::{Transaction, params};
 use serde_json::json;
 
-/// A record that says that `by` holds records, beside those that it holds or instead of them.
+/// A document that pins records on behalf of `by`, in addition to its pins or instead of them.
 pub(crate) fn pinned(stamp_ns: i64, ids: &[RecordId], by: &str, instead: bool) -> Draft<'static> {
     let mut draft = Draft::new(PIN, stamp_ns);
     draft.meta.body = json!({ "records": ids, "by": by, "instead": instead });
     draft
 }
 
-/// A record that says that `by` holds nothing any more.
+/// A document that removes all pins of `by`.
 pub(crate) fn unpinned(stamp_ns: i64, by: &str) -> Draft<'static> {
     let mut draft = Draft::new(UNPIN, stamp_ns);
     draft.meta.body = json!({ "by": by });
     draft
 }
 
-/// Whether a record says something of pins.
+/// True if a document changes pins.
 pub(super) fn speaks(document: &Document) -> bool {
     document.kept || [PIN, UNPIN].contains(&document.kind.as_str())
 }
 
-/// Takes into the index what a record says of pins. What says that records are pinned is pinned with them.
+/// Applies the pins of a document to the index. A document that pins records is pinned itself.
 pub(super) fn apply(tx: &Transaction, document: &Document) -> rusqlite::Result<()> {
     if document.kept {
         tx.prepare_cached("INSERT OR IGNORE INTO pins VALUES(?1, ?2)")?

@@ -1,4 +1,4 @@
-//! Keeping a store within its bounds: whole segments go, oldest first; what is pinned in them moves on.
+//! Retention: whole segments are deleted, oldest first; their pinned records move to another segment.
 
 use super::segment::Encoded;
 use super::{INDEX, LocalStore, WriteState, new_segment, segment_path, unpoisoned};
@@ -8,10 +8,11 @@ use crate::stores::Retention;
 use std::fs;
 use std::path::Path;
 
-/// Room left on the disk of a folder, bytes.
+/// Free room on the disk of a folder, bytes.
 ///
 /// # Errors
-/// [`Error::File`] if the system does not tell.
+///
+/// [`Error::File`] if the system cannot report it.
 pub fn free_bytes(folder: &Path) -> Result<u64, Error> {
     let free = rustix::fs::statvfs(folder)
         .map_err(|e| Error::file("cannot ask for the room on", folder, e.into()))?;
@@ -19,10 +20,11 @@ pub fn free_bytes(folder: &Path) -> Result<u64, Error> {
 }
 
 impl LocalStore {
-    /// Makes room for what is coming, where there is a bound in bytes.
+    /// Makes room for drafts, under a size limit.
     ///
     /// # Errors
-    /// [`Error::Bounded`] if what is pinned, and what is of the same moment, leaves too little.
+    ///
+    /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
     pub(super) fn make_room(
         &self,
         writer: &mut WriteState,
@@ -55,8 +57,8 @@ impl LocalStore {
         Ok(())
     }
 
-    /// Drops segments until the limits hold or nothing is left to drop; what lasts until `now_ns` stays. Returns the number of
-    /// records that went.
+    /// Deletes segments until the limits hold or nothing is left to delete; segments with data up to `now_ns`
+    /// stay. Returns the number of removed records.
     pub(super) fn keep_within(
         &self,
         writer: &mut WriteState,
@@ -94,14 +96,14 @@ impl LocalStore {
         Ok(false)
     }
 
-    /// The size of everything, the index included.
+    /// Total size on the disk, the index included, bytes.
     fn bytes(&self, writer: &WriteState) -> u64 {
         let kept = writer.kept.as_ref().map_or(0, |k| k.end);
         writer.sealed_bytes + writer.segment.end + kept + self.index_bytes()
     }
 
-    /// Drops the oldest segment that holds anything not pinned; `None` if there is none, or if it lasts until `now_ns`: a cloud must
-    /// not push out the transforms of its own time before it can be pinned with them.
+    /// Deletes the oldest segment with any unpinned record; `None` if there is none, or if it holds data up
+    /// to `now_ns`: a cloud must not push out the transforms of its own time before both can be pinned.
     pub(super) fn drop_oldest(&self, writer: &mut WriteState, now_ns: i64) -> Result<Option<u64>, Error> {
         let Some((number, _)) = self.index().oldest_segment()? else { return Ok(None) };
         if self.index().lasts_until(number)?.is_some_and(|until| until >= now_ns) {
@@ -121,7 +123,7 @@ impl LocalStore {
         self.index().forget(number).map(Some)
     }
 
-    /// Copies what is pinned in a segment to the one that keeps, one record at a time.
+    /// Copies the pinned records of a segment to the keeping segment, one record at a time.
     fn carry_pinned(&self, writer: &mut WriteState, number: u64) -> Result<(), Error> {
         let places = self.index().places(number, true)?;
         if places.is_empty() {
@@ -168,7 +170,7 @@ impl LocalStore {
         size("") + size("-wal") + size("-shm")
     }
 
-    /// The size of everything in the folder.
+    /// Total size of the files in the folder, bytes.
     pub(super) fn bytes_on_disk(&self) -> Result<u64, Error> {
         let segments = self.index().segments()?;
         let size = |number| fs::metadata(segment_path(&self.dir, number)).map_or(0, |m| m.len());

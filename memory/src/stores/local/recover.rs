@@ -1,7 +1,7 @@
-//! Opening after whatever happened: segments and index are brought together again.
+//! Opening of a store: reconciles the segments and the index.
 //!
-//! The index is taken as it stands if it is what it was when the store was closed, or if somebody writes it right now. Otherwise
-//! it is made again from the segments: on the disk by who writes, in memory by who reads.
+//! The index is used as it is if it equals its state at closing, or if a process is writing it. Otherwise it
+//! is rebuilt from the segments: on the disk by a writer, in memory by a reader.
 
 use super::closed::Closed;
 use super::index::{INDEX, Index, Place, SegmentRow};
@@ -15,24 +15,26 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A store that was opened, and what was found.
+/// An opened store, with the damage found.
 pub(super) struct Opened {
     pub index: Index,
-    /// The length of each segment, bytes, by its number.
+    /// Length of each segment, bytes, by number.
     pub segments: BTreeMap<u64, u64>,
-    /// The number of the next segment.
+    /// Number of the next segment.
     pub next_segment: u64,
     pub recovery: Recovery,
 }
 
-/// How often a reader looks whether a store that neither is written nor was closed is just being opened or closed.
+/// Maximum number of looks at a store that seems neither written nor closed, since it may be in the middle of
+/// opening or closing.
 const LOOKS: usize = 3;
 
-/// Opens a store that this process alone writes, and mends what a crash has left.
+/// Opens a store for this process alone to write, and repairs the traces of a crash.
 ///
 /// # Errors
-/// [`Error::Faulty`] if something is damaged: then nothing of it is changed. [`Error::Damaged`] for an index of a newer version, or
-/// what the system refuses.
+///
+/// [`Error::Faulty`] if anything is damaged; then nothing is changed. [`Error::Damaged`] for an index of a
+/// newer version, or what the system refuses.
 pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
     let closed = Closed::read(dir);
     let whole = closed.as_ref().is_some_and(|closed| is_as_closed(dir, closed));
@@ -53,14 +55,14 @@ pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
     Ok(opened)
 }
 
-/// What the index is called while another is made.
+/// Suffix of the old index during a rebuild.
 const OLD: &str = ".old";
 
 fn index_files(dir: &Path, ending: &str) -> [PathBuf; 3] {
     ["", "-wal", "-shm"].map(|suffix| dir.join(format!("{INDEX}{suffix}{ending}")))
 }
 
-/// Renames the index and what belongs to it, over what is there.
+/// Renames the files of the index, replacing existing ones.
 fn move_index(dir: &Path, from: &str, to: &str) -> Result<(), Error> {
     for (from, to) in index_files(dir, from).iter().zip(index_files(dir, to)) {
         let gone = if from.exists() { fs::rename(from, &to) } else { fs::remove_file(&to) };
@@ -81,9 +83,10 @@ fn without_faults(opened: Opened) -> Result<Opened, Error> {
     Err(Error::Faulty { place: opened.index.dir.clone(), faults: opened.recovery.faults })
 }
 
-/// Opens a store to read it, and changes nothing.
+/// Opens a store for reading, without any change to it.
 ///
 /// # Errors
+///
 /// As [`for_writing`].
 pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
     for _ in 0..LOOKS {
@@ -107,13 +110,13 @@ pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
     Rebuild::new(dir, Index::in_memory(dir)?, old, false).run()
 }
 
-/// Whether the index is what it was, and no segment has come since.
+/// True if the index equals its state at closing, and no segment is new.
 fn is_as_closed(dir: &Path, closed: &Closed) -> bool {
     let known = |number: &u64| closed.segments.contains_key(number);
     closed.has_index(dir) && on_disk(dir).is_ok_and(|found| found.iter().all(known))
 }
 
-/// The numbers of the segments that are there.
+/// Numbers of the segments on the disk.
 fn on_disk(dir: &Path) -> Result<BTreeSet<u64>, Error> {
     let folder = segment_dir(dir);
     let fail = |e| Error::file("cannot read", &folder, e);
@@ -126,12 +129,12 @@ fn on_disk(dir: &Path) -> Result<BTreeSet<u64>, Error> {
     Ok(numbers)
 }
 
-/// The length of a segment; none if it is not there, or no file.
+/// Length of a segment, bytes; none if it is missing or no regular file.
 fn length(dir: &Path, number: u64) -> Option<u64> {
     fs::metadata(segment_path(dir, number)).ok().filter(fs::Metadata::is_file).map(|m| m.len())
 }
 
-/// Holds the segments against an index that can be trusted.
+/// Checks the segments against a trusted index.
 fn look_over(dir: &Path, index: Index) -> Result<Opened, Error> {
     let mut recovery = Recovery::default();
     let rows = index.segments()?;
@@ -163,7 +166,7 @@ fn fault(dir: &Path, segment: u64, what: String) -> Fault {
     Fault { record: None, place: segment_path(dir, segment).display().to_string(), what }
 }
 
-/// Which records are lost, as numbers and ranges of them.
+/// The numbers of lost records, as text with ranges.
 fn lost_text(lost: &BTreeSet<RecordId>) -> String {
     let mut ranges: Vec<(u64, u64)> = Vec::new();
     for id in lost {
@@ -184,15 +187,15 @@ fn lost_text(lost: &BTreeSet<RecordId>) -> String {
     }
 }
 
-/// What is known of a store whose index is to be made again, as far as it can still be read.
+/// Remains of an index that is to be rebuilt, as far as they are readable.
 #[derive(Default)]
 struct Old {
     closed: Option<Closed>,
     is_current: bool,
-    /// The index itself, for who reads.
+    /// The index itself; readers only.
     index: Option<Index>,
     rows: BTreeMap<u64, SegmentRow>,
-    /// The records of each segment.
+    /// Records of each segment.
     records: BTreeMap<u64, BTreeSet<RecordId>>,
     next: u64,
 }
@@ -216,19 +219,20 @@ impl Old {
         Ok(old)
     }
 
-    /// Where the index has those of some records of a segment.
+    /// Locations in the index of some records of a segment.
     fn places(&self, segment: u64, ids: &BTreeSet<RecordId>) -> Vec<Place> {
         let places = self.index.as_ref().and_then(|index| index.places(segment, false).ok());
         places.unwrap_or_default().into_iter().filter(|place| ids.contains(&place.id)).collect()
     }
 
-    /// The length of a segment that was complete.
+    /// Length of a segment that was complete, bytes.
     fn sealed(&self, number: u64) -> Option<u64> {
         let row = self.rows.get(&number).filter(|row| row.sealed).map(|row| row.bytes);
         row.or_else(|| self.closed.as_ref()?.segments.get(&number).copied())
     }
 
-    /// The segments that should be there. One that was being deleted may be gone; if it is not, its records are as good as any.
+    /// The segments that should exist. One marked for deletion may be missing; if it exists, its records
+    /// count.
     fn expected(&self) -> BTreeSet<u64> {
         let closed = self.closed.iter().flat_map(|closed| closed.segments.keys());
         let all = closed.chain(self.rows.keys()).copied();
@@ -236,18 +240,18 @@ impl Old {
     }
 }
 
-/// An index in the making.
+/// Rebuild of an index.
 struct Rebuild<'a> {
     dir: &'a Path,
     index: Index,
     old: Old,
-    /// Whether torn ends are cut off and segments finished, if nothing is damaged.
+    /// True if torn ends are cut off and segments finished, provided that nothing is damaged.
     mend: bool,
     /// Segments with a torn end or without a summary.
     unfinished: Vec<(u64, Scan)>,
     segments: BTreeMap<u64, u64>,
     recovery: Recovery,
-    /// What says that something is pinned, or is no more.
+    /// Documents that change pins.
     of_pins: BTreeMap<RecordId, Document>,
     found: BTreeSet<RecordId>,
 }
@@ -295,7 +299,7 @@ impl<'a> Rebuild<'a> {
         Ok(Opened { index, segments, next_segment: last + 1, recovery })
     }
 
-    /// Says what came back, and what did not that no fault speaks of yet.
+    /// Counts regained and lost records, except losses that a fault already names.
     fn count(&mut self, is_new: bool) {
         let known: BTreeSet<RecordId> = self.old.records.values().flatten().copied().collect();
         self.recovery.regained = self.found.difference(&known).count() as u64;
@@ -309,7 +313,7 @@ impl<'a> Rebuild<'a> {
         }
     }
 
-    /// Takes in what a segment holds.
+    /// Reads a segment into the index.
     fn read(&mut self, number: u64) -> Result<(), Error> {
         let path = segment_path(self.dir, number);
         let Some(bytes) = length(self.dir, number) else {
@@ -349,7 +353,7 @@ impl<'a> Rebuild<'a> {
         self.index.seal(number, bytes)
     }
 
-    /// Says what a segment lacks.
+    /// Reports the faults of a segment.
     fn judge(&mut self, number: u64, bytes: u64, scan: &Scan, lost: &BTreeSet<RecordId>) {
         let was_complete = self.old.sealed(number);
         let torn = scan.torn.iter().filter(|_| was_complete.is_some());
@@ -373,7 +377,7 @@ impl<'a> Rebuild<'a> {
         }
     }
 
-    /// Takes in, of records in damaged chunks, those that the checksums in the index prove whole.
+    /// Adds records of damaged chunks that the checksums in the index prove undamaged.
     fn proven(
         &mut self,
         number: u64,
@@ -397,7 +401,7 @@ impl<'a> Rebuild<'a> {
         Ok(proven)
     }
 
-    /// Cuts the torn end of a segment off and writes its summary; one without a chunk goes.
+    /// Cuts off the torn end of a segment and writes its summary; deletes a segment without a chunk.
     fn finish(&mut self, number: u64, scan: Scan) -> Result<(), Error> {
         let path = segment_path(self.dir, number);
         if scan.chunks.is_empty() {

@@ -1,8 +1,9 @@
-//! Reading a segment from end to end: every chunk whose checksum holds, wherever it stands.
+//! Sequential reading of a segment: every chunk with a valid checksum, wherever it stands.
 //!
-//! A segment is a row of chunks, and each proves itself: its head gives its length three times, and its checksum covers its data.
-//! Where a chunk cannot be read, the bytes behind it are searched for the next one that proves itself, so that damage costs the
-//! chunks it hits and no other. Damage is told apart from the unfinished last write of a process that was killed.
+//! A segment is a sequence of self-validating chunks: the head gives the length three times, and a checksum
+//! covers the data. Where a chunk cannot be read, the bytes behind it are searched for the next valid one, so
+//! that damage costs the chunks it hits and no other. Damage is distinguished from the unfinished last write
+//! of a killed process.
 
 use super::segment::{
     CHUNK_HEAD, Channels, ChunkEntry, Located, MAGIC, MESSAGE_HEAD, RECORD_HEAD, Spot, message_index, op,
@@ -16,32 +17,32 @@ use std::path::Path;
 /// Content of a segment.
 #[derive(Default)]
 pub(super) struct Scan {
-    /// End of the last whole chunk; bytes behind it belong to no record.
+    /// End of the last complete chunk; bytes behind it belong to no record.
     pub end: u64,
-    /// Bytes of the message index that the last whole chunk lacks, because its write was cut there.
+    /// Bytes missing in the message index of the last chunk, because its write was cut off there.
     pub unwritten: Vec<u8>,
-    /// Whether the summary follows.
+    /// True if the summary follows.
     pub complete: bool,
     pub channels: Channels,
     pub chunks: Vec<ChunkEntry>,
-    /// Unfinished last write: where it begins and what it lacks.
+    /// Unfinished last write: its offset, and the missing part.
     pub torn: Option<Fault>,
-    /// Damage, which no unfinished write explains: where it begins and what it costs.
+    /// Damage not explained by an unfinished write: its offset, and the loss.
     pub damaged: Vec<Fault>,
-    /// Greatest number of a record read so far.
+    /// Highest record number read so far.
     last: Option<u64>,
 }
 
-/// The bytes of a segment with a name for every way in which they can be wrong.
+/// File access to a segment, with a description of every failure.
 struct Bytes {
     file: File,
     length: u64,
 }
 
-/// Where something is wrong, and what.
+/// Offset and description of a fault.
 pub(super) type Fault = (u64, String);
 
-/// Bytes that the search for the next chunk reads at once.
+/// Size of a read in the search for the next chunk, bytes.
 const WINDOW: u64 = 1 << 20;
 
 impl Bytes {
@@ -70,7 +71,7 @@ impl Bytes {
         Ok((head[0], length))
     }
 
-    /// Whether nothing but zeros stands between an offset and the end of the file.
+    /// True if only zeros stand between an offset and the end of the file.
     fn is_blank_from(&self, mut at: u64) -> bool {
         while at < self.length {
             let length = WINDOW.min(self.length - at);
@@ -83,7 +84,7 @@ impl Bytes {
     }
 }
 
-/// A little-endian number of `width` bytes; 0 where there are none.
+/// A little-endian number of `width` bytes; 0 if out of range.
 fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     let slice = bytes.get(at..at + width).unwrap_or(&[]);
     match slice.try_into() {
@@ -92,17 +93,17 @@ fn number(bytes: &[u8], at: usize, width: usize) -> u64 {
     }
 }
 
-/// Head of a chunk as it stands in the file.
+/// Head of a chunk as stored.
 struct Head {
-    /// Bytes of the chunk's data, by each of the three fields that give them.
+    /// Size of the chunk's data, bytes, by each of the three fields that hold it.
     sizes: [Option<u64>; 3],
     times: (u64, u64),
     crc32: u32,
-    /// Whether code and compression are those of a chunk of ours.
+    /// True if code and compression are those of descry's chunks.
     is_chunk: bool,
 }
 
-/// Bytes of a chunk in front of its data.
+/// Bytes of a chunk before its data.
 const HEAD: u64 = RECORD_HEAD + CHUNK_HEAD;
 
 impl Head {
@@ -119,7 +120,7 @@ impl Head {
         }
     }
 
-    /// The size that at least two of its fields give: one damaged field is outvoted.
+    /// The size given by at least two of the three fields: one damaged field is outvoted.
     fn agreed(&self) -> Option<u64> {
         let [a, b, c] = self.sizes;
         let size = if a == b || a == c {
@@ -140,11 +141,12 @@ impl Head {
     }
 }
 
-/// Reads a segment chunk by chunk and hands over each record that is whole. From `acknowledged` on, where it is known, no write
-/// was ever finished.
+/// Reads a segment chunk by chunk and passes each undamaged record to `take`. Behind `acknowledged`, if
+/// known, no write was ever completed.
 ///
 /// # Errors
-/// If the file cannot be opened, or `take` fails. Damage is no error: the scan names it.
+///
+/// If the file cannot be opened, or `take` fails. Damage is reported in the scan instead.
 pub(super) fn scan(
     path: &Path,
     acknowledged: Option<u64>,
@@ -194,7 +196,7 @@ pub(super) fn scan(
 }
 
 impl Scan {
-    /// Takes in a chunk and returns its records.
+    /// Adds a chunk to the scan and returns its records.
     fn adopt(&mut self, chunk: Chunk) -> Vec<(Document, Located)> {
         self.end = chunk.end;
         self.unwritten = chunk.unwritten;
@@ -210,7 +212,7 @@ impl Scan {
         chunk.records
     }
 
-    /// Says that bytes between two chunks cannot be read, and which numbers are missing there.
+    /// The fault for unreadable bytes between two chunks, with the missing record numbers.
     fn gap(&self, bytes: &Bytes, from: u64, to: u64, (at, what): &Fault) -> Fault {
         let first = match step(bytes, to) {
             Ok(Some(chunk)) => chunk.records.first().map(|(document, _)| document.id.0),
@@ -229,7 +231,7 @@ impl Scan {
         )
     }
 
-    /// Says what stands behind the last whole chunk: an unfinished write, or damage.
+    /// Classifies the bytes behind the last complete chunk: an unfinished write, or damage.
     fn stop(&mut self, bytes: &Bytes, at: u64, (place, what): Fault, acknowledged: Option<u64>) {
         if acknowledged.is_some_and(|end| at >= end) || is_unfinished(bytes, at) {
             self.torn = Some((place, what));
@@ -240,8 +242,9 @@ impl Scan {
     }
 }
 
-/// Whether what stands from an offset to the end of the file is the beginning of a write that was never finished. It is if the
-/// file ends within a head, or before the data that a whole head announces, or within the summary, or holds zeros alone.
+/// True if the bytes from an offset to the end of the file are an unfinished write: the file ends within a
+/// head, before the end of the data that a complete head announces, or within the summary, or the rest is all
+/// zeros.
 fn is_unfinished(bytes: &Bytes, at: u64) -> bool {
     let left = bytes.length.saturating_sub(at);
     let Ok(found) = bytes.read(at, left.min(HEAD)) else { return false };
@@ -258,7 +261,7 @@ fn is_unfinished(bytes: &Bytes, at: u64) -> bool {
     begun || bytes.is_blank_from(at)
 }
 
-/// Checks what stands behind the data of a complete segment.
+/// Checks the summary of a complete segment.
 fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     let start = at + RECORD_HEAD + 4;
     let rest = bytes.read(start, bytes.length.saturating_sub(start))?;
@@ -278,8 +281,9 @@ fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The next offset behind a damaged place from which reading can go on: a chunk that proves itself, or the end of the data.
-/// A chunk whose damaged data is all there is passed as a whole, so that nothing within its blobs is taken for a chunk.
+/// The next offset at which reading can resume behind damage: a valid chunk, or the end of the data. A chunk
+/// with damaged data but of full length is skipped as a whole, so that no bytes within its blobs are mistaken
+/// for a chunk.
 fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     let passed = bytes.read(at, HEAD).ok().map(|head| Head::parse(&head)).filter(|head| head.is_chunk);
     let passed = passed.and_then(|head| head.agreed()).and_then(|size| at.checked_add(HEAD + size));
@@ -303,19 +307,19 @@ fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     None
 }
 
-/// The record that ends the data, of which no checksum is written.
+/// The record that ends the data section, written without a checksum.
 const END_OF_DATA: [u8; 13] = [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
 
-/// A chunk that proved itself.
+/// A valid chunk.
 struct Chunk {
     records: Vec<(Document, Located)>,
     entry: ChunkEntry,
     channels: Channels,
-    /// Where the next should begin.
+    /// Expected offset of the next chunk.
     end: u64,
-    /// What is wrong with it, though its records are whole.
+    /// Faults of the chunk beside its undamaged records.
     faults: Vec<Fault>,
-    /// Its message index where the file ends within.
+    /// Truncation of its message index at the end of the file.
     torn: Option<Fault>,
     unwritten: Vec<u8>,
 }
@@ -336,7 +340,7 @@ fn start(bytes: &Bytes) -> Result<u64, Fault> {
     }
 }
 
-/// The chunk at an offset; none at the end of the data.
+/// Reads the chunk at an offset; none at the end of the data.
 fn step(bytes: &Bytes, at: u64) -> Result<Option<Chunk>, Fault> {
     if bytes.read(at, END_OF_DATA.len() as u64).is_ok_and(|found| found == END_OF_DATA) {
         return Ok(None);
@@ -344,7 +348,7 @@ fn step(bytes: &Bytes, at: u64) -> Result<Option<Chunk>, Fault> {
     chunk(bytes, at).map(Some)
 }
 
-/// Reads the chunk at an offset. Damaged fields of its head are outvoted by the others; its checksum decides.
+/// Reads the chunk at an offset. Damaged fields of its head are outvoted by the others; the checksum decides.
 fn chunk(bytes: &Bytes, at: u64) -> Result<Chunk, Fault> {
     let code = bytes.read(at, 1)?[0];
     let raw = bytes.read(at, HEAD)?;
@@ -396,7 +400,7 @@ fn chunk(bytes: &Bytes, at: u64) -> Result<Chunk, Fault> {
 
 type RecordParts = (Vec<(Document, Located)>, Channels, Vec<(u16, u64, u64)>);
 
-/// The records in the data of a chunk: blobs first, then the document that they belong to.
+/// Decodes the records in the data of a chunk: blobs first, then their document.
 fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     let data_at = chunk_at + RECORD_HEAD + CHUNK_HEAD;
     let mut records = Vec::new();
@@ -450,13 +454,13 @@ fn records(data: &[u8], chunk_at: u64) -> Result<RecordParts, Fault> {
     }
 }
 
-/// The last `length` bytes before `end` in the data of a chunk.
+/// Spot of the last `length` bytes before `end` in the data of a chunk.
 fn spot(data: &[u8], data_at: u64, end: usize, length: usize) -> Spot {
     let from = end.saturating_sub(length);
     Spot { at: data_at + from as u64, crc32: crc32fast::hash(data.get(from..end).unwrap_or(&[])) }
 }
 
-/// Where the blobs of a document lie, whose messages end there.
+/// Spots of a document's blobs, whose messages end at these offsets.
 fn located_blobs(
     data: &[u8],
     data_at: u64,
@@ -471,12 +475,12 @@ fn located_blobs(
     Ok(blobs.map(|(end, info)| spot(data, data_at, *end, info.bytes as usize)).collect())
 }
 
-/// The document that a message is, if it is one; the messages of blobs never begin with a brace.
+/// Decodes a message as a document; none for the messages of blobs, which never begin with a brace.
 fn document(content: &[u8]) -> Option<Document> {
     if content.first() == Some(&b'{') { serde_json::from_slice(content).ok() } else { None }
 }
 
-/// Whether a chunk, or the end of the data or of the file, stands at an offset.
+/// True if a chunk, the end of the data, or the end of the file is at an offset.
 fn begins_at(bytes: &Bytes, at: u64) -> bool {
     at == bytes.length
         || bytes.read(at, HEAD).is_ok_and(|head| Head::parse(&head).is_whole())

@@ -1,7 +1,7 @@
-//! One segment: an MCAP file that grows by whole chunks, one for each batch of records.
+//! Segment of a store: an MCAP file that grows by whole chunks, one for each batch of records.
 //!
-//! A chunk carries the checksum of its messages, so that a batch is there as a whole or not at all. Chunks are not
-//! compressed: a blob lies in the file as one piece and is read without touching anything else.
+//! A chunk has a checksum over its messages, so that a batch is present as a whole or not at all. Chunks are
+//! not compressed: the bytes of a blob are contiguous in the file and can be read alone.
 
 use crate::document::{Document, Form};
 use crate::error::Error;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
-/// Codes of the records of MCAP.
+/// Opcodes of MCAP records.
 pub(crate) mod op {
     pub const HEADER: u8 = 0x01;
     pub const FOOTER: u8 = 0x02;
@@ -29,23 +29,24 @@ pub(crate) mod op {
     pub const DATA_END: u8 = 0x0F;
 }
 
-/// Code and length in front of each record of MCAP, bytes.
+/// Size of opcode and length before each MCAP record, bytes.
 pub(crate) const RECORD_HEAD: u64 = 9;
-/// What stands between the head of a chunk and its messages, bytes: times, size, checksum, no compression, size.
+/// Size of the fields between the head of a chunk and its messages, bytes: times, size, checksum, no
+/// compression, size.
 pub(crate) const CHUNK_HEAD: u64 = 8 + 8 + 8 + 4 + 4 + 8;
-/// What stands between the head of a message and its data, bytes: channel, sequence, times.
+/// Size of the fields between the head of a message and its data, bytes: channel, sequence, times.
 pub(crate) const MESSAGE_HEAD: u64 = 2 + 4 + 8 + 8;
 
-/// A segment rolls after so many chunks, which bounds the memory that its summary takes.
+/// Maximum number of chunks in a segment, which limits the memory for its summary.
 pub(crate) const MAX_CHUNKS: usize = 1 << 14;
 
-/// A record on its way into a segment.
+/// A record to be written to a segment.
 pub(crate) struct Encoded<'a> {
     pub document: Document,
     pub blobs: Vec<&'a [u8]>,
 }
 
-/// Where bytes came to lie, and their checksum, by which they are known to be what was written.
+/// Location of bytes in the file, with their checksum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Spot {
     /// Offset in the file.
@@ -53,18 +54,18 @@ pub(crate) struct Spot {
     pub crc32: u32,
 }
 
-/// Where a record came to lie: its document and the bytes of its blobs.
+/// Location of a record: its document and the bytes of its blobs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Located {
     pub chunk: u64,
     pub document: Spot,
     pub document_bytes: u64,
     pub blobs: Vec<Spot>,
-    /// Bytes of all its messages in the file.
+    /// Total size of its messages in the file, bytes.
     pub message_bytes: u64,
 }
 
-/// What a summary says of a chunk.
+/// Summary entry of a chunk.
 #[derive(Clone, Debug)]
 pub(crate) struct ChunkEntry {
     pub start_ns: u64,
@@ -73,11 +74,11 @@ pub(crate) struct ChunkEntry {
     pub bytes: u64,
     pub data_bytes: u64,
     pub index_bytes: u64,
-    /// Where the message index of each channel lies.
+    /// Offset of the message index of each channel.
     pub indexes: Vec<(u16, u64)>,
 }
 
-/// Schemas and channels of a segment, and how many messages each channel has.
+/// Schemas and channels of a segment, with the message count of each channel.
 #[derive(Default)]
 pub(crate) struct Channels {
     pub schemas: Vec<Vec<u8>>,
@@ -87,7 +88,7 @@ pub(crate) struct Channels {
     pub messages: BTreeMap<u16, u64>,
 }
 
-/// A segment that grows.
+/// A segment open for writing.
 pub(crate) struct Segment {
     pub path: PathBuf,
     pub number: u64,
@@ -97,7 +98,7 @@ pub(crate) struct Segment {
     pub chunks: Vec<ChunkEntry>,
 }
 
-/// Appends the bytes of records of MCAP to a buffer.
+/// Writer of MCAP records into a buffer.
 pub(crate) struct Writer<'a>(pub &'a mut Vec<u8>);
 
 impl Writer<'_> {
@@ -128,7 +129,7 @@ impl Writer<'_> {
 }
 
 impl Channels {
-    /// The number of the channel of a topic; what declares it, where it is new, goes to `declare`.
+    /// The number of a topic's channel; the declaration of a new channel is appended to `declare`.
     fn channel(&mut self, topic: &str, form: Option<Form>, declare: &mut Vec<u8>) -> Result<u16, Error> {
         let key = (topic.to_owned(), form);
         if let Some(id) = self.ids.get(&key) {
@@ -171,22 +172,22 @@ impl Channels {
         Ok(id)
     }
 
-    /// Takes in a schema as it stands in a segment that is being mended.
+    /// Adds an existing schema of a segment that is being repaired.
     pub fn adopt_schema(&mut self, record: &[u8]) {
         self.schemas.push(record.to_vec());
     }
 
-    /// Takes in a channel as it stands in a segment that is being mended.
+    /// Adds an existing channel of a segment that is being repaired.
     pub fn adopt_channel(&mut self, record: &[u8]) {
         self.channels.push(record.to_vec());
     }
 }
 
-/// A chunk in the making: small parts in one buffer, blobs where they are.
+/// A chunk under construction: small parts in one buffer, blobs by reference.
 #[derive(Default)]
 struct Batch<'a> {
     small: Vec<u8>,
-    /// After so many bytes of `small` comes this blob, with its checksum.
+    /// Blobs, each with its offset in `small` and its checksum.
     blobs: Vec<(usize, &'a [u8], Hasher)>,
     blob_bytes: u64,
     start_ns: u64,
@@ -200,7 +201,8 @@ impl<'a> Batch<'a> {
         self.small.len() as u64 + self.blob_bytes
     }
 
-    /// Adds a message and returns the offset of its last part within the chunk's data, and the checksum of that part.
+    /// Adds a message and returns the offset of its last part within the chunk's data, and the checksum of
+    /// that part.
     fn message(
         &mut self,
         channel: u16,
@@ -236,7 +238,7 @@ impl<'a> Batch<'a> {
         Spot { at, crc32 }
     }
 
-    /// The chunk's data in pieces, and its checksum: that of a blob is there already.
+    /// The chunk's data in slices, and its checksum, combined from those of the blobs.
     fn slices(&self) -> (Vec<&[u8]>, u32) {
         let mut slices = Vec::with_capacity(2 * self.blobs.len() + 1);
         let mut sum = Hasher::new();
@@ -254,11 +256,11 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Blobs below this are copied together: a system call a piece costs more.
+/// Size below which blobs are copied into one buffer, bytes: a system call for each would cost more.
 const COPIED_BELOW: usize = 16 << 10;
 
 impl Segment {
-    /// Starts a segment; its header is written, not yet synced.
+    /// Creates a segment; its header is written, but not synced.
     pub fn create(path: &Path, number: u64) -> Result<Self, Error> {
         let file = File::options().read(true).write(true).create_new(true).open(path);
         let file = file.map_err(|e| Error::file("cannot create", path, e))?;
@@ -279,7 +281,7 @@ impl Segment {
         Ok(segment)
     }
 
-    /// A segment as it was found, to be finished.
+    /// Reopens an existing segment to finish it.
     pub fn reopen(
         path: &Path,
         number: u64,
@@ -297,7 +299,7 @@ impl Segment {
         Ok(segment)
     }
 
-    /// Writes a batch as one chunk; on an error the file is as it was.
+    /// Writes a batch as one chunk; on an error the file stays unchanged.
     pub fn append(&mut self, batch: &[Encoded]) -> Result<Vec<Located>, Error> {
         let mut declared = Vec::new();
         let (counts, schemas, channels) =
@@ -391,24 +393,24 @@ impl Segment {
         Ok(())
     }
 
-    /// Takes the last chunk back, whose records could not be indexed.
+    /// Removes the last chunk, whose records could not be indexed.
     pub fn take_back(&mut self, end: u64) -> Result<(), Error> {
         self.chunks.retain(|c| c.offset < end);
         self.end = end;
         self.cut()
     }
 
-    /// Brings everything to the disk.
+    /// Syncs everything to the disk.
     pub fn sync(&self) -> Result<(), Error> {
         self.file.sync_data().map_err(|e| Error::file("cannot sync", &self.path, e))
     }
 
-    /// Whether it should be followed by another.
+    /// True if the segment should be followed by another.
     pub fn is_long(&self, segment_bytes: u64) -> bool {
         self.end >= segment_bytes || self.chunks.len() >= MAX_CHUNKS
     }
 
-    /// Writes the summary, by which viewers find their way, and syncs. The file is complete then.
+    /// Writes the summary, which viewers use to seek, and syncs. The file is complete then.
     pub fn finish(&mut self) -> Result<u64, Error> {
         let end = self.end;
         let bytes = self.summary();
@@ -477,7 +479,7 @@ impl Segment {
         });
     }
 
-    /// Writes bytes at the end.
+    /// Appends bytes.
     pub fn write(&mut self, parts: &[&[u8]]) -> Result<(), Error> {
         let mut slices: Vec<IoSlice> = parts.iter().map(|p| IoSlice::new(p)).collect();
         let mut rest = slices.as_mut_slice();
@@ -496,14 +498,14 @@ impl Segment {
         Ok(())
     }
 
-    /// Drops whatever stands in the file behind its end.
+    /// Truncates the file to its valid end.
     fn cut(&self) -> Result<(), Error> {
         self.file.set_len(self.end).map_err(|e| Error::file("cannot shorten", &self.path, e))
     }
 }
 
 impl Channels {
-    /// The number of the next message of a channel.
+    /// Sequence number of the next message of a channel.
     fn count(&mut self, channel: u16) -> u32 {
         let count = self.messages.entry(channel).or_default();
         *count += 1;
@@ -531,7 +533,8 @@ impl ChunkEntry {
     }
 }
 
-/// The index of a chunk: its records, and where each channel's begins among them. Messages are channel, time and offset.
+/// The message index of a chunk, and the offset of each channel's part. Messages are channel, time and
+/// offset.
 pub(crate) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16, u64)>) {
     let mut by_channel: BTreeMap<u16, Vec<(u64, u64)>> = BTreeMap::new();
     for (channel, stamp_ns, at) in messages {
@@ -553,7 +556,7 @@ pub(crate) fn message_index(messages: &[(u16, u64, u64)]) -> (Vec<u8>, Vec<(u16,
     (index, begins)
 }
 
-/// A document as the bytes of its message.
+/// Encodes a document as the bytes of its message.
 fn encode(document: &Document) -> Result<Vec<u8>, Error> {
     serde_json::to_vec(document).map_err(|e| Error::Input {
         what: format!("the {} cannot be written as JSON: {e}", document.kind),

@@ -1,4 +1,4 @@
-//! Reading everything there is, and saying what is not whole.
+//! Verification of a whole store.
 
 use super::index::Place;
 use super::scan::scan;
@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::stores::{Fault, Report};
 use std::collections::BTreeMap;
 
-/// Reads every segment, checks its checksums, and compares what lies in it with what the index says.
+/// Verifies the checksums of every segment, and compares its content with the index.
 pub(super) fn verify(store: &LocalStore) -> Result<Report, Error> {
     let mut report = Report::default();
     let faults = |what: Vec<String>| {

@@ -1,4 +1,4 @@
-//! Keeping within limits: what goes, goes oldest first and with its files.
+//! Retention: records are removed oldest first, together with their files.
 
 use super::{MongoStore, number_of, whole};
 use crate::document::Draft;
@@ -7,15 +7,16 @@ use crate::stores::Retention;
 use mongodb::bson::{Bson, Document as Fields, doc, oid::ObjectId};
 use std::sync::atomic::Ordering;
 
-/// Records that go at a time.
+/// Number of records removed at a time.
 const AT_A_TIME: i64 = 64;
 
 impl MongoStore {
-    /// Makes room for what is coming. Looks at the limits whenever a sixty-fourth of what is allowed has been written, and without a
-    /// limit in bytes each time.
+    /// Makes room for drafts. Checks the limits after every sixty-fourth of the allowed bytes, or each time
+    /// without a size limit.
     ///
     /// # Errors
-    /// [`Error::Bounded`] if what is pinned, and what is of the same moment, leaves too little.
+    ///
+    /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
     pub(super) fn make_room(&self, coming: u64, drafts: &[Draft]) -> Result<(), Error> {
         if self.retention == Retention::default() {
             return Ok(());
@@ -41,8 +42,8 @@ impl MongoStore {
         if must_fit && over > bound / 64 { refused(self.bytes(doc! {})?) } else { Ok(()) }
     }
 
-    /// Removes what is over the limits once so many bytes have come; what lasts until `now_ns` stays. Returns how many records went,
-    /// and by how many bytes it is still over.
+    /// Removes records until the limits hold with `coming` more bytes; data up to `now_ns` stays. Returns the
+    /// number of removed records, and the remaining excess in bytes.
     pub(super) fn keep_within(
         &self,
         retention: &Retention,
@@ -74,7 +75,7 @@ impl MongoStore {
         Ok((gone, over))
     }
 
-    /// Who holds how many records of how many bytes, the most first.
+    /// The holders of pins with the number and bytes of their records, largest first.
     fn holders(&self) -> Result<Vec<(String, u64, u64)>, Error> {
         let each = doc! { "$unwind": "$pins" };
         let sum = doc! { "$group": { "_id": "$pins", "records": { "$sum": 1_i64 }, "bytes": { "$sum": "$bytes" } } };
@@ -88,7 +89,7 @@ impl MongoStore {
         Ok(held)
     }
 
-    /// The newest stamp, or the end of what has it.
+    /// End of the newest record, or its stamp if it has no end, nanoseconds.
     pub(super) fn newest_ns(&self) -> Result<Option<i64>, Error> {
         let newest = self.records.find_one(self.own()).sort(doc! { "stamp_ns": -1, "_id": -1 });
         let newest = self.said(newest.run())?;
@@ -105,8 +106,8 @@ impl MongoStore {
         Ok(bytes.max(0) as u64)
     }
 
-    /// Removes some of the oldest records that end before a time and are not pinned, until so many bytes are gone. Returns how many
-    /// records and bytes went.
+    /// Removes some of the oldest unpinned records that end before a time, until `wanted` bytes are freed.
+    /// Returns the number and bytes of removed records.
     fn remove_oldest(&self, before_ns: i64, wanted: u64) -> Result<(u64, u64), Error> {
         let ended = doc! { "stamp_ns": { "$lt": before_ns }, "end_ns": { "$not": { "$gte": before_ns } } };
         let filter = doc! { "$and": [self.own(), ended, { "pins.0": { "$exists": false } }] };
@@ -125,7 +126,8 @@ impl MongoStore {
         Ok((ids.len() as u64, bytes))
     }
 
-    /// Removes records with their files. They are pending before their files go: never is a part of a record found.
+    /// Removes records with their files. They are marked as pending first, so that no partial record is ever
+    /// found.
     pub(super) fn remove(&self, ids: &[i64]) -> Result<(), Error> {
         if ids.is_empty() {
             return Ok(());
@@ -136,7 +138,7 @@ impl MongoStore {
         self.remove_marked(these)
     }
 
-    /// Removes what a killed process of this name left half written or half removed.
+    /// Removes half-written and half-removed records of a killed process of this name.
     pub(super) fn remove_pending(&self) -> Result<(), Error> {
         self.remove_marked(doc! { "pending": self.name.robot.clone() })
     }

@@ -1,7 +1,8 @@
-//! The numbers of records where several write into one store: each name counts from 1, as if it were alone, so that what one robot
-//! records, and what its documents say of other records, does not depend on the others.
+//! Record numbers in a shared store: each name counts from 1 as if it were alone, so that the records of one
+//! robot, and the references in its documents, do not depend on the others.
 //!
-//! In the database a number stands above the index of its name: `_id = (index << 32) + number`. Without a name the index is 0.
+//! The database key stands above the index of the name: `_id = (index << 32) + number`. Without a name the
+//! index is 0.
 
 use super::{MongoStore, number_of};
 use crate::document::RecordId;
@@ -10,29 +11,30 @@ use mongodb::bson::{Document as Fields, doc};
 use mongodb::options::ReturnDocument;
 
 const BITS: u32 = 32;
-/// The document of `names` that counts them; no robot is called so.
+/// Key of the document in `names` that counts the names; no robot has it as a name.
 const ALL: i64 = 0;
 
-/// Whose records a store is about.
+/// Scope of a store: the name of a robot.
 pub struct Name {
     pub robot: String,
-    /// Its place among the names of the store; none if nothing was ever recorded under it.
+    /// Index of the name in the store; none before the first record.
     pub index: Option<i64>,
 }
 
 impl Name {
-    /// The number in the database of a record as it is known outside.
+    /// Converts a public record number to the database key.
     pub fn inward(&self, id: RecordId) -> i64 {
         let number = i64::try_from(id.0).unwrap_or(i64::MAX);
         if number >> BITS == 0 { (self.index.unwrap_or(0) << BITS) | number } else { number }
     }
 
-    /// The numbers in the database of records as they are known outside.
+    /// Converts public record numbers to database keys.
     pub fn all_inward(&self, ids: &[RecordId]) -> Vec<i64> {
         ids.iter().map(|id| self.inward(*id)).collect()
     }
 
-    /// A record as it is known outside: an own one by its number alone.
+    /// Converts a database key to the public record number; records of this name are identified by the number
+    /// alone.
     pub fn outward(&self, number: i64) -> RecordId {
         let own = self.index == Some(number >> BITS);
         RecordId(if own { number & ((1 << BITS) - 1) } else { number }.unsigned_abs())
@@ -61,7 +63,7 @@ impl MongoStore {
         self.index()?.map_or_else(|| made.and(Err(self.remote("its names cannot be read"))), Ok)
     }
 
-    /// The first of so many numbers, as they are known outside.
+    /// Allocates `count` consecutive numbers; returns the first.
     pub(super) fn numbers(&self, count: usize) -> Result<u64, Error> {
         let last = self.count(doc! { "_id": &self.name.robot }, count as i64)?;
         if last >> BITS != 0 {
@@ -78,7 +80,7 @@ impl MongoStore {
         last.ok_or_else(|| self.remote("the last number of a name is no number"))
     }
 
-    /// Takes back the numbers that a killed process of this name took and gave to no record that anyone knows.
+    /// Releases numbers that a killed process of this name allocated but did not use in any visible record.
     pub(super) fn free_numbers(&self) -> Result<(), Error> {
         let newest = self.records.find_one(self.own()).sort(doc! { "_id": -1 });
         let newest = self.said(newest.run())?.and_then(|fields| number_of(&fields)).unwrap_or(0);
@@ -89,7 +91,7 @@ impl MongoStore {
         self.said(self.names.update_one(doc! { "_id": &self.name.robot }, back).run()).map(|_| ())
     }
 
-    /// Remembers which numbers were given to records that are about to go.
+    /// Stores the highest number among records that are about to be removed.
     pub(super) fn remember_numbers(&self, numbers: &[i64]) -> Result<(), Error> {
         let newest = numbers.iter().max().copied().unwrap_or(0);
         let keep = doc! { "$max": { "pruned": newest } };

@@ -1,11 +1,11 @@
-//! Queries in the words of MongoDB.
+//! Translation of queries to MongoDB filters.
 
 use super::number::Name;
 use crate::document::{Document, Near, Order, Query};
 use mongodb::bson::{Document as Fields, doc};
 
-/// The conditions of a query that the server decides, and for places boxes around what is meant. What is pending is never found;
-/// `own` says whose records are meant where the query names nobody; without a name everybody's.
+/// Filter for the conditions that the server decides, with bounding boxes for places. Pending records are
+/// excluded; `own` gives the robot if the query names none, and all robots if it has no name.
 pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     let mut all = vec![doc! { "pending": { "$exists": false } }];
     let whose = Some(own.robot.clone()).filter(|robot| !robot.is_empty());
@@ -36,8 +36,8 @@ pub(super) fn filter(query: &Query, own: &Name) -> Fields {
     doc! { "$and": all }
 }
 
-/// Bounding-box condition around a ball: each coordinate of the greater corner above it, of the
-/// lesser below.
+/// Bounding-box condition around a ball: each coordinate of the maximum corner above the lower bound, of the
+/// minimum corner below the upper bound.
 fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<Item = Fields> + 'a {
     (0..3).map(move |i| {
         let (low, high) = (near.place_m[i] - near.radius_m, near.place_m[i] + near.radius_m);
@@ -46,12 +46,12 @@ fn within<'a>(near: &'a Near, [greater, lesser]: [&'a str; 2]) -> impl Iterator<
     })
 }
 
-/// True if a query asks for places: the server's results then have to be filtered.
+/// True if a query has a spatial condition, so that the server's results have to be filtered.
 pub(super) fn is_of_places(query: &Query) -> bool {
     query.seen_from.is_some() || query.covers.is_some()
 }
 
-/// True if a document lies where a query asks for.
+/// True if a document meets the spatial conditions of a query.
 pub(super) fn is_there(query: &Query, document: &Document) -> bool {
     let seen = |near: &Near| {
         document.seen_from_m.is_some_and(|p| {

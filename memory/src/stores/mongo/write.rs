@@ -1,4 +1,4 @@
-//! Recording: a document is kept as pending until its files are there, so that nobody ever finds a part of a record.
+//! Recording: a document stays pending until its files are stored, so that no partial record is ever found.
 
 use super::{MongoStore, number_of};
 use crate::document::{Document, Draft, RecordId};
@@ -9,14 +9,14 @@ use mongodb::bson::{self, Document as Fields, doc, oid::ObjectId};
 use std::collections::BTreeSet;
 use std::io::Write;
 
-/// A record on its way: what will be found of it, and the files of its blobs.
+/// A record to be written: its fields, and the files of its blobs.
 struct Row {
     fields: Fields,
     files: Vec<ObjectId>,
 }
 
 impl MongoStore {
-    /// Keeps within the limits and records a batch. What cannot be recorded whole is taken back.
+    /// Makes room and records a batch. A batch that cannot be recorded completely is removed again.
     pub(super) fn record(&self, drafts: &[Draft]) -> Result<Vec<RecordId>, Error> {
         if drafts.is_empty() {
             return Ok(Vec::new());
@@ -65,7 +65,7 @@ impl MongoStore {
         Ok(())
     }
 
-    /// A draft as it will be kept, its number still open.
+    /// Converts a draft to its stored form, without a number.
     fn row(&self, draft: &Draft) -> Result<Row, Error> {
         let document = draft.document(RecordId(0), &self.name.robot)?;
         let files: Vec<ObjectId> = draft.blobs.iter().map(|_| ObjectId::new()).collect();
@@ -86,7 +86,7 @@ impl MongoStore {
         Ok(Row { fields, files })
     }
 
-    /// Puts the blobs of a record into GridFS.
+    /// Uploads the blobs of a record to GridFS.
     fn upload(&self, id: RecordId, draft: &Draft, files: &[ObjectId]) -> Result<(), Error> {
         for (blob, file) in draft.blobs.iter().zip(files) {
             let name = format!("{}/{id}/{}", draft.kind, blob.name);
@@ -98,8 +98,8 @@ impl MongoStore {
         Ok(())
     }
 
-    /// Pins records, beside those that `by` holds or instead of them; a record of its own says so. Whenever it is cut off, more is
-    /// held than should be and never less.
+    /// Pins records, in addition to the pins of `by` or instead of them, and records that in a document. An
+    /// interruption leaves too many pins rather than too few.
     pub(super) fn pin_records(&self, ids: &[RecordId], by: &str, instead: bool) -> Result<(), Error> {
         self.check_there(ids)?;
         let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
@@ -128,7 +128,7 @@ impl MongoStore {
         self.said(self.records.update_many(these, doc! { "$addToSet": { "pins": by } }).run()).map(|_| ())
     }
 
-    /// Takes back every pin in the name of `by`; a record of its own says so.
+    /// Removes all pins of `by`, and records that in a document.
     pub(super) fn unpin_records(&self, by: &str) -> Result<(), Error> {
         let now_ns = self.newest_ns()?.unwrap_or(0).max(0);
         self.record(&[pins::unpinned(now_ns, by)])?;
@@ -142,7 +142,7 @@ impl MongoStore {
     }
 }
 
-/// The fields under which a document is kept.
+/// The stored fields of a document.
 fn fields(document: &Document) -> Result<Fields, Error> {
     let mut fields = bson::serialize_to_document(document).map_err(|e| Error::Input {
         what: format!("what is to be recorded is no document of MongoDB: {e}"),

@@ -1,4 +1,4 @@
-//! A command of descry in a process of its own: it tells its steps, and is stopped as a person stops it.
+//! Runs a descry command in a child process, with its progress and a stop as by Ctrl-C.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use descry_agent::exit::Exit;
 use rustix::process::{Pid, Signal, kill_process};
 
-/// Time that a command has to halt the body and keep its record when it is stopped.
+/// Time for a stopped command to halt the body and finish its record.
 pub(crate) const HALT: Duration = Duration::from_secs(20);
-/// Between looks whether a stopped command has ended.
+/// Interval between checks for the end of a stopped command.
 pub(crate) const POLL: Duration = Duration::from_millis(20);
 
-/// A command while it is carried out; several processes may follow each other.
+/// A running command; one `Child` may cover several processes in a row.
 #[derive(Default)]
 pub(crate) struct Child(Mutex<State>);
 
@@ -25,23 +25,23 @@ struct State {
     has_ended: bool,
 }
 
-/// What a command has come to.
+/// Result of a command.
 pub(crate) struct Ended {
     /// The exit code.
     pub(crate) exit: i32,
     /// Its standard output.
     pub(crate) out: String,
-    /// What it told people.
+    /// Its narration on standard error.
     pub(crate) told: String,
 }
 
 impl Child {
-    /// Whether nothing more will be carried out.
+    /// True if nothing more will run.
     pub(crate) fn has_ended(&self) -> bool {
         self.state(|state| state.has_ended)
     }
 
-    /// Says that nothing more will be carried out; true if it was stopped.
+    /// Marks the end of all work; returns true if it was stopped.
     pub(crate) fn end(&self) -> bool {
         self.state(|state| {
             state.has_ended = true;
@@ -50,7 +50,7 @@ impl Child {
         })
     }
 
-    /// Stops it as a person would.
+    /// Stops the command by SIGINT, as Ctrl-C does.
     pub(crate) fn stop(&self) {
         self.state(|state| {
             state.is_stopped = true;
@@ -63,10 +63,11 @@ impl Child {
         of(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Carries out a command line of descry; `begun` is told the process, `tell` each line for people.
+    /// Runs a descry command line; `begun` receives the process ID, `tell` each line of narration.
     ///
     /// # Errors
-    /// It cannot be started or waited for.
+    ///
+    /// The process cannot be started or waited for.
     pub(crate) fn carry_out(
         &self,
         words: &[String],
@@ -115,7 +116,7 @@ impl Child {
         Ok(Ended { exit, out, told })
     }
 
-    /// The exit code of a command whose output has ended; one that was stopped and stays is killed.
+    /// Waits for the exit code of a command whose output has ended; kills a stopped one that does not exit.
     fn wait(&self, child: &mut std::process::Child) -> Result<i32, String> {
         let mut stopped: Option<Instant> = None;
         loop {

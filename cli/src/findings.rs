@@ -1,13 +1,14 @@
-//! Everything that is to be said about the whole folder of a domain: the same on the command line and in an editor.
+//! Findings about the folder of a domain, common to the command line and the language server.
 
 use descry_domains::check;
 use descry_domains::load::{Domain, LoadError};
 use descry_planner::Findings;
 
-/// The findings in a domain's folder, and how each of its words is grounded.
+/// The findings in a domain's folder, and the grounding of each of its words.
 ///
 /// # Errors
-/// [`LoadError`] where it cannot be loaded for a reason that no finding tells.
+///
+/// [`LoadError`] for reasons other than findings.
 pub fn of_folder(loaded: Result<Domain, LoadError>) -> Result<(Findings, Vec<String>), LoadError> {
     let domain = match loaded {
         Ok(domain) => domain,

@@ -1,11 +1,12 @@
-//! PDDL and plans laid out, whichever a text is: the same on the command line and in an editor.
+//! Formatting of PDDL and plans, common to the command line and the language server.
 
 use descry_planner::{Findings, Plan, Source, pddl};
 
-/// A text laid out.
+/// Formats a text.
 ///
 /// # Errors
-/// What keeps it from being read: such a text is not touched.
+///
+/// The findings that prevent parsing; such a text is left unchanged.
 pub fn laid_out(source: &Source) -> Result<String, Findings> {
     if is_plan(&source.text) { Plan::format(source) } else { pddl::format(source) }
 }

@@ -1,4 +1,4 @@
-//! The command line, and what serves editors and assistants.
+//! The command line, and the servers for editors and assistants.
 
 mod child;
 pub mod commands;

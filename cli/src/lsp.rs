@@ -1,5 +1,6 @@
-//! A language server: findings as one types with the mends that they offer, hover, definitions, completion, layout and symbols, for PDDL, plans and the TOML of a
-//! domain's folder. The findings are those of `descry check`, the layout that of `descry fmt`.
+//! Language server: findings as the user types with their fixes, hover, definitions, completion, formatting
+//! and symbols, for PDDL, plans and the TOML files of a domain. The findings equal those of `descry check`,
+//! the formatting that of `descry fmt`.
 
 mod declared;
 mod findings;
@@ -31,10 +32,11 @@ use serde_json::{Value, json};
 use descry_agent::exit::CommandError;
 use texts::Texts;
 
-/// Serves an editor over standard input and output until it goes.
+/// Serves an editor over standard input and output until it disconnects.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if the editor does not speak the protocol, or goes without a word.
+///
+/// [`CommandError::Broken`] if the editor violates the protocol, or disconnects without a shutdown.
 pub fn serve() -> Result<(), CommandError> {
     let (connection, threads) = Connection::stdio();
     serve_over(&connection)?;
@@ -42,10 +44,11 @@ pub fn serve() -> Result<(), CommandError> {
     threads.join().map_err(CommandError::broken)
 }
 
-/// Serves an editor over a connection until it goes.
+/// Serves an editor over a connection until it disconnects.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if the editor does not speak the protocol, or goes without a word.
+///
+/// [`CommandError::Broken`] if the editor violates the protocol, or disconnects without a shutdown.
 pub fn serve_over(connection: &Connection) -> Result<(), CommandError> {
     let capabilities = serde_json::to_value(capabilities()).map_err(|e| CommandError::Bug(e.to_string()))?;
     let (id, _) = connection.initialize_start().map_err(|e| {
@@ -113,7 +116,7 @@ fn send(connection: &Connection, message: Message) -> Result<(), CommandError> {
     connection.sender.send(message).map_err(|_| CommandError::broken("the editor has gone"))
 }
 
-/// Takes in what the editor says; returns the findings that follow.
+/// Handles a notification; returns the findings that follow.
 fn hear(
     texts: &mut Texts,
     told: &mut findings::Told,

@@ -1,4 +1,4 @@
-//! `descry`: the command line, an interface that scripts depend on.
+//! `descry`: the command line, a stable interface for scripts.
 
 use std::process::ExitCode;
 
@@ -11,7 +11,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
-/// Merging asks for tens of megabytes a look and gives them back: one that keeps them for the next is quicker.
+/// Allocator that keeps freed memory for reuse: each merge allocates and frees tens of megabytes.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -41,7 +41,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Lets signals ask to stop; the second Ctrl-C ends the program at once.
+/// Translates signals to stop requests; a second Ctrl-C ends the program at once.
 fn listen(stop: &Stop) {
     let stop = stop.clone();
     let thread = std::thread::Builder::new().name("signals".into());
@@ -72,7 +72,7 @@ fn hear(stop: &Stop) -> std::io::Result<()> {
     })
 }
 
-/// Lets warnings reach people, on standard error; `RUST_LOG` asks for more or less.
+/// Prints warnings on standard error; `RUST_LOG` sets the level.
 fn warn_people() {
     let asked = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter = asked.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));

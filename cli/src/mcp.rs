@@ -1,7 +1,7 @@
-//! The Model Context Protocol over standard input and output: JSON-RPC 2.0, a message a line.
+//! Model Context Protocol over standard input and output: JSON-RPC 2.0, one message a line.
 //!
-//! Each tool is a command of descry, carried out by a process of its own: what a call does cannot hurt the server, and a call is
-//! cancelled as a person stops a command.
+//! Each tool runs a descry command in a process of its own, so that a call cannot harm the server, and a
+//! cancelled call stops like a command on Ctrl-C.
 
 mod call;
 mod tools;
@@ -16,36 +16,37 @@ use serde_json::{Value, json};
 
 use crate::child::Child;
 
-/// Versions of the protocol that are spoken, the newest first.
+/// Supported versions of the protocol, newest first.
 const VERSIONS: [&str; 4] = ["2025-11-25", "2025-06-18", "2025-03-26", "2024-11-05"];
-/// Bytes of a message at most.
+/// Maximum size of a message, bytes.
 const MESSAGE_BYTES: usize = 16 << 20;
 
-/// JSON-RPC: the text is no JSON.
+/// JSON-RPC error code: the text is not JSON.
 const PARSE_ERROR: i64 = -32700;
-/// JSON-RPC: the message is no request.
+/// JSON-RPC error code: the message is not a request.
 const INVALID_REQUEST: i64 = -32600;
-/// JSON-RPC: there is no such method.
+/// JSON-RPC error code: unknown method.
 const METHOD_NOT_FOUND: i64 = -32601;
-/// JSON-RPC: the parameters are not as the method or tool needs them.
+/// JSON-RPC error code: invalid parameters of a method or tool.
 const INVALID_PARAMS: i64 = -32602;
 
 const INSTRUCTIONS: &str = "descry plans in PDDL and has a robot look for things. Check a domain and mend it by its findings before \
 you plan; each finding has a place and most have a mend. `goals` lists what may be said to `run`. A run answers achieved, not_found \
 (all was seen), cannot_tell (something was not, and it says what), impossible or failed; `explain` tells why.";
 
-/// What a server may do.
+/// Permissions of a server.
 pub(crate) struct Served {
-    /// Where runs are written, and below which files may be named.
+    /// Folder for runs; callers may only name files below it.
     pub(crate) folder: PathBuf,
-    /// The body that callers may have besides the simulated one.
+    /// Body that callers may use besides the simulated one.
     pub(crate) robot: Option<String>,
 }
 
 /// Serves until the input ends.
 ///
 /// # Errors
-/// The input cannot be read.
+///
+/// If the input cannot be read.
 pub(crate) fn serve(served: Served) -> io::Result<()> {
     let mut server = Server { served: Arc::new(served), calls: BTreeMap::new(), threads: Vec::new() };
     let mut input = io::stdin().lock();
@@ -72,7 +73,7 @@ pub(crate) fn serve(served: Served) -> io::Result<()> {
 
 struct Server {
     served: Arc<Served>,
-    /// Calls by the text of their id.
+    /// Running calls by the text of their ID.
     calls: BTreeMap<String, Arc<Child>>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -157,7 +158,7 @@ fn refuse(id: &Value, code: i64, message: &str) {
     say(&json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code, "message": message } }));
 }
 
-/// Lines of several threads do not mix.
+/// Output lock, which keeps the lines of several threads apart.
 static OUT: Mutex<()> = Mutex::new(());
 
 fn say(message: &Value) {

@@ -1,7 +1,8 @@
-//! An agent that stays: goals come and go over HTTP, one is pursued at a time, and each ends in a verdict whatever happens between.
+//! The agent as a service: goals arrive over HTTP, one is pursued at a time, and each ends in a verdict
+//! despite interruptions.
 //!
-//! A goal is pursued by `descry do` in a process of its own. What is more urgent interrupts at a safe point: the run is stopped as a
-//! person stops it, and gone on with from its record.
+//! A goal is pursued by `descry do` in a process of its own. A more urgent goal interrupts at a safe point:
+//! the run is stopped as by Ctrl-C, and resumed later from its record.
 
 mod goals;
 mod http;
@@ -21,20 +22,20 @@ use tokio::sync::broadcast;
 use crate::child::{Child, Ended, HALT, POLL};
 use goals::{Goal, Goals, State};
 
-/// News that a slow listener may be behind.
+/// Maximum number of events that a slow listener may lag behind.
 const NEWS: usize = 1024;
 
-/// What is served, and where.
+/// Settings of the service.
 pub(crate) struct Served {
-    /// Where goals and their runs are kept; the whole path.
+    /// Absolute path of the folder of goals and their runs.
     pub(crate) folder: PathBuf,
     /// Options of `descry do` for every goal.
     pub(crate) options: Vec<String>,
-    /// What a caller must show; none on this machine alone.
+    /// Access token for callers; none for a server reachable from this machine alone.
     pub(crate) token: Option<String>,
 }
 
-/// The agent: what its callers and the one who pursues goals share.
+/// State shared by callers and the worker.
 struct Agent {
     served: Served,
     state: Mutex<Inner>,
@@ -44,18 +45,19 @@ struct Agent {
 
 struct Inner {
     goals: Goals,
-    /// What is pursued now, and by what.
+    /// The goal being pursued, and its process.
     current: Option<(Goal, Arc<Child>)>,
-    /// Whether what is pursued now is to be cancelled, rather than gone on with.
+    /// True if the current goal is to be cancelled instead of resumed.
     is_cancelled: bool,
-    /// Whether nothing more is begun.
+    /// True if no further goal will be started.
     is_closing: bool,
 }
 
-/// Serves at an address until it cannot; `ready` is told where.
+/// Serves at an address until an error; `ready` receives the bound address.
 ///
 /// # Errors
-/// The folder, or the address, cannot be used.
+///
+/// The folder or the address cannot be used.
 pub(crate) fn serve(served: Served, address: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Result<()> {
     let mut goals = Goals::of(&served.folder)?;
     let left: Vec<Goal> = goals.all().filter(|goal| goal.state == State::Running).cloned().collect();
@@ -86,7 +88,7 @@ pub(crate) fn serve(served: Served, address: SocketAddr, ready: impl FnOnce(Sock
     Ok(())
 }
 
-/// Stops what goes on of a goal since an earlier server was killed.
+/// Stops the process of a goal that outlived a killed server.
 fn outlived(goal: &Goal) {
     let Some((process, run)) = goal.process.zip(goal.run.as_ref()) else { return };
     let is_its = || {
@@ -109,7 +111,7 @@ impl Agent {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps how a goal stands, and tells whoever listens.
+    /// Stores the state of a goal, and notifies listeners.
     fn keep(&self, inner: &mut Inner, goal: Goal) -> io::Result<Goal> {
         let goal = inner.goals.keep(goal)?;
         // Nobody may listen.
@@ -117,7 +119,7 @@ impl Agent {
         Ok(goal)
     }
 
-    /// Takes a goal in; an urgent one interrupts one that is not.
+    /// Adds a goal; an urgent one interrupts a current goal that is not.
     fn add(&self, goal: String, urgent: bool) -> io::Result<Goal> {
         let mut inner = self.inner();
         let added = inner.goals.add(goal, urgent)?;
@@ -129,7 +131,7 @@ impl Agent {
         Ok(added)
     }
 
-    /// Cancels a goal; none if there is no such one. One that is over stays as it is.
+    /// Cancels a goal; none if it does not exist. A finished goal stays unchanged.
     fn cancel(&self, id: u64) -> io::Result<Option<Goal>> {
         let mut inner = self.inner();
         let Some(goal) = inner.goals.get(id).cloned() else { return Ok(None) };
@@ -146,7 +148,7 @@ impl Agent {
         }
     }
 
-    /// Stops what is pursued, and begins nothing more.
+    /// Stops the current goal, and starts no further one.
     fn close(&self) {
         let mut inner = self.inner();
         inner.is_closing = true;
@@ -156,7 +158,7 @@ impl Agent {
         self.changed.notify_all();
     }
 
-    /// Pursues one goal after the other.
+    /// Pursues the goals one after the other.
     fn work(&self) {
         loop {
             let mut inner = self.inner();
@@ -180,7 +182,7 @@ impl Agent {
         }
     }
 
-    /// A goal whose turn it is, and the command line that pursues it or goes on with it.
+    /// Marks a goal as running, with the command line that starts or resumes it.
     fn begun(&self, goal: Goal) -> (Goal, Vec<String>) {
         let words = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
         let is_there = |run: &String| Path::new(run).join("run.json").exists();
@@ -210,7 +212,7 @@ impl Agent {
         child.carry_out(words, "", Path::new("."), begun, &mut tell)
     }
 
-    /// Keeps what a goal came to: a verdict, or that it was stopped.
+    /// Stores the end of a goal: its verdict, or its interruption.
     fn finish(&self, goal: Goal, child: &Child, ended: Result<Ended, String>) {
         let is_stopped = child.end();
         let mut inner = self.inner();
@@ -229,14 +231,14 @@ impl Agent {
     }
 }
 
-/// A folder for a run of a goal that is not there yet.
+/// A folder for a goal's run that does not exist yet.
 fn fresh(folder: &Path, id: u64) -> String {
     let names = std::iter::once(format!("goal-{id}")).chain((2..).map(|n| format!("goal-{id}-{n}")));
     let mut paths = names.map(|name| folder.join("runs").join(name));
     paths.find(|path| !path.exists()).unwrap_or_default().display().to_string()
 }
 
-/// How a goal ended, as `descry do --json` says; where it says nothing, that it failed, and why.
+/// The report of a goal, as from `descry do --json`; without output, a failure with its reason.
 fn report(goal: &Goal, ended: Result<Ended, String>) -> Value {
     let (out, why) = match ended {
         Ok(ended) => (ended.out, ended.told),

@@ -1,4 +1,4 @@
-//! What descry promises on the command line: one program, so that what all tests share is built and linked once.
+//! Integration tests of the command line, in one binary.
 
 mod beside;
 mod binary;

@@ -1,4 +1,5 @@
-//! An experiment's shards as a scheduler runs them: with the number of each where the scheduler puts it, in one folder that all share.
+//! Shards of an experiment as a scheduler runs them: each with its index in the scheduler's variable, in one
+//! shared folder.
 
 use std::path::Path;
 use std::process::Command;
@@ -21,7 +22,7 @@ targets = ["cup A"]
 truly = "found"
 "#;
 
-/// Where all results of a batch lie that are the same wherever it is done.
+/// The results of a batch that do not depend on where it ran.
 fn results(folder: &Path, out: &str) -> Vec<String> {
     ["jobs.csv", "summary.json", "tables.md"]
         .map(|name| {
@@ -31,7 +32,7 @@ fn results(folder: &Path, out: &str) -> Vec<String> {
         .to_vec()
 }
 
-/// Runs a shell's script as the pod or the task of that number.
+/// Runs a shell command as the pod or array task with these variables.
 fn run(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) {
     let binary = Path::new(env!("CARGO_BIN_EXE_descry"));
     let path = format!(

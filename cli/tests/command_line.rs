@@ -28,7 +28,7 @@ fn shown(output: &Output) -> (String, String) {
     (text(&output.stdout), text(&output.stderr))
 }
 
-/// Runs descry and expects an exit code and words in what it says.
+/// Runs descry and expects an exit code and words in its output.
 fn check(arguments: &[&str], exit: i32, words: &[&str]) -> (String, String) {
     let folder = TempDir::new().expect("a folder can be made");
     let output = descry(arguments, folder.path());
@@ -231,7 +231,7 @@ fn a_broken_domain_is_drawn_with_place_reason_and_mend() {
     check(&["find", "cup A", "--domain", &domain], 2, &["cup-a.toml", "height"]);
 }
 
-/// Copies the built-in domain to a folder, each file changed as asked.
+/// Copies the built-in domain to a folder, with a change applied to each file.
 fn with_domain(to: &Path, change: fn(&str, String) -> String) -> String {
     fn copy(from: &Path, to: &Path, change: fn(&str, String) -> String) {
         std::fs::create_dir_all(to).expect("a folder can be made");
@@ -449,8 +449,8 @@ fn everything_on_a_real_table_is_identified_where_it_stands_from_all_its_views()
     check_real_table(1);
 }
 
-/// Of the frames of a kitchen every so manieth. They were taken by a tracker that drifts: merged as they are stated, the white mug is in
-/// three places.
+/// Identifies the objects in every `every`-th frame of a kitchen recording. The tracker drifts: merged at the
+/// stated poses, the white mug appears in three places.
 fn check_real_table(every: usize) {
     let all = shared("data/kitchen");
     let folder = TempDir::new().expect("a folder can be made");

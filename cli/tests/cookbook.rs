@@ -1,11 +1,11 @@
-//! The cookbook, typed recipe by recipe: its commands run, its outputs compared.
+//! The cookbook, recipe by recipe: its commands run, its outputs compared.
 
 use std::path::Path;
 use std::process::Command;
 
 use crate::tutorial::{follow, page};
 
-/// Copies a folder with all that is in it.
+/// Copies a folder recursively.
 fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).expect("a folder can be made");
     for entry in std::fs::read_dir(from).expect("it is a folder").flatten() {
@@ -18,7 +18,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Follows the section of a number in a copy of the cookbook's folders.
+/// Follows one section in a copy of the cookbook's folders.
 fn recipe(number: usize) {
     if Command::new("python3").arg("--version").output().is_err() {
         println!("SKIPPED: there is no python3");

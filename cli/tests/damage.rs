@@ -1,5 +1,5 @@
-//! Damaged records: a flipped bit, a cut or missing file. Every command shows what it shows of the whole record, or says what is
-//! lost and shows nothing that was not in it.
+//! Damaged records: a flipped bit, a truncated or missing file. Every command shows the same as for the
+//! undamaged record, or reports a loss and shows nothing that was not in it.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// What is asked of every record.
+/// Commands run on every record.
 const COMMANDS: [&[&str]; 9] = [
     &["show", "run", "--json"],
     &["runs", ".", "--json"],
@@ -23,7 +23,7 @@ const COMMANDS: [&[&str]; 9] = [
     &["replay", "run", "--json"],
 ];
 
-/// What a command came to: exit code, its JSON without what differs from run to run, and what it said.
+/// Outcome of a command: exit code, JSON without parts that differ between runs, and messages.
 struct Outcome {
     exit: Option<i32>,
     shown: Value,
@@ -62,7 +62,7 @@ fn files(run: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Spoils a file of a run and says how: half of the time a segment, else any other.
+/// Damages a file of a run and describes the damage: a segment half of the time, else any other file.
 fn spoil(run: &Path, random: &mut ChaCha8Rng) -> String {
     let is_segment = random.random_bool(0.5);
     let of_kind = |path: &PathBuf| path.extension().is_some_and(|e| e == "mcap") == is_segment;
@@ -88,7 +88,7 @@ fn spoil(run: &Path, random: &mut ChaCha8Rng) -> String {
     format!("{} {how} {at}", name.display())
 }
 
-/// A run of which every file is that of another.
+/// Copies a run by links to its files.
 fn linked(from: &Path, to: &Path) {
     std::fs::create_dir_all(to.join("record/segments")).expect("folders can be made");
     for name in files(from) {
@@ -100,7 +100,7 @@ fn linked(from: &Path, to: &Path) {
     }
 }
 
-/// Every record, event and run that a damaged record shows is one that the whole one shows.
+/// Checks that every record, event and run shown of a damaged record is also shown of the undamaged one.
 fn check_shown(whole: &Value, shown: &Value, about: &str) {
     for list in ["records", "events"] {
         let all = whole[list].as_array().map_or(&[][..], Vec::as_slice);
@@ -120,7 +120,8 @@ fn check_shown(whole: &Value, shown: &Value, about: &str) {
     assert_ne!(shown["same"], Value::Bool(true), "{about}");
 }
 
-/// Spoils copies of a run so many times and asks every command; returns how often each said that something is lost.
+/// Damages copies of a run, one for each seed, and runs every command; returns how often each reported a
+/// loss.
 fn check_damage(source: &Path, seeds: std::ops::Range<u64>) -> BTreeMap<String, usize> {
     let run = |folder: &Path| linked(source, &folder.join("run"));
     let whole = TempDir::new().expect("a folder can be made");
@@ -157,7 +158,7 @@ fn check_damage(source: &Path, seeds: std::ops::Range<u64>) -> BTreeMap<String, 
     said_lost
 }
 
-/// A run that has ended, in segments of some megabytes.
+/// A finished run, in segments of some megabytes.
 fn ended(folder: &Path) -> PathBuf {
     check(folder, &["find", "cup A", "--run", "ended", "--max-bytes", "160MB", "--json"], 0);
     folder.join("ended")
@@ -169,7 +170,8 @@ fn a_damaged_record_is_used_as_far_as_it_is_whole() {
     check_damage(&ended(folder.path()), 0..6);
 }
 
-/// What stands beside a record and is whole, but of another run, is not taken for its own; nor is anything missed without it.
+/// Undamaged files from another run beside a record are recognised as foreign; the record is complete without
+/// them.
 #[test]
 fn files_of_another_run_are_told_from_its_own() {
     let folder = TempDir::new().expect("a folder can be made");

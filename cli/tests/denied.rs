@@ -1,5 +1,5 @@
-//! What is asked with "not", "no", "all" and rooms, in phrases of one's own: it is looked at, nothing is made so by a question, and what
-//! nobody has seen is not denied.
+//! Custom phrases with "not", "no", "all" and rooms: the robot looks before it answers, a question changes
+//! nothing, and unseen things are not denied.
 
 use std::fs;
 
@@ -58,7 +58,7 @@ say = "which <kind> are in <first:room> or <second:room>"
 means = "(and (>= (completeness-in <kind> <first:room>) <threshold>) (>= (completeness-in <kind> <second:room>) <threshold>))"
 "#;
 
-/// The domain *home* with phrases of one's own.
+/// The domain *home* with custom phrases.
 fn own() -> TempDir {
     let folder = TempDir::new().expect("a folder can be made");
     for (path, (_, text)) in &Domain::load("home").expect("a built-in domain").files {
@@ -70,7 +70,7 @@ fn own() -> TempDir {
     folder
 }
 
-/// Asks in two rooms: the answer or verdict, what it says, and what was done or not.
+/// Asks in two rooms, and checks the answer or verdict, its words, and the actions taken.
 fn check(folder: &TempDir, goal: &str, seed: u64, expected: &str, words: &str) -> Value {
     let (seed, run) = (seed.to_string(), format!("run-{seed}-{}", goal.replace(' ', "-")));
     let asked =
@@ -166,7 +166,7 @@ fn a_thing_and_a_kind_of_one_name_are_asked_for_at_once() {
     check(&folder, "find the mug and all mugs", 96501, "achieved", words);
 }
 
-/// A place and a thing of one table and another, as they are called.
+/// A scene with two tables and an object, under the given names.
 fn named(surface: &str, other: &str, thing: &str) -> String {
     format!(
         "title = \"Two tables\"\n[room]\nsize_m = [9.0, 5.0]\n[[surface]]\nname = \"{surface}\"\nsize_m = [1.2, 0.8]\nheight_m = 0.72\n[[surface]]\nname = \

@@ -1,4 +1,4 @@
-//! `descry explain RUN`: why a run went as it did, from its record alone.
+//! `descry explain RUN`: explanation of a run from its record alone.
 
 use crate::binary;
 use std::path::Path;
@@ -14,7 +14,7 @@ use descry_domains::load::Domain;
 use descry_robots::sim::FaultPlan;
 use serde_json::Value;
 
-/// A run of the binary, explained; the words that the explanation must have.
+/// Runs the binary, explains the run, and expects words in the explanation.
 fn check(arguments: &[&str], exit: i32, words: &[&str]) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
     let run = binary::outcome(folder.path(), &[arguments, &["--run", "run"]].concat());
@@ -22,7 +22,7 @@ fn check(arguments: &[&str], exit: i32, words: &[&str]) -> Value {
     explained(folder.path(), words)
 }
 
-/// The explanation of a run in short and with all figures, of which each is whole; the words that they must have.
+/// The explanation of a run, short and with all figures, each complete; both must have these words.
 fn explained(folder: &Path, words: &[&str]) -> Value {
     let told = [&["explain", "run"][..], &["explain", "run", "--figures"]].map(|arguments| {
         let said = binary::outcome(folder, arguments);
@@ -234,7 +234,7 @@ fn what_is_shown_of_a_run_says_what_its_verdict_rests_on() {
     assert_eq!(told["rests_on"]["lost"], serde_json::json!([]), "{told}");
 }
 
-/// What only the document holds that says what the verdict rests on.
+/// Text that occurs only in the document with the evidence behind the verdict.
 const RESTS: &[u8] = b"\"in_doubt\"";
 
 #[test]
@@ -390,7 +390,8 @@ fn what_goes_wrong_in_a_scene_is_explained() {
     );
 }
 
-/// A run in which things go wrong on purpose, in a folder, which is stopped when it says something; its report and what it said.
+/// Report and narration of a run in a folder with injected faults, stopped at the first message that starts
+/// with `until`.
 fn run_with(
     folder: &Path,
     goal: &str,
@@ -429,7 +430,7 @@ fn run_with(
     (report, said)
 }
 
-/// A run in which things go wrong on purpose, explained; and what it said on its way.
+/// Explanation and narration of a run with injected faults.
 fn faulty(goal: &str, seed: u64, faults: &str) -> (String, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run");

@@ -1,4 +1,4 @@
-//! What a hand is for, in a flat where not everything goes well.
+//! Manipulation in a flat with injected faults.
 
 use crate::binary;
 use std::fs;
@@ -6,7 +6,7 @@ use std::fs;
 use descry_domains::load::Domain;
 use tempfile::TempDir;
 
-/// Pursues a goal in the flat, in which there are such faults; with which code it ends, and what was said.
+/// Exit code and narration of a goal pursued in the flat with these faults.
 fn pursued(goal: &str, seed: u64, faults: &str) -> (Option<i32>, String) {
     let folder = TempDir::new().expect("a folder can be made");
     let scene = Domain::load("home").expect("a built-in domain").scenes["default"].clone();
@@ -18,7 +18,7 @@ fn pursued(goal: &str, seed: u64, faults: &str) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&said).into_owned())
 }
 
-/// The same until it is achieved; what was said on the way.
+/// Narration of a goal that is achieved in the flat with these faults.
 fn achieved(goal: &str, seed: u64, faults: &str) -> String {
     let (code, said) = pursued(goal, seed, faults);
     assert_eq!(code, Some(0), "{said}");

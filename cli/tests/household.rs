@@ -1,11 +1,11 @@
-//! A search task of others as a domain that is only text and a Python program.
+//! A foreign search task as a domain of text files and a Python program.
 
 use std::path::Path;
 use std::process::Command;
 
 use tempfile::TempDir;
 
-/// Lays the household out, tidies it up, and returns what the program believes in the end.
+/// Lays the household out, tidies it up, and returns the final belief of the program.
 fn tidied(folder: &Path, seed: &[&str]) -> serde_json::Value {
     let laid_out =
         Command::new("python3").args(["world.py", "reset"]).args(seed).current_dir(folder).status();

@@ -1,4 +1,4 @@
-//! Kills at any moment: the run goes on to the same end, and nothing that was done is asked for again.
+//! Kills at random moments: the run resumes to the same end, and no completed action is requested again.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -10,7 +10,8 @@ use tempfile::TempDir;
 
 const KILLS: u64 = 200;
 
-/// Kills a command within the time that an undisturbed one takes, when the seed has it; false if it had ended by then.
+/// Kills a command at a moment drawn by the seed within the time of an undisturbed one; false if it had ended
+/// by then.
 fn kill_at_random(folder: &Path, arguments: &[&str], seed: u64, longest: Duration) -> bool {
     let mut child = start(folder, arguments);
     let share = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) as f64 / u64::MAX as f64;

@@ -1,4 +1,4 @@
-//! What is no file, what has no end, and limits of the system: each ends at once, with the reason and an exit code.
+//! Unreadable files, endless input, and system limits: each ends promptly, with the reason and an exit code.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use crate::binary::{check_refused, outcome};
 use tempfile::TempDir;
 
-/// Runs a line of the shell in which `descry` is the binary.
+/// Runs a shell line in which `descry` is the binary.
 fn shell(folder: &Path, line: &str) -> Output {
     let line = line.replace("descry", env!("CARGO_BIN_EXE_descry"));
     Command::new("sh").args(["-c", &line]).current_dir(folder).output().expect("the shell runs")
@@ -33,7 +33,7 @@ fn what_is_no_file_is_refused_at_once() {
     assert!(!said(&given).contains("a file was expected"), "{}", said(&given));
 }
 
-/// A recording named by mistake is not printed, be it text or not.
+/// The content of a recording given by mistake is not printed, text or not.
 #[test]
 fn an_error_shows_little_of_a_long_line() {
     let folder = TempDir::new().expect("a folder can be made");

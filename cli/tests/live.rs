@@ -1,4 +1,4 @@
-//! `--live`: the page of what goes on, as a browser on this machine asks for it, and as others do who are refused.
+//! `--live`: the live page as a browser on this machine requests it, and as refused clients do.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -11,14 +11,14 @@ use crate::binary::{check, check_refused, documents, outcome, start};
 use crate::body::has_python;
 use serde_json::Value;
 
-/// An answer: its status, its head and its text.
+/// Response: its status, head and body.
 struct Answer {
     status: u16,
     head: String,
     text: String,
 }
 
-/// Sends a request with these lines after its first; whoever lets go sees none.
+/// Sends a request with these headers; none if the connection is closed.
 fn asked(address: &str, first: &str, lines: &[&str]) -> Option<Answer> {
     let mut stream = TcpStream::connect(address).ok()?;
     let request = format!("{first} HTTP/1.1\r\nConnection: close\r\n{}\r\n\r\n", lines.join("\r\n"));
@@ -35,7 +35,7 @@ fn got(address: &str, path: &str) -> Option<Answer> {
     asked(address, &format!("GET {path}"), &[&format!("Host: {address}")])
 }
 
-/// Expects a status of a request from there, and what every answer says.
+/// Expects a status for a request, and the security headers of every response.
 fn check_status(address: &str, first: &str, lines: &[&str], status: u16) {
     let answer = asked(address, first, lines).unwrap_or_else(|| panic!("{first} {lines:?} was not answered"));
     assert_eq!(answer.status, status, "{first} {lines:?}\n{}\n{}", answer.head, answer.text);
@@ -45,7 +45,7 @@ fn check_status(address: &str, first: &str, lines: &[&str], status: u16) {
     assert!(!answer.head.contains("access-control"), "nobody else is let in: {}", answer.head);
 }
 
-/// Starts something that is shown; gives its address, and what it says later.
+/// Starts a command with a live page; returns its address, and a thread that drains its messages.
 fn shown(folder: &Path, arguments: &[&str]) -> (Child, String, JoinHandle<()>) {
     let mut child = start(folder, arguments);
     let mut said = BufReader::new(child.stderr.take().expect("it speaks"));
@@ -57,7 +57,7 @@ fn shown(folder: &Path, arguments: &[&str]) -> (Child, String, JoinHandle<()>) {
     (child, address, rest)
 }
 
-/// Listens for news until nothing more will come; then what is found at a path at last. And how often there was something new.
+/// Follows the event stream to its end; returns the number of updates, and the final response at a path.
 fn followed(address: &str, path: &str) -> (usize, Answer) {
     let mut stream = TcpStream::connect(address).expect("it is there");
     write!(stream, "GET /news HTTP/1.1\r\nHost: {address}\r\n\r\n").expect("it listens");
@@ -73,7 +73,7 @@ fn followed(address: &str, path: &str) -> (usize, Answer) {
     panic!("the news break off before the end");
 }
 
-/// Asks for everything again and again until it is gone.
+/// Requests everything repeatedly until the server is gone.
 fn hungry(address: String) {
     while let Some(answer) = got(&address, "/story") {
         let story: Value = serde_json::from_str(&answer.text).unwrap_or_default();
@@ -131,7 +131,7 @@ fn a_run_is_shown_to_this_machine_alone_and_knows_nothing_of_it() {
     assert!(documents(folder, "seen") == documents(folder, "alone"), "readers are in the record");
 }
 
-/// The template robot; after its first look it drives on only when it is told to.
+/// The template robot, which waits for a signal after its first look.
 const PATIENT: &str = r#"
 import os, sys, time
 sys.path.insert(0, "PYTHON")

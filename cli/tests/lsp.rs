@@ -1,4 +1,4 @@
-//! `descry lsp`: an editor speaks to it over its standard input and output.
+//! `descry lsp` with an editor on its standard input and output.
 
 use crate::binary;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 
 use serde_json::{Value, json};
 
-/// An editor.
+/// Client of the language server.
 struct Editor {
     server: Child,
     hears: BufReader<ChildStdout>,
@@ -56,7 +56,7 @@ impl Editor {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
-    /// The answer to a request; what is published meanwhile is kept.
+    /// The response to a request; diagnostics that arrive meanwhile are stored.
     fn ask(&mut self, method: &str, params: Value) -> Value {
         self.requests += 1;
         let id = self.requests;
@@ -76,7 +76,7 @@ impl Editor {
         self.tell("textDocument/didOpen", json!({ "textDocument": document }));
     }
 
-    /// Replaces the first place where a text stands by another.
+    /// Replaces the first occurrence of a text.
     fn edit(&mut self, path: &Path, text: &mut String, old: &str, new: &str) {
         let range = json!({ "start": place(text, old, 0), "end": place(text, old, old.len()) });
         *text = text.replacen(old, new, 1);
@@ -85,7 +85,8 @@ impl Editor {
         self.tell("textDocument/didChange", json!({ "textDocument": document, "contentChanges": changes }));
     }
 
-    /// What was last said about a file, code and line; asks for the symbols first, so that all has been said.
+    /// Code and line of the last published findings of a file; a preceding request for symbols ensures that
+    /// all have arrived.
     fn findings(&mut self, path: &Path) -> Vec<(String, u64)> {
         self.ask("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri(path) } }));
         let of = self.published.iter().rev().find(|p| p["uri"] == uri(path));
@@ -97,13 +98,13 @@ impl Editor {
         list.iter().map(one).collect()
     }
 
-    /// A request about the place where a text stands, so many bytes in.
+    /// A request at the first occurrence of a text, `further` bytes in.
     fn at(&mut self, method: &str, path: &Path, text: &str, sought: &str, further: usize) -> Value {
         let position = place(text, sought, further);
         self.ask(method, json!({ "textDocument": { "uri": uri(path) }, "position": position }))
     }
 
-    /// What is offered to mend the findings that were last told of a file: each title, and what the text is with it.
+    /// The fixes offered for the last findings of a file: each title, with the resulting text.
     fn mends(&mut self, path: &Path, text: &str) -> Vec<(String, String)> {
         self.findings(path);
         let of = self.published.iter().rev().find(|p| p["uri"] == uri(path));
@@ -124,7 +125,7 @@ impl Editor {
         offered.as_array().cloned().unwrap_or_default().iter().map(mended).collect()
     }
 
-    /// What is said where a text stands, so many bytes in.
+    /// Hover text at the first occurrence of a text, `further` bytes in.
     fn hover(&mut self, path: &Path, text: &str, sought: &str, further: usize) -> String {
         let hover = self.at("textDocument/hover", path, text, sought, further);
         hover["contents"]["value"].as_str().unwrap_or_default().to_string()
@@ -141,14 +142,14 @@ fn uri(path: &Path) -> String {
     format!("file://{}", path.display())
 }
 
-/// The position of a byte behind the place where a text stands; the texts here are ASCII.
+/// The position `further` bytes behind the first occurrence of a text; the texts are ASCII.
 fn place(text: &str, sought: &str, further: usize) -> Value {
     let at = text.find(sought).unwrap_or_else(|| panic!("{sought} is not there")) + further;
     let line = text[..at].matches('\n').count();
     json!({ "line": line, "character": at - text[..at].rfind('\n').map_or(0, |n| n + 1) })
 }
 
-/// The byte at a position.
+/// The byte offset of a position.
 fn byte(text: &str, position: &Value) -> usize {
     let number = |name: &str| position[name].as_u64().unwrap_or(0) as usize;
     text.split_inclusive('\n').take(number("line")).map(str::len).sum::<usize>() + number("character")

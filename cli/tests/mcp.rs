@@ -1,11 +1,11 @@
-//! `descry mcp`: an assistant speaks to it over its standard input and output.
+//! `descry mcp` with an assistant on its standard input and output.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use serde_json::{Value, json};
 
-/// An assistant.
+/// Client of the server.
 struct Assistant {
     server: Child,
     hears: BufReader<ChildStdout>,
@@ -48,7 +48,7 @@ impl Assistant {
         id
     }
 
-    /// The answer to a request, past what is told of its progress.
+    /// The response to a request, skipping progress notifications.
     fn ask(&mut self, method: &str, parameters: Value) -> Value {
         let id = self.begin_asking(method, parameters);
         loop {
@@ -63,7 +63,7 @@ impl Assistant {
         self.ask("tools/call", json!({ "name": tool, "arguments": arguments }))
     }
 
-    /// What a tool answers.
+    /// The structured content of a tool's result.
     fn answer(&mut self, tool: &str, arguments: Value) -> Value {
         let heard = self.call(tool, arguments);
         let result = &heard["result"];
@@ -127,7 +127,8 @@ fn plans_are_found_checked_and_asked_about() {
     assert_eq!(none["exit"], 3, "{none}");
 }
 
-/// Three faults, one hidden behind the other: each is mended at the place of its finding by what the finding proposes.
+/// Three faults, one hidden behind another: each is fixed at the place of its finding with the suggested
+/// text.
 #[test]
 fn a_domain_is_mended_by_its_findings_alone() {
     let mut assistant = Assistant::begin(&[]);
@@ -194,7 +195,7 @@ fn a_real_robot_is_for_who_starts_the_server_to_give() {
     assert_eq!((&said["isError"], &said["structuredContent"]["exit"]), (&json!(true), &json!(5)), "{heard}");
 }
 
-/// Needs a run in simulation, with what it rests on.
+/// Needs a run in simulation, with its evidence.
 #[test]
 fn a_run_tells_its_steps_and_is_explained() {
     let mut assistant = Assistant::begin(&[]);

@@ -1,4 +1,4 @@
-//! Runs whose records are in MongoDB: what a record on the disk is good for, these are good for, too.
+//! Runs recorded in MongoDB: the same guarantees as for records on disk.
 
 mod binary;
 #[path = "../../memory/tests/server/process.rs"]
@@ -11,7 +11,7 @@ use process::{Process, skipped};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Every document of a record, without the name of who recorded it.
+/// Every document of a record, without the name of the recording robot.
 fn documents(folder: &Path, place: &str) -> Vec<Value> {
     let mut found = check(folder, &["memory", "query", place, "--json"], 0);
     let records = found["records"].as_array_mut().expect("a list");
@@ -21,7 +21,7 @@ fn documents(folder: &Path, place: &str) -> Vec<Value> {
     std::mem::take(records)
 }
 
-/// How many records of each kind there are.
+/// The number of records of each kind.
 fn kinds(folder: &Path, place: &str) -> Vec<(String, Value)> {
     let shown = check(folder, &["memory", "show", place, "--json"], 0);
     let kinds = shown["stats"]["kinds"].as_object().expect("kinds").clone();

@@ -1,4 +1,4 @@
-//! Domains that a person wrote, run whole on a small simulated table: what was changed of the template, and what came of it.
+//! Custom domains, run on a small simulated table: changes of the template, and their outcomes.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -28,7 +28,7 @@ fn replace(file: &'static str, from: &'static str, to: &'static str) -> Edit {
     })
 }
 
-/// An action, before the last parenthesis.
+/// Inserts an action before the last parenthesis.
 fn action(text: &str) -> Edit {
     let text = text.to_string();
     edit("domain.pddl", move |before| {
@@ -37,14 +37,14 @@ fn action(text: &str) -> Edit {
     })
 }
 
-/// A program in the shell that answers each question; `$id` is its number.
+/// A shell program that answers each question; `$id` is its number.
 fn program(file: &'static str, body: &str) -> Edit {
     let id = r#"id=$(printf %s "$asked" | sed 's/.*"id":\([0-9]*\).*/\1/')"#;
     let text = format!("while read -r asked; do {id}\n{body}\ndone\n");
     edit(file, move |_| text.clone())
 }
 
-/// What a program writes in the shell to answer so.
+/// Shell code that prints an answer.
 fn answers(value: &str) -> String {
     format!("echo '{{\"id\":'$id',{value}}}'")
 }
@@ -62,7 +62,7 @@ fn shown(output: &Output) -> (String, String) {
     (text(&output.stdout), text(&output.stderr))
 }
 
-/// A new domain `own` with changes, in a folder that is empty otherwise.
+/// A new domain `own` with changes, in an otherwise empty folder.
 fn own(edits: &[Edit]) -> TempDir {
     let folder = TempDir::new().expect("a folder can be made");
     let made = descry(folder.path(), &["new", "own"]);
@@ -75,7 +75,7 @@ fn own(edits: &[Edit]) -> TempDir {
     folder
 }
 
-/// Pursues a goal and expects an exit code, words that are said and words that are not.
+/// Pursues a goal and expects an exit code, words that must appear and words that must not.
 fn check(edits: &[Edit], goal: &str, exit: i32, words: &[&str], never: &[&str]) -> Value {
     let folder = own(edits);
     pursued(&folder, goal, exit, words, never)
@@ -90,7 +90,7 @@ fn pursued(folder: &TempDir, goal: &str, exit: i32, words: &[&str], never: &[&st
     serde_json::from_str(&out).unwrap_or(Value::Null)
 }
 
-/// Poses that the robot has been to are remembered; and a phrase that asks for two of them.
+/// Adds a predicate for visited poses, and a phrase that requires two of them.
 fn visits(more: &str) -> Vec<Edit> {
     vec![
         replace("domain.pddl", "(:predicates", "(:predicates\n    (visited ?where - pose)"),
@@ -219,7 +219,7 @@ fn every_limit_ends_in_a_verdict() {
     check(&looks, "find mug", 1, &["1 looks were taken"], &["achieved"]);
 }
 
-/// An action `ring` and one `wave`, each carried out by a program that waits until the other is under way.
+/// Two actions, `ring` and `wave`, each carried out by a program that waits until the other is under way.
 #[test]
 fn steps_that_overlap_are_carried_out_at_the_same_time() {
     let greeting = |name: &str, done: &str| {
@@ -248,7 +248,7 @@ fn steps_that_overlap_are_carried_out_at_the_same_time() {
     check(&edits, "greet", 0, &["achieved", "met"], &["alone", "failed "]);
 }
 
-/// An action `ring` by a program, and a phrase for it; what is configured of it.
+/// An action `ring` carried out by a program, with a phrase and settings.
 fn rings(body: &str, configured: &str) -> Vec<Edit> {
     vec![
         replace("domain.pddl", "(:predicates", "(:predicates\n    (rung)\n    (tired)"),
@@ -317,7 +317,7 @@ fn a_fact_may_be_a_program() {
     check(&rain("exit 1"), "ring", 2, &["holds of raining", "ended"], &[]);
 }
 
-/// The template robot with one thing changed, as `--robot` takes it.
+/// The template robot with one change, as the value for `--robot`.
 fn robot(what: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/tests/programs/rogue.py");
     format!("program:python3 '{}' '{what}'", file.display())

@@ -1,4 +1,4 @@
-//! `descry show RUN --html FILE`: one page that holds everything, and that a browser draws.
+//! `descry show RUN --html FILE`: one self-contained page that a browser can draw.
 
 use crate::binary;
 use std::collections::BTreeSet;
@@ -14,7 +14,7 @@ fn page(folder: &Path) -> String {
     std::fs::read_to_string(folder.join("page.html")).expect("the page is there")
 }
 
-/// What the page tells, as its script reads it.
+/// The story embedded in the page, as its script reads it.
 fn story(page: &str) -> Value {
     let begin = "<script type=\"application/json\" id=\"story\">";
     let (_, rest) = page.split_once(begin).expect("the story is in it");
@@ -81,8 +81,8 @@ fn a_page_stands_alone_and_tells_the_run() {
     in_a_browser(folder.path());
 }
 
-/// What the script of a page reads of the story is there: `story.map.rooms` is a path through the data, and what has a unit in
-/// its name is a field of something in it.
+/// Checks that the script reads existing data: `story.map.rooms` must be a path through the story, and a name
+/// with a unit must be a field of something in it.
 fn check_fields(page: &str, story: &Value) {
     let (_, script) = page.rsplit_once("<script>").expect("a script");
     let is_of_name = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.' || c == '?';
@@ -122,7 +122,7 @@ fn check_fields(page: &str, story: &Value) {
     }
 }
 
-/// What Chromium makes of it, where it is installed.
+/// Renders the page in Chromium, if it is installed.
 fn in_a_browser(folder: &Path) {
     let mut chromium = Command::new("chromium");
     chromium.args([

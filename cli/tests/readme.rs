@@ -1,11 +1,11 @@
-//! The commands of README and of the book: each is one, ends as it should, and prints what is shown.
+//! The commands of README and of the book: each exists, exits as documented, and prints what is shown.
 
 use crate::binary;
 use crate::tutorial;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Pages that show commands.
+/// Pages with commands.
 const PAGES: [&str; 7] = [
     "README.md",
     "docs/commands.md",
@@ -26,7 +26,7 @@ fn blocks(text: &str) -> Vec<Vec<&str>> {
     parts.map(|block| block.lines().skip(1).collect()).collect()
 }
 
-/// What help says of a command, `memory query` or `plan`; asked once.
+/// The help text of a command, such as `memory query` or `plan`; cached.
 fn help<'a>(known: &'a mut BTreeMap<String, String>, command: &str) -> &'a str {
     known.entry(command.to_owned()).or_insert_with(|| {
         let arguments: Vec<&str> = std::iter::once("help").chain(command.split(' ')).collect();
@@ -77,7 +77,7 @@ fn the_explanation_that_is_shown_is_what_is_said() {
     assert!(said.contains(&shown), "the page shows\n{shown}\nbut this is said:\n{said}");
 }
 
-/// A folder that looks like a clone of the repository, as far as the pages use it.
+/// A folder that resembles a clone of the repository, as far as the pages use it.
 fn clone() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["docs", "domains", "robots"] {
@@ -87,7 +87,7 @@ fn clone() -> tempfile::TempDir {
     folder
 }
 
-/// A page from a heading to another, or to its end.
+/// Part of a page from one heading to another, or to its end.
 fn part(page: &str, from: &str, to: &str) -> String {
     let text = tutorial::page(page);
     let (_, rest) = text.split_once(from).unwrap_or_else(|| panic!("{page} has no {from}"));
@@ -144,11 +144,11 @@ fn readme_and_all_commands_in_their_order_end_well() {
     tutorial::follow(&tutorial::page("docs/commands.md"), clone().path());
 }
 
-/// Commands of the book that do not simply end well, by how they begin, with the reason.
+/// Prefixes of commands in the book that do not simply succeed, with the reason.
 const NOT_TYPED: [(&str, &str); 1] =
     [("descry experiment two-tables.toml --out all --merge", "needs the folders of three machines")];
 
-/// What stands for something else on the pages, and what it is in the folder of [`scratch`].
+/// Placeholders on the pages, with their values in the folder of [`scratch`].
 const MEANT: [(&str, &str); 4] = [
     ("DOMAIN PROBLEM", "docs/cookbook/fuel/domain.pddl docs/cookbook/fuel/problem.pddl"),
     ("--shards 16", "--shards 8"),
@@ -156,7 +156,7 @@ const MEANT: [(&str, &str); 4] = [
     (" runs/mug", " run"),
 ];
 
-/// A cloud of a table .8 m below its sensor with a block on it, PCD.
+/// Point cloud in PCD format: a table 0.8 m below the sensor, with a block on it.
 fn cloud() -> String {
     let table =
         (0..120 * 80).map(|n| (f64::from(n % 120) / 120.0 - 0.5, 1.0 + f64::from(n / 120) / 130.0, -0.8));
@@ -171,7 +171,7 @@ fn cloud() -> String {
     )
 }
 
-/// A folder with what the book speaks of: a run, a cloud, a small experiment.
+/// A folder with the files that the book mentions: a run, a cloud, a small experiment.
 fn scratch() -> tempfile::TempDir {
     let folder = clone();
     let path = folder.path();
@@ -186,7 +186,7 @@ fn scratch() -> tempfile::TempDir {
     folder
 }
 
-/// A command as it is typed, run in a folder that is its home, too.
+/// Runs a typed command in a folder, which is also its home.
 fn typed(folder: &Path, command: &str) -> std::process::Output {
     let descry = Path::new(env!("CARGO_BIN_EXE_descry")).parent().expect("a folder");
     let path = format!("{}:{}", descry.display(), std::env::var("PATH").unwrap_or_default());

@@ -1,4 +1,4 @@
-//! What the record of a run is good for: it is played again, serves as a body, and lets a run that was killed go on.
+//! Uses of a run's record: replay, as a body, and to resume a killed run.
 
 use std::path::Path;
 
@@ -18,8 +18,8 @@ fn report(folder: &Path, run: &str) -> Value {
     report
 }
 
-/// Pursues a goal three times: undisturbed, and killed (once, and once more while it goes on). All must come to the same, to the last
-/// document, and be played again as they were.
+/// Pursues a goal three times: undisturbed, killed once, and killed again after resuming. All must end the
+/// same, to the last document, and replay identically.
 fn check_goal(goal: &[&str], kills: &[&[usize]]) {
     let folder = TempDir::new().expect("a folder can be made");
     let folder = folder.path();
@@ -60,7 +60,7 @@ fn a_run_on_real_views_is_played_again_and_goes_on_after_kills() {
     check_goal(&["do", "find mug with confidence 0.96", "--robot", &robot], &[&[1], &[12, 10]]);
 }
 
-/// A run whose body is the record of another finds what that one found, where that one found it.
+/// A run with the record of another as its body finds the object at the same place.
 fn check_as_body(thing: &str, first: &[&str]) {
     let folder = TempDir::new().expect("a folder can be made");
     let folder = folder.path();
@@ -123,7 +123,7 @@ fn what_cannot_be_played_or_go_on_is_said() {
     check_refused(folder, &["replay", "cut"], 2, &["does not say what the run began with"]);
 }
 
-/// How many records a query of a run finds; none is exit code 1.
+/// Checks the number of records that a query finds; none means exit code 1.
 fn check_query(folder: &Path, conditions: &[&str], expected: std::ops::RangeInclusive<usize>) {
     let exit = i32::from(*expected.end() == 0);
     let found = check(folder, &[&["memory", "query", "run", "--json"], conditions].concat(), exit);
@@ -181,7 +181,8 @@ fn a_record_is_queried_verified_and_exported() {
     check_refused(folder, &["memory", "show", "nothing"], 2, &["holds no record"]);
 }
 
-/// A bound that cannot hold what is sensed, or what the belief rests on, ends a run with words that say how much would do.
+/// A size limit too small for the sensor data, or for the evidence of the belief, ends a run with a message
+/// that states a sufficient one.
 #[test]
 fn a_bound_that_is_too_small_is_said() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -196,7 +197,7 @@ fn a_bound_that_is_too_small_is_said() {
     }
 }
 
-/// Old records go while a run is recorded; what its belief and plan rest on stays.
+/// Old records are pruned during a run; the evidence of its belief and plan stays.
 #[test]
 fn a_bounded_record_keeps_what_the_belief_rests_on() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -222,7 +223,7 @@ fn a_bounded_record_keeps_what_the_belief_rests_on() {
     assert_eq!((&again["same"], &again["verdict"]), (&true.into(), &"achieved".into()), "{again}");
 }
 
-/// A copy of the built-in domain's folder, in which every text is changed.
+/// A copy of the built-in domain's folder with a change applied to every text.
 fn domain(folder: &Path, change: impl Fn(&str, String) -> String) {
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../domains/tabletop");
     for sub in ["", "objects", "scenes"] {
@@ -237,7 +238,7 @@ fn domain(folder: &Path, change: impl Fn(&str, String) -> String) {
     }
 }
 
-/// The domain of today is another one, or gone: a run is played and goes on with that of its record.
+/// The current domain differs or is missing: a run replays and resumes with the domain in its record.
 #[test]
 fn a_run_needs_no_domain_but_that_of_its_record() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -260,7 +261,7 @@ fn a_run_needs_no_domain_but_that_of_its_record() {
     assert_eq!(documents(folder, "cut"), documents(folder, "whole"));
 }
 
-/// What programs answered is in the record: a replay runs none, and who goes on must allow it.
+/// Answers of programs are in the record: a replay runs none, and resuming requires permission.
 #[test]
 fn a_record_runs_no_program_by_itself() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -292,7 +293,7 @@ fn a_record_runs_no_program_by_itself() {
     assert_eq!(documents(folder, "cut"), documents(folder, "whole"));
 }
 
-/// Several processes that make a run at once: in one folder one of them has it, in folders of their own each has one.
+/// Concurrent processes that start runs: in one folder one of them succeeds, in separate folders each does.
 #[test]
 fn every_run_has_a_folder_of_its_own() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -327,7 +328,7 @@ fn every_run_has_a_folder_of_its_own() {
     assert_eq!(runs["runs"].as_array().map(Vec::len), Some(goals.len()), "{runs}");
 }
 
-/// Warnings are heard, a reader that goes away is no fault, input without an end has one, and runs have dates.
+/// Warnings are printed, a closed reader is not an error, endless input is cut off, and runs have dates.
 #[test]
 fn the_world_around_a_run_is_as_it_is() {
     let folder = TempDir::new().expect("a folder can be made");

@@ -1,4 +1,4 @@
-//! `descry serve`: goals over HTTP, of which each ends in one verdict.
+//! `descry serve`: goals over HTTP, each of which ends in one verdict.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -28,7 +28,7 @@ impl Server {
         Server { process, address, told }
     }
 
-    /// Status and JSON of an answer.
+    /// Status and JSON body of a response.
     fn ask(&self, method: &str, path: &str, body: &str, header: &str) -> (u16, Value) {
         let mut stream = TcpStream::connect(&self.address).expect("it listens");
         let host = &self.address;
@@ -49,7 +49,7 @@ impl Server {
         given["id"].as_u64().expect("a number")
     }
 
-    /// A goal, as soon as it is as wanted.
+    /// Waits for a goal to meet a condition.
     fn wait(&self, id: u64, is: impl Fn(&Value) -> bool) -> Value {
         let began = Instant::now();
         loop {
@@ -109,7 +109,7 @@ fn a_token_is_asked_for_where_one_was_given() {
     assert_eq!(refused.status.code(), Some(2));
 }
 
-/// An urgent goal comes between, one is cancelled, the server is killed: each goal ends once.
+/// An urgent goal interrupts, one is cancelled, the server is killed: each goal ends once.
 #[test]
 fn each_goal_ends_once_whatever_happens() {
     let folder = tempfile::tempdir().expect("a folder");

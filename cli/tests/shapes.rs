@@ -1,4 +1,4 @@
-//! Things on the floor: learned, named, found, and called unknown where nobody has learned them.
+//! Objects on the floor: learned, named, found, and reported as unknown if never learned.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn run(goal: &str, scene: &str, seed: u64, folder: &Path, remember: Option<&Path
         .unwrap_or_else(|e| panic!("{goal}: {e}\n{}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// What is said of a scene: the verdict, the name if one is given, and where it is to a hand's breadth.
+/// Checks the result for a scene: the verdict, the name if one is given, and the position to ten centimetres.
 fn check(
     goal: &str,
     scene: &str,
@@ -90,7 +90,7 @@ fn what_was_learned_is_known_after_a_restart() {
     );
 }
 
-/// The names of the shapes that a store holds.
+/// The names of the learned shapes in a store.
 fn learned(folder: &Path, store: &Path) -> Vec<String> {
     let asked = ["memory", "query", &store.display().to_string(), "--newest", "--limit", "1", "--json"];
     let found: Value = crate::binary::check(folder, &asked, 0);

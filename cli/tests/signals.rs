@@ -1,4 +1,5 @@
-//! Signals: the body is stopped first and asked nothing more, the record stays whole, and the run goes on where it was.
+//! Signals: the body is stopped first and receives no further request, the record stays intact, and the run
+//! resumes where it was.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +14,7 @@ fn signal(name: &str, process: u32) {
     assert!(sent.is_ok_and(|status| status.success()), "{name} could not be sent");
 }
 
-/// Waits until the body has heard something so often.
+/// Waits until the body has received a request a number of times.
 fn wait_for(folder: &Path, word: &str, times: usize) {
     let began = Instant::now();
     while heard(folder).iter().filter(|line| *line == word).count() < times {
@@ -26,8 +27,8 @@ fn wait_for(folder: &Path, word: &str, times: usize) {
     }
 }
 
-/// Sends a signal when the body has been asked for something so often. Expects an exit code, `stop` as the last that the body heard, a whole
-/// record, and that the run goes on to its end without doing again what was done.
+/// Sends a signal once the body has received a request a number of times. Expects an exit code, `stop` as the
+/// last request, an intact record, and that the run resumes to its end without repeating completed actions.
 fn check_stopped(name: &str, exit: i32, word: &str, times: usize) {
     let folder = TempDir::new().expect("a folder can be made");
     let folder = folder.path();

@@ -1,4 +1,4 @@
-//! Several surfaces in one room: every answer is about what was asked, and names where.
+//! Several surfaces in one room: every answer concerns the surface in question, and names the place.
 
 use std::fs;
 use std::path::Path;
@@ -39,7 +39,7 @@ on = "table"
 shape.box = { size_m = [0.07, 0.07, 0.10] }
 "#;
 
-/// Runs a goal in the two-table scene; the report.
+/// Runs a goal in the two-table scene; returns the report.
 fn pursue(folder: &Path, goal: &str, seed: u64, exit: i32) -> Value {
     let (seed, run) = (seed.to_string(), format!("{}-{seed}", goal.replace(' ', "-")));
     let arguments = ["do", goal, "--scene", "two.toml", "--seed", &seed, "--run", &run, "--json"];
@@ -169,7 +169,8 @@ fn a_surface_that_is_not_there_is_refused() {
     );
 }
 
-/// The border of a box's shadow was taken for the end of a table; a third view rubbed the cup out.
+/// Regressions: the border of a box's shadow mistaken for the end of a table, and a cup erased by a third
+/// view.
 #[test]
 fn a_cup_is_found_where_it_is() {
     let folder = TempDir::new().expect("a folder can be made");
@@ -189,8 +190,8 @@ fn a_cup_is_found_where_it_is() {
     }
 }
 
-/// The cups that are found in two rooms, against where they truly stand, which a search for each by itself reports. It may not be sure
-/// that there are no others, but none is missed.
+/// Compares the cups found in two rooms with their true positions, which separate searches report. The agent
+/// may remain unsure about further cups, but must not miss one.
 fn check_all_cups(arrangements: &[(u64, &str)]) {
     const TOLERANCE_M: f64 = 0.02;
     let folder = TempDir::new().expect("a folder can be made");
@@ -216,14 +217,15 @@ fn check_all_cups(arrangements: &[(u64, &str)]) {
     }
 }
 
-/// Views of a board from afar that blur what stands on it; through the few points of a cup at three metres a circle was drawn that is too near.
+/// Regressions: distant views of a board that blur the objects on it, and a circle fitted too near through
+/// the few points of a cup at three metres.
 #[test]
 fn cups_in_two_rooms_are_all_found_and_where_they_are() {
     check_all_cups(&[(11035, "cup A"), (12056, "cup A")]);
 }
 
-/// A plane that cuts through the wall behind a board; something measured that no object explains; views that slide along a counter; a cup at three
-/// metres of which too little is left to be an object.
+/// Regressions: a plane that cuts through the wall behind a board, a measurement that no object explains,
+/// views that slide along a counter, and a cup at three metres with too few points for an object.
 #[test]
 #[ignore = "slow: a minute: more arrangements in which a cup was missed"]
 fn cups_in_more_rooms_are_all_found_and_where_they_are() {

@@ -1,4 +1,4 @@
-//! Rooms of which the body has no map: mapped, and things found in them, in one run and after a restart.
+//! Rooms without a map: mapped, and objects found in them, in one run and after a restart.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn descry(arguments: &[&str]) -> Value {
         .unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// A run in a scene; what it reports, and its record.
+/// A run in a scene; its report, and its folder.
 fn run(goal: &str, scene: &str, seed: u64, folder: &Path, store: Option<&Path>) -> (Value, String) {
     let seed = seed.to_string();
     let name = Path::new(scene).file_stem().unwrap().to_string_lossy().into_owned();
@@ -34,13 +34,13 @@ fn check_found(report: &Value, goal: &str) {
 
 type Foot = [[f64; 2]; 2];
 
-/// The last map that a run made.
+/// The last map of a run.
 fn last_map(run: &str) -> Value {
     let maps = descry(&["memory", "query", run, "--kind", "map", "--json"]);
     maps["records"].as_array().unwrap().last().unwrap()["body"].clone()
 }
 
-/// The feet of the walls of a map, in the body's map.
+/// The base lines of the walls of a map, in the map frame of the body.
 fn feet_of(body: &Value) -> Vec<Foot> {
     let number = |value: &Value| value.as_f64().unwrap();
     let pose = |key: &str, axis: usize| number(&body["map_from_chart"][key][axis]);
@@ -61,21 +61,21 @@ fn feet_of(body: &Value) -> Vec<Foot> {
     feet
 }
 
-/// The direction of a foot, and its length, metres.
+/// The direction of a base line, and its length, metres.
 fn way([a, b]: &Foot) -> ([f64; 2], f64) {
     let way = [b[0] - a[0], b[1] - a[1]];
     let length_m = way[0].hypot(way[1]);
     (way.map(|w| w / length_m), length_m)
 }
 
-/// Places every 10 cm along a foot.
+/// Points every 10 cm along a base line.
 fn places(foot: &Foot) -> Vec<[f64; 2]> {
     let (along, length_m) = way(foot);
     let at = |i: usize| [0, 1].map(|k| foot[0][k] + 0.1 * (i as f64 + 0.5) * along[k]);
     (0..(length_m / 0.1).round() as usize).map(at).collect()
 }
 
-/// How far a place is from a foot if that runs beside it, metres.
+/// Distance of a point from a base line, if it lies beside the line, metres.
 fn beside_m(place: [f64; 2], foot: &Foot) -> Option<f64> {
     let (along, length_m) = way(foot);
     let off = [place[0] - foot[0][0], place[1] - foot[0][1]];
@@ -89,7 +89,7 @@ fn are_parallel(a: &Foot, b: &Foot) -> bool {
     (u[0] * v[0] + u[1] * v[1]).abs() > 0.97
 }
 
-/// The sides of the room of `one-room`, metres.
+/// The walls of the room of `one-room`, as axis and coordinate, metres.
 const SIDES_M: [(usize, f64); 4] = [(0, -2.2), (0, 2.2), (1, -2.0), (1, 2.0)];
 
 #[test]
@@ -117,7 +117,7 @@ fn a_room_is_mapped_and_the_cup_is_found_on_that_map_after_a_restart() {
     assert!(maps["records"].as_array().unwrap().is_empty(), "what is known is not mapped again");
 }
 
-/// Two small rooms with a passage; the body begins in the left one and looks away from the passage.
+/// Two small rooms with a passage; the body starts in the left one, facing away from the passage.
 const TWO_SMALL: &str = r#"
 title = "Two small rooms"
 mapped = false
@@ -143,8 +143,8 @@ position_m = [-1.2, -0.4]
 yaw_deg = 180.0
 "#;
 
-/// A run maps a part until its time is up; a later one loads that map and goes on: the other room is added, what was known stays where it was and stands
-/// there once. A third finds nothing left to do.
+/// A run maps a part until its time is up; a later one loads that map and extends it by the other room, while
+/// known walls stay in place and appear once. A third finds nothing left to do.
 #[test]
 fn a_later_run_extends_the_map() {
     let folder = tempfile::tempdir().unwrap();

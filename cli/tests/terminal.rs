@@ -1,9 +1,9 @@
-//! What commands say on a terminal of 80 columns.
+//! Output of commands on a terminal of 80 columns.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// What a command says on a terminal: line by line; none where no terminal can be had.
+/// Lines that a command prints on a terminal; none if no terminal is available.
 fn on_a_terminal(folder: &Path, command: &str) -> Option<Vec<String>> {
     let typed = format!("stty cols 80; {} {command}", env!("CARGO_BIN_EXE_descry"));
     let mut script = Command::new("script");

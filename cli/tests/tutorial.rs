@@ -1,20 +1,21 @@
-//! The tutorial, followed word for word in an empty folder: its files are written, its commands run, its outputs compared.
+//! The tutorial, followed word for word in an empty folder: its files are written, its commands run, its
+//! outputs compared.
 
 use std::path::Path;
 use std::process::Command;
 
 use tempfile::TempDir;
 
-/// What a reader of the tutorial is asked to do.
+/// Task for a reader of the tutorial.
 #[derive(Debug)]
 enum Task<'a> {
-    /// Change a file as a sentence says.
+    /// Change a file as the sentence says.
     Edit { sentence: String, text: String },
-    /// Type commands and see what comes.
+    /// Type commands and compare their output.
     Run { lines: Vec<&'a str> },
 }
 
-/// The fenced blocks of the text, each of a file with the sentence before it.
+/// The fenced blocks of the text; each block of a file comes with the sentence before it.
 fn tasks(markdown: &str) -> Vec<Task<'_>> {
     let mut tasks = Vec::new();
     let mut paragraph: Vec<&str> = Vec::new();
@@ -87,7 +88,8 @@ fn edit(folder: &Path, sentence: &str, text: &str) {
     std::fs::write(&path, after).unwrap_or_else(|e| panic!("{sentence}: {e}"));
 }
 
-/// Runs a command as typed, with descry on the path: both streams in the order in which they came, and whether it ended well.
+/// Runs a command as typed, with descry on the path; returns both output streams in order, and true if it
+/// succeeded.
 fn run(folder: &Path, command: &str) -> (String, bool) {
     let descry = Path::new(env!("CARGO_BIN_EXE_descry")).parent().expect("a folder");
     let path = format!("{}:{}", descry.display(), std::env::var("PATH").unwrap_or_default());
@@ -100,7 +102,7 @@ fn run(folder: &Path, command: &str) -> (String, bool) {
     (String::from_utf8_lossy(&output.stdout).into_owned(), output.status.success())
 }
 
-/// Whether lines are as expected; `…` stands for any part of a line, or alone for any lines.
+/// True if lines are as expected; `…` stands for any part of a line, or alone for any lines.
 fn fits(expected: &[&str], found: &[&str]) -> bool {
     match expected.split_first() {
         None => found.is_empty(),
@@ -132,7 +134,7 @@ pub fn page(path: &str) -> String {
     std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// Does in a folder what a text asks a reader to do, and compares what is printed with what the text shows.
+/// Carries out in a folder what a text asks of a reader, and compares the output with the text.
 pub fn follow(text: &str, folder: &Path) {
     for task in tasks(text) {
         match task {

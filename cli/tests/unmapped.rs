@@ -1,5 +1,5 @@
-//! Recordings that say nothing of surfaces: every surface in view is one to stand things on, and none that may be the floor proves
-//! anything.
+//! Recordings without a map: every visible surface is a support surface, and one that may be the floor proves
+//! nothing.
 
 use std::fs;
 use std::path::Path;
@@ -44,7 +44,7 @@ on = "high"
 shape.cup = { diameter_m = 0.070, height_m = 0.104 }
 "#;
 
-/// A plane that goes on beyond every view: a large table, or the floor.
+/// A plane that extends beyond every view: a large table, or the floor.
 const PLANE: &str = r#"
 title = "A level plane without an edge"
 [room]
@@ -63,7 +63,7 @@ position_m = [0.0, -1.8]
 shape.mug = { diameter_m = 0.080, height_m = 0.095 }
 "#;
 
-/// Writes what the simulated camera sees from some places, each turned to a point, as a recording.
+/// Writes simulated camera views from some positions, each turned to a point, as a recording.
 fn record(folder: &Path, scene: &str, looks: &[([f64; 2], [f64; 3])]) {
     let spec = SceneSpec::parse("scene.toml", scene).expect("the scene is right");
     let options = SimOptions { seed: 7, ..SimOptions::default() };
@@ -98,7 +98,7 @@ fn record(folder: &Path, scene: &str, looks: &[([f64; 2], [f64; 3])]) {
     fs::write(folder.join("recording.toml"), "up = [0.0, 0.0, 1.0]\n").expect("it is written");
 }
 
-/// Places around both tables, each turned to their middle.
+/// Viewpoints around both tables, each turned to their middle.
 fn both_tables(from: [[f64; 2]; 6]) -> Vec<([f64; 2], [f64; 3])> {
     from.map(|from| (from, [0.0, 0.0, 0.75])).to_vec()
 }

@@ -1,4 +1,4 @@
-//! What helps to write and to plan: layout, why an action is not in a plan, completions, man pages.
+//! Authoring aids: formatting, why-not questions, completions, man pages.
 
 use crate::binary;
 use std::io::Write;
@@ -22,7 +22,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// What is said of an action.
+/// Checks the answer to a why-not question.
 fn check_why_not(action: &str, said: &[&str], in_plan: bool) {
     let folder = folder();
     let asked = ["plan", "domain.pddl", "problem.pddl", "--why-not", action];

@@ -1,5 +1,5 @@
-//! `descry check DOMAIN [PROBLEM]`: every finding at once, drawn under the text; of a domain's folder all of its files, and how each
-//! word, call and action is grounded.
+//! `descry check DOMAIN [PROBLEM]`: all findings at once, each drawn under the text; for the folder of a
+//! domain, those of all its files, and the grounding of each predicate, call and action.
 
 use std::path::PathBuf;
 
@@ -47,7 +47,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     Ok(if findings.has_errors() { Exit::No } else { Exit::Done })
 }
 
-/// The whole folder of a domain.
+/// Checks the whole folder of a domain.
 fn folder(name: &str, json: bool) -> Result<Exit, CommandError> {
     let (findings, grounding) = findings::of_folder(Domain::load(name)).map_err(CommandError::bad_input)?;
     say(&findings, &grounding, json)

@@ -1,4 +1,4 @@
-//! `descry experiment FILE`: a batch of runs, and what they say together.
+//! `descry experiment FILE`: a batch of runs, and its statistics.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -9,37 +9,38 @@ use descry_agent::stop::Stop;
 use descry_experiments::cluster::{self, Cluster};
 use descry_experiments::{Batch, Ended, ExperimentError, Options, Shard, Source};
 
-/// A job that fails while less than this is left on the disk failed for want of room.
+/// Free disk space below which a failed job is attributed to a full disk.
 const LEAST_FREE_BYTES: u64 = 64 << 20;
 
 /// Arguments of `descry experiment`.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cluster").args(["slurm", "kubernetes"]).multiple(true))]
 pub struct Arguments {
-    /// Experiment file (TOML): what is varied and measured
+    /// Experiment file (TOML): variables and measures
     file: PathBuf,
     /// Replace a value of the file, such as first_seed=7 or set.1.arrangements=10; may be given several times
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "slurm")]
     set: Vec<String>,
-    /// Folder of the results; what it holds of this experiment is not done again [default: results/ and the file's name]
+    /// Folder of the results; results that it already holds are not computed again [default: results/ and the
+    /// file's name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Do only every N-th job, such as 3/8; run again without --shard to put shards in one folder together
+    /// Run only every N-th job, such as 3/8; to combine shards in one folder, run again without --shard
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Run nothing: put the shards of these folders together in --out
+    /// Run nothing: merge the shards in these folders into --out
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
-    /// Run nothing: write the script of a Slurm job array that runs the shards, for sbatch
+    /// Run nothing: write the script of a Slurm job array for the shards, for sbatch
     #[arg(long, value_name = "FILE", requires = "shards", conflicts_with_all = ["shard", "merge", "live"])]
     slurm: Option<PathBuf>,
-    /// Run nothing: write an indexed Kubernetes job that runs the shards, for kubectl apply
+    /// Run nothing: write an indexed Kubernetes job for the shards, for kubectl apply
     #[arg(long, value_name = "FILE", requires = "shards", conflicts_with_all = ["shard", "merge", "live"])]
     kubernetes: Option<PathBuf>,
-    /// With --slurm or --kubernetes: how many shards; --jobs is then the processors of each
+    /// With --slurm or --kubernetes: number of shards; --jobs is then the processors of each
     #[arg(long, value_name = "N", requires = "cluster")]
     shards: Option<usize>,
-    /// Jobs at a time [default: one a core]
+    /// Number of parallel jobs [default: one a core]
     #[arg(long, value_name = "N")]
     jobs: Option<usize>,
     #[command(flatten)]
@@ -101,7 +102,7 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
     }
 }
 
-/// Writes what a cluster's scheduler takes.
+/// Writes the job description for a cluster's scheduler.
 fn write_for_cluster(
     arguments: &Arguments,
     source: &Source,
@@ -118,7 +119,7 @@ fn write_for_cluster(
     Ok(Exit::Done)
 }
 
-/// What went wrong is the input's fault, or the disk's.
+/// Maps an error to bad input or to a failure of the disk.
 fn failed(error: ExperimentError) -> CommandError {
     match error {
         ExperimentError::File { .. } | ExperimentError::Threads { .. } | ExperimentError::NoRoom { .. } => {

@@ -1,4 +1,4 @@
-//! `descry explain RUN`: why a run went as it did, in plain sentences.
+//! `descry explain RUN`: explanation of a run in plain sentences.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use descry_agent::exit::{CommandError, Exit};
 pub struct Arguments {
     /// The run's folder
     run: PathBuf,
-    /// With what each way to get further takes and gains, and what is counted for it
+    /// With the duration, gain and cost of each alternative
     #[arg(long)]
     figures: bool,
     /// Print one JSON object

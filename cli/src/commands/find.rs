@@ -24,7 +24,7 @@ use descry_pages::page::Running;
 /// Arguments of `descry find`.
 #[derive(clap::Args)]
 pub struct FindArguments {
-    /// What to find, such as "cup A"
+    /// The object to find, such as "cup A"
     #[arg(required_unless_present = "resume")]
     thing: Vec<String>,
     #[command(flatten)]
@@ -41,7 +41,7 @@ pub struct DoArguments {
     with: With,
 }
 
-/// What `find` and `do` share.
+/// Options common to `find` and `do`.
 #[derive(clap::Args)]
 pub struct With {
     /// Built-in domain or a domain's folder
@@ -50,37 +50,39 @@ pub struct With {
     /// Scene of the simulated robot: a name of the domain or a TOML file
     #[arg(long)]
     scene: Option<String>,
-    /// The body: sim; recorded:DIR for a folder of depth frames or of an earlier run (also recorded:mongodb://HOST/DATABASE#RUN);
-    /// program:COMMAND for a program that is a robot; socket:HOST:PORT or socket:PATH for one that runs already
+    /// The body: sim; recorded:DIR for a folder of depth frames or of an earlier run (also
+    /// recorded:mongodb://HOST/DATABASE#RUN); program:COMMAND to start a robot program; socket:HOST:PORT or
+    /// socket:PATH for a running one
     #[arg(long, default_value = "sim")]
     robot: String,
-    /// Fixes the arrangement, the noise and every choice
+    /// Seed of the arrangement, the noise and every choice
     #[arg(long, default_value_t = 1, value_parser = input::seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Who chooses where to look next: plan (weighs gain against cost over several looks), sweep, nearest, random,
-    /// most-unknown, rear-side or gain-per-second
+    /// Policy that chooses where to look next: plan (weighs gain against cost over several looks), sweep,
+    /// nearest, random, most-unknown, rear-side or gain-per-second
     #[arg(long, default_value = policies::PLAN)]
     policy: String,
     /// Folder of this run [default: a new one under runs/]
     #[arg(long, value_name = "DIR")]
     run: Option<PathBuf>,
-    /// Go on with a run that was cut off, from its record: goal and settings are those of that run
+    /// Resume an interrupted run from its record, with its goal and settings
     #[arg(long, value_name = "RUN", conflicts_with_all = ["run", "domain", "scene", "robot", "seed", "policy", "remember", "KeepingArguments"])]
     resume: Option<PathBuf>,
-    /// With --resume: run the programs that the record names to answer calls of its domain
+    /// With --resume: run the programs that the record names for the calls of its domain
     #[arg(long, requires = "resume")]
     allow_programs: bool,
-    /// Begin with what earlier runs saw last, and keep what this one sees: a folder, or mongodb://HOST/DATABASE
+    /// Start from the last sightings of earlier runs, and store those of this one: a folder, or
+    /// mongodb://HOST/DATABASE
     #[arg(long, value_name = "STORE")]
     remember: Option<String>,
-    /// Say nothing while the run goes on: print the result alone
+    /// No narration during the run: print the result alone
     #[arg(long, short)]
     quiet: bool,
     #[command(flatten)]
     live: live::LiveArguments,
     #[command(flatten)]
     keeping: KeepingArguments,
-    /// Print the result as one JSON object, also if it fails
+    /// Print the result as one JSON object, even on failure
     #[arg(long)]
     json: bool,
 }
@@ -125,7 +127,7 @@ fn carry_out(words: &[String], verb: &str, with: &With, stop: &Stop) -> Result<E
     })
 }
 
-/// What `--json` says of a run that came to no end: the keys that every result has.
+/// Result of an unfinished run for `--json`, with the keys that every result has.
 #[derive(serde::Serialize)]
 struct Unended<'a> {
     goal: &'a str,
@@ -141,7 +143,8 @@ impl<'a> Unended<'a> {
     }
 }
 
-/// Prints for `--json` that a command line of `find` or `do` cannot be read; `words` are those behind the program's name.
+/// Prints the `--json` result for a command line of `find` or `do` that cannot be parsed; `words` are the
+/// arguments after the program's name.
 pub(super) fn refuse(words: &[String], because: &str) -> Result<(), CommandError> {
     let (options, verb) = match words.split_first() {
         Some((command, rest)) if command == "find" => (rest, "find "),
@@ -158,14 +161,14 @@ pub(super) fn refuse(words: &[String], because: &str) -> Result<(), CommandError
     input::print_json(&Unended::of(format!("{verb}{}", said.join(" ")).trim_end(), &failed))
 }
 
-/// Keeps how a run ended.
+/// Stores the final report of a run.
 fn end(mut report: Report, folder: &Folder, started: Instant) -> Result<Report, CommandError> {
     report.wall_s = started.elapsed().as_secs_f64();
     run::finish(folder.path(), &report)?;
     Ok(report)
 }
 
-/// What people hear while a run goes on.
+/// Receiver of events that narrates them on standard error.
 fn narrator(saying: Saying, is_quiet: bool) -> impl FnMut(&Event) {
     move |event| {
         if !is_quiet {

@@ -1,17 +1,17 @@
-//! Lines as long as a terminal is wide. Where nobody looks at them on one, each stays in one piece.
+//! Wrapping of lines to the width of the terminal; without a terminal, lines stay unwrapped.
 
 use std::io::IsTerminal;
 
-/// A terminal that does not say how wide it is.
+/// Width of a terminal that does not report one, columns.
 const USUAL_WIDTH: usize = 80;
 
-/// How wide the terminal behind a stream is, in letters; none where there is none.
+/// Width of the terminal behind a stream, columns; none without a terminal.
 pub fn width(stream: &(impl IsTerminal + std::os::fd::AsFd)) -> Option<usize> {
     let known = || terminal_size::terminal_size_of(stream).map(|(width, _)| usize::from(width.0));
     stream.is_terminal().then(|| known().filter(|width| *width > 0).unwrap_or(USUAL_WIDTH))
 }
 
-/// A text in which nothing steers a terminal but colours: control characters are shown as Rust writes them.
+/// Escapes control characters as Rust does, except colour codes, so that the text cannot steer the terminal.
 pub fn harmless(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -28,14 +28,14 @@ pub fn harmless(text: &str) -> String {
     out
 }
 
-/// How long the colour is that a text begins with, as findings are drawn in: `ESC [`, numbers, `m`; 0: it begins with none.
+/// Length of a colour code (`ESC [`, numbers, `m`) at the start of a text, bytes; 0 without one.
 fn colour(text: &str) -> usize {
     let Some(numbers) = text.strip_prefix("\u{1b}[") else { return 0 };
     let end = numbers.find(|sign: char| !sign.is_ascii_digit() && sign != ';').unwrap_or(numbers.len());
     if numbers[end..].starts_with('m') { 2 + end + 1 } else { 0 }
 }
 
-/// A text in lines of at most so many letters; none: as it is. What goes on stands below where its second column begins.
+/// Wraps a text to a width; none: unchanged. Continuation lines are indented to the second column.
 pub fn fitted(text: &str, width: Option<usize>) -> String {
     let Some(width) = width else { return text.to_string() };
     text.lines().map(|line| folded(line, width)).collect::<Vec<_>>().join("\n")
@@ -65,7 +65,8 @@ pub fn folded(line: &str, width: usize) -> String {
     lines.join("\n")
 }
 
-/// Where the second column of a line begins; where it has none so far to the left, a little further in than the line does.
+/// Start of the second column of a line; a line without one in its left part hangs a little beyond its own
+/// indent.
 fn hang(line: &str, most: usize) -> usize {
     let signs: Vec<char> = line.chars().collect();
     let first = signs.iter().position(|sign| *sign != ' ').unwrap_or(0);

@@ -1,4 +1,4 @@
-//! `descry fmt FILES…`: lays out PDDL and plans; comments stay, and what is read is the same as before.
+//! `descry fmt FILES…`: formats PDDL and plans; comments stay, and the meaning is unchanged.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -12,14 +12,15 @@ use descry_agent::exit::{CommandError, Exit};
 /// Arguments of `descry fmt`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Domains, problems, plans, or folders of them (*.pddl, *.plan); `-` or nothing: standard input to standard output
+    /// Domains, problems, plans, or folders of them (*.pddl, *.plan); `-` or nothing: standard input to
+    /// standard output
     files: Vec<PathBuf>,
-    /// Change nothing: name the files that are laid out otherwise, and end with exit code 1 if there are any
+    /// Change nothing: list the files that would be changed, and exit with 1 if there are any
     #[arg(long)]
     check: bool,
 }
 
-/// Endings of what is looked for in folders.
+/// File extensions collected from folders.
 const ENDINGS: [&str; 2] = ["pddl", "plan"];
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
@@ -66,7 +67,7 @@ fn piped(is_check: bool) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-/// The files of a path: itself, or all below it that end as PDDL and plans do.
+/// The files of a path: itself, or every PDDL and plan file below it.
 fn gather(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), CommandError> {
     if !path.is_dir() {
         files.push(path.to_owned());
@@ -85,7 +86,7 @@ fn gather(path: &Path, files: &mut Vec<PathBuf>) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Replaces a file whole or not at all.
+/// Replaces a file atomically.
 fn replace(path: &Path, text: &str) -> Result<(), CommandError> {
     let refused = |e: std::io::Error| CommandError::broken(format!("{}: {e}", path.display()));
     let path = path.canonicalize().map_err(refused)?;

@@ -1,4 +1,4 @@
-//! `descry goals`: what may be said to a domain.
+//! `descry goals`: the goal phrases of a domain.
 
 use descry_domains::goal::spoken_types;
 use descry_domains::lexicon::{Lexicon, Places};

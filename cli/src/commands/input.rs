@@ -1,4 +1,4 @@
-//! What several commands read and print in the same way.
+//! Input and output common to several commands.
 
 use std::io::{IsTerminal, Read, Write};
 use std::os::unix::fs::FileTypeExt;
@@ -20,7 +20,7 @@ use serde::Serialize;
 use crate::commands::fitted;
 use descry_agent::exit::{CommandError, Exit};
 
-/// No text that people write is longer.
+/// Maximum size of a text file, bytes.
 const MOST_TEXT_BYTES: u64 = 256 << 20;
 
 /// Reads a text file.
@@ -35,48 +35,48 @@ pub fn source(path: &Path) -> Result<Source, CommandError> {
     Ok(Source::new(name, text))
 }
 
-/// A seed on the command line.
+/// Parses a seed.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "a whole number from 0 was expected".into())
 }
 
-/// Where the commands let bodies move and runs go on.
+/// Single-threaded runtime for robots and runs.
 pub fn runtime() -> Result<tokio::runtime::Runtime, CommandError> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     runtime.map_err(|e| CommandError::broken(format!("the runtime could not be started: {e}")))
 }
 
-/// A domain that makes sense as a whole, by its name or folder.
+/// Loads a domain by its name or folder, and checks it as a whole.
 pub fn domain(name: &str) -> Result<Domain, CommandError> {
     let domain = Domain::load(name).map_err(CommandError::bad_input)?;
     check::runnable(&domain).map_err(|findings| CommandError::BadInput(drawn(&findings)))?;
     Ok(domain)
 }
 
-/// How the domain of a run says what is written in PDDL; of a run whose record cannot be read, as it is written.
+/// Wording of the domain of a run; PDDL as written if the record cannot be read.
 pub fn saying(run: &Path) -> Saying {
     let record = descry_agent::keeping::open_written(run);
     let beginning = record.ok().and_then(|record| Beginning::of(&record).ok().flatten());
     beginning.as_ref().map(descry_explain::saying_of).unwrap_or_default()
 }
 
-/// Findings as people read them: drawn under the text, in colour on a terminal.
+/// Renders findings under the text, in colour on a terminal.
 pub fn drawn(findings: &Findings) -> String {
     findings.render(is_coloured())
 }
 
-/// The same as a result, on standard output.
+/// Prints findings as a result, on standard output.
 pub fn print_findings(findings: &Findings) -> Result<(), CommandError> {
     print_text(findings.render(shows_colours(&std::io::stdout())).trim_end())
 }
 
-/// Prints one JSON object on standard output. A reader that has gone away is no fault.
+/// Prints one JSON object on standard output. A reader that has gone away is not an error.
 pub fn print_json(value: &impl Serialize) -> Result<(), CommandError> {
     let text = serde_json::to_string(value).map_err(|e| CommandError::Bug(e.to_string()))?;
     print_text(&text)
 }
 
-/// Prints a text and a line end on standard output. A reader that has gone away is no fault.
+/// Prints a text and a newline on standard output. A reader that has gone away is not an error.
 pub fn print_text(text: &str) -> Result<(), CommandError> {
     match writeln!(std::io::stdout(), "{text}") {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -86,42 +86,42 @@ pub fn print_text(text: &str) -> Result<(), CommandError> {
     }
 }
 
-/// Tells people what happens, on standard error; that nobody hears it is no fault.
+/// Prints narration on standard error; failures are ignored.
 pub fn narrate(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// The same in lines that fit a terminal; what would steer the terminal is shown escaped.
+/// Prints narration, wrapped to the terminal; control characters are escaped.
 pub fn narrate_fitted(text: &str) {
     narrate(&fitted::fitted(&fitted::harmless(text), fitted::width(&std::io::stderr())));
 }
 
-/// [`print_text`] in lines that fit a terminal; what would steer the terminal is shown escaped.
+/// [`print_text`], wrapped to the terminal; control characters are escaped.
 pub fn print_fitted(text: &str) -> Result<(), CommandError> {
     print_text(&fitted::fitted(&fitted::harmless(text), fitted::width(&std::io::stdout())))
 }
 
-/// Says what of a record is lost; returns how a command ends that showed the rest.
+/// Reports the lost parts of a record; returns the exit code of a command that showed the rest.
 pub fn lost(faults: &[Fault]) -> Exit {
     faults.iter().for_each(|fault| narrate(&format!("descry: lost: {fault}")));
     if faults.is_empty() { Exit::Done } else { Exit::No }
 }
 
-/// Whether standard error shows colours.
+/// True if standard error shows colours.
 pub fn is_coloured() -> bool {
     shows_colours(&std::io::stderr())
 }
 
-/// Whether a stream shows colours: a terminal, and nobody said [`NO_COLOR`](https://no-color.org).
+/// True if a stream shows colours: a terminal, without [`NO_COLOR`](https://no-color.org).
 fn shows_colours(stream: &impl IsTerminal) -> bool {
     stream.is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty())
 }
 
-/// So much is read of what does not say how long it is: standard input and its like.
+/// Maximum number of bytes read from streams without a known length, such as standard input.
 const MOST_STREAM_BYTES: u64 = 256 << 20;
 
-/// Reads a file of at most so many bytes, or what this process was given as an open pipe or terminal. A named pipe may have nobody
-/// who writes, and a device no end: they are refused.
+/// Reads a file of at most `most` bytes, or an open pipe or terminal of this process. Named pipes, which may
+/// have no writer, and devices, which may have no end, are refused.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
     let name = path.display();
     let refused = |e: std::io::Error| CommandError::BadInput(format!("{name}: {e}"));
@@ -140,14 +140,15 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, CommandError> {
     if bytes.len() as u64 > most { Err(too_much()) } else { Ok(bytes) }
 }
 
-/// Whether this is an open pipe of this process (`/dev/stdin`, `<(command)`), which has no place in a folder, or its terminal.
+/// True for an open pipe of this process (`/dev/stdin`, `<(command)`), which has no place in a folder, or for
+/// its terminal.
 fn is_given(path: &Path, kind: std::fs::FileType) -> bool {
     let is_pipe = kind.is_fifo() && std::fs::canonicalize(path).is_err();
     let is_terminal = || std::fs::File::open(path).is_ok_and(|file| file.is_terminal());
     is_pipe || (kind.is_char_device() && is_terminal())
 }
 
-/// Where the programs behind a domain's attachments are named.
+/// Options that name the programs behind a domain's attachments.
 #[derive(clap::Args)]
 pub struct AttachmentArguments {
     /// TOML file that names the programs of attachments, as `domain.toml` does [default: domain.toml beside the domain]
@@ -158,7 +159,7 @@ pub struct AttachmentArguments {
     attach: Vec<String>,
 }
 
-/// The part of a TOML file that names programs; what else it says is another command's.
+/// The part of a TOML file that names programs; other parts are ignored.
 #[derive(serde::Deserialize)]
 struct Programs {
     #[serde(default)]
@@ -166,7 +167,7 @@ struct Programs {
 }
 
 impl AttachmentArguments {
-    /// The attachments of a planning task.
+    /// Binds the attachments of a planning task.
     pub fn bind(&self, domain: &Path) -> Result<Attachments, CommandError> {
         let started = Instant::now();
         let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());

@@ -1,40 +1,41 @@
-//! Where and how the record of a run is kept, as options of the command line.
+//! Command-line options for the storage of a run's record.
 
 use descry_agent::keeping::{Keeping, Kept};
 
 /// Options of a run that is recorded.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct KeepingArguments {
-    /// Where the record is kept: `mongodb://HOST[:PORT]/DATABASE[#RUN]`, for a descry that was built with the feature mongodb
-    /// [default: in the run's folder]
+    /// Store of the record: `mongodb://HOST[:PORT]/DATABASE[#RUN]`, for a descry built with the feature
+    /// mongodb [default: in the run's folder]
     #[arg(long, value_name = "ADDRESS")]
     memory: Option<String>,
-    /// When something counts as recorded: disk (it survives a power cut) or process (it survives any end of descry; a power cut
-    /// costs at most the last segment) [default: disk]
+    /// Durability of the record: disk (survives a power cut) or process (survives any end of descry; a power
+    /// cut costs at most the last segment) [default: disk]
     #[arg(long, value_name = "disk|process")]
     durability: Option<KeptArgument>,
-    /// Greatest size of the record, such as 500MB; what is over goes oldest first, unless a belief or a plan rests on it
+    /// Maximum size of the record, such as 500MB; excess data is pruned oldest first, unless a belief or a
+    /// plan rests on it
     #[arg(long, value_name = "SIZE", value_parser = size)]
     max_bytes: Option<u64>,
-    /// Greatest age of what is recorded, seconds on the body's clock
+    /// Maximum age of recorded data, seconds on the body's clock
     #[arg(long, value_name = "S", value_parser = seconds)]
     max_age: Option<f64>,
-    /// Least room to be left on the disk, such as 2GB
+    /// Minimum free space on the disk, such as 2GB
     #[arg(long, value_name = "SIZE", value_parser = size)]
     min_free: Option<u64>,
 }
 
-/// When something counts as recorded.
+/// Durability of the record.
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
 enum KeptArgument {
-    /// When it is on the disk.
+    /// Writes are on the disk before they are acknowledged.
     Disk,
-    /// When the system has it.
+    /// Writes are with the operating system before they are acknowledged.
     Process,
 }
 
 impl KeepingArguments {
-    /// What they ask for.
+    /// Storage settings of a run.
     pub fn keeping(&self) -> Keeping {
         Keeping {
             memory: self.memory.clone(),

@@ -1,4 +1,4 @@
-//! Limits that the system sets to a process, heard as errors instead of as a death without a word.
+//! Resource limits of the process, reported as errors instead of a silent death by a signal.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -7,8 +7,8 @@ use descry_agent::exit::Exit;
 use signal_hook::consts::{SIGABRT, SIGXFSZ};
 use signal_hook::flag;
 
-/// Makes a file that may grow no longer an error of the write, and ends with [`Exit::OutOfTime`] where memory or a stack is used up: the
-/// runtime has said so on standard error by then.
+/// Turns the file-size limit into an error of the write, and makes an exhausted memory or stack exit with
+/// [`Exit::OutOfTime`], after the runtime's message on standard error.
 pub fn heed_limits() {
     let always = || Arc::new(AtomicBool::new(true));
     let heard = flag::register(SIGXFSZ, always()).and_then(|_| {

@@ -1,10 +1,10 @@
-//! The command line as a whole: its commands with examples, for help, man pages and the completions of shells.
+//! The whole command line with examples, for help, man pages and shell completions.
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 
 use super::Command;
 
-/// Letters in a line of help.
+/// Width of help, columns.
 pub const WIDTH: usize = 80;
 
 /// Finds things by looking carefully: plans where to look, drives there, records, merges, recognises, and looks again.
@@ -25,7 +25,7 @@ const EXIT_CODES: &str = "Exit codes:
   70  a bug of descry
   130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
-/// Each command with lines that show what it is for.
+/// Example lines of each command.
 pub const EXAMPLES: [(&str, &[&str]); 24] = [
     (
         "find",
@@ -112,13 +112,13 @@ pub fn line() -> clap::Command {
     })
 }
 
-/// The command that was asked for; what cannot be read ends the program with a word about it.
+/// Parses the command line; on an error, prints it and exits.
 pub fn asked() -> Command {
     let read = line().try_get_matches().and_then(|matches| Line::from_arg_matches(&matches));
     read.unwrap_or_else(|error| refuse(&error)).command
 }
 
-/// Says why a line cannot be read, or the help that it asks for, and ends.
+/// Prints a parse error, or the requested help, and exits.
 fn refuse(error: &clap::Error) -> ! {
     let words: Vec<String> = std::env::args_os().skip(1).map(|w| w.to_string_lossy().into_owned()).collect();
     if error.use_stderr() {

@@ -5,7 +5,7 @@ use descry_agent::exit::{CommandError, Exit};
 /// Arguments of `descry lsp`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Over standard input and output, which is the only way; many editors say so
+    /// Use standard input and output: the only transport, accepted because many editors pass this option
     #[arg(long)]
     stdio: bool,
 }

@@ -1,4 +1,4 @@
-//! `descry completions SHELL` and `descry man`: what a shell and `man` want to know of the command line.
+//! `descry completions SHELL` and `descry man`: shell completions and man pages.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct CompletionsArguments {
 /// Arguments of `descry man`.
 #[derive(clap::Args)]
 pub struct ManArguments {
-    /// Write a page for each command into this folder, instead of the first to standard output
+    /// Write a page for each command into this folder, instead of the main page to standard output
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -45,7 +45,7 @@ pub(super) fn man(arguments: &ManArguments) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-/// Writes the page of a command and of those in it.
+/// Writes the man pages of a command and its subcommands.
 fn write(folder: &Path, command: &clap::Command, name: &str) -> Result<(), CommandError> {
     let path = folder.join(format!("{name}.1"));
     let text = page(command.clone().display_name(name.to_string()))?;

@@ -1,4 +1,4 @@
-//! `descry mcp`: serves assistants that call tools.
+//! `descry mcp`: serves assistants over the Model Context Protocol.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,10 @@ use crate::mcp::{self, Served};
 /// Arguments of `descry mcp`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder that runs are written to, and below which callers may name files
+    /// Folder for runs; callers may only name files below it
     #[arg(long, value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Let callers pursue goals with this body too, as in `descry do --robot`; without it, in simulation alone
+    /// Let callers also use this body, as in `descry do --robot`; without it, simulation only
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `descry memory …` and `descry export`: a record by itself.
+//! `descry memory …` and `descry export`: inspection of a record.
 
 use std::path::PathBuf;
 
@@ -9,20 +9,20 @@ use crate::commands::{fitted, input};
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::keeping;
 
-/// What can be asked of a record.
+/// Operations on a record.
 #[derive(clap::Subcommand)]
 pub enum Arguments {
-    /// What a record holds: counts, sizes, times
+    /// Show the contents of a record: counts, sizes, times
     Show(Place),
-    /// The records that meet conditions
+    /// List the records that match conditions
     Query(QueryArguments),
-    /// Read every record and say what is whole: exit 0 if everything is, 1 if not
+    /// Verify every record: exit 0 if all are undamaged, 1 if not
     Verify(Place),
-    /// Write everything, or what meets conditions, into one MCAP file
+    /// Export everything, or the records that match conditions, as one MCAP file
     Export(ExportArguments),
 }
 
-/// Where a record is.
+/// Location of a record.
 #[derive(clap::Args)]
 pub struct Place {
     /// Folder of a run or of its record, or mongodb://HOST/DATABASE[#RUN]
@@ -42,7 +42,7 @@ pub struct QueryArguments {
     /// Only the record nearest to this time, seconds
     #[arg(long, value_name = "S")]
     nearest: Option<f64>,
-    /// How far off the nearest may be, seconds
+    /// Maximum difference in time of the nearest, seconds
     #[arg(long, value_name = "S", default_value_t = 0.5, requires = "nearest")]
     tolerance: f64,
 }
@@ -52,49 +52,49 @@ pub struct QueryArguments {
 pub struct ExportArguments {
     #[command(flatten)]
     place: Place,
-    /// The MCAP file to be made
+    /// The MCAP file to write
     file: PathBuf,
     #[command(flatten)]
     filter: Filter,
 }
 
-/// Conditions; all that are given must hold.
+/// Conditions, all of which must hold.
 #[derive(clap::Args)]
 struct Filter {
-    /// Of this kind: cloud, image, transforms, log, belief, …
+    /// Kind: cloud, image, transforms, log, belief, …
     #[arg(long)]
     kind: Option<String>,
-    /// In this coordinate frame
+    /// Coordinate frame
     #[arg(long)]
     frame: Option<String>,
-    /// By this robot
+    /// Robot that recorded it
     #[arg(long)]
     robot: Option<String>,
-    /// From this time on, seconds
+    /// Earliest time, seconds
     #[arg(long, value_name = "S")]
     from: Option<f64>,
-    /// Up to this time, seconds
+    /// Latest time, seconds
     #[arg(long, value_name = "S")]
     to: Option<f64>,
-    /// Speaking of this object
+    /// Mentioning this object
     #[arg(long, value_name = "NAME")]
     object: Option<String>,
-    /// With at least this confidence, 0 to 1
+    /// Minimum confidence, 0 to 1
     #[arg(long, value_name = "P")]
     min_confidence: Option<f64>,
-    /// Seen from near here, metres
+    /// Seen from near this point, metres
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = place)]
     seen_from: Option<[f64; 3]>,
-    /// Showing this spot, metres
+    /// Showing this point, metres
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = place)]
     covers: Option<[f64; 3]>,
-    /// What counts as near, metres
+    /// Radius of nearness, metres
     #[arg(long, value_name = "M", default_value_t = 0.5)]
     radius: f64,
     /// Newest first
     #[arg(long)]
     newest: bool,
-    /// At most so many
+    /// Maximum number of records
     #[arg(long, value_name = "N")]
     limit: Option<usize>,
 }
@@ -180,7 +180,7 @@ fn query(arguments: &QueryArguments) -> Result<Exit, CommandError> {
     Ok(Exit::No)
 }
 
-/// A query that finds one record of those that another finds.
+/// Narrows a query to one document of its results.
 fn exactly(query: Query, document: &Document) -> Query {
     let before = descry_memory::RecordId(document.id.0.saturating_sub(1));
     Query { after: Some((document.stamp_ns, before)), order: Order::Oldest, limit: Some(1), ..query }
@@ -250,9 +250,10 @@ impl Filter {
     }
 }
 
-/// A record in a line: number, time, kind, frame, and what of its content fits; no more than a terminal is wide.
+/// A record on one line: number, time, kind, frame, and the start of its content, cut to the terminal's
+/// width.
 fn line(document: &Document) -> String {
-    /// So much of a content is shown where nobody looks at it on a terminal.
+    /// Width without a terminal, columns.
     const WIDTH: usize = 100;
     let body = if document.body.is_null() { String::new() } else { document.body.to_string() };
     let bytes: u64 = document.blobs.iter().map(|b| b.bytes).sum();

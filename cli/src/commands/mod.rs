@@ -1,4 +1,4 @@
-//! The commands: one file each, and the list of them.
+//! The commands: one file each, and their list.
 
 mod check;
 mod experiment;
@@ -42,70 +42,74 @@ pub use line::asked;
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::stop::Stop;
 
-/// What descry can be asked to do.
+/// Commands of descry.
 #[derive(Subcommand)]
 pub enum Command {
     /// Find something: short for `do "find THING"`
     Find(find::FindArguments),
-    /// Pursue a goal, in the words of a domain
+    /// Pursue a goal in the words of a domain
     Do(find::DoArguments),
-    /// Write a small domain of your own into a folder: it runs, and is there to be changed
+    /// Create a small working domain in a folder, as a starting point
     New(new::Arguments),
-    /// List what may be said to a domain
+    /// List the goal phrases of a domain
     Goals(goals::Arguments),
-    /// Plan: any PDDL domain and problem
+    /// Plan for any PDDL domain and problem
     Plan(plan::Arguments),
     /// Check a plan against its domain and problem
     Validate(validate::Arguments),
-    /// Read a domain (and a problem) and show every finding under its text
+    /// Check a domain (and a problem) and show every finding under its text
     Check(check::Arguments),
-    /// Lay out PDDL and plans: comments stay, and what is read is the same
+    /// Format PDDL and plans: comments stay, and the meaning is unchanged
     Fmt(fmt::Arguments),
-    /// Serve editors: findings, hover, definitions, completion and layout of PDDL, plans and domain.toml (LSP, standard input and output)
+    /// Serve editors: findings, hover, definitions, completion and formatting of PDDL, plans and domain.toml
+    /// (LSP, standard input and output)
     Lsp(lsp::Arguments),
-    /// Serve assistants that call tools: check, plan, validate, run in simulation, explain and more (MCP, standard input and output)
+    /// Serve assistants with tools: check, plan, validate, run in simulation, explain and more (MCP, standard
+    /// input and output)
     Mcp(mcp::Arguments),
-    /// Stay: take goals over HTTP, pursue one after the other, urgent ones first, and remember what was seen
+    /// Run as a service: accept goals over HTTP, pursue one after the other, urgent ones first, and remember
+    /// sightings
     Serve(serve::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
-    /// Carry out a batch of runs: tables with intervals, plots and a page; goes on where it was cut off
+    /// Run a batch of runs: tables with intervals, plots and a page; resumable
     Experiment(experiment::Arguments),
-    /// A body by itself: check that it keeps the promises of bodies
+    /// Test a body: check that it fulfils the contract of bodies
     #[command(subcommand)]
     Robot(robot::Arguments),
-    /// Show what happened in a run
+    /// Show the events of a run
     Show(show::Arguments),
-    /// Say why a run went as it did: why each plan, why this and not that, what the verdict rests on
+    /// Explain a run: the reason for each plan, its alternatives, and the evidence behind the verdict
     Explain(explain::Arguments),
-    /// Live through a run again from its record: the same percepts, beliefs and verdict, or where they part
+    /// Replay a run from its record, and compare percepts, beliefs and verdict
     Replay(replay::Arguments),
     /// List the runs
     Runs(runs::Arguments),
-    /// A record by itself: show, query, verify, export
+    /// Inspect a record: show, query, verify, export
     #[command(subcommand)]
     Memory(memory::Arguments),
-    /// Say what a thing is called that a run has learned; without names, list what was learned
+    /// Rename an object that runs have learned; without names, list the learned objects
     Name(name::Arguments),
-    /// Write a record into one MCAP file: short for `memory export`
+    /// Export a record as one MCAP file: short for `memory export`
     Export(memory::ExportArguments),
-    /// Print what lets a shell complete commands and options
+    /// Print completions of commands and options for a shell
     Completions(manual::CompletionsArguments),
     /// Print the man page, or write one for each command
     Man(manual::ManArguments),
 }
 
 impl Command {
-    /// Whether it ends in order when it is asked to stop; others may be ended at any time.
+    /// True if the command ends in order when stopped; others may be killed at any time.
     pub fn can_be_stopped(&self) -> bool {
         matches!(self, Self::Find(_) | Self::Do(_) | Self::Experiment(_))
     }
 }
 
-/// Carries a command out; `stop` ends it early, if it can be stopped.
+/// Runs a command; `stop` ends it early, if it can be stopped.
 ///
 /// # Errors
-/// [`CommandError`] with its text ready to be shown.
+///
+/// [`CommandError`] with its text ready for display.
 pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
     match command {
         Command::Find(arguments) => find::find(arguments, stop),

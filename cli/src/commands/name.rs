@@ -1,4 +1,4 @@
-//! `descry name`: the things that runs have learned, and what they are called.
+//! `descry name`: the objects that runs have learned, and their names.
 
 use std::path::{Path, PathBuf};
 
@@ -16,14 +16,15 @@ use descry_agent::keeping::{Address, is_address};
 /// Arguments of `descry name`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Where runs keep what they remember: a folder, or mongodb://HOST/DATABASE
+    /// Store of earlier runs: a folder, or mongodb://HOST/DATABASE
     store: PathBuf,
-    /// What it is called, such as "thing 1": by itself, it is described; left out, all that was learned is
+    /// Current name, such as "thing 1": alone, describes the object; without it, all learned objects are
+    /// listed
     old: Option<String>,
-    /// What it is to be called, such as "the thing from Tuesday"
+    /// New name, such as "the thing from Tuesday"
     #[arg(group = "deed")]
     new: Option<String>,
-    /// Write the points of its model, metres about its middle, to a PLY file
+    /// Write the points of the object's model to a PLY file, metres relative to its centre
     #[arg(long, value_name = "FILE", group = "deed", requires = "old")]
     points: Option<PathBuf>,
     /// Print one JSON object
@@ -86,7 +87,7 @@ fn find<'a>(remembered: &'a Remembered, old: &str) -> Result<&'a LearnedThing, C
     })
 }
 
-/// A name must be something that can be said, and nothing else's.
+/// Rejects a name that cannot be spoken, or that is taken.
 fn check_free(remembered: &Remembered, old: &str, new: &str) -> Result<(), CommandError> {
     let symbol = called(new);
     if symbol.is_empty() {
@@ -102,7 +103,7 @@ fn check_free(remembered: &Remembered, old: &str, new: &str) -> Result<(), Comma
     }
 }
 
-/// Sides of the box around a thing, centimetres.
+/// Size of the bounding box of an object, centimetres.
 fn size_cm(thing: &LearnedThing) -> [f64; 3] {
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     [0, 1, 2].map(|k| 1e2 * f64::from(high[k] - low[k]))
@@ -140,7 +141,7 @@ fn line(thing: &LearnedThing, now_unix_s: f64) -> String {
     )
 }
 
-/// The day of the week in UTC: the first of January 1970 was a Thursday.
+/// Day of the week in UTC; 1 January 1970 was a Thursday.
 pub fn weekday(unix_s: f64) -> &'static str {
     let days = (unix_s / 86_400.0).floor() as i64;
     ["Thursday", "Friday", "Saturday", "Sunday", "Monday", "Tuesday", "Wednesday"]

@@ -1,4 +1,4 @@
-//! `descry new DIR`: a small domain that runs, to be changed.
+//! `descry new DIR`: a small working domain, as a starting point.
 
 use std::path::PathBuf;
 

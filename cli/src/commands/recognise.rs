@@ -1,4 +1,4 @@
-//! `descry recognise CLOUD…`: the surface and the objects in point clouds, perception alone.
+//! `descry recognise CLOUD…`: the surface and the objects in point clouds, without the agent.
 
 use std::path::{Path, PathBuf};
 
@@ -26,13 +26,14 @@ pub struct Arguments {
     /// Recogniser: descry, or published (the score of paper 004)
     #[arg(long, default_value = "descry", value_parser = ["descry", "published"])]
     recogniser: String,
-    /// Where the sensor stood in the frame of the cloud, metres [default: what the file says, or the origin]
+    /// Position of the sensor in the frame of the cloud, metres [default: as stated in the file, or the
+    /// origin]
     #[arg(long, value_name = "X,Y,Z", value_parser = triple, allow_hyphen_values = true)]
     viewpoint: Option<[f64; 3]>,
-    /// Direction of up in the frame of the cloud [default: told from what is in view, or not at all]
+    /// Upward direction in the frame of the cloud [default: estimated from the cloud, or unknown]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
-    /// Draw the cloud with each object tinted and named, as SVG; of one cloud
+    /// Draw the cloud as SVG, with each object tinted and labelled; for a single cloud
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
     /// Print one JSON object
@@ -40,10 +41,10 @@ pub struct Arguments {
     json: bool,
 }
 
-/// A larger cloud than any sensor gives at once: some fifty million points.
+/// Maximum size of a cloud file, bytes: some fifty million points, more than any sensor delivers at once.
 const MOST_CLOUD_BYTES: u64 = 1 << 30;
 
-/// What a cloud holds.
+/// Recognition result for a cloud file.
 struct Seen {
     path: String,
     points: usize,
@@ -115,8 +116,8 @@ fn look(
     Ok(Seen { path: shown, points, notes, cloud: view.cloud, found })
 }
 
-/// What was seen from where the sensor stood, and what a person should know of that. An organised cloud tells by its pixels what it looked
-/// through; any other was seen from where it is said, by the option or else by the file.
+/// Visibility of a cloud, with a note for the user. The pixels of an organised cloud tell which space was
+/// seen through; for others, the sensor's position is taken from the option `told` or else from the file.
 pub fn seen_from(
     view: &View,
     told: Option<Point3<f64>>,
@@ -135,7 +136,7 @@ pub fn seen_from(
     (visibility, known.is_none().then_some(unknown))
 }
 
-/// Three finite numbers with commas between them.
+/// Parses three finite numbers, separated by commas.
 pub fn triple(text: &str) -> Result<[f64; 3], String> {
     let number = |word: &str| word.trim().parse().ok().filter(|x: &f64| x.is_finite());
     let numbers: Option<Vec<f64>> = text.split(',').map(number).collect();
@@ -143,7 +144,7 @@ pub fn triple(text: &str) -> Result<[f64; 3], String> {
     numbers.ok_or_else(|| "expected three numbers such as 0,-0.5,1.2".to_string())
 }
 
-/// Three numbers that point somewhere.
+/// Parses a direction: three numbers, not all zero.
 pub fn direction(text: &str) -> Result<[f64; 3], String> {
     let up = triple(text)?;
     let length = Vector3::from(up).norm();

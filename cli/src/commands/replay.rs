@@ -1,4 +1,4 @@
-//! `descry replay RUN`: lives through a run again from its record, and says whether it comes out the same.
+//! `descry replay RUN`: replays a run from its record, and reports any difference.
 
 use std::path::PathBuf;
 
@@ -15,10 +15,10 @@ use crate::commands::input;
 pub struct Arguments {
     /// The run's folder
     run: PathBuf,
-    /// Seconds of the body's clock that pass in one second [default: as fast as it goes]
+    /// Seconds of the body's clock for each second of replay [default: as fast as possible]
     #[arg(long, value_name = "X", value_parser = speed)]
     speed: Option<f64>,
-    /// Keep what came about as a run in this folder
+    /// Record the replay as a run in this folder
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object

@@ -1,4 +1,4 @@
-//! `descry robot check BODY`: whether a body keeps the promises of bodies, reported like a test.
+//! `descry robot check BODY`: conformance test of a body.
 
 use descry_domains::load::{DEFAULT, Domain};
 use descry_robots::conformance;
@@ -8,10 +8,10 @@ use crate::commands::input;
 use descry_agent::body;
 use descry_agent::exit::{CommandError, Exit};
 
-/// What can be asked of a body by itself.
+/// Operations on a body.
 #[derive(clap::Subcommand)]
 pub enum Arguments {
-    /// Drive it, look, take frames, stop it, and hold it to the promises of every body
+    /// Test a body: drives, looks, frames and stops, against the contract of bodies
     Check(CheckArguments),
 }
 

@@ -1,4 +1,4 @@
-//! `descry runs`: the runs in a folder, one a line.
+//! `descry runs`: list of the runs in a folder, one a line.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use descry_agent::{run, shell};
 /// Arguments of `descry runs`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder that holds runs
+    /// Folder with the runs
     #[arg(default_value = "runs")]
     folder: PathBuf,
     /// Print one JSON object
@@ -38,7 +38,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     Ok(Exit::Done)
 }
 
-/// The runs, a line each: when it began, its folder, how it ended, its views, its goal.
+/// Table of runs: start time, folder, verdict, views and goal of each.
 fn table(runs: &[Value]) -> String {
     let text = |run: &Value, key: &str| run[key].as_str().unwrap_or("?").to_string();
     let row = |run: &Value| {
@@ -75,7 +75,7 @@ fn list(arguments: &Arguments) -> Result<Vec<Value>, CommandError> {
     Ok(paths.iter().map(|path| describe(path)).collect())
 }
 
-/// A run, as far as its folder tells.
+/// Description of a run, as far as its folder is readable.
 fn describe(path: &Path) -> Value {
     let header = run::header(path).ok();
     let (report, otherwise) = match run::report(path) {
@@ -92,7 +92,7 @@ fn describe(path: &Path) -> Value {
     })
 }
 
-/// Day and time in UTC, to the minute.
+/// Date and time in UTC, to the minute.
 pub fn date(unix_s: u64) -> String {
     // Days are counted from the first of March of the year 0, so that a leap day ends a year and 400 years are one era of 146097
     // days (Richards, Explanatory Supplement to the Astronomical Almanac, 15.11.3).

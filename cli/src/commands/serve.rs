@@ -1,4 +1,4 @@
-//! `descry serve`: an agent that stays.
+//! `descry serve`: the agent as a service.
 
 use std::net::ToSocketAddrs;
 use std::path::{Path, PathBuf};
@@ -12,13 +12,13 @@ use crate::serve::{self, Served};
 /// Arguments of `descry serve`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Folder of the goals and their runs; with goals that an earlier server left, those are gone on with
+    /// Folder of the goals and their runs; unfinished goals of an earlier server are resumed
     #[arg(long, value_name = "DIR", default_value = ".")]
     folder: PathBuf,
-    /// Where to listen
+    /// Address to listen at
     #[arg(long, value_name = "HOST:PORT", default_value = "127.0.0.1:7447")]
     listen: String,
-    /// File with the token that callers must show; needed where other machines can reach it
+    /// File with the access token for callers; required for addresses that other machines can reach
     #[arg(long, value_name = "FILE")]
     token: Option<PathBuf>,
     /// Built-in domain or a domain's folder
@@ -30,10 +30,10 @@ pub struct Arguments {
     /// The body, as for `descry do`
     #[arg(long, default_value = "sim")]
     robot: String,
-    /// Fixes the arrangement, the noise and every choice
+    /// Seed of the arrangement, the noise and every choice
     #[arg(long, default_value_t = 1, value_parser = input::seed, allow_negative_numbers = true)]
     seed: u64,
-    /// Where what was seen is kept from goal to goal: a folder, or mongodb://HOST/DATABASE [default: `seen` in the folder]
+    /// Store of sightings across goals: a folder, or mongodb://HOST/DATABASE [default: `seen` in the folder]
     #[arg(long, value_name = "STORE")]
     remember: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! `descry show RUN`: what happened in a run, from its record.
+//! `descry show RUN`: the events of a run, from its record.
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -17,7 +17,7 @@ use descry_explain::basis;
 pub struct Arguments {
     /// The run's folder
     run: PathBuf,
-    /// Write the run as one page instead: map, plans, what was seen, and what was said, moment by moment
+    /// Write the run as one page instead: map, plans, point clouds and narration on a time line
     #[arg(long, value_name = "FILE", conflicts_with = "json")]
     html: Option<PathBuf>,
     /// Print one JSON object
@@ -77,7 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     Ok(if damaged.is_some() || !more.is_empty() { Exit::No } else { exit })
 }
 
-/// An event of another version, as it stands in the record.
+/// An event of another version, as raw JSON.
 fn compact(event: &Value) -> String {
     serde_json::to_string(event).unwrap_or_default()
 }

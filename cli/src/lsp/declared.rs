@@ -13,7 +13,7 @@ pub enum Kind {
     Predicate,
     /// A function.
     Function,
-    /// A module, whose calls are answered from outside.
+    /// A module, whose calls are answered by attachments.
     Module,
     /// An action.
     Action,
@@ -24,7 +24,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As an outline shows it.
+    /// Symbol kind in an outline.
     pub fn symbol(self) -> SymbolKind {
         match self {
             Kind::Predicate => SymbolKind::BOOLEAN,
@@ -36,7 +36,7 @@ impl Kind {
         }
     }
 
-    /// As a list of proposals shows it.
+    /// Item kind in completions.
     pub fn item(self) -> CompletionItemKind {
         match self {
             Kind::Predicate => CompletionItemKind::PROPERTY,
@@ -48,7 +48,7 @@ impl Kind {
         }
     }
 
-    /// In a word.
+    /// Name of the kind.
     pub fn word(self) -> &'static str {
         match self {
             Kind::Predicate => "predicate",
@@ -105,7 +105,7 @@ fn typed(kind: Kind, all: &[Typed]) -> impl Iterator<Item = (Kind, Name, Span)> 
     all.iter().map(move |t| (kind, t.name, t.types.iter().fold(t.name.span, |span, of| span.to(of.span))))
 }
 
-/// The innermost list around a place.
+/// The innermost list around a span.
 pub fn list_around(text: &str, span: Span) -> Span {
     let bytes = text.as_bytes();
     let mut depth = 0_i32;
@@ -139,7 +139,7 @@ pub fn list_around(text: &str, span: Span) -> Span {
     Span { source: span.source, start: start as u32, end: text.len() as u32 }
 }
 
-/// The comment lines right above a place, and the comment behind it in its line.
+/// The comment lines right above a span, and the comment at the end of its line.
 pub fn comments(text: &str, span: Span) -> Vec<String> {
     let start = text[..span.start as usize].rfind('\n').map_or(0, |at| at + 1);
     let mut above: Vec<String> = Vec::new();
@@ -155,7 +155,7 @@ pub fn comments(text: &str, span: Span) -> Vec<String> {
     above
 }
 
-/// The word at a byte: what stands between delimiters, and where it begins.
+/// The word at a byte offset, between delimiters, with its start.
 pub fn word_at(text: &str, at: usize) -> (usize, &str) {
     let is_part = |c: char| !c.is_whitespace() && !"()[]{};\"'=,<>".contains(c);
     let start =

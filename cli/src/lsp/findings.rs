@@ -1,4 +1,4 @@
-//! Findings about texts, as an editor shows them.
+//! Diagnostics for an editor.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -16,16 +16,16 @@ use super::mends;
 use super::texts::{Lines, Texts, path_of, uri_of};
 use super::units::{self, Unit};
 
-/// The files about which something was said that still stands.
+/// Files with published findings.
 #[derive(Default)]
 pub struct Told {
     files: BTreeSet<PathBuf>,
-    /// Grounding of the words of each domain's folder, as of the last time that it could be read.
+    /// Grounding of the words of each domain's folder, as of the last successful read.
     grounded: BTreeMap<PathBuf, Vec<String>>,
 }
 
 impl Told {
-    /// Findings after a change of a text: its own, and those of all texts that depend on it.
+    /// Findings after a change of a text: its own, and those of all dependent texts.
     pub fn after(&mut self, texts: &Texts, uri: &Uri) -> Vec<PublishDiagnosticsParams> {
         let path = path_of(uri);
         let text = texts.text(&path).unwrap_or_default();
@@ -60,8 +60,8 @@ impl Told {
         said.into_iter().filter_map(publish).collect()
     }
 
-    /// Findings of a domain's folder; also keeps the grounding of its words, for unfinished texts
-    /// as far as they can be read once open lists are closed.
+    /// Findings of a domain's folder; also updates the grounding of its words, for unfinished texts after
+    /// closing their open lists.
     fn of_folder(&mut self, texts: &Texts, folder: &Path) -> BTreeMap<PathBuf, Vec<Shown>> {
         let (said, grounding) = of_folder(texts, folder);
         let is_known = self.grounded.contains_key(folder);
@@ -71,12 +71,12 @@ impl Told {
         said
     }
 
-    /// Grounding of the words of a folder, as of the last time that it could be read.
+    /// Grounding of the words of a folder, as of the last successful read.
     pub fn grounding(&self, folder: &Path) -> &[String] {
         self.grounded.get(folder).map_or(&[], Vec::as_slice)
     }
 
-    /// Nothing is said any more about a text that was closed.
+    /// Clears the findings of a closed text.
     pub fn forget(&mut self, uri: &Uri) -> PublishDiagnosticsParams {
         self.files.remove(&path_of(uri));
         PublishDiagnosticsParams { uri: uri.clone(), diagnostics: Vec::new(), version: None }
@@ -100,7 +100,7 @@ fn of_text(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Show
     }
 }
 
-/// A problem with its domain; where there is none to be found, what can be said without.
+/// Findings of a problem with its domain; without the domain, those of the problem alone.
 fn of_problem(texts: &Texts, path: &Path, text: &str) -> BTreeMap<PathBuf, Vec<Shown>> {
     let source = descry_planner::Source::new(path.display().to_string(), text);
     let domain = units::domain_of(texts, path, text).and_then(|domain| units::source(texts, &domain));
@@ -128,7 +128,8 @@ fn grounding_once_closed(texts: &Texts, folder: &Path) -> Option<Vec<String>> {
     Some(descry_domains::check::grounding(&domain))
 }
 
-/// The whole folder of a domain: what `descry check DIR` says, and how its words are grounded where it can be read.
+/// Findings of a domain's folder, as from `descry check DIR`, and the grounding of its words if it is
+/// readable.
 fn of_folder(texts: &Texts, folder: &Path) -> (BTreeMap<PathBuf, Vec<Shown>>, Option<Vec<String>>) {
     let files = units::files(texts, folder);
     let mut all: BTreeMap<PathBuf, Vec<Shown>> =
@@ -164,7 +165,7 @@ fn of_folder(texts: &Texts, folder: &Path) -> (BTreeMap<PathBuf, Vec<Shown>>, Op
     (all, known)
 }
 
-/// Place and message of an error that is no finding.
+/// Place and message of an error other than a finding.
 fn of_error(
     folder: &Path,
     files: &descry_domains::load::Files,
@@ -193,7 +194,7 @@ fn of_error(
     }
 }
 
-/// The place that `TOML parse error at line L, column C` names: to the end of that line.
+/// Span named by `TOML parse error at line L, column C`, to the end of that line.
 fn toml_place(text: &str, drawn: &str) -> Span {
     let number = |before: &str| {
         let (_, rest) = drawn.split_once(before)?;
@@ -206,7 +207,7 @@ fn toml_place(text: &str, drawn: &str) -> Span {
     Span { source: 0, start: from as u32, end: (start + rest.len()).max(from) as u32 }
 }
 
-/// Findings by the file that they are about.
+/// Groups findings by file.
 fn by_file(findings: &Findings) -> BTreeMap<PathBuf, Vec<Shown>> {
     let mut all: BTreeMap<PathBuf, Vec<Shown>> =
         findings.sources.iter().map(|source| (PathBuf::from(&source.name), Vec::new())).collect();
@@ -219,7 +220,7 @@ fn by_file(findings: &Findings) -> BTreeMap<PathBuf, Vec<Shown>> {
     all
 }
 
-/// A finding as an editor shows it.
+/// Converts a finding to a diagnostic.
 fn shown(finding: &Diagnostic, text: &str, all: Option<&Findings>) -> Shown {
     let first = finding.labels.first();
     let range = Lines::of(text).range(first.map_or(Span::default(), |label| label.span));

@@ -1,14 +1,15 @@
-//! Meanings of the headings and keys of a domain's TOML files: tables of the reference, which are
-//! made from the types that read them.
+//! Documentation of the headings and keys in a domain's TOML files, from the tables of the reference, which
+//! are generated from the types that read these files.
 
-/// The page of the reference that tells of a file, by the folder that it stands in; none: `domain.toml`.
+/// Reference page of each file or folder of a domain.
 const PAGES: [(&str, &str); 3] = [
     ("domain.toml", include_str!("reference/domain.md")),
     ("objects", include_str!("reference/objects.md")),
     ("scenes", include_str!("reference/scenes.md")),
 ];
 
-/// A heading of TOML around a place, as the names between its dots, with where it begins; none before the first.
+/// The TOML heading in force at a byte offset, as the names between its dots, with its start; none before the
+/// first heading.
 fn heading(text: &str, at: usize) -> Option<(usize, Vec<&str>)> {
     let mut start = 0;
     let mut found = None;
@@ -27,13 +28,13 @@ fn heading(text: &str, at: usize) -> Option<(usize, Vec<&str>)> {
 
 /// Name of a heading or key at a byte of a TOML file, with its meaning.
 pub struct Here<'t> {
-    /// First byte of the name, and the name.
+    /// Start of the name, byte offset, and the name.
     pub name: (usize, &'t str),
-    /// Entry of the reference; empty for a name that a domain gives.
+    /// Entry of the reference; empty for names that a domain defines.
     pub meaning: String,
 }
 
-/// Finds the name at a byte, in a heading or before an equals sign; `part` is the file or folder of
+/// Finds the name at a byte offset, in a heading or before an equals sign; `part` is the file or folder of
 /// the text.
 pub fn here<'t>(part: &str, text: &'t str, at: usize) -> Option<Here<'t>> {
     let page = PAGES.iter().find(|(of, _)| *of == part)?.1;
@@ -58,7 +59,7 @@ pub fn here<'t>(part: &str, text: &'t str, at: usize) -> Option<Here<'t>> {
     Some(Here { name: (start, name), meaning: meaning.unwrap_or_default() })
 }
 
-/// The part of a page about a table; none: what stands before the first.
+/// The section of a page on a table; none: the part before the first section.
 fn section<'p>(page: &'p str, table: Option<&str>) -> Option<&'p str> {
     let mut parts = page.split("\n## ");
     let Some(table) = table else { return parts.next() };
@@ -71,7 +72,7 @@ fn section<'p>(page: &'p str, table: Option<&str>) -> Option<&'p str> {
     parts.skip(1).find(of)
 }
 
-/// Entry for a key in the first table of a part.
+/// Entry for a key in the first table of a section.
 fn row(part: &str, key: &str) -> Option<String> {
     let rows = part.lines().filter(|line| line.starts_with('|'));
     let mut cells = rows.map(|line| line.trim_matches('|').split(" | ").map(str::trim).collect::<Vec<_>>());

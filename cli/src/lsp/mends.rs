@@ -1,4 +1,4 @@
-//! The mends that findings offer, as an editor carries them out.
+//! Quick fixes for findings.
 
 use descry_planner::{Diagnostic, Span};
 use lsp_types::{
@@ -9,22 +9,22 @@ use serde::{Deserialize, Serialize};
 
 use super::texts::Lines;
 
-/// A mend, as it goes to the editor with a finding and comes back with a question about it.
+/// A quick fix; travels to the editor within the diagnostic and returns with a request for code actions.
 #[derive(Debug, Serialize, Deserialize)]
 struct Mend {
-    /// Title of the mend.
+    /// Title of the fix.
     title: String,
-    /// Replacements.
+    /// Text edits.
     edits: Vec<TextEdit>,
 }
 
-/// The mend that a finding about a text offers, for the editor to keep; none if it offers none.
+/// The fix for a finding, as data of its diagnostic; none without one.
 pub fn of(finding: &Diagnostic, text: &str) -> Option<serde_json::Value> {
     let mend = meant(finding, text).or_else(|| closed(finding, text))?;
     serde_json::to_value(mend).ok()
 }
 
-/// `did you mean …`: that, wherever the finding points at what was written.
+/// Fix for `did you mean …`, at every place that the finding points at.
 fn meant(finding: &Diagnostic, text: &str) -> Option<Mend> {
     let (_, rest) = finding.help.as_ref()?.split_once("did you mean `")?;
     let meant = rest.split('`').next()?;
@@ -42,7 +42,7 @@ fn meant(finding: &Diagnostic, text: &str) -> Option<Mend> {
     Some(Mend { title: format!("Write `{meant}`"), edits })
 }
 
-/// A missing sign, before what shows that it is missing.
+/// Fix for missing closing brackets, inserted at the end of the code before the place that reveals them.
 fn closed(finding: &Diagnostic, text: &str) -> Option<Mend> {
     let (end, signs) = missing(finding, text)?;
     let range = Lines::of(text).range(Span { source: 0, start: end as u32, end: end as u32 });
@@ -50,7 +50,7 @@ fn closed(finding: &Diagnostic, text: &str) -> Option<Mend> {
     Some(Mend { title, edits: vec![TextEdit { range, new_text: signs }] })
 }
 
-/// A text in PDDL with every list closed that is open; none if none is.
+/// A PDDL text with every open list closed; none if all are closed.
 pub fn all_closed(text: &str) -> Option<String> {
     let findings = descry_planner::check(&descry_planner::Source::new("", text), None);
     let mut closed = text.to_string();
@@ -60,7 +60,7 @@ pub fn all_closed(text: &str) -> Option<String> {
     (!missing.is_empty()).then_some(closed)
 }
 
-/// Place and text of missing signs.
+/// Place and text of missing brackets.
 fn missing(finding: &Diagnostic, text: &str) -> Option<(usize, String)> {
     let (_, rest) = finding.help.as_ref()?.split_once("add `")?;
     let sign = rest.split('`').next().filter(|sign| matches!(*sign, ")" | "]"))?;
@@ -70,7 +70,7 @@ fn missing(finding: &Diagnostic, text: &str) -> Option<(usize, String)> {
     Some((end, sign.repeat(many)))
 }
 
-/// End of the last line of code: the last line that has more than blanks and a comment.
+/// End of the last line with more than blanks and a comment, byte offset.
 fn end_of_code(text: &str) -> usize {
     let mut end = 0;
     let mut start = 0;
@@ -86,7 +86,7 @@ fn end_of_code(text: &str) -> usize {
     end
 }
 
-/// Code actions for the findings that an editor asks about.
+/// Code actions for the diagnostics in a request.
 pub fn actions(params: &CodeActionParams) -> CodeActionResponse {
     let action = |shown: &lsp_types::Diagnostic| {
         let mend: Mend = serde_json::from_value(shown.data.clone()?).ok()?;

@@ -1,4 +1,4 @@
-//! The texts that an editor has open, and positions in them.
+//! Open texts of an editor, and positions in them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::str::FromStr;
 use descry_planner::Span;
 use lsp_types::{Position, Range, TextDocumentContentChangeEvent, Uri};
 
-/// Files longer than this are not looked into, bytes.
+/// Maximum size of a file to be read, bytes.
 const MOST_BYTES: u64 = 16 << 20;
 
 /// Open texts; all others are read from the disk.
@@ -17,12 +17,12 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// A text was opened.
+    /// Stores an opened text.
     pub fn open(&mut self, uri: &Uri, text: String) {
         self.open.insert(path_of(uri), text);
     }
 
-    /// A text was changed: all of it, or a part.
+    /// Applies a change to a text: all of it, or a part.
     pub fn change(&mut self, uri: &Uri, change: TextDocumentContentChangeEvent) {
         let text = self.open.entry(path_of(uri)).or_default();
         match change.range {
@@ -34,7 +34,7 @@ impl Texts {
         }
     }
 
-    /// A text was closed: what the disk has counts again.
+    /// Forgets a closed text; the file on the disk counts again.
     pub fn close(&mut self, uri: &Uri) {
         self.open.remove(&path_of(uri));
     }
@@ -48,17 +48,17 @@ impl Texts {
         is_small.then(|| std::fs::read_to_string(path).ok()).flatten()
     }
 
-    /// True if there is such a file.
+    /// True if the file is open or exists on the disk.
     pub fn has(&self, path: &Path) -> bool {
         self.open.contains_key(path) || path.is_file()
     }
 
-    /// The paths of what is open.
+    /// The paths of open texts.
     pub fn paths(&self) -> impl Iterator<Item = &PathBuf> {
         self.open.keys()
     }
 
-    /// The files of a folder that end so, open or on the disk, in the order of their names.
+    /// The files of a folder with these extensions, open or on the disk, sorted by name.
     pub fn of_folder(&self, folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
         let on_disk = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
         let open = self.open.keys().filter(|path| path.parent() == Some(folder)).cloned();
@@ -71,7 +71,7 @@ impl Texts {
     }
 }
 
-/// The path that an address means; of one that means no file, its text.
+/// The path of a URI; for other URIs than files, its text.
 pub fn path_of(uri: &Uri) -> PathBuf {
     let text = uri.as_str();
     let Some(path) = text.strip_prefix("file://") else { return PathBuf::from(text) };
@@ -94,7 +94,7 @@ pub fn path_of(uri: &Uri) -> PathBuf {
     PathBuf::from(String::from_utf8_lossy(&decoded).into_owned())
 }
 
-/// The address of a path; none where it makes none.
+/// The URI of a path; none if the path has no valid URI.
 pub fn uri_of(path: &Path) -> Option<Uri> {
     let text = path.to_str()?;
     if !text.starts_with('/') {
@@ -108,7 +108,8 @@ pub fn uri_of(path: &Path) -> Option<Uri> {
     Uri::from_str(&format!("file://{encoded}")).ok()
 }
 
-/// The byte at a position; columns count units of UTF-16. Beyond a line's end it is that end.
+/// The byte offset of a position; columns count UTF-16 units. Positions beyond the end of a line are clamped
+/// to it.
 pub fn offset(text: &str, position: Position) -> usize {
     let mut start = 0;
     for _ in 0..position.line {
@@ -128,20 +129,20 @@ pub fn offset(text: &str, position: Position) -> usize {
     start + line.len()
 }
 
-/// Positions in a text, where many are asked for.
+/// Line index for converting many positions in a text.
 pub struct Lines<'a> {
     text: &'a str,
     starts: Vec<usize>,
 }
 
 impl<'a> Lines<'a> {
-    /// Index of the lines of a text.
+    /// Builds the index.
     pub fn of(text: &'a str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         Lines { text, starts }
     }
 
-    /// The position of a byte.
+    /// The position of a byte offset.
     pub fn position(&self, at: usize) -> Position {
         let at = at.min(self.text.len());
         let line = self.starts.partition_point(|&start| start <= at) - 1;

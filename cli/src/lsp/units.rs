@@ -1,4 +1,4 @@
-//! Unit that a text belongs to: a domain's folder, or a domain, problem or plan by itself.
+//! Units of checking: a domain's folder, or a single domain, problem or plan.
 
 use std::path::{Path, PathBuf};
 
@@ -12,9 +12,9 @@ use super::texts::Texts;
 /// Kind of unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unit {
-    /// One of the files of a domain's folder.
+    /// A file of a domain's folder.
     Folder(PathBuf),
-    /// A domain in PDDL.
+    /// A PDDL domain.
     Domain,
     /// A problem.
     Problem,
@@ -24,9 +24,9 @@ pub enum Unit {
     Other,
 }
 
-/// The parts of a domain's folder.
+/// Subfolders of a domain's folder.
 const PARTS: [&str; 3] = ["objects", "scenes", "shapes"];
-/// More files than this are not looked into for the domain of a problem.
+/// Maximum number of files searched for the domain of a problem.
 const MOST_FILES: usize = 200;
 
 /// Finds the unit of the text at a path.
@@ -49,7 +49,7 @@ pub fn of(texts: &Texts, path: &Path, text: &str) -> Unit {
     }
 }
 
-/// The part of a domain's folder that a TOML file is by its name: `domain.toml`, or the folder that it stands in.
+/// The part of a domain's folder that a TOML file belongs to: `domain.toml`, or the name of its folder.
 pub fn part_of(path: &Path) -> Option<&str> {
     path.extension().filter(|e| *e == "toml")?;
     let name = path.file_name()?.to_str()?;
@@ -88,12 +88,12 @@ pub fn files(texts: &Texts, folder: &Path) -> Files {
     files
 }
 
-/// A text by its path.
+/// Loads a text as a source named by its path.
 pub fn source(texts: &Texts, path: &Path) -> Option<Source> {
     Some(Source::new(path.display().to_string(), texts.text(path)?))
 }
 
-/// The domain that a problem says it belongs to: among the files beside it, then above it.
+/// The domain that a problem names, searched among the files beside it, then above it.
 pub fn domain_of(texts: &Texts, path: &Path, problem: &str) -> Option<PathBuf> {
     let mut symbols = Symbols::default();
     let name = parse::problem(problem, 1, &mut symbols, &mut Vec::new()).domain?;
@@ -112,7 +112,7 @@ fn named_so(text: &str, wanted: &str) -> bool {
     name.is_some_and(|name| symbols.name(name.symbol) == wanted)
 }
 
-/// The domain that a plan may be of: the only one beside it or above it.
+/// The domain of a plan: the only one beside it or above it.
 pub fn domain_of_plan(texts: &Texts, path: &Path) -> Option<PathBuf> {
     let is_domain = |path: &PathBuf| {
         let text = texts.text(path).unwrap_or_default();
@@ -122,7 +122,7 @@ pub fn domain_of_plan(texts: &Texts, path: &Path) -> Option<PathBuf> {
     found.next().filter(|_| found.next().is_none())
 }
 
-/// PDDL beside a file and in the folder above, `domain.pddl` first.
+/// PDDL files beside a file and in the parent folder, `domain.pddl` first.
 fn beside(texts: &Texts, path: &Path) -> Vec<PathBuf> {
     let folders = [path.parent(), path.parent().and_then(Path::parent)];
     let mut all = Vec::new();

@@ -16,13 +16,13 @@ use super::keys;
 use super::texts::{Lines, Texts, offset, path_of, uri_of};
 use super::units::{self, Unit};
 
-/// Words that join conditions and effects.
+/// Keywords of conditions and effects.
 const JOINING: [&str; 13] = [
     "and", "or", "not", "imply", "forall", "exists", "when", "at start", "at end", "over all", "increase",
     "decrease", "assign",
 ];
 
-/// Declarations that a text can name: its own, those of its domain and of the problem.
+/// Declarations in scope of a text: its own, those of its domain and of the problem.
 fn in_scope(texts: &Texts, path: &Path, text: &str) -> Vec<(PathBuf, String, Vec<Declared>)> {
     let unit = units::of(texts, path, text);
     let mut files: Vec<(PathBuf, bool)> = Vec::new();
@@ -77,7 +77,7 @@ pub fn hover(texts: &Texts, told: &Told, at: &TextDocumentPositionParams) -> Opt
     Some(Hover { contents: HoverContents::Markup(contents), range: Some(range) })
 }
 
-/// Text about a name that is in scope.
+/// Documentation of a name in scope.
 fn about(texts: &Texts, told: &Told, (path, text): (&Path, &str), name: &str) -> Vec<String> {
     const LONGEST: usize = 2_000;
     let mut parts: Vec<String> = Vec::new();
@@ -130,14 +130,14 @@ pub fn definition(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Goto
     (!found.is_empty()).then_some(GotoDefinitionResponse::Array(found))
 }
 
-/// The section of a definition that a place stands in: from a `(:` to the next.
+/// The section of a definition around an offset: from a `(:` to the next.
 fn section(text: &str, at: usize) -> std::ops::Range<usize> {
     let start = text[..at].rfind("(:").unwrap_or(0);
     let end = text[at..].find("(:").map_or(text.len(), |n| at + n);
     start..end
 }
 
-/// The variables of a part of a text, each where it first stands.
+/// The variables in a part of a text, each at its first occurrence.
 fn variables(text: &str, part: std::ops::Range<usize>) -> Vec<(usize, &str)> {
     let mut found: Vec<(usize, &str)> = Vec::new();
     for (at, _) in text[part.clone()].match_indices('?') {
@@ -213,7 +213,7 @@ pub fn completion(texts: &Texts, at: &TextDocumentPositionParams) -> Option<Comp
     Some(CompletionResponse::Array(items))
 }
 
-/// A text laid out, as one change; nothing where it is laid out already or cannot be read.
+/// Formatting of a text as one edit; none if it is formatted already or cannot be parsed.
 pub fn formatting(texts: &Texts, uri: &Uri) -> Option<Vec<TextEdit>> {
     let path = path_of(uri);
     let text = texts.text(&path)?;

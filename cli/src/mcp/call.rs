@@ -1,4 +1,4 @@
-//! A call: a command of descry in a process of its own.
+//! Tool call: a descry command in a process of its own.
 
 use serde_json::{Value, json};
 
@@ -7,10 +7,10 @@ use super::tools::Task;
 use crate::child::Child;
 use descry_agent::exit::Exit;
 
-/// Bytes of narration that an answer about a failure has at most: its end.
+/// Maximum size of the narration in the answer on a failure, bytes; its end is kept.
 const TOLD_BYTES: usize = 4000;
 
-/// The result of a tool, as the protocol has it; none for a call that was cancelled.
+/// Runs a tool and returns its result in the protocol's form; none for a cancelled call.
 pub(super) fn carry_out(
     child: &Child,
     task: &Task,
@@ -52,7 +52,7 @@ fn answered(
     Ok(json!({ "content": [{ "type": "text", "text": text }], "structuredContent": said, "isError": false }))
 }
 
-/// Whether a command could not do what it was asked for; an honest no is an answer.
+/// True if a command failed; a truthful no is an answer, not a failure.
 fn is_failure(exit: i32) -> bool {
     let answers = [Exit::Done, Exit::No, Exit::Unsolvable, Exit::OutOfTime];
     answers.iter().all(|answer| *answer as i32 != exit)

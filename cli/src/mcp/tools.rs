@@ -1,4 +1,4 @@
-//! The tools: what each takes, and the command line that carries it out.
+//! The tools: their parameters, and the command lines that carry them out.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 
 use super::Served;
 
-/// Seconds that a search for a plan may take where the caller says nothing.
+/// Default time limit of planning, seconds.
 const PLANNING_S: f64 = 60.0;
 
 /// A tool.
@@ -17,12 +17,12 @@ pub(super) struct Tool {
     kind: Kind,
 }
 
-/// What a tool does to the world.
+/// Effect of a tool on the world.
 #[derive(PartialEq)]
 enum Kind {
-    /// It reads and reckons.
+    /// Reads and computes only.
     Reads,
-    /// It writes a run, and with a real body moves it.
+    /// Writes a run, and moves the body if it is real.
     Runs,
 }
 
@@ -34,18 +34,18 @@ struct Parameter {
     is_required: bool,
 }
 
-/// What a parameter holds.
+/// Type of a parameter.
 #[derive(PartialEq)]
 enum Holds {
-    /// PDDL or a plan, or a file of it.
+    /// PDDL or plan text, or the path of a file with it.
     Source,
-    /// Words.
+    /// Free text.
     Words,
-    /// A domain's folder, or a built-in one by its name.
+    /// A domain's folder, or the name of a built-in domain.
     Domain,
-    /// A path to something that exists.
+    /// Path of an existing file or folder.
     Path,
-    /// Several of these.
+    /// Several such paths.
     Paths,
     Number,
     Whole,
@@ -67,7 +67,7 @@ const DOMAIN: Parameter =
 const SCENE: Parameter =
     optional("scene", Holds::Words, "scene of the simulated robot, by its name in the domain");
 
-/// Every tool.
+/// All tools.
 pub(super) static TOOLS: [Tool; 9] = [
     Tool {
         name: "check",
@@ -161,30 +161,30 @@ pub(super) static TOOLS: [Tool; 9] = [
     },
 ];
 
-/// The tool of a name.
+/// Finds a tool by name.
 pub(super) fn named(name: &str) -> Option<&'static Tool> {
     TOOLS.iter().find(|tool| tool.name == name)
 }
 
-/// The parameter by which a caller asks for the real body; there is none without one.
+/// Parameter that requests the real body; offered only by a server with one.
 const REAL: Parameter =
     optional("real", Holds::Flag, "with the real robot, which moves, and not in simulation");
 
-/// The tools as the protocol lists them.
+/// Descriptions of the tools in the protocol's form.
 pub(super) fn listed(has_robot: bool) -> Vec<Value> {
     TOOLS.iter().map(|tool| tool.listed(has_robot)).collect()
 }
 
-/// A command line to carry out.
+/// Command line of a call.
 #[derive(Default)]
 pub(super) struct Task {
     /// The command and its options.
     pub(super) words: Vec<String>,
-    /// Files that are written for it beforehand, in a folder of their own, by name.
+    /// Files to write beforehand into a temporary folder, by name.
     pub(super) files: Vec<(&'static str, String)>,
-    /// What it is given over its standard input.
+    /// Standard input of the command.
     pub(super) input: String,
-    /// How its findings are asked for if it cannot read its files.
+    /// Command line that reports findings if the command cannot read its files.
     pub(super) check: Option<Vec<String>>,
 }
 
@@ -208,10 +208,11 @@ impl Tool {
         })
     }
 
-    /// The command line for a call.
+    /// Builds the command line for a call.
     ///
     /// # Errors
-    /// An argument is missing, unknown, or not as it must be: with what was expected.
+    ///
+    /// A missing, unknown or invalid argument, with the expectation.
     pub(super) fn task(&self, arguments: &Value, served: &Served) -> Result<Task, String> {
         let none = Map::new();
         let given = match arguments {
@@ -274,7 +275,7 @@ impl Tool {
     }
 }
 
-/// The real body, if it is asked for.
+/// The real body, if requested.
 fn robot(given: &Map<String, Value>, served: &Served) -> Result<Option<String>, String> {
     match (given.get(REAL.name), &served.robot) {
         (None | Some(Value::Bool(false)), _) => Ok(None),
@@ -288,7 +289,7 @@ fn robot(given: &Map<String, Value>, served: &Served) -> Result<Option<String>, 
     }
 }
 
-/// The values of a call, as words of a command line.
+/// Conversion of a call's values to words of a command line.
 struct Values<'a> {
     given: &'a Map<String, Value>,
     folder: &'a Path,
@@ -331,7 +332,7 @@ impl Values<'_> {
         Ok(())
     }
 
-    /// The file of a text, or a file that is named.
+    /// The file of a PDDL or plan argument: one to be written with the given text, or the named file.
     fn source(&mut self, name: &'static str, text: &str) -> Result<String, String> {
         if text.contains('(') {
             let file = match name {
@@ -345,13 +346,13 @@ impl Values<'_> {
         self.domain(text)
     }
 
-    /// A path, or a name of something that is built in.
+    /// A path, or the name of a built-in domain.
     fn domain(&self, text: &str) -> Result<String, String> {
         let is_name = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
         if is_name && !self.folder.join(text).exists() { Ok(text.to_string()) } else { self.path(text) }
     }
 
-    /// Something that exists below the folder of the server.
+    /// Resolves an existing path below the server's folder.
     fn path(&self, text: &str) -> Result<String, String> {
         let folder = self.folder.display();
         let found = self.folder.join(text).canonicalize();

@@ -1,4 +1,4 @@
-//! The goals of an agent that stays: a queue, and a journal that outlives the process.
+//! Goals of the service: a queue, and a journal that survives the process.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -8,57 +8,58 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Where a goal stands.
+/// State of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum State {
-    /// It waits for its turn.
+    /// Waiting for its turn.
     Queued,
-    /// It is pursued.
+    /// Being pursued.
     Running,
-    /// Something more urgent, or the end of the server, came between; it is gone on with.
+    /// Interrupted by a more urgent goal or the end of the server; will be resumed.
     Interrupted,
-    /// It came to a verdict.
+    /// Finished with a verdict.
     Ended,
-    /// Somebody cancelled it.
+    /// Cancelled by a caller.
     Cancelled,
 }
 
 /// A goal that was given.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Goal {
-    /// Its number, from 1.
+    /// Number, from 1.
     pub(super) id: u64,
-    /// Its words.
+    /// The goal in words.
     pub(super) goal: String,
-    /// Whether it goes before those that are not.
+    /// True if it takes precedence over goals that are not urgent.
     pub(super) urgent: bool,
     pub(super) state: State,
     /// The folder of its run, once it has one.
     pub(super) run: Option<String>,
     /// The process that pursues it.
     pub(super) process: Option<u32>,
-    /// How it ended, as `descry do --json` says.
+    /// Its report, as from `descry do --json`.
     pub(super) report: Option<Value>,
 }
 
 impl Goal {
-    /// Whether nothing more comes of it.
+    /// True if the goal is finished.
     pub(super) fn is_over(&self) -> bool {
         matches!(self.state, State::Ended | State::Cancelled)
     }
 }
 
-/// All goals, each kept on disk as it is now before anybody is told.
+/// All goals; each state is on the disk before anyone is notified of it.
 pub(super) struct Goals {
     all: BTreeMap<u64, Goal>,
     journal: File,
 }
 
 impl Goals {
-    /// Reads the journal of a folder: the last line of a goal is how it stands; a line that was cut off is none.
+    /// Reads the journal in a folder: the last line of a goal is its state; a truncated line is ignored.
     ///
     /// # Errors
+    ///
     /// The journal cannot be read or written.
     pub(super) fn of(folder: &Path) -> io::Result<Self> {
         let path = folder.join("goals.jsonl");
@@ -76,19 +77,21 @@ impl Goals {
         Ok(Self { all, journal })
     }
 
-    /// A new goal.
+    /// Adds a goal.
     ///
     /// # Errors
-    /// It cannot be kept.
+    ///
+    /// The journal cannot be written.
     pub(super) fn add(&mut self, goal: String, urgent: bool) -> io::Result<Goal> {
         let id = self.all.keys().next_back().map_or(1, |last| last + 1);
         let (run, process, report) = Default::default();
         self.keep(Goal { id, goal, urgent, state: State::Queued, run, process, report })
     }
 
-    /// Keeps how a goal stands now.
+    /// Stores the state of a goal.
     ///
     /// # Errors
+    ///
     /// The journal cannot be written.
     pub(super) fn keep(&mut self, goal: Goal) -> io::Result<Goal> {
         let line = format!("{}\n", serde_json::to_string(&goal)?);
@@ -106,7 +109,7 @@ impl Goals {
         self.all.values()
     }
 
-    /// What is pursued next: urgent ones first, then what was interrupted, then the oldest.
+    /// The next goal to pursue: urgent ones first, then interrupted ones, then the oldest.
     pub(super) fn next(&self) -> Option<Goal> {
         let waits = |goal: &&Goal| matches!(goal.state, State::Queued | State::Interrupted);
         let turn = |goal: &&Goal| (!goal.urgent, goal.state != State::Interrupted, goal.id);

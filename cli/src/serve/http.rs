@@ -1,4 +1,4 @@
-//! Goals over HTTP: JSON in and out, and a stream of news.
+//! Goals over HTTP: JSON requests and responses, and a stream of events.
 
 use std::convert::Infallible;
 use std::io;
@@ -22,18 +22,18 @@ use tokio::sync::broadcast::error::RecvError;
 
 use super::Agent;
 
-/// Bytes of a request at most.
+/// Maximum size of a request, bytes.
 const ASKED_BYTES: usize = 64 << 10;
-/// Most connections at a time; further ones wait.
+/// Maximum number of open connections; further ones wait.
 const MOST_CONNECTIONS: usize = 256;
-/// Within this a caller must have said what it wants.
+/// Time within which a client must have sent its request.
 const ASK_WITHIN: Duration = Duration::from_secs(10);
 
 const OPENAPI: &str = include_str!("openapi.json");
 
 type Body = BoxBody<Bytes, Infallible>;
 
-/// A goal as a caller gives it.
+/// Body of a request to add a goal.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Given {
@@ -42,7 +42,7 @@ struct Given {
     urgent: bool,
 }
 
-/// Answers callers for ever.
+/// Serves callers indefinitely.
 pub(super) async fn serve(listener: TcpListener, agent: Arc<Agent>) -> io::Result<()> {
     let port = listener.local_addr()?.port();
     let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
@@ -99,7 +99,7 @@ async fn answer(
     })
 }
 
-/// Why a caller is refused: it shows no token, or a page from elsewhere makes a browser ask.
+/// Refusal of a caller: a missing token, or a cross-site request of a browser; none if it is allowed.
 fn refused(request: &Request<Incoming>, port: u16, agent: &Agent) -> Option<Response<Body>> {
     match &agent.served.token {
         Some(token) => {
@@ -135,7 +135,7 @@ async fn add(request: Request<Incoming>, agent: &Agent) -> Response<Body> {
     }
 }
 
-/// News as server-sent events; who falls behind is told how many it missed.
+/// Events as server-sent events; a listener that lags is told the number of missed events.
 fn events(agent: &Agent) -> Response<Body> {
     let news = stream::unfold(agent.news.subscribe(), |mut news| async move {
         let text = match news.recv().await {

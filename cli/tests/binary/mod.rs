@@ -1,4 +1,4 @@
-//! The binary as a script runs it.
+//! Runs the binary as a script does.
 
 // Each test uses some of it.
 #![allow(dead_code)]
@@ -28,19 +28,19 @@ pub fn check(folder: &Path, arguments: &[&str], exit: i32) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}\n{err}"))
 }
 
-/// Starts descry; what it says on standard error can be heard.
+/// Starts descry with its standard error captured.
 pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts")
 }
 
-/// The first line that it says.
+/// The first line of its standard error.
 pub fn first_line(child: &mut Child) -> String {
     let mut line = String::new();
     BufReader::new(child.stderr.as_mut().expect("it speaks")).read_line(&mut line).expect("it is text");
     line
 }
 
-/// Kills a run after it has said so many lines.
+/// Kills a run after `lines` lines of narration.
 pub fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
     let mut child = start(folder, arguments);
     let said = BufReader::new(child.stderr.take().expect("it speaks"));
@@ -50,7 +50,7 @@ pub fn kill_after(folder: &Path, arguments: &[&str], lines: usize) {
     child.wait().expect("it is gone");
 }
 
-/// Runs descry where it cannot do what it is asked, and expects an exit code and words.
+/// Runs descry and expects a failure with an exit code and words.
 pub fn check_refused(folder: &Path, arguments: &[&str], exit: i32, words: &[&str]) {
     let output = outcome(folder, arguments);
     let err = String::from_utf8_lossy(&output.stderr);
@@ -60,7 +60,7 @@ pub fn check_refused(folder: &Path, arguments: &[&str], exit: i32, words: &[&str
     }
 }
 
-/// Runs descry where nobody reads its standard output, or its standard error; returns its exit code.
+/// Runs descry with its standard output or standard error closed by the reader; returns the exit code.
 pub fn without_readers(folder: &Path, arguments: &[&str], out: bool, err: bool) -> Option<i32> {
     let pipe = |closed: bool| if closed { Stdio::piped() } else { Stdio::null() };
     let mut child =
@@ -69,7 +69,7 @@ pub fn without_readers(folder: &Path, arguments: &[&str], out: bool, err: bool) 
     child.wait().expect("it ends").code()
 }
 
-/// Everything in a record but the bytes of blobs, and when the run began.
+/// All documents of a record, without blobs and the start time of the run.
 pub fn documents(folder: &Path, run: &str) -> Vec<String> {
     let mut found = check(folder, &["memory", "query", run, "--json"], 0);
     let all = found["records"].as_array_mut().expect("a list");

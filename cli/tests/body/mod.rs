@@ -1,4 +1,4 @@
-//! A program as a body that writes down what it is asked.
+//! A robot program that logs its requests.
 
 // Each test uses some of it.
 #![allow(dead_code)]
@@ -6,7 +6,8 @@
 use std::path::Path;
 use std::process::Command;
 
-/// A body that writes down what it is asked, in time that a test can follow: drives to the table of the template's room.
+/// Source of a robot program that logs its requests and drives to the table of the template's room, slowly
+/// enough for a test to follow.
 const BODY: &str = r#"
 import os, sys, time
 sys.path.insert(0, "PYTHON")
@@ -43,18 +44,18 @@ body.drive_to = driven
 descry.serve(body)
 "#;
 
-/// Whether there is something to run it.
+/// True if Python is installed.
 pub fn has_python() -> bool {
     Command::new("python3").arg("--version").output().is_ok()
 }
 
-/// What it has heard, in order.
+/// The logged requests, in order.
 pub fn heard(folder: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(folder.join("heard")).unwrap_or_default();
     text.lines().map(str::to_string).collect()
 }
 
-/// Puts the body into a folder; returns what `--robot` asks for.
+/// Writes the robot program into a folder; returns the value for `--robot`.
 pub fn body_in(folder: &Path) -> &'static str {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../robots/python");
     let body = BODY.replace("PYTHON", &python.display().to_string());
@@ -62,7 +63,7 @@ pub fn body_in(folder: &Path) -> &'static str {
     "program:python3 body.py"
 }
 
-/// That no drive which ended was asked for again.
+/// Checks that no completed drive was requested again.
 pub fn check_nothing_twice(folder: &Path) {
     let drives = heard(folder).into_iter().filter(|line| line.starts_with("drive_to done"));
     let mut once: Vec<String> = drives.collect();

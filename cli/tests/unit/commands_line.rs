@@ -2,7 +2,7 @@
 
 use descry_cli::commands::line::*;
 
-/// The words of a line as a shell has them, up to where it would go elsewhere.
+/// The words of a line as a shell splits them, up to a redirection.
 fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quote = None;

@@ -1,5 +1,5 @@
-//! An experiment's shards as what a cluster's scheduler runs: a Slurm job array, a Kubernetes job whose pods are numbered. All shards
-//! write into one folder that they share; whichever ends last writes the results, and `--merge` writes them again.
+//! Job descriptions for clusters: a Slurm job array, or an indexed Kubernetes job. All shards write into one
+//! shared folder; the last to finish writes the results, and `--merge` writes them again.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,19 @@ use super::{ExperimentError, Kind, Source, kinds};
 /// Experiment to run on a cluster: number of shards, threads and folder of results.
 #[derive(Debug, Clone)]
 pub struct Cluster {
-    /// Into how many shards the jobs are divided.
+    /// Number of shards.
     pub shards: usize,
-    /// Jobs at a time, and processors, of each shard.
+    /// Parallel jobs, and processors, of each shard.
     pub threads: usize,
-    /// Folder of the results, which all shards see.
+    /// Folder of the results, shared by all shards.
     pub out: PathBuf,
 }
 
 /// The script of a Slurm job array, for `sbatch`.
 ///
 /// # Errors
-/// [`ExperimentError`] if the file is no experiment, or has fewer jobs than there are to be shards.
+///
+/// [`ExperimentError`] if the file is not an experiment, or has fewer jobs than shards.
 pub fn slurm(source: &Source, cluster: &Cluster) -> Result<String, ExperimentError> {
     let kind = checked(source, cluster)?;
     let Cluster { shards, threads, out } = cluster;
@@ -54,9 +55,10 @@ exec "${{DESCRY:-descry}}" experiment {file} --out {out} \
     ))
 }
 
-/// An indexed Kubernetes job with the experiment's text beside it, for `kubectl apply`.
+/// An indexed Kubernetes job that includes the experiment's text, for `kubectl apply`.
 ///
 /// # Errors
+///
 /// As [`slurm`].
 pub fn kubernetes(source: &Source, cluster: &Cluster) -> Result<String, ExperimentError> {
     let kind = checked(source, cluster)?;
@@ -129,19 +131,19 @@ fn checked(source: &Source, cluster: &Cluster) -> Result<Box<dyn Kind>, Experime
     }
 }
 
-/// A name that schedulers take: small letters, digits and hyphens, at most 63 of them.
+/// A name that schedulers accept: lower-case letters, digits and hyphens, at most 63 of them.
 pub fn name(said: &str) -> String {
     let plain = said.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' });
     let name: String = "descry-".chars().chain(plain).take(63).collect();
     name.trim_end_matches('-').into()
 }
 
-/// A path as a word of a shell.
+/// Quotes a path for the shell.
 pub fn quoted(path: &Path) -> String {
     shell::quoted(&path.to_string_lossy())
 }
 
-/// A text as YAML has it within quotation marks, which is how JSON has it.
+/// Quotes a text for YAML, as in JSON.
 pub fn text(said: &str) -> String {
     serde_json::Value::from(said).to_string()
 }

@@ -1,7 +1,7 @@
 //! Hash that identifies an experiment (FNV-1a over its texts).
 
-/// 64-bit FNV-1a (Fowler, Noll, Vo) over texts one after another, each with its length, as `fnv1a:` and 16 hexadecimal digits.
-/// It tells files apart that differ by accident; it is no protection against intent.
+/// 64-bit FNV-1a (Fowler, Noll, Vo) of a sequence of texts, each with its length, as `fnv1a:` and 16
+/// hexadecimal digits. It detects accidental differences; it does not protect against manipulation.
 pub fn fnv1a<'a>(texts: impl Iterator<Item = &'a [u8]>) -> String {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut take = |bytes: &[u8]| {

@@ -1,7 +1,7 @@
-//! `jobs.jsonl`: what has been done so far, a line a job, so that a batch goes on where it was cut off.
+//! `jobs.jsonl`: the finished jobs, one a line, which make a batch resumable.
 //!
-//! The first line says which experiment the folder belongs to. A line counts once its line end is on the disk: what a power
-//! cut left of a line is ignored, and the job is done again.
+//! The first line identifies the experiment. A line counts once its newline is on the disk: a line truncated
+//! by a power cut is ignored, and its job runs again.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -15,7 +15,7 @@ use super::{ExperimentError, Finished};
 /// Name of the file in an experiment's folder.
 pub const FILE: &str = "jobs.jsonl";
 
-/// The first line: whose jobs these are.
+/// First line: identity of the experiment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     /// The experiment's name.
@@ -28,7 +28,7 @@ pub struct Header {
     pub jobs: usize,
 }
 
-/// A journal that is open for writing; no other process writes to it meanwhile.
+/// A journal open for writing, locked against other processes.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
@@ -39,10 +39,13 @@ pub struct Journal {
 pub type Done = BTreeMap<String, Finished>;
 
 impl Journal {
-    /// Opens the journal of a folder, or begins one. Gives what has been done already and how many lines were unreadable.
+    /// Opens or creates the journal of a folder. Returns the finished jobs and the number of unreadable
+    /// lines.
     ///
     /// # Errors
-    /// [`ExperimentError`] if it belongs to another experiment, another process writes to it, or the disk refuses.
+    ///
+    /// [`ExperimentError`] if it belongs to another experiment, another process holds it, or the disk
+    /// refuses.
     pub fn open(folder: &Path, header: &Header) -> Result<(Self, Done, usize), ExperimentError> {
         let path = folder.join(FILE);
         let io = |e: std::io::Error| ExperimentError::file(&path, &e);
@@ -67,9 +70,10 @@ impl Journal {
         Ok((journal, contents.done, contents.unreadable))
     }
 
-    /// Appends a finished job; it is on the disk when this returns.
+    /// Appends a finished job, durably.
     ///
     /// # Errors
+    ///
     /// [`ExperimentError::File`] if the disk refuses.
     pub fn append(&mut self, finished: &Finished) -> Result<(), ExperimentError> {
         self.write(finished)
@@ -82,7 +86,7 @@ impl Journal {
     }
 }
 
-/// Reads the journal of a folder without opening it for writing; an empty one if there is none.
+/// Reads the journal of a folder without locking it; empty if there is none.
 ///
 /// # Errors
 /// [`ExperimentError`] if it belongs to another experiment or cannot be read.
@@ -97,7 +101,7 @@ pub fn done(folder: &Path, header: &Header) -> Result<Done, ExperimentError> {
 
 #[doc(hidden)]
 pub struct Contents {
-    /// Bytes up to the last complete line.
+    /// Length up to the last complete line, bytes.
     length: u64,
     done: Done,
     unreadable: usize,

@@ -26,10 +26,10 @@ pub use kinds::Kind;
 pub use live::Batch;
 pub use write::Results;
 
-/// Named values, in the order in which they are shown.
+/// Named values, in display order.
 pub type Row = Map<String, Value>;
 
-/// One combination of what is varied.
+/// One combination of the variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
     /// Unique in the experiment, the same on every machine, such as `scene=0012 poses=8 policy=plan`.
@@ -39,7 +39,7 @@ pub struct Job {
 }
 
 impl Job {
-    /// A job from its factors; they make up its id.
+    /// A job from its factors, which make up its ID.
     pub fn new<const N: usize>(factors: [(&str, Value); N]) -> Self {
         let shown = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
         let id: Vec<String> =
@@ -51,23 +51,23 @@ impl Job {
     }
 }
 
-/// Result of a job: rows of measurements, the same on every machine, and times on the wall.
+/// Result of a job: rows of measurements, the same on every machine, and wall-clock times.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Outcome {
     /// Measurements; usually one row.
     pub rows: Vec<Row>,
-    /// Times on the wall: they differ from run to run and are reported apart.
+    /// Wall-clock times, which differ between runs and are reported separately.
     pub clock: Row,
 }
 
-/// A line of the journal: a job that has been done.
+/// A line of the journal: a finished job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finished {
     /// The job's id.
     pub job: String,
     /// Its factors with its measurements.
     pub rows: Vec<Row>,
-    /// Times on the wall.
+    /// Wall-clock times.
     #[serde(default)]
     pub clock: Row,
     /// Error, if there are no measurements.
@@ -87,13 +87,13 @@ impl Finished {
     }
 }
 
-/// A finished job, and which of all jobs it is.
+/// A finished job, with its number among all jobs.
 pub type Numbered<'a> = (usize, &'a Finished);
 
 /// An experiment file as it was read.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Its path, as it was given.
+    /// Its path, as given.
     pub path: PathBuf,
     /// Its text.
     pub text: String,
@@ -103,7 +103,8 @@ impl Source {
     /// Reads an experiment file.
     ///
     /// # Errors
-    /// [`ExperimentError::File`] if it is not there or no text.
+    ///
+    /// [`ExperimentError::File`] if it is missing or not a text.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
         let text = descry_robots::input::read_text(path).map_err(|e| {
             ExperimentError::file(
@@ -114,10 +115,12 @@ impl Source {
         Ok(Self { path: path.to_path_buf(), text })
     }
 
-    /// Replaces one value of the file by that of an assignment `KEY=VALUE`: a path of keys and numbers, and a TOML value.
+    /// Replaces one value of the file by an assignment `KEY=VALUE`: a path of keys and numbers, and a TOML
+    /// value.
     ///
     /// # Errors
-    /// [`ExperimentError::Input`] if the file has no such key, or the text is no assignment.
+    ///
+    /// [`ExperimentError::Input`] if the file has no such key, or the text is not an assignment.
     pub fn set(&mut self, assignment: &str) -> Result<(), ExperimentError> {
         let refused = |problem: &str, mend: String| {
             ExperimentError::Input(format!("--set {assignment}: {problem}\n  {mend}"))
@@ -138,7 +141,7 @@ impl Source {
     }
 }
 
-/// A part of the jobs: of every `of` jobs one.
+/// A shard: every `of`-th job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     /// Index of the shard, below `of`.
@@ -150,7 +153,7 @@ pub struct Shard {
 impl std::str::FromStr for Shard {
     type Err = String;
 
-    /// `I/N`. Counting may begin at 0 or at 1, as the machines' scheduler has it: `0/N` and `N/N` are the same shard.
+    /// Parses `I/N`. Counting may start at 0 or at 1, as schedulers do: `0/N` and `N/N` are the same shard.
     fn from_str(text: &str) -> Result<Self, String> {
         let number = |part: &str| part.trim().parse::<usize>().ok();
         match text.split_once('/').and_then(|(i, n)| Some((number(i)?, number(n)?))) {
@@ -165,30 +168,30 @@ impl std::str::FromStr for Shard {
 pub struct Options {
     /// Folder of the results.
     pub out: PathBuf,
-    /// Only a part of the jobs.
+    /// The shard to run; none: all jobs.
     pub shard: Option<Shard>,
-    /// Do nothing; put these folders together.
+    /// Folders to merge, without running any job.
     pub merge: Vec<PathBuf>,
-    /// Number of jobs at a time.
+    /// Number of parallel jobs.
     pub threads: usize,
-    /// A job that fails while less room is left on the disk does not count, and none is begun after it.
+    /// Free disk space below which a failed job does not count, and no further job starts, bytes.
     pub least_free_bytes: u64,
-    /// Ends it early.
+    /// Ends the batch early.
     pub stop: Stop,
-    /// Hears how far it has got, a line now and then where there is no terminal for a bar.
+    /// Receives progress messages, occasionally, where there is no terminal for a bar.
     pub tell: fn(&str),
 }
 
 /// Progress of the experiment at the end of a call.
 #[derive(Debug)]
 pub enum Ended {
-    /// All jobs are done; the results are written.
+    /// All jobs are finished; the results are written.
     Whole(Box<Results>),
-    /// This shard is done, others are not.
+    /// This shard is finished, others are not.
     Part {
-        /// Jobs that are done, in all shards whose folders are here.
+        /// Number of finished jobs, in all shards whose folders are here.
         done: usize,
-        /// All jobs.
+        /// Number of all jobs.
         all: usize,
         /// The shard's folder.
         folder: PathBuf,
@@ -198,7 +201,7 @@ pub enum Ended {
 /// Error that keeps an experiment from being carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
-    /// The experiment file says what cannot be understood or done; the text points at the place and offers a mend.
+    /// The experiment file cannot be understood or carried out; the text gives the place and a remedy.
     #[error("{0}")]
     Input(String),
     /// A file or folder cannot be read or written.
@@ -222,13 +225,13 @@ pub enum ExperimentError {
         /// Expected first line.
         expected: Box<Header>,
     },
-    /// A file that is called like a journal and is none.
+    /// A file with the name of a journal but another content.
     #[error("{path}: this is no journal of an experiment\n  name another folder with --out")]
     NoJournal {
         /// The file.
         path: String,
     },
-    /// Another process is at work in the folder.
+    /// Another process is working in the folder.
     #[error(
         "{folder}: another process is at work on this experiment\n  wait for it, or give each its own --shard"
     )]
@@ -236,10 +239,10 @@ pub enum ExperimentError {
         /// The folder.
         folder: String,
     },
-    /// Two combinations cannot be told apart.
+    /// Two jobs have the same ID.
     #[error("the job \"{id}\" is there twice\n  remove what the file lists twice")]
     Twice {
-        /// Its id.
+        /// Their ID.
         id: String,
     },
     /// Shards are missing.
@@ -254,27 +257,27 @@ pub enum ExperimentError {
         /// The first of them.
         first: String,
     },
-    /// The disk is full; what was journalled stands.
+    /// The disk is full; journalled jobs are kept.
     #[error(
         "{folder}: the disk is full, and {job} failed: {because}\n  free some room and run it again: what is done is not done again"
     )]
     NoRoom {
         /// The folder of the results.
         folder: String,
-        /// The job that does not count.
+        /// The job that failed and does not count.
         job: String,
         /// Error of the job.
         because: String,
     },
-    /// More shards than jobs, or none.
+    /// More shards than jobs, or no shards.
     #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
     Shards {
-        /// Number of shards that were asked for.
+        /// Requested number of shards.
         shards: usize,
         /// Number of jobs.
         jobs: usize,
     },
-    /// The system gives no thread.
+    /// The system cannot start a thread.
     #[error("no thread could be started: {because}\n  try a smaller --jobs")]
     Threads {
         /// Message of the system.
@@ -288,10 +291,11 @@ impl ExperimentError {
     }
 }
 
-/// Carries an experiment out as far as it is not done yet, and writes its results once every job is done.
+/// Runs the unfinished jobs of an experiment, and writes the results once every job is finished.
 ///
 /// # Errors
-/// [`ExperimentError`]. A job that fails is no error but a row that says so.
+///
+/// [`ExperimentError`]. A failed job is a row with its error instead.
 pub fn run(source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
     carry_out(&*kinds::read(source)?, source, options)
 }
@@ -339,7 +343,7 @@ fn header(source: &Source, kind: &dyn Kind, jobs: usize) -> Header {
     Header { experiment: kind.head().name.clone(), hash: hash::fnv1a(texts), version, jobs }
 }
 
-/// Folder into which this process writes.
+/// Folder that this process writes to.
 fn own_folder(options: &Options) -> PathBuf {
     match options.shard {
         Some(Shard { index, of }) => options.out.join(format!("shard-{index}-of-{of}")),
@@ -347,7 +351,7 @@ fn own_folder(options: &Options) -> PathBuf {
     }
 }
 
-/// Everything that has been done so far: in the folder, in the folders of its shards, and in those that are named.
+/// All finished jobs: in the folder, in the folders of its shards, and in the folders to merge.
 fn gather(out: &Path, merge: &[PathBuf], header: &Header) -> Result<Done, ExperimentError> {
     let mut folders = vec![out.to_owned()];
     folders.extend(merge.iter().cloned());
@@ -368,7 +372,7 @@ fn gather(out: &Path, merge: &[PathBuf], header: &Header) -> Result<Done, Experi
     Ok(done)
 }
 
-/// Does what this process is to do and has not been done.
+/// Runs the unfinished jobs of this process.
 fn perform(
     kind: &dyn Kind,
     jobs: &[Job],

@@ -1,5 +1,5 @@
-//! The page of a batch while it goes on. It is told from the journals in its folder, as any reader has them; so it shows what other
-//! machines do of it too, where they have the same folder.
+//! Live page of a batch. It is rendered from the journals in its folder, so it also shows the work of other
+//! machines that share the folder.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -10,7 +10,7 @@ use super::{ExperimentError, Job, Kind, Numbered, Source, gather, header, kinds,
 use descry_agent::exit::CommandError;
 use descry_pages::live::{Found, Shown};
 
-/// A batch that goes on.
+/// A batch under way.
 pub struct Batch {
     kind: Box<dyn Kind>,
     jobs: Vec<Job>,
@@ -18,14 +18,15 @@ pub struct Batch {
     source: Source,
     out: PathBuf,
     begun: Instant,
-    /// Jobs that were done before.
+    /// Number of jobs finished before the page was opened.
     before: usize,
 }
 
 impl Batch {
-    /// The batch of a file whose results come into a folder.
+    /// The batch of a file with its results in a folder.
     ///
     /// # Errors
+    ///
     /// [`ExperimentError`] if the file or the folder cannot be used.
     pub fn of(source: &Source, out: PathBuf) -> Result<Self, ExperimentError> {
         let kind = kinds::read(source)?;
@@ -60,7 +61,7 @@ impl Batch {
         Ok(html((&head.name, &head.about), &facts, &sections, &self.source.text, Some(progress)))
     }
 
-    /// Time since the page was opened, and time left at this rate.
+    /// Time since the page was opened, and remaining time at this rate.
     fn time(&self, Progress { done, all }: Progress) -> String {
         let since_s = self.begun.elapsed().as_secs_f64();
         match done.saturating_sub(self.before) {

@@ -4,10 +4,12 @@ use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
-/// Bytes of the value at a path such as `first_seed` or `set.1.first_seed`; numbers count tables of a list from 0.
+/// Byte range of the value at a path such as `first_seed` or `set.1.first_seed`; numbers count tables of a
+/// list from 0.
 ///
 /// # Errors
-/// The keys that are there instead, where the path leaves the file; none if the text is no TOML.
+///
+/// The existing keys where the path leaves the file; empty if the text is not TOML.
 pub(crate) fn value_at(text: &str, path: &str) -> Result<Range<usize>, Vec<String>> {
     let document = DeTable::parse(text).map_err(|_| Vec::new())?;
     let mut inner = Inner::Table(document.get_ref());
@@ -36,7 +38,7 @@ pub(crate) fn value_at(text: &str, path: &str) -> Result<Range<usize>, Vec<Strin
     }
 }
 
-/// Contents of a value that a further step of a path may name.
+/// Content of a value that a further step of a path may select.
 enum Inner<'t> {
     Table(&'t DeTable<'t>),
     List(&'t toml::de::DeArray<'t>),

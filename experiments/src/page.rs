@@ -1,4 +1,4 @@
-//! The results as one page that needs nothing else: tables, plots, the experiment's text, and how to do it again.
+//! Self-contained HTML page of the results: tables, plots, the experiment's text, and how to reproduce it.
 
 use super::plot::Plot;
 use super::table::Table;
@@ -8,7 +8,7 @@ use descry_pages::page::COLOURS;
 
 const SCRIPT: &str = include_str!("live.js");
 
-/// A part of the results as people read them.
+/// A section of the results.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Section {
     /// A heading.
@@ -38,12 +38,12 @@ dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace
 @media (max-width: 600px) { body { padding: 0 .8rem; } th, td { padding: .2rem .45rem; } }
 ";
 
-/// Progress of a batch, for a page that follows it.
+/// Progress of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Jobs that are done.
+    /// Number of finished jobs.
     pub done: usize,
-    /// All jobs.
+    /// Number of all jobs.
     pub all: usize,
 }
 
@@ -56,7 +56,7 @@ impl Progress {
     }
 }
 
-/// The page: of results, or of a batch that goes on.
+/// The page of results, or of a batch under way.
 pub fn html(
     (title, about): (&str, &str),
     facts: &Facts,
@@ -88,7 +88,7 @@ fn section(section: &Section) -> String {
     }
 }
 
-/// The tables alone, as Markdown.
+/// The tables as Markdown.
 pub fn markdown(title: &str, facts: &Facts, sections: &[Section]) -> String {
     let mut text = format!("# {title}\n\n");
     facts.iter().for_each(|(name, value)| text += &format!("- {name}: {value}\n"));

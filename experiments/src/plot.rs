@@ -1,5 +1,5 @@
-//! Plots as SVG: lines over a numeric axis, and dots by category. One style: axes with units, a legend, intervals as bars.
-//! Series differ in colour and in shape, so that they can be told apart without colour.
+//! SVG plots: lines over a numeric axis, and dots by category. Axes have units, and intervals are bars.
+//! Series differ in colour and shape, so that they are distinguishable without colour.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ pub mod axis;
 
 use axis::Scale;
 
-/// Colours that people with any colour vision can tell apart (Okabe and Ito).
+/// Colours distinguishable with any colour vision (Okabe and Ito).
 const COLOURS: [&str; 8] =
     ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8A8A00"];
 const WIDTH: f64 = 760.0;
@@ -19,28 +19,28 @@ const BOTTOM: f64 = 54.0;
 const LEGEND: f64 = 170.0;
 /// Height of the strip of counts under a reliability plot.
 const STRIP: f64 = 64.0;
-/// Width of a letter of the axes' text, on average.
+/// Average width of a letter in the axes' text, pixels.
 const LETTER: f64 = 6.6;
 
 /// A point with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Along the numeric axis of [`Plot::Lines`], or the number of the category in [`Plot::Dots`].
+    /// Position along the numeric axis of [`Plot::Lines`], or the index of the category in [`Plot::Dots`].
     pub at: f64,
     /// Measured value.
     pub value: f64,
-    /// Its interval of 95 %.
+    /// 95 % interval.
     pub interval: Option<[f64; 2]>,
 }
 
-/// Points that belong together.
+/// Points of one series.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Name in the legend.
     pub name: String,
-    /// In the order in which a line joins them.
+    /// Points, in the order in which a line joins them.
     pub points: Vec<Point>,
-    /// Drawn with a broken line: a reference, not a measurement of ours.
+    /// True for a dashed line: a reference instead of a measurement.
     pub broken: bool,
 }
 
@@ -49,12 +49,12 @@ pub struct Series {
 pub struct Axis {
     /// Label of the axis, with its unit.
     pub label: String,
-    /// Fixed ends; from the data if none.
+    /// Fixed ends; none: from the data.
     pub range: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// An axis that ends where the data ends.
+    /// An axis with its ends from the data.
     pub fn free(label: impl Into<String>) -> Self {
         Self { label: label.into(), range: None }
     }
@@ -74,15 +74,15 @@ pub enum Plot {
         name: String,
         /// Heading.
         title: String,
-        /// Horizontal.
+        /// Horizontal axis.
         x: Axis,
-        /// Vertical.
+        /// Vertical axis.
         y: Axis,
         /// The lines.
         series: Vec<Series>,
-        /// Draws where both axes say the same: the reference of a reliability plot.
+        /// True to draw the diagonal, the reference of a reliability plot.
         diagonal: bool,
-        /// Counts in a strip of their own below: place along x and number.
+        /// Counts for a strip below the plot: position along x, and number.
         counts: Vec<(f64, usize)>,
     },
     /// A dot with its interval for each category, the series beside each other.
@@ -91,17 +91,17 @@ pub enum Plot {
         name: String,
         /// Heading.
         title: String,
-        /// From the top.
+        /// Categories, from the top.
         categories: Vec<String>,
-        /// Horizontal: the values.
+        /// Horizontal axis of values.
         x: Axis,
-        /// The dots; [`Point::at`] is the number of the category.
+        /// The dots; [`Point::at`] is the index of the category.
         series: Vec<Series>,
     },
 }
 
 impl Plot {
-    /// Name of its file, without the ending.
+    /// File name without its extension.
     pub fn name(&self) -> &str {
         match self {
             Self::Lines { name, .. } | Self::Dots { name, .. } => name,
@@ -115,7 +115,7 @@ impl Plot {
         }
     }
 
-    /// The picture.
+    /// Renders the plot.
     pub fn svg(&self) -> String {
         match self {
             Self::Lines { title, x, y, series, diagonal, counts, .. } => {
@@ -126,7 +126,7 @@ impl Plot {
     }
 }
 
-/// A rectangle of the picture with its scales.
+/// A rectangle of the plot with its scales.
 struct Frame {
     left: f64,
     top: f64,
@@ -341,7 +341,7 @@ fn label_upright(svg: &mut String, x: f64, y: f64, text: &str) {
     );
 }
 
-/// An interval with its ends.
+/// Draws an interval with end caps.
 fn bar(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &str) {
     let (dx, dy) = if (x1 - x2).abs() > (y1 - y2).abs() { (0.0, 3.5) } else { (3.5, 0.0) };
     let cap = |x: f64, y: f64| format!("M{:.1},{:.1} L{:.1},{:.1}", x - dx, y - dy, x + dx, y + dy);
@@ -353,7 +353,7 @@ fn bar(svg: &mut String, (x1, y1): (f64, f64), (x2, y2): (f64, f64), colour: &st
     );
 }
 
-/// The shape of a series: circle, square, triangle, diamond, each filled or hollow.
+/// Draws the marker of a series: circle, square, triangle, diamond, each filled or hollow.
 fn mark(svg: &mut String, x: f64, y: f64, n: usize) {
     let fill = if n % 8 < 4 { colour(n) } else { "#fff" };
     let style = format!(r#"fill="{fill}" stroke="{}" stroke-width="1.5""#, colour(n));

@@ -1,4 +1,4 @@
-//! Does jobs on all cores. What a job gives does not depend on which thread does it, or when.
+//! Parallel execution of jobs. The result of a job does not depend on the thread or the time.
 
 use descry_agent::stop::Stop;
 use std::any::Any;
@@ -14,17 +14,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::journal::Journal;
 use super::{ExperimentError, Finished, Job, Kind};
 
-/// Runs plan by recursion and render: more than a thread's usual stack.
+/// Stack size of worker threads, bytes: planning and rendering recurse deeper than the default allows.
 const STACK_BYTES: usize = 16 << 20;
 /// Interval between lines of progress where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(15);
 
-/// Does the jobs of these numbers and writes each into the journal. Runs keep what they record under `scratch`, which is
-/// emptied. Where it is stopped, jobs under way are not done. Gives the finished jobs in the order in which they ended.
+/// Runs these jobs and appends each to the journal. Runs record into `scratch`, which is emptied afterwards.
+/// On a stop, jobs under way do not count. Returns the finished jobs in the order in which they ended.
 ///
 /// # Errors
-/// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails while less than
-/// `least_free_bytes` are left; no further job is begun then.
+///
+/// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails
+/// with less than `least_free_bytes` free; no further job starts then.
 pub fn run(
     kind: &dyn Kind,
     jobs: &[Job],
@@ -67,7 +68,7 @@ pub fn run(
     result
 }
 
-/// Does one job. A job that panics is a row like any other that failed.
+/// Runs one job. A panic is recorded as a failed row.
 fn finish(kind: &dyn Kind, jobs: &[Job], number: usize, scratch: &Path, stop: &Stop) -> Finished {
     let scratch = scratch.join(number.to_string());
     // What a batch that was cut off has left there is no run that could go on.
@@ -83,7 +84,7 @@ fn said(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "without a word".into())
 }
 
-/// A job that failed on a disk without room says nothing of itself.
+/// The error for a job that failed on a full disk; such a failure says nothing about the job.
 fn lacks_room(job: &Finished, scratch: &Path, least_free_bytes: u64) -> Option<ExperimentError> {
     let because = job.error.clone()?;
     let folder = scratch.parent()?;
@@ -116,7 +117,7 @@ fn collect(
     Ok(finished)
 }
 
-/// A bar on a terminal, a line now and then elsewhere; always on standard error.
+/// Progress on standard error: a bar on a terminal, occasional lines elsewhere.
 struct Progress {
     bar: Option<ProgressBar>,
     all: usize,

@@ -1,8 +1,9 @@
-//! Rates, means, differences and calibration, with intervals of 95 %.
+//! Rates, means, differences and calibration, with 95 % intervals.
 //!
-//! Rates get Wilson's score interval. Everything else gets a percentile bootstrap that resamples whole *groups* (all runs in
-//! one scene), since runs in the same scene are not independent; its seed is fixed, so the same rows give the same interval. A share
-//! of all or nothing, of which it says nothing, gets Wilson's interval of as many observations as there are groups.
+//! Rates get Wilson's score interval. Everything else gets a percentile bootstrap that resamples whole
+//! *groups* (all runs in one scene), since runs in the same scene are not independent; its seed is fixed, so
+//! the same rows give the same interval. For shares of 0 or 1 the bootstrap is degenerate; they get Wilson's
+//! interval with the number of groups as observations.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -10,7 +11,7 @@ use serde::Serialize;
 
 /// 97.5 % quantile of the standard normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
-/// Resamples of the bootstrap.
+/// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
 /// Seed of the bootstrap.
 const SEED: u64 = 4;
@@ -20,7 +21,7 @@ const SEED: u64 = 4;
 pub struct Estimate {
     /// The value itself.
     pub value: f64,
-    /// Interval of 95 %; none where the sample is too small to say.
+    /// 95 % interval; none if the sample is too small.
     pub interval: Option<[f64; 2]>,
     /// Number of observations.
     pub n: usize,
@@ -29,7 +30,7 @@ pub struct Estimate {
 /// A value observed in a group: a run in a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// Observations of one group may depend on each other.
+    /// Group; observations of one group may be dependent.
     pub group: u64,
     /// Observed value.
     pub value: f64,
@@ -38,11 +39,11 @@ pub struct Observation {
 /// Two values observed under the same conditions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// Pairs of one group may depend on each other.
+    /// Group; pairs of one group may be dependent.
     pub group: u64,
-    /// The first.
+    /// First value.
     pub a: f64,
-    /// The second.
+    /// Second value.
     pub b: f64,
 }
 
@@ -59,7 +60,7 @@ pub fn rate(hits: usize, n: usize) -> Option<Estimate> {
     Some(Estimate { value: p, interval: Some([(middle - half).max(0.0), (middle + half).min(1.0)]), n })
 }
 
-/// The mean with its bootstrapped interval; none without observations.
+/// The mean with its bootstrap interval; none without observations.
 pub fn mean(observations: &[Observation]) -> Option<Estimate> {
     let sums = sums(observations.iter().map(|o| (o.group, [o.value, 1.0])));
     estimate(observations.len(), &sums, |[total, n]| total / n)
@@ -72,7 +73,8 @@ pub fn ratio(pairs: &[Pair]) -> Option<Estimate> {
     estimate(n, &sums, |[a, b]| a / b).map(|found| at_an_end(found, sums.len()))
 }
 
-/// A share of 0 or 1 is resampled as 0 or 1 however few groups there are: then each group counts once, by Wilson's interval.
+/// Replaces the degenerate bootstrap interval of a share of 0 or 1 by Wilson's interval, each group counting
+/// once.
 fn at_an_end(found: Estimate, groups: usize) -> Estimate {
     match found.interval {
         Some([low, high]) if low == high && (low == 0.0 || low == 1.0) => {
@@ -95,7 +97,7 @@ pub fn saving(pairs: &[Pair]) -> Option<Estimate> {
     estimate(pairs.len(), &sums, |[a, b]| 1.0 - a / b)
 }
 
-/// The middle of the values (the mean of the two middle ones); none without values.
+/// The median (the mean of the two middle values); none without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -107,7 +109,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// Sums of each group, in the order of the groups' numbers.
+/// Sums of each group, ordered by group number.
 fn sums(values: impl Iterator<Item = (u64, [f64; 2])>) -> Vec<[f64; 2]> {
     let mut groups = std::collections::BTreeMap::<u64, [f64; 2]>::new();
     for (group, [a, b]) in values {
@@ -137,22 +139,22 @@ fn estimate(n: usize, groups: &[[f64; 2]], statistic: impl Fn([f64; 2]) -> f64) 
     Some(Estimate { value, interval, n })
 }
 
-/// A stated probability and what turned out.
+/// A stated probability, and true if the event occurred.
 pub type Forecast = (f64, bool);
 
-/// Mean squared distance of stated probabilities from the outcomes (Brier 1950): 0 is perfect, always saying one half
-/// gives .25; none without forecasts.
+/// Brier score (1950), the mean squared difference between stated probabilities and outcomes: 0 is perfect, a
+/// constant one half gives 0.25; none without forecasts.
 pub fn brier(forecasts: &[Forecast]) -> Option<f64> {
     let squared = |&(p, happened): &Forecast| (p - f64::from(happened)).powi(2);
     (!forecasts.is_empty()).then(|| forecasts.iter().map(squared).sum::<f64>() / forecasts.len() as f64)
 }
 
-/// One bar of a reliability plot.
+/// A bin of a reliability plot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bin {
-    /// Least probability that falls into it.
+    /// Lower bound of the bin.
     pub from: f64,
-    /// Probability from which the next bin begins; the last bin includes it.
+    /// Upper bound; included in the last bin only.
     pub to: f64,
     /// Mean of the stated probabilities.
     pub stated: f64,
@@ -160,7 +162,7 @@ pub struct Bin {
     pub observed: Estimate,
 }
 
-/// Forecasts in bins of equal width, without the empty ones.
+/// Non-empty bins of equal width.
 pub fn reliability(forecasts: &[Forecast], bins: usize) -> Vec<Bin> {
     let bins = bins.max(1);
     let bin_of = |p: f64| ((p * bins as f64).floor().max(0.0) as usize).min(bins - 1);

@@ -1,4 +1,4 @@
-//! Tables: as text (which is Markdown) and as HTML.
+//! Tables as aligned Markdown and as HTML.
 
 use descry_pages::escaped;
 
@@ -9,9 +9,9 @@ use super::statistics::Estimate;
 pub struct Table {
     /// Heading.
     pub title: String,
-    /// Note below the table: meaning of its numbers and of their intervals.
+    /// Note below the table: meaning of its numbers and intervals.
     pub note: String,
-    /// Names of the columns, with units.
+    /// Column names, with units.
     pub head: Vec<String>,
     /// Cells.
     pub rows: Vec<Vec<String>>,
@@ -24,7 +24,7 @@ impl Table {
         Self { title: title.into(), note: note.into(), head, rows: Vec::new() }
     }
 
-    /// As Markdown that is also aligned for the eye.
+    /// Renders the table as aligned Markdown.
     pub fn markdown(&self) -> String {
         let columns = 0..self.head.len();
         let cell =
@@ -55,7 +55,7 @@ impl Table {
         text
     }
 
-    /// As a part of a page.
+    /// Renders the table as HTML.
     pub fn html(&self) -> String {
         let class = |c: usize| if self.is_numeric(c) { " class=\"n\"" } else { "" };
         let line = |row: &[String], tag: &str| {
@@ -78,7 +78,7 @@ impl Table {
         )
     }
 
-    /// Columns of numbers are aligned to the right.
+    /// True for a column of numbers, which is aligned to the right.
     fn is_numeric(&self, column: usize) -> bool {
         let numeric = |text: &String| {
             text.is_empty()
@@ -89,7 +89,7 @@ impl Table {
     }
 }
 
-/// A value with its interval, as `0.98 [0.95, 0.99]`; a dash if there is none.
+/// Formats a value with its interval, as `0.98 [0.95, 0.99]`; a dash if there is none.
 pub fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
     match estimate {
         None => "-".into(),
@@ -100,7 +100,7 @@ pub fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
     }
 }
 
-/// A number, or a dash.
+/// Formats a number, or a dash.
 pub fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("-".into(), |value| format!("{value:.decimals$}"))
 }

@@ -1,7 +1,7 @@
-//! Writes the results of an experiment into its folder.
+//! Writing of an experiment's results.
 //!
-//! `jobs.csv`, `summary.json`, `tables.md`, `plots/*.svg` and `index.html` are the same whatever the number of threads and
-//! shards; times on the wall, which are not, stand in `clock.csv` and `clock.md`.
+//! `jobs.csv`, `summary.json`, `tables.md`, `plots/*.svg` and `index.html` do not depend on the number of
+//! threads and shards; wall-clock times, which do, are in `clock.csv` and `clock.md`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -18,13 +18,13 @@ use super::{ExperimentError, Finished, Kind, Numbered, Row, Source};
 /// The results of an experiment.
 #[derive(Debug, Clone)]
 pub struct Results {
-    /// `summary.json`.
+    /// Content of `summary.json`.
     pub summary: Row,
-    /// `tables.md`.
+    /// Content of `tables.md`.
     pub tables: String,
-    /// `clock.md`; empty if nothing was timed.
+    /// Content of `clock.md`; empty if nothing was timed.
     pub clock: String,
-    /// Jobs that failed.
+    /// Number of failed jobs.
     pub failed: usize,
 }
 
@@ -75,7 +75,7 @@ pub(super) fn results(
     Ok(Results { summary, tables, clock: clock_text, failed })
 }
 
-/// Replaces a file at once: whoever reads it sees the old text or the new one.
+/// Replaces a file atomically.
 fn save(folder: &Path, name: &str, text: &str) -> Result<(), ExperimentError> {
     let (path, draft) = (folder.join(name), folder.join(format!(".{name}.part")));
     std::fs::create_dir_all(folder)
@@ -84,7 +84,7 @@ fn save(folder: &Path, name: &str, text: &str) -> Result<(), ExperimentError> {
         .map_err(|e| ExperimentError::file(&path, &e))
 }
 
-/// The jobs that failed, the same reason once with its count.
+/// The failed jobs, grouped by reason with a count.
 pub(super) fn failures<'a>(finished: impl IntoIterator<Item = &'a Finished>) -> Vec<Section> {
     let mut reasons = std::collections::BTreeMap::<&str, Vec<&str>>::new();
     for job in finished {
@@ -103,7 +103,7 @@ pub(super) fn failures<'a>(finished: impl IntoIterator<Item = &'a Finished>) -> 
     vec![Section::Heading("Failures".into()), Section::Table(table)]
 }
 
-/// A line a row; the columns are all names that occur, in the order of their first occurrence (RFC 4180).
+/// CSV (RFC 4180), one line for each row; the columns are all names, in the order of their first occurrence.
 pub fn csv(finished: &[Finished], rows: impl Fn(&Finished) -> Vec<Row>) -> String {
     let all: Vec<(&Finished, Row)> =
         finished.iter().flat_map(|job| rows(job).into_iter().map(move |row| (job, row))).collect();
@@ -143,7 +143,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// Times on the wall over all jobs, as a table.
+/// Table of wall-clock times over all jobs.
 fn clock_table(finished: &[Finished]) -> Option<Table> {
     let mut seen = BTreeSet::new();
     let names: Vec<&String> =

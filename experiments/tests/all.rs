@@ -1,3 +1,3 @@
-//! What batches of runs promise, from outside: one program, so that what all tests share is built and linked once.
+//! Integration tests of experiments, in one binary.
 
 mod unit;

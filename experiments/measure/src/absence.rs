@@ -1,8 +1,9 @@
-//! What "it is there" is said with while looks go on, against how often it is there:
-//! `cargo run --release -p descry-measure --bin absence -- COUNT SEED HOLES [PLOT.svg]`.
+//! Calibration of the stated probability of presence as looks accumulate: `cargo run --release -p
+//! descry-measure --bin absence -- COUNT SEED HOLES [PLOT.svg]`.
 //!
-//! As many arrangements have cup A, nearly hidden from the start, as have it not. Each is looked at from the start and then from three
-//! poses of the ring, drawn for each; the camera loses a share of its returns in patches.
+//! Half of the arrangements contain cup A, nearly hidden from the start; the others lack it. Each is viewed
+//! from the start and then from three random poses of the ring; the camera loses a share of its returns in
+//! patches.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -24,7 +25,7 @@ use descry_skills::{Call, Context, SkillFailure};
 
 const LOOKS: usize = 4;
 const TARGET: &str = "cup A";
-/// A cup that is farther than this from where it is said to stand is not found, metres.
+/// Maximum distance between stated and true position for a found cup, metres.
 const FOUND_M: f64 = 0.05;
 
 /// Statement after one look.
@@ -192,7 +193,7 @@ async fn one(
     Ok(said)
 }
 
-/// Carries a call out and takes in what came of it.
+/// Carries out a call and updates the world model from its outcome.
 async fn act(
     world: &mut World<'_>,
     robot: &dyn Robot,
@@ -222,7 +223,8 @@ fn heard(s: &Situation, true_m: Option<[f64; 2]>) -> Said {
     }
 }
 
-/// Stated against true shares, where half have it and where as many have it as the prior says.
+/// Reliability plot: stated against true shares, with the target present in half of the cases, and as often
+/// as the prior says.
 fn drawn(half: &Reliability, expected: &Reliability) -> String {
     let filled = |told: &Reliability| told.bins.iter().filter(|b| b.count > 0).copied().collect::<Vec<Bin>>();
     let spread = |b: &Bin| 2.0 * (b.came_true * (1.0 - b.came_true) / b.count as f64).sqrt();

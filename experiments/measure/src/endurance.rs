@@ -1,10 +1,10 @@
-//! What a record withstands, measured: `cargo run --release -p descry-measure --bin endurance -- WHAT DIR [SIZE]`.
+//! Stress tests of records: `cargo run --release -p descry-measure --bin endurance -- WHAT DIR [SIZE]`.
 //!
 //! | WHAT | shows | SIZE |
 //! |---|---|---|
-//! | `clouds` | sustained clouds of 5 MB beside a raw append with `fdatasync`, in turns | clouds, 200 |
-//! | `transforms` | 3,500 transforms a second: how long the caller waits, and the greatest burst | simulated seconds, 600 |
-//! | `nearest` | the nearest in time among many documents | documents, 1000000 |
+//! | `clouds` | sustained clouds of 5 MB, alternating with a raw append with `fdatasync` | clouds, 200 |
+//! | `transforms` | 3,500 transforms a second: blocking time of the caller, and the greatest burst | simulated seconds, 600 |
+//! | `nearest` | lookup of the nearest in time among many documents | documents, 1000000 |
 //! | `open` | opening a large record | gigabytes, 5 |
 //! | `kills` | kills at random moments of a recording process | kills, 200 |
 //! | `full` | a full disk; DIR is on a small file system, as `mount -t tmpfs -o size=24m tmpfs DIR` makes | rounds, 20 |
@@ -54,7 +54,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// A generator of numbers that a seed fixes.
+/// Seeded random number generator.
 struct Random(u64);
 
 impl Random {
@@ -69,7 +69,7 @@ impl Random {
     }
 }
 
-/// Memory of this process that is in use, and the most it ever was, megabytes.
+/// Current and peak memory of this process, megabytes.
 fn memory_mb() -> (u64, u64) {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let field = |name: &str| {
@@ -148,7 +148,7 @@ fn clouds(dir: &Path, count: u64) -> Outcome {
 const RATE_HZ: u64 = 3500;
 const CHILDREN: u64 = 100;
 
-/// The stress is this many times what a robot brings in real time.
+/// Speed-up of the stress over real time.
 const SPEED_UP: u64 = 10;
 
 fn transforms(dir: &Path, seconds: u64) -> Outcome {
@@ -291,7 +291,7 @@ fn open(dir: &Path, gigabytes: u64) -> Outcome {
     clean(dir)
 }
 
-/// The content of a record that follows from its number.
+/// The content of a record, derived from its number.
 fn numbered(i: u64) -> Draft<'static> {
     let length = Random(i + 1).below(200_000) as usize;
     let mut random = Random(i.wrapping_mul(77) | 1);
@@ -302,7 +302,7 @@ fn numbered(i: u64) -> Draft<'static> {
     draft
 }
 
-/// Records and says each acknowledged number, until it is killed.
+/// Records and prints each acknowledged number, until killed.
 fn record_until_killed(dir: &Path, first: u64) -> Outcome {
     let record = match Record::open(dir, small_segments()) {
         Err(Error::NoRecord { .. }) => Record::create(dir, small_segments())?,

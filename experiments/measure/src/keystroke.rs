@@ -1,6 +1,7 @@
-//! How long an editor waits for the findings after a key: in a domain of so many lines, a key at a time.
+//! Latency of findings after a keystroke in an editor, for a domain of a given length.
 //!
-//! `cargo run --release -p descry-measure --bin keystroke [LINES [KEYS]]`, 2,000 lines and 200 keys if left out.
+//! `cargo run --release -p descry-measure --bin keystroke [LINES [KEYS]]`, 2,000 lines and 200 keys by
+//! default.
 
 use std::time::{Duration, Instant};
 
@@ -38,7 +39,7 @@ fn main() {
     serving.join().expect("it has ended").expect("it served");
 }
 
-/// A domain of at least so many lines: one action after another, each six lines.
+/// A domain of at least this many lines: a sequence of actions, six lines each.
 fn domain(lines: usize) -> String {
     let mut text = String::from(
         "(define (domain long)\n  (:requirements :typing :negative-preconditions)\n  (:types place)\n\
@@ -53,7 +54,8 @@ fn domain(lines: usize) -> String {
     text + ")\n"
 }
 
-/// A key in the word `linked` of the action nearest to a line; how long it takes until all findings are there.
+/// Time from a keystroke, in the word `linked` of the action nearest to a line, until all findings have
+/// arrived.
 fn key(editor: &Connection, line: usize, n: usize) -> Duration {
     let line = (line - 8) / 6 * 6 + 8;
     let (from, to, text) = if n.is_multiple_of(2) { (13, 13, "x") } else { (13, 14, "") };
@@ -77,7 +79,7 @@ fn tell(editor: &Connection, method: &str, params: Value) {
     editor.sender.send(Message::Notification(said)).expect("it hears");
 }
 
-/// How many findings the server tells next.
+/// Waits for the next diagnostics; returns the number of findings.
 fn findings(editor: &Connection) -> usize {
     loop {
         if let Message::Notification(said) = editor.receiver.recv().expect("it speaks") {

@@ -1,9 +1,9 @@
-//! What a planning round of the tabletop domain takes: `cargo run --release -p descry-measure --bin planning`
+//! Time of a planning round in the tabletop domain: `cargo run --release -p descry-measure --bin planning`
 //!
-//! A table with posts that hide parts of it from parts of the room; a look shows the spots that no post hides, and
-//! is expected to raise the confidence by the share of the spots that no earlier look has shown. For 5, 20 and 100
-//! candidate poses it prints a JSON line: planning time from the text on (least and median of several rounds, each
-//! with an empty cache), the part of it that the attachments took, what was asked of them, and the plan.
+//! Posts on a table hide parts of it from parts of the room; a look shows the unoccluded spots, and is
+//! expected to raise the confidence by the share of newly shown spots. For 5, 20 and 100 candidate poses,
+//! prints a JSON line: planning time from the text on (least and median of several rounds, each with an empty
+//! cache), the share of the attachments in it, their calls, and the plan.
 
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -21,7 +21,7 @@ const SPEED_M_PER_S: f64 = 0.5;
 /// Posts on the table: x, y, radius.
 const POSTS_M: [[f64; 3]; 4] = [[0.1, 0.05, 0.09], [-0.2, -0.1, 0.07], [0.15, -0.3, 0.08], [-0.1, 0.3, 0.06]];
 
-/// Poses around a table, and which spots of it each sees.
+/// Poses around a table, and the visibility of its spots from each.
 struct Room {
     poses_m: Vec<[f64; 2]>,
     shown: Vec<Vec<bool>>,
@@ -56,14 +56,14 @@ impl Room {
     }
 }
 
-/// Whether the line from `a` to `b` keeps clear of a post.
+/// True if the segment from `a` to `b` keeps clear of a post.
 fn passes(a: [f64; 2], b: [f64; 2], [x, y, radius_m]: [f64; 3]) -> bool {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let along = (((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
     (a[0] + along * dx - x).hypot(a[1] + along * dy - y) > radius_m
 }
 
-/// What the room answers to one module.
+/// Attachment that answers one module from the room.
 struct Answers {
     room: std::sync::Arc<Room>,
     reads: bool,

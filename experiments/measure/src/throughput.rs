@@ -1,5 +1,5 @@
-//! What a program costs as a body: 640 x 480 depths of 16 bits from a Python program that has them ready, over pipes and sockets, and
-//! beside it the same bytes through a bare pipe in the same run.
+//! Overhead of a program as a body: 640 x 480 depths of 16 bits that a Python program holds ready, over pipes
+//! and sockets, compared with the same bytes through a bare pipe.
 //!
 //! `cargo run --release -p descry-measure --bin throughput [-- FRAMES]`
 
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 const BODY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../robots/tests/programs/frames.py");
 const FRAME_BYTES: usize = 2 * 640 * 480;
-/// Questions whose answer is short, for each frame.
+/// Number of short requests for each frame.
 const QUESTIONS: usize = 10;
 
 type Anyhow<T> = Result<T, Box<dyn std::error::Error>>;
@@ -39,13 +39,13 @@ fn main() -> Anyhow<()> {
     Ok(())
 }
 
-/// Seconds a frame as frames and bytes a second, and as a share of the bare pipe's rate.
+/// Formats seconds a frame as frames and bytes a second, and as a share of the bare pipe's rate.
 fn rates(frame_s: f64, bare_s: f64) -> String {
     let megabytes = FRAME_BYTES as f64 / frame_s * 1e-6;
     format!("{:>12.0}{megabytes:>10.0}{:>16.2}", 1.0 / frame_s, bare_s / frame_s)
 }
 
-/// The same bytes from Python without any protocol, seconds a frame.
+/// Time of the same bytes from Python without a protocol, seconds a frame.
 fn bare_pipe(frames: usize) -> Anyhow<f64> {
     let script = format!(
         "import os\nd=bytes({FRAME_BYTES})\nfor _ in range({frames}):\n v=memoryview(d)\n while v: v=v[os.write(1,v):]"
@@ -63,7 +63,7 @@ fn bare_pipe(frames: usize) -> Anyhow<f64> {
     Ok(taken_s)
 }
 
-/// What a frame costs once it is here: as many depths to a cloud, seconds.
+/// Time of converting as many depths to a cloud, seconds a frame.
 fn clouds(frames: usize) -> Anyhow<f64> {
     let camera = descry_robots::perception::Intrinsics {
         width: 640,
@@ -81,7 +81,7 @@ fn clouds(frames: usize) -> Anyhow<f64> {
     Ok(started.elapsed().as_secs_f64() / frames as f64)
 }
 
-/// Connects once the program listens.
+/// Connects as soon as the program listens.
 fn reach(address: &str) -> Anyhow<ProgramRobot> {
     let until = Instant::now() + Duration::from_secs(20);
     loop {

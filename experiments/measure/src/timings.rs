@@ -1,8 +1,11 @@
-//! Times the kernels on one thread: `timings CLOUD [CLOUD2]` prints a JSON array of `{op, n, ms_min, ms_median, result}`.
+//! Times the kernels on one thread: `timings CLOUD [CLOUD2]` prints a JSON array of `{op, n, ms_min,
+//! ms_median, result}`.
 //!
-//! Voxel 1 cm centroids; plane: 1,000 rounds at 1 cm on the voxelled cloud; normals and statistical outliers (2 sigma) by 20 neighbours, the tree counted in;
-//! clusters: steps of 2 cm, 30 points or more, on the voxelled cloud without its plane; registration from CLOUD2 (or CLOUD, moved by 2 cm and 2 degrees) to CLOUD,
-//! both voxelled, from the identity, 5 cm, at most 50 rounds, trees and normals counted in.
+//! Voxel filter: 1 cm centroids. Plane: 1,000 RANSAC rounds at 1 cm on the filtered cloud. Normals and
+//! statistical outliers (2 sigma): 20 neighbours, including building the tree. Clusters: 2 cm gap, 30 points
+//! or more, on the filtered cloud without its plane. Registration: from CLOUD2 (or CLOUD, moved by 2 cm and 2
+//! degrees) to CLOUD, both filtered, from the identity, 5 cm, at most 50 iterations, including trees and
+//! normals.
 
 use descry_perception::cloud::Cloud;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
@@ -13,7 +16,7 @@ use std::time::Instant;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Repetitions after one to warm up, and how long (seconds) one operation may take in all before it is cut short.
+/// Number of repetitions after a warm-up, and total time after which an operation is cut short, seconds.
 const REPETITIONS: usize = 15;
 const LONGEST_S: f64 = 5.0;
 const EDGE_M: f32 = 0.01;

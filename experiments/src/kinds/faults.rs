@@ -1,4 +1,4 @@
-//! Runs in which things go wrong on purpose: whether the verdict is right all the same, and that every run ends.
+//! Fault injection: runs with injected faults, which must all end, with the right verdict.
 
 use descry_agent::stop::Stop;
 use std::path::Path;
@@ -38,7 +38,7 @@ struct Text {
     scene: String,
     /// Goal, in the words of the domain.
     goal: String,
-    /// The object of the scene that is looked for, by name or kind.
+    /// The object to find, by its name or kind in the scene.
     target: String,
     /// Runs of each case, each in an arrangement of its own.
     runs: usize,
@@ -48,24 +48,24 @@ struct Text {
     /// Share of the runs of each case without the target.
     #[serde(default)]
     absent_share: f64,
-    /// Who chooses where to look next: one of the policies above.
+    /// Policy that chooses where to look next, from the list above.
     #[serde(default = "default_policy")]
     policy: String,
-    /// A thing is found where it is if it stands no farther from there.
+    /// Maximum distance between the stated and the true position of a found object.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
-    /// Cases: the mishaps that are injected.
+    /// Cases, each with its injected faults.
     #[serde(rename = "case")]
     cases: Vec<Case>,
 }
 
-/// Mishaps that come together.
+/// A combination of injected faults.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
-    /// For tables and plots.
+    /// Name in tables and plots.
     name: String,
-    /// Injected mishaps; empty for a run without any.
+    /// Injected faults; empty for a run without any.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }

@@ -1,9 +1,10 @@
-//! Figure 4 of paper 004: precision and recall of a kind of object after each view, from that view alone and from all views
-//! merged, by each recogniser.
+//! Figure 4 of paper 004: precision and recall for a kind of object after each view, from that view alone and
+//! from all views merged, by each recogniser.
 //!
-//! The body drives around the table and looks from each pose in turn. *Single* at k is the k-th view alone, *merged* at k are
-//! the first k views in one cloud. A percept that is called the kind counts as right if it stands where a thing of the kind
-//! stands in truth, each thing once. Recall is over all things of the kind, hidden or not.
+//! The body drives around the table and looks from each pose in turn. *Single* at k is the k-th view alone,
+//! *merged* at k are the first k views in one cloud. A percept classified as the kind is correct if it lies
+//! at the true position of an object of the kind, each object counted once. Recall is over all objects of the
+//! kind, hidden or not.
 
 use descry_agent::stop::Stop;
 use std::collections::BTreeMap;
@@ -40,36 +41,36 @@ struct Text {
     domain: String,
     /// Scene of the domain, or a file.
     scene: String,
-    /// The kind of object that is counted.
+    /// The kind of object to score.
     of_kind: String,
     /// The known objects; all of the domain if left out.
     #[serde(default)]
     known: Vec<String>,
-    /// Recognisers by their names, `descry` and `published` (that of the paper); the figures of the first stand at the top of the
-    /// summary.
+    /// Names of the recognisers, `descry` and `published` (that of the paper); the figures of the first one
+    /// lead the summary.
     recognisers: Vec<String>,
-    /// Looks, all around.
+    /// Number of views, evenly around the surface.
     #[serde(default = "default_poses")]
     poses: usize,
-    /// From the centre of the surface.
+    /// Distance of the views from the centre of the surface.
     #[serde(default = "default_distance_m")]
     distance_m: f64,
-    /// Arrangements that are counted together.
+    /// Sets of arrangements.
     #[serde(rename = "set")]
     sets: Vec<Set>,
 }
 
-/// Arrangements that are counted together.
+/// Arrangements that are scored together.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Set {
-    /// For tables and plots.
+    /// Name in tables and plots.
     name: String,
     /// Seed of the first arrangement; each further one has the next.
     first_seed: u64,
     /// Number of arrangements.
     arrangements: u64,
-    /// Instead of our simulator: `program:COMMAND`, in a world of its own that has things of the same kinds.
+    /// Body instead of the simulator: `program:COMMAND`, whose own world has objects of the same kinds.
     #[serde(default)]
     robot: Option<OtherBody>,
 }
@@ -100,7 +101,7 @@ struct Figure4 {
     spec: SceneSpec,
     models: Vec<ObjectModel>,
     recognisers: Vec<Box<dyn Recogniser>>,
-    /// Set, by its number, and seed of each job.
+    /// Set index and seed of each job.
     jobs: Vec<(usize, u64)>,
 }
 
@@ -206,15 +207,16 @@ impl Kind for Figure4 {
 /// A cell of the figure.
 #[derive(Debug, Clone, Default)]
 struct Cell {
-    /// One entry an arrangement: its number, percepts called the kind and right, called and wrong, things of the kind found
-    /// by their own name, things of the kind.
+    /// One entry for each arrangement: its number; correct and wrong percepts of the kind; objects of the
+    /// kind found by their own name; all objects of the kind.
     counts: Vec<(u64, [f64; 4])>,
     forecasts: Vec<(f64, bool)>,
-    /// Look-alikes with a handle: called the kind, of how many; before and after enough of the handle was seen.
+    /// Look-alikes with a handle: number classified as the kind, and total, before and after enough of the
+    /// handle was seen.
     handled: [(usize, usize); 2],
 }
 
-/// Rows of one cell of the table: recogniser, number of views, single or merged.
+/// Groups the rows by recogniser, number of views, and single or merged.
 fn cells(finished: &[Numbered<'_>]) -> BTreeMap<(String, String, String, u64), Cell> {
     let mut cells = BTreeMap::<_, Cell>::new();
     for &(number, job) in finished {
@@ -248,7 +250,7 @@ fn cells(finished: &[Numbered<'_>]) -> BTreeMap<(String, String, String, u64), C
     cells
 }
 
-/// A row from what `json!` made.
+/// Converts a JSON object to a row.
 fn row(value: Value) -> Row {
     value.as_object().cloned().unwrap_or_default()
 }

@@ -19,35 +19,37 @@ use super::page::Section;
 use super::{ExperimentError, Job, Numbered, Outcome, Row, Source};
 use descry_agent::body::program;
 
-/// Runtime on which the run of a job goes on.
+/// Runtime for the run of a job.
 fn runtime() -> Result<tokio::runtime::Runtime, String> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
     runtime.map_err(|e| format!("the runtime could not be started: {e}"))
 }
 
-/// A kind of experiment, bound to what a file says of it.
+/// A kind of experiment, with the settings of a file.
 pub trait Kind: Send + Sync {
-    /// Keys that every experiment file has.
+    /// Keys common to all experiment files.
     fn head(&self) -> &Head;
 
-    /// Other texts that the results depend on, by name: scenes, domain, programs. They count in the experiment's hash.
+    /// Other texts that the results depend on, by name: scenes, domain, programs. They are part of the
+    /// experiment's hash.
     fn inputs(&self) -> Vec<(String, String)>;
 
-    /// Every combination, in an order that is always the same.
+    /// All jobs, in a fixed order.
     fn jobs(&self) -> Vec<Job>;
 
-    /// Does the job of this number. The outcome depends on nothing but the file and the number. `scratch` is a path that
-    /// nothing else uses; what is there afterwards is removed.
+    /// Runs a job. The outcome depends on the file and the number alone. `scratch` is an exclusive path,
+    /// removed afterwards.
     ///
     /// # Errors
-    /// A text for people; it becomes a row.
+    ///
+    /// A message for people; it becomes a row.
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
-    /// Summarises finished jobs, all or those done so far, in the order of [`Kind::jobs`].
+    /// Summarises finished jobs, all or those so far, in the order of [`Kind::jobs`].
     fn summarise(&self, finished: &[Numbered<'_>]) -> Summary;
 }
 
-/// Keys that every experiment file has.
+/// Keys common to all experiment files.
 #[derive(Debug, Clone, Deserialize)]
 pub struct Head {
     /// The experiment's name.
@@ -59,7 +61,7 @@ pub struct Head {
     pub about: String,
 }
 
-/// What runs in a domain depend on, by name.
+/// Texts that runs in a domain depend on, by name.
 pub fn inputs_of<'b>(
     domain: &Domain,
     scenes: String,
@@ -72,19 +74,19 @@ pub fn inputs_of<'b>(
     [("scene".into(), scenes), ("domain".into(), read)].into_iter().chain(programs).collect()
 }
 
-/// A body other than our simulator, as an experiment file names it: `program:COMMAND`. Its runs differ by seed and are held against
-/// the truth, so the command takes both.
+/// A body other than the simulator in an experiment file: `program:COMMAND`. Its runs differ by seed and are
+/// compared with the truth, so the command takes both.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(try_from = "String")]
 pub struct OtherBody(String);
 
 impl OtherBody {
-    /// The program's command line, with places for seed and truth.
+    /// The program's command line, with placeholders for seed and truth.
     fn command(&self) -> &str {
         &self.0
     }
 
-    /// Texts that the robot's program is made of, by path.
+    /// Texts of the robot's program, by path.
     fn texts(&self) -> BTreeMap<PathBuf, String> {
         program_texts(self.0.split_whitespace(), Path::new("."))
     }
@@ -107,16 +109,16 @@ impl TryFrom<String> for OtherBody {
 /// Summary of all jobs.
 #[derive(Debug, Clone, Default)]
 pub struct Summary {
-    /// For scripts: `summary.json`.
+    /// Values for scripts: `summary.json`.
     pub values: Row,
-    /// For people: tables and plots in the order in which they are read.
+    /// Tables and plots for people, in reading order.
     pub sections: Vec<Section>,
 }
 
-/// Reads what a file says of its kind.
+/// Reader of experiment files of a kind.
 type Reader = fn(&Source) -> Result<Box<dyn Kind>, ExperimentError>;
 
-/// Every kind by its name in experiment files.
+/// All kinds by their names in experiment files.
 pub const ALL: &[(&str, Reader)] = &[
     ("figure-4", figure_4::read),
     ("where-to-look", where_to_look::read),
@@ -124,10 +126,11 @@ pub const ALL: &[(&str, Reader)] = &[
     ("tasks", tasks::read),
 ];
 
-/// The kind of an experiment file, with everything that the file says checked.
+/// Reads and checks an experiment file.
 ///
 /// # Errors
-/// [`ExperimentError::Input`] points at the place.
+///
+/// [`ExperimentError::Input`] with the place of the fault.
 pub fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     let head: Head = parse(source)?;
     let known: Vec<&str> = ALL.iter().map(|(name, _)| *name).collect();
@@ -142,13 +145,13 @@ pub fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     }
 }
 
-/// Reads an experiment file as TOML.
+/// Parses an experiment file as TOML.
 fn parse<T: serde::de::DeserializeOwned>(source: &Source) -> Result<T, ExperimentError> {
     input::parse_toml(&source.path.display().to_string(), &source.text)
         .map_err(|e| ExperimentError::Input(e.to_string()))
 }
 
-/// A value that the format allows and the meaning does not, drawn under its line.
+/// The error for an invalid value, drawn under its line.
 fn refuse(
     source: &Source,
     key: &'static str,

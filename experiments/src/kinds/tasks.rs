@@ -1,5 +1,5 @@
-//! Tasks in a place with several surfaces: whatever may be said to a domain, by several policies, with and without mishaps. What
-//! is answered and done is held against how everything stands in the end.
+//! Tasks in a place with several surfaces: any goals of a domain, by several policies, with and without
+//! faults. Answers and actions are compared with the true final state.
 
 use descry_agent::stop::Stop;
 use std::path::Path;
@@ -42,53 +42,53 @@ struct Text {
     /// Seed of the first arrangement; each further one has the next.
     #[serde(default = "default_seed")]
     first_seed: u64,
-    /// Who chooses where to look next: one of the policies above each.
+    /// Policies that choose where to look next, from the list above.
     policies: Vec<String>,
-    /// A thing is found where it is if it stands no farther from there, along the floor.
+    /// Maximum distance along the floor between the stated and the true position of a found object.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
     /// Goals; each is pursued with each policy and case.
     #[serde(rename = "goal")]
     goals: Vec<GoalText>,
-    /// Cases: the mishaps that are injected; a single case without any if left out.
+    /// Cases, each with its injected faults; a single case without any if left out.
     #[serde(default = "nothing_goes_wrong", rename = "case")]
     cases: Vec<Case>,
 }
 
-/// Goal, and the condition under which it is truly achieved.
+/// A goal, and the condition under which it is truly achieved.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct GoalText {
-    /// In the words of the domain.
+    /// The goal in the words of the domain.
     say: String,
-    /// The objects of the scene that it is about, by name or kind.
+    /// The objects that the goal is about, by name or kind in the scene.
     targets: Vec<String>,
-    /// When it is right.
+    /// Condition under which the goal is truly achieved.
     truly: Truly,
-    /// The surface that it is about, by the scene's name.
+    /// The surface that the goal is about, by its name in the scene.
     #[serde(default)]
     surface: Option<String>,
-    /// The room that it is about, by the scene's name.
+    /// The room that the goal is about, by its name in the scene.
     #[serde(default)]
     room: Option<String>,
     /// Share of the runs without the targets.
     #[serde(default)]
     absent_share: f64,
-    /// Actions that are counted: the share of the runs in which each was carried out.
+    /// Actions whose share of runs with a completed execution is reported.
     #[serde(default)]
     stages: Vec<String>,
 }
 
-/// Mishaps that come together, or another body.
+/// A combination of injected faults, or another body.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Case {
-    /// For tables and plots.
+    /// Name in tables and plots.
     name: String,
-    /// Instead of our simulator: `program:COMMAND`, whose world has the places and things of the scene.
+    /// Body instead of the simulator: `program:COMMAND`, whose world has the places and objects of the scene.
     #[serde(default)]
     robot: Option<OtherBody>,
-    /// Injected mishaps; empty for a run without any.
+    /// Injected faults; empty for a run without any.
     #[serde(default, rename = "fault")]
     faults: Vec<Fault>,
 }
@@ -111,11 +111,11 @@ struct Tasks {
     text: Text,
     domain: Domain,
     spec: SceneSpec,
-    /// The goals as they are understood, in the order of the file.
+    /// The parsed goals, in the order of the file.
     goals: Vec<Goal>,
 }
 
-/// One combination.
+/// One combination of the variables.
 struct Setting<'a> {
     goal: usize,
     case: &'a Case,
@@ -175,7 +175,7 @@ fn check(source: &Source, text: &Text) -> Result<(), ExperimentError> {
     Ok(())
 }
 
-/// A goal names what the scene has, and all that it takes to tell whether it is truly so.
+/// Checks that a goal names parts of the scene, and everything needed to judge it.
 fn check_goal(source: &Source, goal: &GoalText, spec: &SceneSpec) -> Result<(), ExperimentError> {
     let refused = |problem: String, mend: String| {
         Err(refuse(source, "goal", format!("goal \"{}\": {problem}", goal.say), mend))
@@ -250,7 +250,7 @@ fn check_words(
     }
 }
 
-/// The symbols by which a goal may speak of a target: its name, what it is, and of which kind that is.
+/// The symbols by which a goal may name a target: its name, its identity, and its kind.
 fn names(target: &str, domain: &Domain, spec: &SceneSpec) -> Vec<String> {
     let there = spec.objects.iter().filter(|o| o.name == target || o.kind.as_deref() == Some(target));
     let called = there.flat_map(|o| [Some(&o.name), o.kind.as_ref()]).flatten();
@@ -262,7 +262,8 @@ fn names(target: &str, domain: &Domain, spec: &SceneSpec) -> Vec<String> {
 }
 
 impl Tasks {
-    /// Runs are outermost, so that the first shard of many has some of everything, and neighbours share an arrangement.
+    /// The setting of a job. Runs are outermost, so that the first of many shards covers everything, and
+    /// neighbours share an arrangement.
     fn setting(&self, number: usize) -> Setting<'_> {
         let Text { goals, cases, policies, .. } = &self.text;
         let (rest, policy) = (number / policies.len(), number % policies.len());

@@ -1,4 +1,4 @@
-//! One run of the agent in a simulated world, ours or a program's, held against the truth.
+//! One run of the agent in a simulated world, built-in or a program's, compared with the truth.
 
 use descry_agent::stop::Stop;
 use std::collections::BTreeMap;
@@ -23,9 +23,9 @@ use descry_domains::answer::Verdict;
 use descry_agent::report::{Event, Report};
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
 
-/// Seeds tried for an arrangement that is as hidden as was asked for.
+/// Maximum number of seeds tried for an arrangement with the requested occlusion.
 const ARRANGEMENTS: u64 = 20;
-/// Between the seeds that are tried, so that scenes do not share them.
+/// Stride between the tried seeds, which keeps scenes from sharing them.
 const NEXT_ARRANGEMENT: u64 = 1_000_003;
 
 /// Settings of one run.
@@ -34,27 +34,28 @@ pub(super) struct Trial<'a> {
     pub domain: &'a Domain,
     /// Goal.
     pub goal: &'a Goal,
-    /// The scene; its places and things have the same names in a program's world.
+    /// The scene; in a program's world, places and objects have the same names.
     pub spec: &'a SceneSpec,
-    /// The command line of a program with a world of its own; none: our simulator.
+    /// The command line of a program with its own world; none: the simulator.
     pub program: Option<&'a str>,
     /// Targets of the search: names or kinds in the scene.
     pub targets: &'a [String],
     /// True if the targets are in the scene.
     pub present: bool,
-    /// Fixes arrangement, noise, mishaps and random choices.
+    /// Seed of arrangement, noise, faults and random choices.
     pub seed: u64,
-    /// Injected mishaps.
+    /// Injected faults.
     pub faults: FaultPlan,
-    /// Who chooses.
+    /// Name of the policy.
     pub policy: &'a str,
     /// True if the first look is taken from the start, whatever the policy.
     pub first_look_here: bool,
-    /// A thing is found where it is if it stands no farther from there, metres.
+    /// Maximum distance between the stated and the true position of a found object, metres.
     pub tolerance_m: f64,
 }
 
-/// Carries a run out and holds it against how its target stands in the end. Its record is kept in `scratch`.
+/// Carries out a run and compares its result with the target's true final position. Its record is kept in
+/// `scratch`.
 pub(super) fn carry_out(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
     let Lived { report, truth, share, clock, .. } = live(trial, scratch, stop)?;
     let mut row = measured(trial, &report);
@@ -71,13 +72,13 @@ pub(super) struct Lived {
     pub truth: Truth,
     /// Number of completed executions of each action, by name.
     pub carried: BTreeMap<String, usize>,
-    /// The share of the target that was seen from the start.
+    /// Share of the target that was visible from the start.
     pub share: Option<f64>,
-    /// Times on the wall.
+    /// Wall-clock times.
     pub clock: Row,
 }
 
-/// Lets the agent live through a run.
+/// Carries out a run of the agent.
 pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Lived, String> {
     let started = std::time::Instant::now();
     let Staged { body, goal, share, foresight } = match trial.program {
@@ -124,9 +125,9 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
 /// A body in its world, before a run.
 struct Staged {
     body: Body,
-    /// As it is understood there.
+    /// The goal as parsed for this body.
     goal: Goal,
-    /// The share of the target that is seen from the start.
+    /// Share of the target that is visible from the start.
     share: Option<f64>,
     foresight: Option<Foresight>,
 }
@@ -168,7 +169,7 @@ fn arrangement(trial: &Trial<'_>) -> Result<descry_robots::sim::Scene, String> {
     Err(last)
 }
 
-/// Tests if the object is there and is one of the targets, by name or kind.
+/// True if the object is present and is one of the targets, by name or kind.
 pub(super) fn is_among(object: &TrueObject, targets: &[String]) -> bool {
     object.present && targets.iter().any(|target| object.name == *target || object.kind == *target)
 }
@@ -184,7 +185,7 @@ fn foresight(robot: &Arc<SimRobot>, targets: &[String]) -> Foresight {
     })
 }
 
-/// Measures a report against the true scene at the end.
+/// Measurements of a report against the true final scene.
 fn measured(trial: &Trial<'_>, report: &Report) -> Row {
     let believed = report.position_m.filter(|_| report.verdict == Verdict::Achieved);
     let error_m = believed.zip(report.true_position_m).map(|(believed, truth)| {
@@ -214,10 +215,10 @@ fn measured(trial: &Trial<'_>, report: &Report) -> Row {
     value.as_object().cloned().unwrap_or_default()
 }
 
-/// A finished run, as the summaries read it.
+/// A finished run, for the summaries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Runs in one scene belong together.
+    /// Scene of the run; runs in one scene are not independent.
     pub group: u64,
     /// True if the target was there at the end.
     pub present: bool,
@@ -225,18 +226,18 @@ pub struct Measured {
     pub right: bool,
     /// True if the run claimed to have found an absent target.
     pub false_declaration: bool,
-    /// Looks.
+    /// Number of views.
     pub views: f64,
-    /// Driven.
+    /// Distance driven, metres.
     pub metres: f64,
-    /// On the body's clock.
+    /// Duration on the body's clock, seconds.
     pub seconds: f64,
-    /// The probability that it stated, and whether it came true.
+    /// The stated probability, and true if the event occurred.
     pub forecast: Option<(f64, bool)>,
 }
 
 impl Measured {
-    /// Reads a row; a job that failed gives none.
+    /// Reads a row; none for a failed job.
     pub fn read(group: u64, row: &Row) -> Option<Self> {
         let truth = |key: &str| row.get(key).and_then(Value::as_bool);
         let number = |key: &str| row.get(key).and_then(Value::as_f64);

@@ -1,5 +1,5 @@
-//! Policies against each other: how many looks, metres and seconds each takes to the right verdict on a target that is more
-//! or less hidden, or not there at all, with more or fewer poses to look from.
+//! Comparison of policies: views, metres and seconds until the right verdict on a target that is more or less
+//! hidden, or absent, with more or fewer viewpoints.
 
 use descry_agent::stop::Stop;
 use std::path::Path;
@@ -37,7 +37,7 @@ struct Text {
     scene: String,
     /// Goal, in the words of the domain.
     goal: String,
-    /// The object of the scene that is looked for, by name or kind.
+    /// The object to find, by its name or kind in the scene.
     target: String,
     /// Arrangements; each has one level of occlusion, in turn.
     scenes: usize,
@@ -51,16 +51,16 @@ struct Text {
     /// levels of occlusion are defined.
     #[serde(default)]
     first_look_from_start: bool,
-    /// Numbers of poses around the surface.
+    /// Numbers of viewpoints around the surface.
     poses: Vec<usize>,
-    /// Who chooses where to look next: one of the policies above each.
+    /// Policies that choose where to look next, from the list above.
     policies: Vec<String>,
-    /// The policy that is compared with others.
+    /// The policy to be compared with others.
     ours: String,
-    /// The policies that it is compared with.
+    /// The policies it is compared with.
     #[serde(default)]
     against: Vec<String>,
-    /// A thing is found where it is if it stands no farther from there.
+    /// Maximum distance between the stated and the true position of a found object.
     #[serde(default = "default_tolerance_m")]
     position_tolerance_m: f64,
     /// Levels of occlusion, in turn.
@@ -72,9 +72,9 @@ struct Text {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Occlusion {
-    /// For tables and plots.
+    /// Name in tables and plots.
     name: String,
-    /// Least and greatest share of the target that is not occluded from the start.
+    /// Minimum and maximum share of the target that is visible from the start.
     visible_from_start: [f64; 2],
 }
 
@@ -101,7 +101,7 @@ struct WhereToLook {
     jobs: Vec<Setting>,
 }
 
-/// One combination.
+/// One combination of the variables.
 #[derive(Debug, Clone)]
 struct Setting {
     scene: usize,
@@ -191,7 +191,7 @@ fn check(source: &Source, text: &Text) -> Result<(), ExperimentError> {
     wrong(!text.occlusions.is_empty(), "occlusion", "there is no level of occlusion", "add an [[occlusion]]")
 }
 
-/// Every combination, scenes outermost, so that neighbours share a scene.
+/// All combinations, scenes outermost, so that neighbours share a scene.
 fn settings(text: &Text) -> Vec<Setting> {
     let levels = text.occlusions.len();
     let mut settings = Vec::new();

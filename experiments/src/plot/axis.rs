@@ -1,11 +1,11 @@
-//! From values to places on the picture, with round ticks.
+//! Mapping of values to positions on the plot, with round ticks.
 
 /// Approximate number of ticks of an axis.
 const TICKS: f64 = 6.0;
 
 /// A linear scale.
 pub struct Scale {
-    /// Value at the beginning.
+    /// Value at the start.
     pub low: f64,
     /// Value at the end.
     pub high: f64,
@@ -15,7 +15,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// A scale from `from` to `to` on the picture with given ends, or ends at round values around the data.
+    /// A scale from `from` to `to` on the plot with given ends, or with round ends around the data.
     pub fn new(range: Option<[f64; 2]>, values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (low, high) = match range {
             Some([low, high]) if high > low => (low, high),
@@ -29,7 +29,7 @@ impl Scale {
         Self { low, high, from, to, step }
     }
 
-    /// The place of a value; what lies beyond the ends is drawn at the end.
+    /// The position of a value, clamped to the ends.
     pub fn at(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.from + share * (self.to - self.from)
@@ -54,7 +54,7 @@ impl Scale {
     }
 }
 
-/// Ends around values, with zero if it is near; a unit wide at least for a single value.
+/// Ends around the values, including a nearby zero; at least one unit wide for a single value.
 fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     if low > high {
@@ -64,7 +64,7 @@ fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
     if high - low < 1e-9 * (1.0 + high.abs()) { (low - 0.5, high + 0.5) } else { (low, high) }
 }
 
-/// The next 1, 2 or 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let share = step / power;

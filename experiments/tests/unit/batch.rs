@@ -1,4 +1,4 @@
-//! The whole way from a kind of experiment to its results, with a kind that only counts.
+//! A complete batch from kind to results, with a kind that only counts.
 
 use descry_agent::stop::Stop;
 use descry_experiments::kinds::Kind;
@@ -76,7 +76,7 @@ fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {
     }
 }
 
-/// Every file of the results, without the journals.
+/// The result files, without the journals.
 fn results(folder: &Path) -> BTreeMap<String, String> {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     files

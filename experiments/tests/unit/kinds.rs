@@ -6,7 +6,8 @@ use descry_experiments::kinds::*;
 use descry_experiments::{Row, Source};
 use std::path::Path;
 
-/// A file of the tabletop by its name alone, of another domain with the domain before it.
+/// The text of a shipped experiment: by its file name in the domain tabletop, or with the domain's name
+/// before it.
 fn shipped(name: &str) -> String {
     let (domain, file) = name.split_once('/').unwrap_or(("tabletop", name));
     let path =
@@ -55,8 +56,8 @@ fn programs_of_a_domain_count_as_inputs() {
     assert!(program.is_some_and(|(_, text)| text.contains("def ")), "{inputs:?}");
 }
 
-/// The template robot, and a file that says how its room is in truth: there is nothing that the camera could not see, or a cup A
-/// that it does not show.
+/// The template robot with a ground-truth file: everything is visible to the camera, or there is a cup A that
+/// it does not show.
 const TELLING: &str = r#"
 import json, sys
 sys.path.insert(0, "PYTHON")
@@ -178,7 +179,7 @@ fn every_fourth_scene_of_each_level_is_without_the_target() {
     assert_eq!(levels[..4], ["hidden", "below a quarter", "up to 0.6", "hidden"]);
 }
 
-/// One job of a shipped file; its only row.
+/// Runs one job of a shipped file; returns its only row.
 fn one_job(text: String, number: usize) -> Row {
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));
     let kind = read(&source(text)).unwrap_or_else(|e| panic!("{e}"));

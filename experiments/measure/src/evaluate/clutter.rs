@@ -1,4 +1,4 @@
-//! Piles of labelled things: which surface is taken for the table, and which things are found in one piece.
+//! Piles of labelled objects: choice of the table surface, and segmentation of each object.
 
 use super::mosd::{Tally, labelled_objects, overlap};
 use super::tabletop::pile::Pile;
@@ -9,10 +9,10 @@ use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{Cloud, Scene, View, Visibility};
 use std::path::Path;
 
-/// A surface this far from the table's height is another, metres.
+/// Height difference from which a surface is not the table, metres.
 const OFF_M: f64 = 0.015;
 
-/// Scores piles with `count` seeds from `first`; pictures of the first twenty go to `out`.
+/// Scores piles with `count` seeds from `first`; pictures of the first twenty are written to `out`.
 pub fn run(count: u64, first: u64, out: Option<&Path>) -> Result<(), String> {
     if let Some(dir) = out {
         std::fs::create_dir_all(dir).map_err(|e| format!("{}: {e}", dir.display()))?;
@@ -72,7 +72,7 @@ pub fn run(count: u64, first: u64, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-/// A view as the camera sees it, its cloud in the frame of its pose, a colour a segment.
+/// Picture of a view from its camera, with one colour a segment; its cloud is in the frame of its pose.
 pub fn picture(path: &Path, view: &View, cloud: &Cloud, scene: &Scene) -> Result<(), String> {
     let mut labels = vec![0_u32; cloud.len()];
     for (label, segment) in (1..).zip(&scene.segments) {

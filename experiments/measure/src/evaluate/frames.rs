@@ -1,4 +1,4 @@
-//! Recorded frames of depth with poses.
+//! Recorded depth frames with poses.
 
 use descry_perception::files::depth;
 use descry_perception::nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -10,7 +10,7 @@ fn numbers(path: &Path) -> Result<Vec<f64>, String> {
     text.split_whitespace().map(|w| w.parse().map_err(|e| format!("{}: {e}", path.display()))).collect()
 }
 
-/// The frames of a folder by name, in their order.
+/// The frames of a folder with their names, in order.
 pub fn frames(dir: &Path) -> Result<Vec<(String, View)>, String> {
     let k = numbers(&dir.join("camera-intrinsics.txt"))?;
     let mut names: Vec<String> = std::fs::read_dir(dir)

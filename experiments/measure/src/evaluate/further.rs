@@ -1,5 +1,5 @@
-//! What one more look at a table costs: time of merging as views become more, anew, with what was kept of the look before, and of what is
-//! done ahead of the next look; and CPU time of all threads.
+//! Cost of one more view of a table: wall-clock and CPU time of merging against the number of views, from
+//! scratch, incrementally, and incrementally with the work done ahead of the next view.
 
 use super::table::{arrangement, judge, options};
 use super::tabletop::{Draws, Thing, disturbed, look, on_ring};
@@ -8,7 +8,7 @@ use descry_perception::recognise::Descry;
 use descry_perception::{Merged, Percept, View};
 use std::time::Instant;
 
-/// CPU time of all threads so far, milliseconds.
+/// CPU time of all threads since the start, milliseconds.
 fn cpu_ms() -> f64 {
     let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten().filter_map(Result::ok);
     let of_task = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("schedstat")).ok();
@@ -16,10 +16,10 @@ fn cpu_ms() -> f64 {
     tasks.filter_map(of_task).filter_map(first).sum::<f64>() / 1e6
 }
 
-/// How often all looks of an arrangement are merged: the least times count.
+/// Repetitions of each merge; the least time counts.
 const REPETITIONS: usize = 7;
 
-/// The least of how long something took, and of how much CPU time, milliseconds.
+/// Least wall-clock and CPU time, milliseconds.
 #[derive(Clone, Copy)]
 struct Least {
     wall_ms: f64,
@@ -27,7 +27,7 @@ struct Least {
 }
 
 impl Least {
-    /// Nothing was timed yet.
+    /// No measurement yet.
     const NONE: Least = Least { wall_ms: f64::INFINITY, cpu_ms: f64::INFINITY };
 
     fn time<T>(&mut self, of: impl FnOnce() -> T) -> T {
@@ -47,7 +47,7 @@ impl Least {
     }
 }
 
-/// Merges up to `count` views of some arrangements, look by look.
+/// Merges up to `count` views of some arrangements, one by one.
 pub fn run(count: usize, mode: &str) -> Result<(), String> {
     println!(
         "{:>5} {:>10} {:>10} {:>10}   ms (of CPU), least of {REPETITIONS}; {:>9} {:>9}  cups right, wrong",
@@ -100,7 +100,7 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// How many cups are named rightly and wrongly, and how many views were left out.
+/// The number of correct and of wrong names, and of views left out.
 fn of_cups(merged: &Merged, things: &[(Thing, Option<&str>)]) -> Result<String, String> {
     let percepts = judge(merged, &Descry::default())?;
     let is_right = |p: &&Percept| {

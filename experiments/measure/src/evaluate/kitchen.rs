@@ -1,4 +1,5 @@
-//! Frames of a real kitchen with poses: merged at random, mugs against their reference places.
+//! Posed frames of a real kitchen: random subsets merged, and recognised mugs compared with reference
+//! positions.
 
 use super::frames::frames;
 use super::mosd::cup;
@@ -11,7 +12,7 @@ use descry_perception::{ObjectModel, Recogniser, View};
 use std::path::Path;
 
 const DRAWS: u64 = 20;
-/// A mug farther from its reference than this is another thing, metres.
+/// Maximum distance of a mug from its reference, metres.
 const SAME_M: f64 = 0.08;
 
 struct Reference {
@@ -31,10 +32,10 @@ pub fn mug() -> ObjectModel {
     }
 }
 
-/// What is known of the table and of what stands on it.
+/// Reference data of the table and the objects on it.
 pub struct Table {
     up: Unit<Vector3<f64>>,
-    /// Along `up`, metres.
+    /// Height along `up`, metres.
     height: f64,
     objects: Vec<Reference>,
 }
@@ -53,7 +54,7 @@ impl Table {
         Ok(Table { up, height: up.dot(&three(&json["table_point"])), objects })
     }
 
-    /// A surface at the table's height, give or take a decimetre.
+    /// Surface options for the table's height, within a decimetre.
     pub fn surface(&self) -> SurfaceOptions {
         let height_band_m = Some((self.height - 0.1, self.height + 0.1));
         SurfaceOptions { up: Some(self.up), height_band_m, ..SurfaceOptions::default() }
@@ -65,7 +66,7 @@ impl Table {
         view.cloud.points.iter().filter(on).count() > 60_000
     }
 
-    /// Distance along the table, metres.
+    /// Distance parallel to the table, metres.
     fn distance(&self, reference: &Reference, place: &Point3<f64>) -> f64 {
         let gap = reference.place - place;
         (gap - self.up.scale(self.up.dot(&gap))).norm()
@@ -115,7 +116,7 @@ pub fn run(dir: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Merges a set of views and counts what each recogniser finds in it.
+/// Merges a set of views and scores each recogniser on it.
 fn score(
     set: &[View],
     table: &Table,
@@ -180,7 +181,7 @@ impl Tally {
     }
 }
 
-/// True if the place with some room around it lies in the image and a return is near it.
+/// True if the place lies in the image with a margin and has a return near it.
 fn in_view(view: &View, place: &Point3<f64>) -> bool {
     const ROOM_PX: f64 = 35.0;
     let q = view.world_from_camera.inverse_transform_point(place);

@@ -1,5 +1,5 @@
-//! Segmentation, merging and recognition against what is known, how long single views take, and where the values of all constants are
-//! from, as tables:
+//! Segmentation, merging and recognition compared with ground truth, times of single views, and the origin of
+//! all constants, as tables:
 //! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
@@ -18,7 +18,7 @@ mod times;
 mod variants;
 
 use std::path::Path;
-/// As the program has it.
+/// The same allocator as in the program.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -69,7 +69,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The constants of this copy of the sources and where their values are from, in Markdown.
+/// Prints the constants of these sources with the origin of their values, in Markdown.
 fn constants() -> Result<(), String> {
     let found = constants::all(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../perception/src"));
     print!("{}", constants::table(&found));

@@ -1,4 +1,4 @@
-//! Worlds that are not the assumed one: other cameras, holes, and vessels that no model describes.
+//! Worlds that violate the model assumptions: other cameras, holes, and vessels without a model.
 
 use super::mosd::words;
 use super::table::{Known, arrangement, judge, options, picture, strewn};
@@ -11,15 +11,15 @@ use descry_perception::{Intrinsics, Percept, View};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// After so many views each is judged.
+/// Numbers of views after which the result is judged.
 const VIEWS: [usize; 5] = [1, 2, 3, 5, 8];
-/// What the agent asks for before it says yes.
+/// Confidence that the agent requires for a yes.
 const SURE: f64 = 0.8;
 
-/// What is said farther than this from a thing is not said of it, metres.
+/// Maximum distance at which a percept is attributed to an object, metres.
 const NEAR_M: f64 = 0.06;
 
-/// A world: its name, its camera, and what stands there.
+/// A world: its name, its camera, and its generator of objects.
 type World = (&'static str, Device, fn(&mut Draws) -> Vec<Known>);
 
 fn worlds() -> Vec<World> {
@@ -53,7 +53,7 @@ const VASE: &[[f64; 2]] = &[[0.0, 0.025], [0.05, 0.042], [0.09, 0.04], [0.13, 0.
 const BARREL: &[[f64; 2]] = &[[0.0, 0.034], [0.025, 0.041], [0.05, 0.044], [0.075, 0.041], [0.1, 0.034]];
 const GLASS: &[[f64; 2]] = &[[0.0, 0.026], [0.11, 0.037]];
 
-/// Two cups of each kind among vessels, each of a size of its own.
+/// Two cups of each kind among vessels of varied size.
 fn vessels(draws: &mut Draws) -> Vec<Known> {
     strewn(draws, [1.2, 0.6], 0..10, |kind, x, y, draws| {
         let scale = 0.85 + 0.3 * draws.next();
@@ -75,7 +75,8 @@ fn vessels(draws: &mut Draws) -> Vec<Known> {
     })
 }
 
-/// Two cups of each kind on their side, among tins and cartons of just their size, a mug and a cup that stands.
+/// Two cups of each kind lying on their sides, among tins and cartons of the same size, a mug and a standing
+/// cup.
 fn lying(draws: &mut Draws) -> Vec<Known> {
     strewn(draws, [1.2, 0.6], 0..10, |kind, x, y, draws| {
         let turn_rad = std::f64::consts::TAU * draws.next();
@@ -106,7 +107,7 @@ fn lying(draws: &mut Draws) -> Vec<Known> {
     })
 }
 
-/// What was said of the things after a number of views.
+/// Score after a number of views.
 #[derive(Clone, Default)]
 struct Tally {
     right: usize,
@@ -117,7 +118,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Takes in what was said; the lines tell what was wrong.
+    /// Scores percepts against the objects; returns a line for each error.
     fn score(&mut self, things: &[Known], percepts: &[Percept]) -> Vec<String> {
         self.cups += things.iter().filter(|t| t.1.is_some()).count();
         let mut found = vec![false; things.len()];
@@ -156,8 +157,8 @@ impl Tally {
     }
 }
 
-/// `count` arrangements from a seed on, in the worlds whose names begin as asked (all: ""); what is wrong is told, and drawn
-/// to `out`.
+/// Runs `count` arrangements from a seed on, in the worlds whose names begin with `only` (all: ""); errors
+/// are printed, and drawn to `out`.
 pub fn run(count: u64, first_seed: u64, only: &str, out: Option<&Path>) -> Result<(), String> {
     if let Some(dir) = out {
         std::fs::create_dir_all(dir).map_err(|e| format!("{}: {e}", dir.display()))?;

@@ -1,4 +1,4 @@
-//! Kinect scenes of the Object Segmentation Database with a label a point.
+//! Kinect scenes of the Object Segmentation Database, with a label for each point.
 
 use super::clutter::picture;
 use descry_perception::cloud::is_finite;
@@ -10,7 +10,7 @@ use descry_perception::{ObjectModel, Percept, Recogniser, Scene, View, Visibilit
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The kind of thing that the labels call a cup.
+/// Model of the cups in the labels.
 pub fn cup() -> ObjectModel {
     ObjectModel {
         name: "cup".into(),
@@ -36,7 +36,7 @@ pub struct Tally {
     pub extra: usize,
 }
 
-/// Scores every scene of the folder; pictures of them go to `out`.
+/// Scores every scene of a folder; pictures are written to `out`.
 pub fn run(dir: &Path, out: Option<&Path>) -> Result<(), String> {
     if let Some(out) = out {
         std::fs::create_dir_all(out).map_err(|e| format!("{}: {e}", out.display()))?;
@@ -105,7 +105,7 @@ pub fn run(dir: &Path, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-/// A scene as one view, and the labels of its points.
+/// Reads a scene as one view, with the labels of its points.
 fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let cloud = read_cloud(&bytes).map_err(|e| format!("{}: {e}", path.display()))?.cloud;
@@ -113,7 +113,7 @@ fn labelled(path: &Path, name: &str) -> Result<(View, Vec<u32>), String> {
     Ok((View::alone(cloud), labels))
 }
 
-/// What the labels call objects, where no table lists them.
+/// The labels of objects, for scenes that no table lists.
 pub fn labelled_objects(labels: &[u32]) -> Vec<u32> {
     const FEWEST: usize = 60;
     let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
@@ -121,7 +121,7 @@ pub fn labelled_objects(labels: &[u32]) -> Vec<u32> {
     sizes.into_iter().filter(|(_, size)| *size >= FEWEST).map(|(object, _)| object).collect()
 }
 
-/// How a recogniser does on cups.
+/// Score of a recogniser on cups.
 #[derive(Clone, Default)]
 struct Hits {
     right: usize,
@@ -130,7 +130,7 @@ struct Hits {
 }
 
 impl Hits {
-    /// Counts the percepts of a scene: the object that each mostly is, and which objects are cups.
+    /// Counts the percepts of a scene, given the majority object of each and the set of cups.
     fn count(
         &mut self,
         recogniser: &dyn Recogniser,
@@ -182,7 +182,7 @@ pub fn words(p: &Percept) -> String {
     )
 }
 
-/// The object that most of each segment belongs to; counts what was found, split and merged.
+/// The majority object of each segment; counts found, split and merged objects.
 pub fn overlap(
     scene: &Scene,
     cloud: &descry_perception::Cloud,

@@ -1,4 +1,5 @@
-//! The level surfaces in recordings of depth frames with poses (as the kitchen's), and in organised clouds: what each is and why.
+//! Horizontal surfaces in posed depth recordings (such as the kitchen's) and in organised clouds, each with
+//! its classification.
 
 use descry_perception::files::read_cloud;
 use descry_perception::merge::{MergeOptions, merge};

@@ -1,4 +1,5 @@
-//! Figure 4 of paper 004 on simulated tables: four cups of two kinds, a handled mug, a large box and other things; five poses around.
+//! Figure 4 of paper 004 on simulated tables: four cups of two kinds, a mug with a handle, a large box and
+//! other objects; five poses around.
 
 use super::mosd::words;
 use super::tabletop::{Draws, TABLE_M, Thing, disturbed, look, on_ring};
@@ -39,10 +40,11 @@ pub fn models() -> Vec<ObjectModel> {
     ]
 }
 
-/// A thing and the name of the cup that it is.
+/// An object, with its name if it is a cup.
 pub type Known = (Thing, Option<&'static str>);
 
-/// Things that are drawn kind by kind at places within a part of the table, metres, with two centimetres between them; what finds no room is left out.
+/// Places objects at random within a part of the table, metres, two centimetres apart; objects without room
+/// are left out.
 pub fn strewn<K: Copy>(
     draws: &mut Draws,
     [length_m, width_m]: [f64; 2],
@@ -87,7 +89,7 @@ struct Tally {
     claims: Vec<(f64, bool)>,
 }
 
-/// Scores arrangements with seeds 1 to `count`; pictures of the first three go to `out`.
+/// Scores arrangements with seeds 1 to `count`; pictures of the first three are written to `out`.
 pub fn run(count: u64, out: Option<&Path>) -> Result<(), String> {
     if let Some(dir) = out {
         std::fs::create_dir_all(dir).map_err(|e| format!("{}: {e}", dir.display()))?;
@@ -145,7 +147,7 @@ pub fn options() -> MergeOptions {
     }
 }
 
-/// Views of things from poses around their table, each stated a little wrongly.
+/// Views of objects from poses around their table, with localisation errors.
 fn around(things: &[Known], draws: &mut Draws) -> Vec<View> {
     let bare: Vec<Thing> = things.iter().map(|t| t.0).collect();
     let start = std::f64::consts::TAU * draws.next();
@@ -173,7 +175,7 @@ pub fn view(seed: u64) -> View {
     look(&things, &pose, &pose, &mut draws)
 }
 
-/// A level surface about as high as a table.
+/// Surface options for a horizontal surface at table height.
 pub fn surface() -> SurfaceOptions {
     SurfaceOptions {
         up: Some(Unit::new_normalize(Vector3::z())),
@@ -268,7 +270,7 @@ fn report(recognisers: &[&dyn Recogniser], tallies: &[Vec<Vec<Tally>>]) {
     }
 }
 
-/// A picture of a cloud, colours by percept.
+/// Picture of a cloud, coloured by percept.
 pub fn picture(path: &Path, cloud: &descry_perception::Cloud, percepts: &[Percept]) -> Result<(), String> {
     let mut labels = vec![0_u32; cloud.len()];
     for (number, p) in percepts.iter().enumerate() {

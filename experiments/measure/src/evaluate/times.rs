@@ -1,4 +1,4 @@
-//! How long one view takes from cloud to percepts, stage by stage, and whether a change left the results as they were.
+//! Time from one view to its percepts, by stage, with a digest of the results to detect changes.
 
 use super::kitchen::{self, Table};
 use super::{mosd, table};
@@ -14,7 +14,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A view with what is asked of it.
+/// A view with its options.
 struct Case {
     name: String,
     view: View,
@@ -22,7 +22,8 @@ struct Case {
     models: Vec<ObjectModel>,
 }
 
-/// Times single views: made ones (`made`), and those of folders of point clouds or of frames of a kitchen; and five of them in one (`merged`).
+/// Times single views: simulated ones (`made`), and those of folders of point clouds or kitchen frames; or
+/// merges of five (`merged`).
 pub fn run(repetitions: usize, views: &[&str]) -> Result<(), String> {
     if views == ["merged"] {
         return merged(repetitions);
@@ -58,7 +59,7 @@ pub fn run(repetitions: usize, views: &[&str]) -> Result<(), String> {
     Ok(())
 }
 
-/// Times five views of a table from their files to what stands on it.
+/// Times five views of a table from their files to percepts.
 fn merged(repetitions: usize) -> Result<(), String> {
     println!("{:>6} {:>8} {:>8} {:>9}   ms, least of {repetitions}", "table", "read", "merge", "recognise");
     for seed in 1..=4 {
@@ -91,9 +92,9 @@ fn merged(repetitions: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Least times, and what came out, but for rounding, in one number.
+/// Least times, and a digest of the rounded results.
 struct Row {
-    /// None without a surface.
+    /// Number of segments; none without a surface.
     segments: Option<usize>,
     stages_ms: [f64; 3],
     all_ms: f64,
@@ -116,7 +117,7 @@ fn time(case: &Case, repetitions: usize) -> Row {
     Row { segments, stages_ms, all_ms, digest: hasher.finish() }
 }
 
-/// What comes out, and how long finding the surface, parting what stands on it and recognising took, milliseconds.
+/// Results of the stages, with the time of finding the surface, segmenting and recognising, milliseconds.
 fn stages(case: &Case, cloud: &Cloud, seen: &Visibility) -> (Option<Scene>, Option<Vec<Percept>>, [f64; 3]) {
     let start = Instant::now();
     let surface = find_surface(cloud, seen, &case.options.surface).ok();

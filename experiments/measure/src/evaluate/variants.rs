@@ -1,4 +1,5 @@
-//! The same points told in other ways: without rows, in another order and frame, with a stray return, from a camera held otherwise.
+//! Invariance tests: the same points unorganised, in another order and frame, with a stray return, from a
+//! rotated camera.
 
 use super::mosd::cup;
 use super::table::models;
@@ -10,7 +11,7 @@ use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::{Cloud, Percept, Recogniser, Scene, View, Visibility};
 use std::path::{Path, PathBuf};
 
-/// A cloud in its world with what is known of the camera, and the way back to the camera's frame.
+/// A variant of a cloud with the camera's visibility, and the transform back to the camera's frame.
 struct Variant {
     name: &'static str,
     cloud: Cloud,
@@ -18,7 +19,7 @@ struct Variant {
     camera_from_world: Isometry3<f64>,
 }
 
-/// Every scene of the folders in every way, each against the scene as it is.
+/// Compares every variant of every scene in the folders with the original scene.
 pub fn run(dirs: &[&str]) -> Result<(), String> {
     let mut models = models();
     models.push(cup());

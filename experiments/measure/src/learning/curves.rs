@@ -1,4 +1,5 @@
-//! Recognition against coverage (Fig. 5): models learned by the robot beside models made from perfect poses.
+//! Recognition against coverage (Fig. 5): models learned by the robot compared with models from perfect
+//! poses.
 
 use crate::household::{Room, bodies};
 use crate::knowing::{Model, Scene, Tally, is_right, learned_steps, library, offline, options, scene, some};
@@ -13,13 +14,13 @@ use descry_perception::learning::{Candidate, choose};
 use descry_perception::voxel;
 use std::time::Instant;
 
-/// Side of the voxels that coverage is counted in, metres.
+/// Voxel size for measuring coverage, metres.
 const COVERAGE_M: f32 = 0.005;
-/// Looks of partial models: on the turntable, and by the robot.
+/// Numbers of views of partial models: on the turntable, and by the robot.
 const TURNTABLE_STEPS: [usize; 3] = [1, 3, 14];
 const ROBOT_STEPS: [usize; 3] = [1, 3, 100];
 
-/// How a model came about.
+/// Origin of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Perfect,
@@ -33,12 +34,12 @@ const KINDS: [(Kind, &str, &str, bool); 3] = [
     (Kind::Uncontrolled, "learned, uncontrolled", GREEN, false),
 ];
 
-/// A model and how complete it is.
+/// A model with its coverage.
 struct Variant {
     kind: Kind,
     model: Model,
     coverage: f64,
-    /// True for the most looks of its kind.
+    /// True for the model of its kind with the most views.
     whole: bool,
 }
 
@@ -46,7 +47,7 @@ fn voxels(cloud: &Cloud) -> f64 {
     voxel::assign(&cloud.points, COVERAGE_M).map_or(0.0, |a| a.voxels as f64)
 }
 
-/// Models of one body from more and more looks.
+/// Models of one body from increasing numbers of views.
 fn variants(body: usize, seed: u64, page: &mut Page) -> Vec<Variant> {
     let bodies = bodies();
     let options = |controlled: bool| RunOptions {
@@ -87,7 +88,7 @@ fn variants(body: usize, seed: u64, page: &mut Page) -> Vec<Variant> {
     all
 }
 
-/// Prints and draws; `objects` and `scenes` bound the work.
+/// Prints and plots the curves; `objects` and `scenes` limit the work.
 pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Result<Vec<Claim>, String> {
     page.heading("Recognition against coverage");
     let bodies = bodies();
@@ -135,7 +136,8 @@ pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Resul
     Ok(claims)
 }
 
-/// What a library of one variant and the whole models of the other bodies says of the variant's body in a scene.
+/// Scores the answers about one variant's body in a scene, for a library of that variant and the complete
+/// models of the other bodies.
 fn look_for(
     variant: usize,
     variants: &[Variant],

@@ -1,4 +1,4 @@
-//! What evidence is worth: logistic regression on scenes of other objects than those that are evaluated.
+//! Weights of evidence: logistic regression on scenes with other objects than those evaluated.
 
 use crate::household::{Body, Room, made::made};
 use crate::knowing::{Model, is_right, learned_steps, library, offline, options, scene_among, some};
@@ -12,18 +12,18 @@ use descry_perception::learning::{Evidence, Judge, KnowOptions, WEIGHTS};
 use descry_perception::nalgebra::{SMatrix, SVector};
 
 const ROUNDS: usize = 30;
-/// Pull of the weights towards nothing.
+/// Ridge penalty on the weights.
 const RIDGE: f64 = 0.02;
-/// Objects that are learned, and as many that nobody knows; others after so many scenes.
+/// Number of learned objects, with as many unknown ones, and of scenes for each set.
 const KNOWN: usize = 16;
 const SCENES: usize = 20;
 
-/// Looks of models: what little is known of is taken for something else most easily.
+/// Numbers of views of the models: sparse models are confused most easily.
 const LOOKS: [usize; 4] = [1, usize::MAX, 2, usize::MAX];
-/// Leaflets in a scene: what is flat and printed fits what is known of one side alone.
+/// Number of leaflets in a scene: flat prints fit any model known from one side only.
 const LEAFLETS: usize = 4;
 
-/// Models as the robot and as a turntable makes them, one after the other.
+/// Models as learned by the robot and by a turntable, alternately.
 fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     let mut models = Vec::new();
     for (i, body) in bodies.iter().enumerate().take(KNOWN) {
@@ -46,7 +46,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
     models
 }
 
-/// A claim as a line of a file.
+/// A claim as a line of CSV.
 pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
     format!(
         "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",
@@ -63,7 +63,7 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
     )
 }
 
-/// Fits a judge and prints it; what it was fitted to is written to the page's folder.
+/// Fits a judge and prints it; the training data is written to the page's folder.
 pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     let mut claims: Vec<(Evidence, bool)> = Vec::new();
     let mut lines = Vec::new();
@@ -89,7 +89,8 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
     Ok(())
 }
 
-/// What is said in scenes of a set of objects of which half are known: scene, model, what speaks for it and whether it is so.
+/// Claims in scenes with a set of objects, half of them known: scene, model, evidence, and true if the claim
+/// is right.
 fn judged(set: u64, scenes: std::ops::Range<usize>) -> Result<Vec<(usize, usize, Evidence, bool)>, String> {
     let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(set * 1000 + k)).collect();
     let surfaces: Vec<Cloud> = bodies.iter().map(|b| Room::surface(b, 0.004)).collect();
@@ -115,7 +116,7 @@ fn judged(set: u64, scenes: std::ops::Range<usize>) -> Result<Vec<(usize, usize,
     Ok(judged)
 }
 
-/// Stated against true shares of answers.
+/// Prints stated against true shares of correct answers.
 pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), String> {
     page.heading("Confidence against truth");
     let mut table = Table::new(&[
@@ -158,7 +159,7 @@ pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), Strin
     Ok(())
 }
 
-/// Newton's method.
+/// Fits the regression by Newton's method.
 fn regression(claims: &[(Evidence, bool)]) -> Judge {
     let mut judge = Judge { weights: [0.0; WEIGHTS] };
     for _ in 0..ROUNDS {

@@ -1,4 +1,4 @@
-//! Learned objects known again in clutter: f-score against coverage (Fig. 5), confidence against truth.
+//! Recognition of learned objects in clutter: f-score against coverage (Fig. 5), confidence against truth.
 
 use crate::household::made::furniture;
 use crate::household::{Body, CAMERA, Room, RoomOptions, TABLE_M, looking, standing};
@@ -10,20 +10,20 @@ use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Cloud, Neighbours, View};
 use std::f64::consts::TAU;
 
-/// Things of a household on the round table, seen from somewhere.
+/// Scene of household objects on the round table, with a view of it.
 pub struct Scene {
     pub view: View,
-    /// Which bodies stand where.
+    /// Bodies by index, with their poses in the world.
     pub things: Vec<(usize, Isometry3<f64>)>,
 }
 
-/// A scene of some of the bodies: those asked for, if there is room. Behind the table stands furniture, on it a box that nobody learned; every fourth
-/// is a desk with chairs.
+/// A scene of the given bodies, as far as there is room. Furniture stands behind the table, with an unlearned
+/// box on it; every fourth scene is a desk with chairs.
 pub fn scene(bodies: &[Body], which: &[usize], seed: u64) -> Scene {
     scene_among(bodies, which, 0, seed)
 }
 
-/// The same among so many leaflets that stand or hang behind the things.
+/// A scene with leaflets that stand or hang behind the objects.
 pub fn scene_among(bodies: &[Body], which: &[usize], leaflets: usize, seed: u64) -> Scene {
     let mut draws = Draws(seed ^ 0x5ce);
     let mut room = Room::new(RoomOptions { controlled: seed % 4 != 3, seed });
@@ -52,7 +52,8 @@ pub fn scene_among(bodies: &[Body], which: &[usize], leaflets: usize, seed: u64)
     Scene { view, things: things.into_iter().map(|(i, p, _)| (i, p)).collect() }
 }
 
-/// Puts two pieces of furniture on the floor in a direction from the table's middle, and a box and leaflets from the table's border on.
+/// Places two pieces of furniture on the floor in a direction from the table's centre, and a box and leaflets
+/// beyond the table's edge.
 fn furnish(room: &mut Room, towards: f64, leaflets: usize, draws: &mut Draws) {
     let mut put = |low, high, far_m: f64, up_m: f64, wide: f64| {
         let body = furniture(low, high, (draws.next() * 1e12) as u64);
@@ -68,7 +69,7 @@ fn furnish(room: &mut Room, towards: f64, leaflets: usize, draws: &mut Draws) {
     }
 }
 
-/// Light is another than when things were learned, and the camera of colours does not see quite what that of depth sees.
+/// Changes the lighting relative to learning, and shifts the colour image against the depth image.
 fn recolour(view: &mut View, draws: &mut Draws) {
     let gains: [f64; 3] = std::array::from_fn(|_| 1.0 + 0.06 * draws.normal());
     let off = [0; 2].map(|_| (2.0 * draws.normal()).round() as isize);
@@ -88,15 +89,15 @@ pub struct Model {
     pub cloud: Cloud,
 }
 
-/// How things are recognised where up is z, in models and in scenes.
+/// Options of recognition where z is up, in models and in scenes.
 pub fn options() -> KnowOptions {
     KnowOptions { up: Some(Vector3::z_axis()), ..KnowOptions::default() }
 }
 
-/// How many looks a turntable gives, from two heights.
+/// Number of views on a turntable, from two heights.
 const TURNTABLE: usize = 14;
 
-/// A model made with a turntable, of its first looks: near, from perfect poses, of pixels that are given.
+/// Model from the first views of a turntable: close range, perfect poses, given pixel masks.
 pub fn offline(body: &Body, number: usize, looks: usize, seed: u64) -> Result<Model, String> {
     let mut room = Room::new(RoomOptions { controlled: true, seed });
     let world_from_body = standing(0.0, 0.0, 0.0);
@@ -118,7 +119,7 @@ pub fn offline(body: &Body, number: usize, looks: usize, seed: u64) -> Result<Mo
     Ok(Model { body: number, cloud: model.cloud.transformed(&body_from_model) })
 }
 
-/// The models of a run over its first looks, brought onto the true body.
+/// Models of a run from increasing numbers of views, registered onto the true body.
 pub fn learned_steps(
     bodies: &[Body],
     body: usize,
@@ -138,7 +139,8 @@ pub fn learned_steps(
     looks.iter().map(model).collect()
 }
 
-/// Mean distance of a body's surface where it was said to be from where it is, metres: what looks the same at both counts as the same.
+/// Mean distance of a body's surface at the stated pose from that at the true pose, metres, so that symmetric
+/// poses count as equal.
 pub fn surface_off_m(surface: &Cloud, said: &Isometry3<f64>, truly: &Isometry3<f64>) -> f64 {
     let tree = Neighbours::new(&surface.points).expect("few points");
     let there = surface.transformed(&(truly.inverse() * said));
@@ -150,7 +152,7 @@ pub fn surface_off_m(surface: &Cloud, said: &Isometry3<f64>, truly: &Isometry3<f
     off.clone().sum::<f64>() / off.count().max(1) as f64
 }
 
-/// An answer is right if that body's surface is on average no farther from where it truly is, metres.
+/// Maximum mean surface distance of a correct answer, metres.
 pub const RIGHT_M: f64 = 0.01;
 
 /// True if an answer is right.
@@ -160,7 +162,7 @@ pub fn is_right(scene: &Scene, surfaces: &[Cloud], body: usize, found: &Recognis
     })
 }
 
-/// Answers about one model in all scenes.
+/// Scores of one model over all scenes.
 #[derive(Default)]
 pub struct Tally {
     pub right: usize,
@@ -169,7 +171,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Whether it was there, and for each answer whether it is right.
+    /// Adds a scene: true if the object was there, and for each answer true if it is right.
     pub fn add(&mut self, there: bool, answers: impl Iterator<Item = bool>) {
         let (mut right, mut all) = (0, 0);
         answers.for_each(|is_right| (right, all) = (right + usize::from(is_right), all + 1));
@@ -192,7 +194,7 @@ pub fn library(models: &[&Model]) -> Library {
     library
 }
 
-/// Some of the numbers below `of`, none twice.
+/// Random distinct numbers below `of`.
 pub fn some(draws: &mut Draws, of: usize, count: usize) -> Vec<usize> {
     let mut all: Vec<usize> = (0..of).collect();
     (0..count.min(of)).map(|_| all.remove((draws.next() * all.len() as f64) as usize % all.len())).collect()

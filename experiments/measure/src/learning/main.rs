@@ -1,6 +1,7 @@
-//! The evaluation of Fäulhammer et al. in a simulated room, and on recordings:
-//! `cargo run --release -p descry-measure --bin learning -- SEED DIR [PART] [COUNT]`. DIR/page.html has tables, plots and pictures. PART is one of
-//! them alone, by the name of its file; COUNT is how many objects `modelling` learns, and how many scenes the others look at.
+//! Evaluation of Fäulhammer et al. in a simulated room and on recordings: `cargo run --release -p
+//! descry-measure --bin learning -- SEED DIR [PART] [COUNT]`. DIR/page.html receives tables, plots and
+//! pictures. PART selects one part by the name of its file; COUNT is the number of objects for `modelling`,
+//! and of scenes for the others.
 
 mod curves;
 #[path = "../evaluate/frames.rs"]
@@ -24,10 +25,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 const PARTS: [&str; 5] = ["modelling", "curves", "many", "recorded", "judge"];
-/// Objects that are learned, as in the paper; how many are known at once at most.
+/// Number of learned objects, as in the paper, and maximum number known at once.
 const OBJECTS: usize = 10;
 const MANY: usize = 50;
-/// Scenes that are looked at for the curves and for many models.
+/// Number of scenes for the curves and for many models.
 const SCENES: usize = 36;
 
 fn run(seed: u64, out: &Path, part: Option<&str>, count: Option<usize>) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! Many learned models known at once: time of a recognition, and what is taken for what.
+//! Recognition with many learned models: time, and confusions.
 
 use crate::household::{Body, Room, bodies, made::made};
 use crate::knowing::{Model, Scene, is_right, learned_steps, library, options, scene, some};
@@ -12,30 +12,30 @@ use descry_perception::calibration::Claim;
 use descry_perception::learning::{Recognised, choose};
 use std::time::Instant;
 
-/// How many models are known.
+/// Numbers of known models.
 const KNOWN: [usize; 3] = [5, 20, 50];
-/// Things in a scene.
+/// Number of objects in a scene.
 const THINGS: usize = 5;
-/// Drawn objects have seeds beyond this, so that they are others than those that confidence was fitted to.
+/// Offset of the seeds of generated objects, which keeps them apart from those that confidence was fitted to.
 const APART: u64 = 1 << 32;
-/// Scenes that are timed.
+/// Number of timed scenes.
 const TIMED: usize = 5;
 
-/// What was said of the things in all scenes.
+/// Scores over all scenes.
 #[derive(Default)]
 struct Said {
-    /// Known things: named with their place, named at a wrong pose, taken for another, not named.
+    /// Known objects: correct name and pose, correct name at a wrong pose, confused with another, not named.
     right: usize,
     askew: usize,
     other: usize,
     silent: usize,
-    /// Things that are not known: taken for something, not named.
+    /// Unknown objects: mistaken for a known one, not named.
     strangers: (usize, usize),
-    /// Answers where nothing stands.
+    /// Answers where no object stands.
     nowhere: usize,
 }
 
-/// Prints and draws; `known` bounds how many are learned, `scenes` how many scenes are looked at.
+/// Prints and plots; `known` limits the number of learned objects, `scenes` that of scenes.
 pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<Vec<Claim>, String> {
     page.heading("Many models known at once");
     let mut draws = Draws(seed ^ 0x3a27);
@@ -86,7 +86,7 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
     Ok(claims)
 }
 
-/// What was said with so many models known, and how long a recognition takes then.
+/// Table of scores and recognition time, for each number of known models.
 fn counted(learned: &[Model], sums: &[Said], scenes: &[Scene]) -> Result<Table, String> {
     let mut table = Table::new(&[
         "models known",
@@ -125,7 +125,8 @@ fn counted(learned: &[Model], sums: &[Said], scenes: &[Scene]) -> Result<Table, 
     Ok(table)
 }
 
-/// Learns so many objects by the robot, in a mixed order; returns models that go by the numbers of the bodies, and the bodies, strangers last.
+/// Learns `most` objects by the robot, in random order; returns models indexed by body, and the bodies,
+/// unknown ones last.
 fn learn_all(
     seed: u64,
     most: usize,
@@ -175,7 +176,7 @@ fn learn_all(
     Ok((models, all))
 }
 
-/// The thing where an answer is said to be: index in the scene.
+/// Index of the object in the scene at the pose of an answer.
 fn thing_at(scene: &Scene, all: &[Body], found: &Recognised) -> Option<usize> {
     let away = |k: usize| {
         let pose = scene.things[k].1;
@@ -185,7 +186,7 @@ fn thing_at(scene: &Scene, all: &[Body], found: &Recognised) -> Option<usize> {
     (away(nearest) < radius_m(&all[scene.things[nearest].0]).max(0.08)).then_some(nearest)
 }
 
-/// A row about a wrong answer: what it says, and what is there.
+/// A row about a wrong answer: the answer, and the truth.
 fn told_wrongly(number: usize, scene: &Scene, all: &[Body], found: &Recognised) -> Vec<String> {
     let at = found.world_from_model.translation.vector;
     let there = thing_at(scene, all, found).map_or_else(
@@ -238,7 +239,7 @@ impl Said {
     }
 }
 
-/// Counts what each thing is taken for: rows the truth, columns what is said.
+/// Updates the confusion matrix: rows are the truth, columns the answers.
 fn confuse(scene: &Scene, told: &[Recognised], all: &[Body], confusion: &mut [Vec<usize>]) {
     let nothing = confusion.len() - 1;
     for (k, thing) in scene.things.iter().enumerate() {

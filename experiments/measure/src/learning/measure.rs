@@ -1,4 +1,4 @@
-//! Recall, precision and distance as the paper measures them (section VII).
+//! Recall, precision and distance as defined in the paper (section VII).
 
 use crate::household::{Body, CAMERA};
 use crate::runs::{Run, apart, truth};
@@ -7,13 +7,14 @@ use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::register::{Method, Prepared, RegisterOptions, align};
 use descry_perception::{Cloud, Neighbours};
 
-/// A true point is visible if the camera measured within this of it, metres; explained if a learned point lies within this, metres.
+/// Maximum distance of a measured point from a visible true point, metres, and of a learned point from an
+/// explained true point, metres.
 const VISIBLE_M: f32 = 0.01;
 const EXPLAINED_M: f32 = 0.02;
 /// A stricter distance than the paper's, metres.
 const STRICT_M: f32 = 0.006;
 
-/// How well a run did.
+/// Scores of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Score {
     pub first: (f64, f64),
@@ -21,7 +22,7 @@ pub struct Score {
     pub strict: (f64, f64),
     /// Mean distance of the model's points from the true surface, metres.
     pub distance_m: f64,
-    /// Mean error of the used keyframes' poses among each other, metres and radians.
+    /// Mean relative pose error of the used keyframes, metres and radians.
     pub poses: (f64, f64),
     pub used: usize,
     pub looks: usize,
@@ -41,7 +42,7 @@ fn tree(cloud: &Cloud) -> Neighbours {
     Neighbours::new(&cloud.points).expect("few points")
 }
 
-/// True points that a run's looks, from their true poses, measured.
+/// True points measured in a run's views, from their true poses.
 fn visible(run: &Run, truth: &Cloud, views: impl Iterator<Item = usize> + Clone) -> Cloud {
     truth.filter(|p| {
         views.clone().any(|k| {
@@ -52,7 +53,7 @@ fn visible(run: &Run, truth: &Cloud, views: impl Iterator<Item = usize> + Clone)
     })
 }
 
-/// The motion that brings a learned cloud onto the truth, as the paper aligns before it compares.
+/// Registers a learned cloud onto the truth, as the paper does before the comparison.
 pub fn onto(found: &Cloud, truth: &Cloud) -> Isometry3<f64> {
     let source = Prepared::new(&found.points).expect("few points");
     let target = Prepared::with_normals(&truth.points, 15).expect("few points");
@@ -68,7 +69,8 @@ pub fn onto(found: &Cloud, truth: &Cloud) -> Isometry3<f64> {
     }
 }
 
-/// A model where it truly is: by the look that noticed it, whose pose localisation had wrong by as much as all the rest, then by its surface.
+/// A model moved to its true pose: by the first view, whose localisation error is common to all, then by
+/// registering the surfaces.
 pub fn aligned(model: &LearnedModel, registered: bool, run: &Run, truth: &Cloud) -> Cloud {
     let first = if registered { run.keyframes[0].world_from_camera } else { run.views[0].world_from_camera };
     let true_from_stated = run.truths[0] * first.inverse();
@@ -101,7 +103,7 @@ pub fn score(run: &Run, body: &Body) -> Score {
     }
 }
 
-/// How the used keyframes lie to the first against how they truly do: mean at the object, metres, and radians.
+/// Pose error of the used keyframes relative to the first: mean at the object, metres, and radians.
 fn pose_error(run: &Run, used: &[usize]) -> (f64, f64) {
     let object = Point3::from(run.world_from_body.translation.vector);
     let errors: Vec<Isometry3<f64>> =
@@ -115,12 +117,14 @@ fn pose_error(run: &Run, used: &[usize]) -> (f64, f64) {
     (metres, turns)
 }
 
-/// Distance of a point from the true surface that it may be measured off and be of the same wall, metres; and of what is looked for aside.
+/// Minimum gap along the normal between two layers of a doubled wall, metres; maximum offset across the
+/// normal, and search radius.
 const GAP_M: f32 = 0.005;
 const ASIDE_M: f32 = 0.004;
 const DEEP_M: f32 = 0.03;
 
-/// Mean distance of a model's points from the true surface, what 95 % keep within, metres, and the share of the learned surface that is there twice.
+/// Mean distance of a model's points from the true surface and its 95th percentile, metres, and the share of
+/// the surface that is doubled.
 pub fn doubled(model: &LearnedModel, registered: bool, body: &Body, run: &Run) -> (f64, f64, f64) {
     let truth = truth(body, &run.world_from_body);
     let found = aligned(model, registered, run, &truth);
@@ -150,7 +154,7 @@ pub fn doubled(model: &LearnedModel, registered: bool, body: &Body, run: &Run) -
     (distances.iter().sum::<f64>() / n as f64, within, twice as f64 / seen.max(1) as f64)
 }
 
-/// Mean and standard deviation in words.
+/// Formats mean and standard deviation.
 pub fn pair(values: impl Iterator<Item = f64>) -> String {
     let (mean, sigma) = spread(&values.collect::<Vec<f64>>());
     format!("{mean:.2}±{sigma:.2}")
@@ -163,7 +167,7 @@ pub fn spread(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt())
 }
 
-/// The middle one.
+/// The median, the upper one of two.
 pub fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

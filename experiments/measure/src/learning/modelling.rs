@@ -1,4 +1,4 @@
-//! How much of an object is noticed and learned, and how well (section VII-A and Table I); the double wall and what removes it.
+//! Detection and learning of objects (section VII-A and Table I); the doubled wall, and methods against it.
 
 use crate::household::bodies;
 use crate::measure::{Score, aligned, doubled, median, pair, score, spread};
@@ -10,7 +10,7 @@ use crate::runs::{Run, RunOptions, Way, modelled, run, truth};
 const NOISES: [(&str, f64, f64); 3] =
     [("exact poses", 0.0, 0.0), ("0.5 cm, 0.5°", 0.005, 0.5), ("1 cm, 1°", 0.01, 1.0)];
 
-/// Where the runs of a row take place.
+/// Setting of the runs in a row.
 #[derive(Clone, Copy)]
 struct Place {
     name: &'static str,
@@ -24,17 +24,18 @@ const PLACES: [Place; 3] = [
     Place { name: "controlled, another thing touches it", controlled: true, touching: true },
 ];
 
-/// What became of the runs of a row.
+/// Results of the runs in a row.
 #[derive(Default)]
 struct Row {
     scores: Vec<Score>,
     seconds: Vec<f64>,
     failed: Vec<String>,
-    /// By the ways of modelling: distances and doubled walls.
+    /// Results by modelling method: distances and share of doubled surface.
     ways: [Vec<(f64, f64, f64)>; WAYS.len()],
 }
 
-/// Ways to a model: whether keyframes are registered, and whether each point lies where all measurements around it say.
+/// Modelling methods: with or without registration of the keyframes, and with or without smoothing over all
+/// measurements.
 const WAYS: [Way; 4] = [
     Way { registered: false, smooth: false, name: "stated poses, the least variance a cube (paper)" },
     Way { registered: false, smooth: true, name: "stated poses, moved to the mean of all measurements" },
@@ -52,7 +53,7 @@ fn options(place: Place, noise: (&str, f64, f64), seed: u64) -> RunOptions {
     }
 }
 
-/// Runs one setting for `objects` bodies; with all ways if asked for.
+/// Runs one setting for `objects` bodies; with all methods if `all_ways`.
 fn row(place: Place, noise: (&str, f64, f64), objects: usize, seed: u64, all_ways: bool) -> Row {
     let all = bodies();
     let mut row = Row::default();
@@ -78,7 +79,7 @@ fn row(place: Place, noise: (&str, f64, f64), objects: usize, seed: u64, all_way
     row
 }
 
-/// The paper's tables, then those of the double wall.
+/// Prints the paper's tables, then those of the doubled wall.
 pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
     page.heading("What is noticed, and the models");
     page.say(&format!(
@@ -147,7 +148,7 @@ pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
     section(&run, page)
 }
 
-/// A cut through one model made in all ways.
+/// Cross-section of one model by every method.
 fn section(run: &Run, page: &mut Page) -> Result<(), String> {
     let truth = truth(&bodies()[0], &run.world_from_body);
     let mut cuts = Vec::new();

@@ -1,9 +1,9 @@
-//! One page of tables, plots and pictures; tables are printed as well.
+//! HTML page of tables, plots and pictures; tables are printed as well.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Rows under a head.
+/// Table with a header.
 pub struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -27,7 +27,7 @@ impl Table {
     }
 }
 
-/// The page so far.
+/// The page under construction.
 pub struct Page {
     dir: PathBuf,
     body: String,
@@ -47,7 +47,7 @@ impl Page {
         Page { dir: dir.to_owned(), body: String::new() }
     }
 
-    /// Where files of the page go.
+    /// Path of a file of the page.
     pub fn file(&self, name: &str) -> PathBuf {
         self.dir.join(name)
     }
@@ -62,7 +62,7 @@ impl Page {
         let _ = writeln!(self.body, "<p>{}</p>", escaped(text));
     }
 
-    /// Rows that begin with "paper" are set off.
+    /// Adds a table; rows that begin with "paper" are highlighted.
     pub fn table(&mut self, table: &Table) {
         table.print();
         let cells = |row: &[String], kind: &str| -> String {
@@ -76,7 +76,7 @@ impl Page {
         self.body.push_str("</table>\n");
     }
 
-    /// A picture that was written to a file of the page.
+    /// Adds a picture from a file of the page.
     pub fn figure(&mut self, name: &str, words: &str) {
         println!("\n{name}: {words}");
         let _ = writeln!(
@@ -86,7 +86,7 @@ impl Page {
         );
     }
 
-    /// Writes what there is so far.
+    /// Writes the page as it stands.
     pub fn write(&self) -> Result<(), String> {
         let path = self.file("page.html");
         let text = format!(

@@ -6,7 +6,7 @@ use descry_perception::{Cloud, View};
 use std::fmt::Write;
 use std::path::Path;
 
-/// A picture of a cloud, colours by label, from an eye to a target with a direction up.
+/// Picture of a cloud, coloured by label, from an eye to a target with an up direction.
 pub fn picture(
     cloud: &Cloud,
     labels: &[u32],
@@ -26,7 +26,7 @@ pub fn picture(
     std::fs::write(path, bytes).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// A frame as its camera took it, with models where they were said to be: in green where that is right, in red where it is not.
+/// A camera frame with models drawn at the answers' poses: green if right, red if wrong.
 pub fn said(view: &View, answers: &[(&Cloud, Isometry3<f64>, bool)], path: &Path) -> Result<(), String> {
     let (Some(grid), Some(camera)) = (view.cloud.grid, view.intrinsics) else { return Ok(()) };
     let colours = view.cloud.colours.as_deref().unwrap_or_default();
@@ -47,7 +47,7 @@ pub fn said(view: &View, answers: &[(&Cloud, Isometry3<f64>, bool)], path: &Path
     image.save(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Models beside each other in their own colours, seen from the front and from behind, as a PNG.
+/// Contact sheet of models in their own colours, from the front and from behind, as PNG.
 pub fn sheet(models: &[&Cloud], path: &Path) -> Result<(), String> {
     const SIDE: u32 = 240;
     let columns = models.len().div_ceil(2) as u32;
@@ -64,7 +64,7 @@ pub fn sheet(models: &[&Cloud], path: &Path) -> Result<(), String> {
     image.save(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Orthographic, least depth a pixel.
+/// Draws a cloud orthographically, the nearest point of each pixel in front.
 fn draw(
     image: &mut image::RgbImage,
     cloud: &Cloud,
@@ -101,27 +101,27 @@ fn draw(
     }
 }
 
-/// A line of a panel: points (coverage, f-score), joined if there is more than one.
+/// A line of a panel: points (coverage, f-score), joined if there are several.
 pub struct Line {
     pub dashed: bool,
     pub colour: &'static str,
     pub points: Vec<(f64, f64)>,
 }
 
-/// A plot of its own with a name.
+/// A plot with a name.
 pub struct Panel {
     pub name: String,
     pub lines: Vec<Line>,
 }
 
-/// Okabe and Ito.
+/// Colours of Okabe and Ito.
 pub const BLUE: &str = "#0072B2";
 pub const ORANGE: &str = "#D55E00";
 pub const GREEN: &str = "#009E73";
 
 const OPEN: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" font-family="sans-serif" font-size="11""#;
 
-/// Panels beside each other, both axes from 0 to 1.
+/// Writes panels side by side, both axes from 0 to 1.
 pub fn panels(panels: &[Panel], axes: (&str, &str), path: &Path) -> Result<(), String> {
     const COLUMNS: usize = 5;
     let (side, left, top, gap) = (160.0, 46.0, 24.0, (56.0, 62.0));
@@ -177,13 +177,13 @@ pub fn panels(panels: &[Panel], axes: (&str, &str), path: &Path) -> Result<(), S
     std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// A cut through a model, metres.
+/// Cross-section of a model, metres.
 pub struct Slice {
     pub name: &'static str,
     pub points: Vec<(f32, f32)>,
 }
 
-/// Cuts beside each other at one scale.
+/// Writes cross-sections side by side at one scale.
 pub fn slices(cuts: &[Slice], path: &Path) -> Result<(), String> {
     const PER_M: f32 = 1150.0;
     let (wide, high) = (270.0, 150.0);
@@ -213,7 +213,7 @@ pub fn slices(cuts: &[Slice], path: &Path) -> Result<(), String> {
     std::fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Counts by row and column as shades, each row by its sum.
+/// Writes a heat map of counts, each row normalised by its sum.
 pub fn heat(counts: &[Vec<usize>], names: (&str, &str), path: &Path) -> Result<(), String> {
     let (rows, columns) = (counts.len(), counts.first().map_or(0, Vec::len));
     let cell = (620.0 / columns.max(1) as f64).min(26.0);

@@ -1,5 +1,5 @@
-//! Recordings: a milk carton in a scene of clutter, and not in others; things of a kitchen, learned from one half of the frames and found in the
-//! other.
+//! Recordings: a milk carton in one scene of clutter, absent from others; kitchen objects, learned from half
+//! of the frames and found in the rest.
 
 use crate::frames::frames;
 use crate::judge::line;
@@ -38,7 +38,7 @@ pub fn print(page: &mut Page) -> Result<(), String> {
     kitchen(&shared.join("kitchen"), page)
 }
 
-/// Answers in words: place and axis of rotation times angle.
+/// Formats answers: position, and rotation vector.
 fn words(found: &[Recognised]) -> String {
     let pose = |f: &Recognised| {
         let (at, turn) = (f.world_from_model.translation.vector, f.world_from_model.rotation.scaled_axis());
@@ -91,7 +91,7 @@ fn milk(shared: &Path, page: &mut Page) -> Result<(), String> {
     Ok(())
 }
 
-/// The scene in grey and the models that were found in it.
+/// Draws the scene in grey with the models found in it.
 fn draw(view: &View, model: &Cloud, found: &[Recognised], path: &Path) -> Result<(), String> {
     let mut all = view.cloud.transformed(&view.world_from_camera).finite();
     let mut labels = vec![0_u32; all.len()];
@@ -104,7 +104,8 @@ fn draw(view: &View, model: &Cloud, found: &[Recognised], path: &Path) -> Result
     picture(&all, &labels, path, from)
 }
 
-/// A view of a recording that may look along −z with y up: turned, so that its world is the frame of the file.
+/// A view of a recording that may look along −z with y up, rotated so that its world is the frame of the
+/// file.
 fn in_optical_frame(cloud: Cloud) -> View {
     let behind = cloud.points.iter().filter(|p| p.z < 0.0).count();
     if 2 * behind < cloud.count_finite() {
@@ -114,11 +115,11 @@ fn in_optical_frame(cloud: Cloud) -> View {
     View { world_from_camera: turn.inverse(), ..View::alone(cloud.transformed(&turn)) }
 }
 
-/// The recording's colour camera as its depth camera sees it: focal length and centre, pixels, and shift, metres. By where steps of depth meet
-/// edges of the image best, over all frames.
+/// Calibration of the recording's colour camera in the frame of its depth camera: focal length and principal
+/// point, pixels, and shift, metres. Fitted by matching depth steps to image edges over all frames.
 const COLOUR: (f64, [f64; 2], [f64; 2]) = (525.0, [322.0, 236.0], [-0.029, 0.005]);
 
-/// A frame with the colours of its image.
+/// A depth frame coloured from its image.
 fn coloured(mut view: View, dir: &Path, name: &str) -> Result<View, String> {
     let path = dir.join(format!("{name}.color.jpg"));
     let image = image::open(&path).map_err(|e| format!("{}: {e}", path.display()))?.to_rgb8();
@@ -133,16 +134,16 @@ fn coloured(mut view: View, dir: &Path, name: &str) -> Result<View, String> {
     Ok(view)
 }
 
-/// The poses of the frames are good to a few centimetres among each other: an answer no farther off is where the thing stands, metres.
+/// Maximum distance of a correct answer, metres; the poses of the frames agree to a few centimetres.
 const THERE_M: f64 = 0.08;
 
-/// A thing of the kitchen: its name and where it stands.
+/// An object of the kitchen: its name and position.
 struct Thing {
     name: String,
     at: Point3<f64>,
 }
 
-/// Things of a table, learned from every other frame and looked for in the rest.
+/// Learns the objects of a table from every other frame, and finds them in the rest.
 fn kitchen(dir: &Path, page: &mut Page) -> Result<(), String> {
     let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
     let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
@@ -193,7 +194,7 @@ fn kitchen(dir: &Path, page: &mut Page) -> Result<(), String> {
     Ok(())
 }
 
-/// What is found in frames that were not learned from: counts for each thing, and every answer.
+/// Scores recognition in the frames not used for learning: counts for each object, and every answer.
 fn found_again(
     library: &Library,
     known: &[(&Thing, LearnedModel)],
@@ -268,7 +269,7 @@ fn found_again(
     std::fs::write(&path, claims.join("\n")).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// A model of what stands at a place on the table, begun in the frame that shows most of it.
+/// Model of the object at a place on the table, started from the frame that shows most of it.
 fn model_of(
     thing: &Thing,
     views: &[View],

@@ -1,4 +1,4 @@
-//! One patrol run: the empty place, the place with something new, the looks around it.
+//! A patrol run: the empty place, the place with a new object, the views around it.
 
 use crate::household::{Body, CAMERA, CAMERA_M, Room, RoomOptions, TABLE_M, looking, standing};
 use crate::tabletop::{Draws, disturbed};
@@ -9,22 +9,22 @@ use descry_perception::nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use descry_perception::{Cloud, View};
 use std::time::Instant;
 
-/// How a run is made.
+/// Options of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunOptions {
     pub controlled: bool,
-    /// Spread of the pose of each keyframe, metres and radians.
+    /// Standard deviation of each keyframe's pose, metres and radians.
     pub noise: (f64, f64),
-    /// Something else stands beside the object, so near that they touch.
+    /// True if another object touches the new one.
     pub touching: bool,
-    /// Between keyframes, radians.
+    /// Angle between keyframes, radians.
     pub step_rad: f64,
     pub seed: u64,
 }
 
-/// A run and its truth.
+/// A run with its ground truth.
 pub struct Run {
-    /// The first is the look that noticed the object.
+    /// Views; the first is the one that detected the object.
     pub views: Vec<View>,
     pub truths: Vec<Isometry3<f64>>,
     pub keyframes: Vec<Keyframe>,
@@ -35,7 +35,7 @@ pub struct Run {
     pub learn_s: f64,
 }
 
-/// Where the keyframes' cameras stand.
+/// Camera positions of the keyframes.
 fn stands(object: &Point3<f64>, from: f64, options: &RunOptions, draws: &mut Draws) -> Vec<Point3<f64>> {
     let mut stands = Vec::new();
     let steps = 72;
@@ -53,7 +53,7 @@ fn stands(object: &Point3<f64>, from: f64, options: &RunOptions, draws: &mut Dra
     stands
 }
 
-/// The three looks of a visit from the waypoint, with one error of localisation.
+/// The three views of a visit from the waypoint, with a common localisation error.
 fn visit(
     room: &Room,
     waypoint: &Point3<f64>,
@@ -74,7 +74,7 @@ fn visit(
     (views, truths)
 }
 
-/// Runs; `Err` says why nothing was learned.
+/// Carries out a run; the error is the reason for learning nothing.
 pub fn run(body: &Body, beside: &Body, options: RunOptions) -> Result<Run, String> {
     let mut draws = Draws(options.seed ^ 0xb0d1);
     let mut room = Room::new(RoomOptions { controlled: options.controlled, seed: options.seed });
@@ -131,35 +131,35 @@ pub fn run(body: &Body, beside: &Body, options: RunOptions) -> Result<Run, Strin
     Ok(Run { views, truths: poses, keyframes, mask, world_from_body, model, notice_s, learn_s })
 }
 
-/// A way to a model.
+/// A modelling method.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
-    /// False: the stated poses are taken as they are.
+    /// True if keyframes are registered; false: their stated poses are used.
     pub registered: bool,
     /// As [`LearnOptions::smooth`].
     pub smooth: bool,
     pub name: &'static str,
 }
 
-/// The model of a run made in another way.
+/// The model of a run by another method.
 pub fn modelled(run: &Run, way: &Way) -> Result<LearnedModel, LearningError> {
     let keyframes: &[Keyframe] = if way.registered { &run.keyframes } else { &[] };
     let options = LearnOptions { smooth: way.smooth, ..LearnOptions::default() };
     learn(&run.views, keyframes, &run.mask, &options)
 }
 
-/// How far a body reaches from its axis, metres.
+/// Radius of a body around its axis, metres.
 pub fn radius_m(body: &Body) -> f64 {
     let surface = Room::surface(body, 0.01);
     surface.points.iter().map(|p| f64::from(p.xy().coords.norm())).fold(0.0, f64::max)
 }
 
-/// What is truly there, in the world.
+/// True surface of a body, world frame.
 pub fn truth(body: &Body, world_from_body: &Isometry3<f64>) -> Cloud {
     Room::surface(body, 0.003).transformed(world_from_body)
 }
 
-/// How far two poses are apart: metres and radians.
+/// Distance between two poses: metres and radians.
 pub fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, f64) {
     let turn: UnitQuaternion<f64> = a.rotation.inverse() * b.rotation;
     ((a.translation.vector - b.translation.vector).norm(), turn.angle())

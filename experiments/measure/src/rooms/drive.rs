@@ -1,4 +1,5 @@
-//! A drive for other programs, on which `peers.py` beside this file runs what others offer, and what ours make of it.
+//! Exports a drive for comparison with other programs, which `peers.py` in this folder runs, together with
+//! our own results.
 
 use super::corridor::measure::survey;
 use super::corridor::{Building, Rig, around};
@@ -11,8 +12,9 @@ use descry_perception::nalgebra::Point2;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Writes a cloud a stop, poses (x y heading by odometry, true, rectified, closed), the true walls and ours at true poses (x y x y), and what ours took:
-/// processor seconds for the steps, for coming by again and the graph, for the walls, and most megabytes.
+/// Writes a cloud for each stop, poses (x y heading by odometry, true, rectified, closed), the true walls and
+/// ours at true poses (x y x y), and our cost: processor seconds for the steps, for loop closure and the
+/// graph, and for the walls, and peak megabytes.
 pub fn export(seed: u64, dir: &Path) -> Result<(), String> {
     let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
     let truths = around(LONG_M, SHORT_M, 6.0, 0.8);

@@ -1,4 +1,5 @@
-//! Flats mapped without a list of stops: the next pose by what it is expected to show and what the way costs, beside going to the nearest frontier.
+//! Autonomous exploration of flats: next pose by expected information against travel cost, compared with the
+//! nearest frontier.
 
 use super::corridor::measure::{BODY_M, MAP_FAR_M};
 use super::corridor::{Building, CAMERA_HEIGHT_M, DOOR_WIDE_M, Opening, Panel, Rig, Table, field_of_view};
@@ -9,23 +10,23 @@ use descry_perception::mapping::{
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use descry_perception::occupancy::{Occupancy, Space};
 
-/// Flats that are made of a seed, and seeds.
+/// Number of flats for a seed, and of seeds.
 const FLATS: u64 = 12;
 const SEEDS: u64 = 4;
-/// Walls are known when this share of them is.
+/// Share of known walls at which exploration ends.
 const ENOUGH: f64 = 0.95;
 const MOST_LOOKS: usize = 250;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Policy {
-    /// The pose that is expected to show most for the seconds that the way, the turn and the look take.
+    /// The pose with the highest expected information per second of driving, turning and looking.
     Expected,
     NearestFrontier,
 }
 
 const POLICIES: [Policy; 2] = [Policy::Expected, Policy::NearestFrontier];
 
-/// Metres driven, looks taken and share of the walls known when it was enough, or at the end.
+/// Metres driven, views taken and share of known walls at the end.
 struct Run {
     metres: f64,
     looks: usize,
@@ -38,7 +39,7 @@ fn options() -> ExploreOptions {
     ExploreOptions { field, ..ExploreOptions::default() }
 }
 
-/// Two rows of two or three rooms, doors between them, a table in each; and the middle of the first room.
+/// Two rows of two or three rooms, doors between them, a table in each; with the start in the first room.
 fn flat(seed: u64) -> (Building, Isometry2<f64>) {
     let mut draws = Draws(seed);
     let mut building = Building::default();
@@ -71,7 +72,7 @@ fn flat(seed: u64) -> (Building, Isometry2<f64>) {
     (building, start)
 }
 
-/// A wall, with a door if it has one.
+/// Adds a wall, with a door if requested.
 fn wall(building: &mut Building, a: Point2<f64>, b: Point2<f64>, door: bool, draws: &mut Draws) {
     let along = (b - a).normalize();
     let length = (b - a).norm();
@@ -95,7 +96,7 @@ fn table(building: &mut Building, low: Point2<f64>, size: Vector2<f64>) {
     building.tables.push(Table { middle, half: [0.5 * size.x, 0.5 * size.y], height: 0.74 });
 }
 
-/// Share of the walls of which the grid knows a square nearby.
+/// Share of the walls with an occupied cell nearby.
 fn known(building: &Building, grid: &Occupancy) -> f64 {
     let (mut hit, mut all) = (0, 0);
     for (a, b) in &building.walls {

@@ -1,6 +1,7 @@
-//! The drive of Viejo and Cazorla in a simulated building, and what they did not try:
-//! `cargo run --release -p descry-measure --bin rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG,
-//! and the drive as clouds (PART `drive`), on which `peers.py` beside this file runs what others offer. PART is one of them alone, by the name of its file.
+//! The drive of Viejo and Cazorla in a simulated building, and further experiments: `cargo run --release -p
+//! descry-measure --bin rooms -- [SEED] [DIR] [PART]`. Plots are written to DIR as SVG, and the drive as
+//! clouds (PART `drive`), on which `peers.py` in this folder runs other programs. PART selects one part by
+//! the name of its file.
 
 #[path = "../../../../perception/tests/corridor/mod.rs"]
 mod corridor;

@@ -1,4 +1,5 @@
-//! Pillars, which the paper announces: halls with round posts and square ones, seen on a drive around and between them.
+//! Pillars, announced as future work in the paper: halls with round and square posts, seen on a drive around
+//! and between them.
 
 use super::corridor::measure::{BODY_M, MAP_FAR_M, PillarScore, score_pillars};
 use super::corridor::{Building, CAMERA_HEIGHT_M, Rig, along};
@@ -8,17 +9,17 @@ use descry_perception::mapping::{MapOptions, Station, Survey};
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::path::Path;
 
-/// Halls that are made.
+/// Number of halls.
 const HALLS: u64 = 20;
 
-/// Around the rows of posts, and between them.
+/// Poses around the rows of posts, and between them.
 fn way() -> Vec<Isometry2<f64>> {
     let at = Point2::new;
     let corners = [at(-5.0, -3.0), at(5.0, -3.0), at(5.0, 3.0), at(-5.0, 3.0), at(-5.0, 0.0), at(5.0, 0.0)];
     along(&corners, 0.8, 0.5)
 }
 
-/// A hall as it is seen at poses that are off by so much: metres, radians.
+/// Survey of a hall at poses with these errors: metres, radians.
 fn seen(hall: &Building, edge_m: f64, off: (f64, f64), seed: u64) -> Survey {
     let truths = way();
     let mut draws = Draws(seed);
@@ -33,7 +34,7 @@ fn seen(hall: &Building, edge_m: f64, off: (f64, f64), seed: u64) -> Survey {
     survey
 }
 
-/// Prints how well pillars are found.
+/// Prints detection scores of pillars.
 pub fn print(seed: u64, out: Option<&Path>) -> Result<(), String> {
     println!(
         "\n{HALLS} halls with eight posts each, some round: pillars found of those that there are, false ones, how far axis and radius are off (cm); walls"

@@ -1,4 +1,4 @@
-//! Plots: the points from above, walls, and the grid, as SVG.
+//! SVG plots: points from above, walls, and the grid.
 
 use descry_perception::mapping::{RoomMap, Station, UprightCylinder};
 use descry_perception::nalgebra::{Isometry2, Point2};
@@ -6,16 +6,16 @@ use descry_perception::occupancy::{Occupancy, Space};
 use std::fmt::Write;
 use std::path::Path;
 
-/// A part of the plan, drawn at a scale.
+/// A section of the floor plan, drawn to scale.
 pub struct Sheet {
     low: Point2<f64>,
     high: Point2<f64>,
-    /// Pixels a metre.
+    /// Scale, pixels a metre.
     scale: f64,
     text: String,
 }
 
-/// Okabe and Ito.
+/// Colours of Okabe and Ito.
 const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8A8A00"];
 
 impl Sheet {
@@ -23,7 +23,7 @@ impl Sheet {
         Sheet { low, high, scale, text: String::new() }
     }
 
-    /// A sheet around places.
+    /// A sheet around points.
     pub fn around(places: impl Iterator<Item = Point2<f64>>, scale: f64) -> Sheet {
         let (low, high) = places.fold(
             (Point2::new(f64::INFINITY, f64::INFINITY), Point2::new(f64::NEG_INFINITY, f64::NEG_INFINITY)),
@@ -33,7 +33,7 @@ impl Sheet {
         Sheet::new(low - margin, high + margin, scale)
     }
 
-    /// The same with a wider margin.
+    /// Enlarges the margin.
     pub fn grown(mut self, by_m: f64) -> Sheet {
         let by = descry_perception::nalgebra::Vector2::repeat(by_m);
         (self.low, self.high) = (self.low - by, self.high + by);
@@ -59,7 +59,8 @@ impl Sheet {
         );
     }
 
-    /// Squares of 10 cm that hold points between floor and ceiling; darker the more stations saw something there.
+    /// Draws squares of 10 cm with points between floor and ceiling, darker with the number of stations that
+    /// saw them.
     pub fn stations(&mut self, stations: &[Station], poses: &[Isometry2<f64>], far_m: f64) {
         let mut squares: std::collections::BTreeMap<(i32, i32), u32> = std::collections::BTreeMap::new();
         for (station, pose) in stations.iter().zip(poses) {
@@ -91,7 +92,7 @@ impl Sheet {
         }
     }
 
-    /// Walls in different colours, cylinders in one.
+    /// Draws walls in different colours, cylinders in one.
     pub fn upright(&mut self, map: &RoomMap) {
         for (i, wall) in map.walls.iter().enumerate() {
             let style = format!(r#"stroke="{}" stroke-width="2.5""#, COLOURS[i % COLOURS.len()]);

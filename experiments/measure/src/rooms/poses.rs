@@ -1,4 +1,4 @@
-//! Section 3: errors of single steps, and what is left when the drive comes back to where it began.
+//! Section 3: errors of single steps, and the residual at loop closure.
 
 use super::corridor::{Building, Rig, around, field_of_view, with_people};
 use super::tabletop::Draws;
@@ -11,7 +11,7 @@ use descry_perception::nalgebra::Isometry2;
 pub const LONG_M: f64 = 40.0;
 pub const SHORT_M: f64 = 20.0;
 
-/// What matches, by a short name.
+/// Matching methods, with short names.
 const MATCHERS: [(&str, Matcher); 5] = [
     ("odometry", Matcher::Odometry),
     ("ICP, all points", Matcher::Icp),
@@ -24,7 +24,7 @@ pub fn options(matcher: Matcher) -> RectifyOptions {
     RectifyOptions { matcher, field: field_of_view(), ..RectifyOptions::default() }
 }
 
-/// Shift (metres) and turn (degrees) between two poses.
+/// Distance (metres) and angle (degrees) between two poses.
 pub fn off(found: &Isometry2<f64>, truth: &Isometry2<f64>) -> (f64, f64) {
     let apart = (found.translation.vector - truth.translation.vector).norm();
     (apart, found.rotation.angle_to(&truth.rotation).abs().to_degrees())
@@ -41,7 +41,7 @@ pub fn steps(stations: &[Station], rectify: &RectifyOptions) -> Result<Vec<PairF
     rectify_drive(stations, rectify).map_err(|e| e.to_string())
 }
 
-/// Where it came by again.
+/// Loop closures of a drive.
 pub fn again(
     stations: &[Station],
     poses: &[Isometry2<f64>],
@@ -87,7 +87,7 @@ pub fn pairs(seed: u64) {
     }
 }
 
-/// What is left at closure.
+/// Prints the residuals at loop closure.
 pub fn loops(seed: u64) -> Result<(), String> {
     println!(
         "\nonce around {:.0} m: way (m) and turn (degrees) off where the drive came back; farthest and mean pose off the truth (m)",

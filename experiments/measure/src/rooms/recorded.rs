@@ -1,4 +1,4 @@
-//! Planes of real rooms: two laser scans, brought onto each other, and five views of a dining room.
+//! Planes of real rooms: two laser scans, registered onto each other, and five views of a dining room.
 
 use super::plot::{Sheet, write};
 use descry_perception::cloud::Cloud;
@@ -28,7 +28,8 @@ fn read(path: &Path) -> Result<Vec<u8>, String> {
     std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Points with their floor brought to z = 0, and where they were seen from in that frame: the largest plane across the given direction is the floor.
+/// Points moved so that the floor is at z = 0, with their viewpoints; the largest plane across the given
+/// direction is the floor.
 fn floored(
     cloud: &Cloud,
     up: Vector3<f64>,
@@ -103,7 +104,7 @@ fn sheet(map: &RoomMap, clouds: &[Station], scale: f64) -> Sheet {
     sheet
 }
 
-/// Maps the points of one place, seen from one or several.
+/// Maps the points of one place, seen from one or several viewpoints.
 fn map(views: &[(Vec<Point3<f32>>, Point3<f64>)], edge_m: f64) -> Result<RoomMap, String> {
     let mut survey = Survey::new(edge_m).map_err(|e| e.to_string())?;
     for (points, eye) in views {
@@ -155,7 +156,7 @@ fn level_station(points: Vec<Point3<f32>>) -> Station {
     Station { points, odom_from_level: Isometry2::identity() }
 }
 
-/// Where the first scan lies on the second, by their plans alone and from nothing.
+/// Relocates the first scan on the second by their floor plans alone, without an initial guess.
 fn by_plans(first: &Cloud, second: &Cloud) -> Result<Isometry2<f64>, String> {
     let before = Instant::now();
     let station = |cloud: &Cloud| [level_station(cloud.points.clone())];
@@ -179,7 +180,7 @@ fn by_plans(first: &Cloud, second: &Cloud) -> Result<Isometry2<f64>, String> {
     Ok(found)
 }
 
-/// The same with all points, from there.
+/// Refines that pose with all points.
 fn by_all_points(first: &Cloud, second: &Cloud, plan: &Isometry2<f64>) -> Result<Isometry3<f64>, String> {
     let before = Instant::now();
     let thin = |cloud: &Cloud| voxel::downsample(cloud, 0.05).map_err(|e| e.to_string());

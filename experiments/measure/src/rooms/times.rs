@@ -1,11 +1,11 @@
-//! Time and memory against the number of points, and how both grow.
+//! Time and memory against the number of points, with their growth.
 
 use super::corridor::measure::{BODY_M, MAP_FAR_M, score};
 use super::corridor::{Building, CAMERA_HEIGHT_M, Rig, around};
 use super::poses::{LONG_M, SHORT_M, options};
 use descry_perception::mapping::{MapOptions, Matcher, Station, Survey, rectify_drive};
 
-/// Processor time of the program until now, seconds.
+/// Processor time of the process since its start, seconds.
 pub fn processor_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     // After the name in brackets; a tick is a hundredth of a second.
@@ -13,7 +13,7 @@ pub fn processor_s() -> f64 {
     fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
-/// Most memory that the program had until now, megabytes; and how much it has.
+/// Peak and current memory of the process, megabytes.
 pub fn memory_mb() -> (f64, f64) {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let of = |key: &str| {
@@ -24,7 +24,7 @@ pub fn memory_mb() -> (f64, f64) {
     (of("VmHWM:"), of("VmRSS:"))
 }
 
-/// Prints them for 0.1 to 16 million points of one drive.
+/// Prints time and memory for 0.1 to 16 million points of one drive.
 pub fn print(seed: u64) {
     println!(
         "\none pass, one thread: points (millions), processor seconds for the steps (ICP-EM), to take all in, for the planes; cells (thousands), store (MB), memory taken by the pass itself (MB)"

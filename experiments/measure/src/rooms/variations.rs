@@ -1,4 +1,4 @@
-//! What the paper did not try: a diagonal wall, a round room, a corridor that is bare on one side, glass.
+//! Cases beyond the paper: a diagonal wall, a round room, a corridor that is bare on one side, glass.
 
 use super::corridor::measure::{score, survey};
 use super::corridor::{Building, Panel, Rig, along};
@@ -9,7 +9,7 @@ use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// A pose every 20 degrees around places.
+/// Poses every 20 degrees at each place.
 fn looking_round(places: &[(f64, f64)]) -> Vec<Isometry2<f64>> {
     let turn = |(x, y): (f64, f64)| {
         (0..18).map(move |i| Isometry2::new(Vector2::new(x, y), TAU * f64::from(i) / 18.0))
@@ -53,7 +53,7 @@ fn told(name: &str, building: &Building, truths: &[Isometry2<f64>], seed: u64) -
     Ok(map)
 }
 
-/// A corridor 20 m long with doors left out.
+/// A corridor 20 m long without doors.
 fn bare(left: f64, right: f64) -> (Building, Vec<Isometry2<f64>>) {
     let at = Point2::new;
     let corners = [at(-2.0, -1.1), at(20.0, -1.1), at(20.0, 1.1), at(-2.0, 1.1)];
@@ -61,7 +61,7 @@ fn bare(left: f64, right: f64) -> (Building, Vec<Isometry2<f64>>) {
     (building, along(&[at(0.0, 0.0), at(16.0, 0.0)], 0.8, 0.3))
 }
 
-/// Prints what comes out.
+/// Prints the results.
 pub fn print(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let at = Point2::new;
     println!("\nother buildings: poses by the wheels and rectified, walls at true poses");

@@ -1,4 +1,4 @@
-//! Section 4: walls held to the truth, before and after they are joined and constrained.
+//! Section 4: walls compared with the truth, before and after joining and constraining them.
 
 use super::corridor::measure::{MAP_FAR_M, on_truth, score, survey};
 use super::corridor::{Building, Rig, around};
@@ -8,7 +8,7 @@ use descry_perception::mapping::{Fit, FuseOptions, MapOptions, Matcher, Station,
 use descry_perception::nalgebra::Isometry2;
 use std::path::Path;
 
-/// What is done to the planes, by a short name.
+/// Variants of plane processing, with short names.
 pub fn ways() -> [(&'static str, MapOptions); 6] {
     let with = |fit, constrained, fuse: bool| MapOptions {
         fit,
@@ -26,7 +26,7 @@ pub fn ways() -> [(&'static str, MapOptions); 6] {
     ]
 }
 
-/// Walls by every way, at true poses, rectified ones, and those of odometry.
+/// Prints the walls of every variant, at true, rectified and odometry poses.
 pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
     let building = Building::corridor_loop(LONG_M, SHORT_M, seed);
     let truths = around(LONG_M, SHORT_M, 6.0, 0.8);
@@ -83,7 +83,7 @@ pub fn walls(seed: u64, out: Option<&Path>) -> Result<(), String> {
     Ok(())
 }
 
-/// The points from above by odometry, rectified and closed, and the map (Fig. 4, 7 and 14).
+/// Draws the points from above by odometry, rectified and closed, and the map (Fig. 4, 7 and 14).
 fn draw(
     dir: &Path,
     stations: &[Station],

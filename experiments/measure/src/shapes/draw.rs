@@ -1,19 +1,19 @@
-//! Scans and models as SVG.
+//! SVG drawings of scans and models.
 
 use descry_perception::laser::{PosedScan, ShapeModel};
 use descry_perception::nalgebra::{Point2, Vector2};
 use std::fmt::Write;
 
-/// Okabe and Ito.
+/// Colours of Okabe and Ito.
 const COLOURS: [&str; 8] =
     ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8A8A00"];
 
-/// A square of the plane around a centre, drawn at a place of the page.
+/// Square section of the plane around a centre, drawn at a position on the page.
 pub struct Panel {
     pub left: f64,
     pub top: f64,
     pub side_m: f64,
-    /// Pixels a metre.
+    /// Scale, pixels a metre.
     pub scale: f64,
     pub centre: Point2<f64>,
     pub text: String,
@@ -46,7 +46,7 @@ impl Panel {
         );
     }
 
-    /// Readings, and for each scan its pose and the rays that bound the thing.
+    /// Draws readings, and for each scan its pose and the rays that bound the object.
     pub fn scans(&mut self, scans: &[PosedScan], rays: bool) {
         for (k, posed) in scans.iter().enumerate() {
             let colour = COLOURS[k % COLOURS.len()];
@@ -78,7 +78,7 @@ pub fn page(width: f64, height: f64, panels: &[Panel]) -> String {
     )
 }
 
-/// Panels side by side, each of scans around the middle of their readings.
+/// Panels side by side, each of scans around the centre of their readings.
 pub fn side_by_side(rows: &[(&str, Vec<PosedScan>)], side_m: f64, scale: f64, rays: bool) -> String {
     let panels: Vec<Panel> = rows
         .iter()

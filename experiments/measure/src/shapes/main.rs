@@ -1,5 +1,6 @@
-//! The experiment of Modayil and Kuipers in a simulated lab, beside the figures of their paper, and what they did not try:
-//! `cargo run --release -p descry-measure --bin shapes -- [SEED] [DIR]`. Plots are written to DIR as SVG.
+//! The experiment of Modayil and Kuipers in a simulated lab, with the figures of their paper for comparison,
+//! and further experiments: `cargo run --release -p descry-measure --bin shapes -- [SEED] [DIR]`. Plots are
+//! written to DIR as SVG.
 
 mod draw;
 #[path = "../../../../perception/tests/lab/mod.rs"]
@@ -18,7 +19,7 @@ use lab::{Run, models};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// What is minimised and how, by a short name.
+/// Solvers and objectives, with short names.
 const METHODS: [(&str, Solver, Option<Objective>); 4] = [
     ("centred, least squares", Solver::LeastSquares, None),
     ("centred, simplex", Solver::Simplex, None),

@@ -1,4 +1,4 @@
-//! Plots of aligned scans as Fig. 3 and 4, as SVG.
+//! Plots of aligned scans like Fig. 3 and 4, as SVG.
 
 use super::draw::{Panel, page, side_by_side};
 use super::lab::{INSTANCES, NAMES, Run, circled, four_legs, map_of_the_lab, object, seed_of};
@@ -8,7 +8,7 @@ use super::variations::{FAR, by_icp};
 use descry_perception::laser::{Alignment, align};
 use std::path::Path;
 
-/// Fig. 4: every observation of every object, a column an object.
+/// Fig. 4: every observation of every object, one column for each object.
 fn all_objects(learnt: &[Alignment]) -> String {
     const SIDE_M: f64 = 0.9;
     const SCALE: f64 = 220.0;

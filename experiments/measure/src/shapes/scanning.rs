@@ -1,4 +1,5 @@
-//! How many scans it takes: the next one from where it is expected to settle most, beside a circle and chance.
+//! Number of scans needed: the next scan from the most informative bearing, compared with a circle and with
+//! chance.
 
 use super::lab::{self, INSTANCES, Lab, NAMES, Run, map_of_the_lab, named, object, observed, seed_of};
 use super::options;
@@ -11,11 +12,11 @@ use descry_perception::laser::{
 use descry_perception::nalgebra::{Isometry2, Vector2};
 use std::f64::consts::TAU;
 
-/// Bearings from which the thing can be scanned.
+/// Number of bearings from which the object can be scanned.
 const PLACES: usize = 16;
 pub const MOST: usize = 8;
 
-/// Who says from where.
+/// Policy for the next bearing.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Policy {
     Settling,
@@ -31,7 +32,7 @@ struct Sum {
     right: usize,
 }
 
-/// Prints what is known after each scan.
+/// Prints the remaining uncertainty after each scan.
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let known = named(learnt);
     println!(
@@ -89,7 +90,7 @@ fn after_each(seed: u64, policy: Policy, known: &[KnownShape]) -> [Sum; MOST] {
     sums
 }
 
-/// From where the next scan is taken.
+/// Bearing of the next scan.
 pub fn next_bearing(
     policy: Policy,
     bearing: f64,

@@ -1,4 +1,4 @@
-//! What things that nobody has learned are taken for, and how soon things that are known are named, scan after scan.
+//! False recognition of unknown objects, and number of scans until known ones are named.
 
 use super::lab::{INSTANCES, Lab, NAMES, Outline, Run, map_of_the_lab, object, observed, rounded, seed_of};
 use super::scanning::{MOST, Policy, next_bearing};
@@ -10,24 +10,25 @@ use descry_perception::laser::{
 };
 use std::f64::consts::TAU;
 
-/// Things of either sort.
+/// Number of objects of either sort.
 const THINGS: usize = 100;
-/// Thresholds of what fits, metres; the middle one is that of [`RecogniseOptions`].
+/// Thresholds of the fit, metres; the middle one is the default of [`RecogniseOptions`].
 const SAME_M: [f64; 3] = [0.005, 0.0025, 0.002];
-/// Edges of bins of looseness, metres.
+/// Edges of the bins of shape uncertainty, metres.
 const BINS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.16, f64::INFINITY];
 
-/// Verdicts: one name and the right one, several, unknown, one name and the wrong one; for each threshold, of known things and of strangers.
+/// Counts of verdicts by threshold, for known and unknown objects: one correct name, several names, unknown,
+/// one wrong name.
 type Counts = [[[usize; 4]; 2]; SAME_M.len()];
 const SEVERAL: usize = 1;
 
-/// What is said of a thing after one more scan, by each threshold.
+/// Verdicts on an object after one more scan, for each threshold.
 struct Told {
     loose_m: f64,
     verdicts: [usize; SAME_M.len()],
 }
 
-/// A thing that may be anything between a waste-paper basket and an armchair.
+/// A random object between the sizes of a waste-paper basket and an armchair.
 pub fn stranger(draws: &mut Draws) -> Outline {
     let [a, b, r] = [0, 1, 2].map(|_| draws.next());
     let (width, depth) = (25.0 + 50.0 * a, 25.0 + 50.0 * b);
@@ -36,7 +37,8 @@ pub fn stranger(draws: &mut Draws) -> Outline {
     rounded(width, depth, 0.49 * draws.next() * width.min(depth))
 }
 
-/// Prints verdicts after each scan, by how loose the shape still is, and of who scans until it is not.
+/// Prints verdicts after each scan by the remaining shape uncertainty, and those of a policy that scans until
+/// it is small.
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let known: Vec<KnownShape> =
         (0..NAMES.len()).map(|k| KnownShape::new(NAMES[k], learnt[k * INSTANCES].model.clone())).collect();
@@ -86,7 +88,8 @@ fn line(counts: &Counts) -> String {
     counts.iter().map(|[known, strangers]| format!("   {known:>3?} | {strangers:>3?}")).collect()
 }
 
-/// Scans a thing from where it settles most each time, and asks what it is; `name` is what it is, if it is known.
+/// Scans an object from the most informative bearing each time and recognises it; `name` is its true name, if
+/// it is known.
 fn scan_after_scan(
     outline: &Outline,
     name: Option<&str>,
@@ -115,7 +118,7 @@ fn scan_after_scan(
     all
 }
 
-/// Its place in [`Counts`].
+/// Index of the verdict in [`Counts`].
 fn verdict(
     alignment: &Alignment,
     loose_m: f64,

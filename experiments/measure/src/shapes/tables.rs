@@ -1,4 +1,4 @@
-//! The paper's tables beside its numbers.
+//! The paper's tables with our numbers.
 
 use super::lab::{
     self, INSTANCES, NAMES, Run, circled, f_c_range, map_of_the_lab, models, named, paper, relocalised,
@@ -45,7 +45,7 @@ pub fn alignment(seed: u64) {
     }
 }
 
-/// Fig. 7, and what features alone recognise.
+/// Fig. 7, and recognition by features alone.
 pub fn features(learnt: &[Alignment]) {
     println!("\nFig. 7: area (cm²) and perimeter (cm) of hulls, spreads; [the paper]");
     let all: Vec<_> = learnt.iter().map(|a| a.model.features()).collect();
@@ -83,7 +83,7 @@ pub fn features(learnt: &[Alignment]) {
     println!("clusters without names: {}", told.join("; "));
 }
 
-/// Fig. 8, and the threshold that tells all apart.
+/// Fig. 8, and the threshold that separates all objects.
 pub fn f_c(learnt: &[Alignment]) {
     println!("\nFig. 8: f_C (m²), least to greatest over all pairs of instances; [the paper]");
     let (mut same, mut other) = ((0.0_f64, 0.0_f64), (f64::INFINITY, f64::INFINITY));
@@ -115,7 +115,8 @@ pub fn f_c(learnt: &[Alignment]) {
     );
 }
 
-/// The published area and perimeter of the recycle-bin leave one parameter open: its cells for other corners.
+/// Results for other outlines of the recycle-bin, whose published area and perimeter leave one parameter
+/// open.
 pub fn recycle_bins(seed: u64, learnt: &[Alignment]) {
     println!(
         "\nrecycle-bin and garbage-can, f_C (m²) [0.013-0.039], for other outlines with the same hull area and perimeter"
@@ -185,7 +186,8 @@ pub fn localisation(seed: u64, learnt: &[Alignment]) {
     );
 }
 
-/// What single scans are taken for, and where, with no pose to start from: each scan of each instance, held against all models but its own.
+/// Recognition and localisation of single scans without an initial pose: each scan against all models but its
+/// own.
 pub fn single_scans(learnt: &[Alignment]) {
     let known = named(learnt);
     let (mut scans, mut right, mut among, mut wrong, mut missed, mut off_m) = (0, 0, 0, 0, 0, Vec::new());

@@ -1,4 +1,5 @@
-//! Times on one thread, least of a few repetitions: alignment by each method, recognition against few and many known models.
+//! Single-threaded times, least of several repetitions: alignment by each method, recognition against few and
+//! many known models.
 
 use super::lab::{INSTANCES, NAMES, Run, circled, map_of_the_lab, object, rounded, seed_of};
 use super::tabletop::Draws;
@@ -9,11 +10,11 @@ use descry_perception::laser::{
 };
 use std::time::Instant;
 
-/// Repetitions, and how long (milliseconds) the first may take to be repeated at all.
+/// Number of repetitions, and the longest first run that is repeated at all, milliseconds.
 const REPETITIONS: usize = 5;
 const LONG_MS: f64 = 500.0;
 
-/// Least time of a few, milliseconds.
+/// Least time of several repetitions, milliseconds.
 fn least_ms<T>(mut run: impl FnMut() -> T) -> f64 {
     let mut least = f64::INFINITY;
     for _ in 0..REPETITIONS {
@@ -27,7 +28,7 @@ fn least_ms<T>(mut run: impl FnMut() -> T) -> f64 {
     least
 }
 
-/// Prints them.
+/// Prints the times.
 pub fn print(seed: u64, learnt: &[Alignment]) {
     let map = map_of_the_lab(&mut Draws(seed));
     println!("\ntimes, ms: a model of 7 or 8 scans, and of 30; times that the errors were computed");

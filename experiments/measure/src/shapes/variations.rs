@@ -1,4 +1,5 @@
-//! Fewer and more scans, wrong background subtraction, worse poses, a porous object; ICP on the same data.
+//! Variations: fewer and more scans, wrong background subtraction, worse poses, a porous object; ICP on the
+//! same data.
 
 use super::lab::{
     INSTANCES, NAMES, Outline, Run, circled, four_legs, map_of_the_lab, named, object, seed_of,
@@ -13,18 +14,19 @@ use descry_perception::laser::{
 use descry_perception::nalgebra::{Isometry2, Isometry3, Point2, Point3, Rotation2, Vector2};
 use descry_perception::register::{self, Method, RegisterOptions};
 
-/// Partners in ICP are no farther apart, metres: thrice the spread of a position.
+/// Maximum distance of correspondences in ICP, metres: three standard deviations of a position.
 const ICP_WITHIN_M: f32 = 0.15;
 
-/// What came of a method over many observations.
+/// Results of a method over many observations.
 #[derive(Default)]
 struct Tally {
-    /// Root mean square distance of readings from where they are on the object, the whole put in place as well as can be, metres.
+    /// Root mean square distance of readings from their true places on the object, after the best common
+    /// motion, metres.
     off_m: Vec<f64>,
-    /// Area of the hull over the true one.
+    /// Area of the hull relative to the true one.
     area: Vec<f64>,
     exterior_m: f64,
-    /// Alignments that say that their scans contradict each other.
+    /// Number of alignments that report contradictory scans.
     contradicts: usize,
     right: usize,
     wrong: usize,
@@ -59,11 +61,12 @@ pub fn print(seed: u64, learnt: &[Alignment]) {
     legs(seed, &chair[0]);
 }
 
-/// Observations of a chair's legs with wrong points, and how far off what agrees may be, metres.
+/// Number of observations of a chair's legs with wrong points, and maximum error of a correct one, metres.
 const LEGS: usize = 40;
 const NEAR_M: f64 = 0.03;
 
-/// What becomes of a chair's legs where a reading in five is wrongly subtracted: often all that a scan has of a leg.
+/// Prints results for a chair's legs with a fifth of the readings wrongly subtracted, which often removes all
+/// readings of a leg.
 fn legs(seed: u64, chair: &Outline) {
     let map = map_of_the_lab(&mut Draws(seed));
     let run = Run { wrong: 0.2, ..Run::default() };
@@ -85,16 +88,16 @@ fn legs(seed: u64, chair: &Outline) {
     );
 }
 
-/// The true poses of the scans that an alignment has not left out.
+/// The true poses of the scans used in an alignment.
 fn true_poses(alignment: &Alignment, map_from_lasers: &[Isometry2<f64>]) -> Vec<Isometry2<f64>> {
     let used = |i: &usize| !alignment.left_out.contains(i);
     (0..map_from_lasers.len()).filter(used).map(|i| map_from_lasers[i]).collect()
 }
 
-/// Errors longer than this, metres, contradict each other: twice the precision of the laser.
+/// Residual from which scans contradict each other, metres: twice the precision of the laser.
 pub const CONTRADICTS_M: f64 = 0.02;
 
-/// Scans that are aligned by the simplex, too.
+/// Maximum number of scans that are also aligned by the simplex.
 const MOST_BY_SIMPLEX: usize = 8;
 
 fn case(seed: u64, name: &str, outlines: &[Outline], run: &Run, known: &[KnownShape]) {
@@ -138,7 +141,7 @@ fn case(seed: u64, name: &str, outlines: &[Outline], run: &Run, known: &[KnownSh
     }
 }
 
-/// What is true of an observation.
+/// Ground truth of an observation.
 struct Truth<'a> {
     outline: &'a Outline,
     map_from_lasers: &'a [Isometry2<f64>],
@@ -194,7 +197,8 @@ pub fn area_m2(outline: &Outline) -> f64 {
     (0..n).map(|i| corners[i].coords.perp(&corners[(i + 1) % n].coords)).sum::<f64>() / 2.0
 }
 
-/// Root mean square distance of the readings from where they were truly taken, after the one motion that brings all of them nearest.
+/// Root mean square distance of the readings from their true places, after the best common rigid motion,
+/// metres.
 pub fn off_m(scans: &[PosedScan], truth: &[Isometry2<f64>]) -> f64 {
     let pairs: Vec<(Vector2<f64>, Vector2<f64>)> = scans
         .iter()
@@ -217,10 +221,11 @@ pub fn off_m(scans: &[PosedScan], truth: &[Isometry2<f64>]) -> f64 {
     (squares / n).sqrt()
 }
 
-/// So many spreads of a stated pose are far.
+/// Number of standard deviations from which a pose is far from its stated one.
 pub const FAR: f64 = 3.0;
 
-/// Scan after scan onto all before it, point to point; one that would be moved by more spreads of its stated pose stays there.
+/// Registers scan after scan onto all previous ones by point-to-point ICP; a scan that would move by more
+/// than `spreads` standard deviations of its stated pose stays there.
 pub fn by_icp(scans: &[PosedScan], spreads: f64) -> Vec<PosedScan> {
     let flat = |p: Point2<f64>| Point3::new(p.x as f32, p.y as f32, 0.0);
     let mut placed: Vec<PosedScan> = Vec::new();

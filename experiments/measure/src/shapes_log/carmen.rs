@@ -1,11 +1,12 @@
-//! Sweeps of the front laser in a log in CARMEN's format: `FLASER n range … x y theta …`, metres and radians, where x, y, theta is the laser's pose.
+//! Sweeps of the front laser in a CARMEN log: `FLASER n range … x y theta …`, metres and radians, where x, y,
+//! theta is the laser's pose.
 
 use descry_perception::laser::Scan;
 use descry_perception::nalgebra::{Isometry2, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-/// A SICK says so much or more where nothing returns, metres.
+/// Range from which a SICK reading means no return, metres.
 const NOTHING_M: f64 = 80.0;
 
 /// Reads all sweeps of a log.

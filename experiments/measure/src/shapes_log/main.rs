@@ -1,8 +1,8 @@
-//! Shapes of the things in the logs of robots, in CARMEN's format with corrected poses:
-//! `cargo run --release -p descry-measure --bin shapes_log -- LOG… [--plots DIR]`. Plots are SVG.
+//! Shapes of objects in robot logs in CARMEN's format with corrected poses: `cargo run --release -p
+//! descry-measure --bin shapes_log -- LOG… [--plots DIR]`. Plots are SVG.
 //!
-//! Things are what stands apart and was scanned from five directions or more. Each has two models, of scans that have none in common: whether the second is nearest to
-//! the first of all is the test of recognition.
+//! Objects are isolated clusters scanned from five directions or more. Each has two models from disjoint sets
+//! of scans; recognition succeeds if the second is nearest to the first among all.
 
 mod carmen;
 #[path = "../shapes/draw.rs"]
@@ -15,12 +15,12 @@ use descry_perception::laser::{
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Errors longer than this contradict each other, metres: twice the precision of the laser.
+/// Residual from which scans contradict each other, metres: twice the precision of the laser.
 const CONTRADICTS_M: f64 = 0.02;
-/// Things that are drawn.
+/// Number of objects drawn.
 const DRAWN: usize = 12;
 
-/// A thing with what two sets of scans say of it.
+/// An object with two sets of scans and their models.
 struct Seen {
     scans: [Vec<PosedScan>; 2],
     models: [Alignment; 2],
@@ -80,7 +80,8 @@ fn table(seen: &[Seen]) {
     }
 }
 
-/// Whether the second model of each thing is nearest to its own first, by f_C a pair of scans and by features.
+/// Prints how often the second model of each object is nearest to its own first, by f_C a pair of scans and
+/// by features.
 fn recognition(seen: &[&Seen]) {
     let (mut by_fit, mut by_features) = (0, 0);
     let (mut own_mm, mut other_mm): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());

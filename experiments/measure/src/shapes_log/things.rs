@@ -1,4 +1,4 @@
-//! Things of which a log knows most sides: clusters of all readings that stand apart, and scans of each from all around.
+//! Objects that a log shows from most sides: isolated clusters of all readings, with the scans around each.
 
 use descry_perception::cluster::euclidean;
 use descry_perception::hull::convex;
@@ -7,29 +7,29 @@ use descry_perception::nalgebra::{Point2, Point3, Vector2};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Edge of a cell in which readings are counted, metres, and fewest readings in one.
+/// Cell size for counting readings, metres, and minimum number of readings in a cell.
 const CELL_M: f64 = 0.05;
 const LEAST_IN_CELL: usize = 2;
-/// What is farther apart is not one thing, metres.
+/// Distance that separates two objects, metres.
 const APART_M: f32 = 0.3;
-/// Greatest and least width of a thing, metres.
+/// Minimum and maximum width of an object, metres.
 const WIDTH_M: (f64, f64) = (0.15, 1.2);
-/// Readings so far around a thing are of it: poses may be off by as much, metres.
+/// Margin around an object within which readings belong to it, metres, for errors of the poses.
 const AROUND_M: f64 = 0.2;
-/// Scans count from so near, metres.
+/// Maximum distance of scans from an object, metres.
 const NEAR_M: f64 = 4.0;
-/// Directions in which scans are sorted; a thing must have been scanned from so many, and from so many twice.
+/// Number of sectors by which scans are sorted; minimum number of sectors with a scan, and with two.
 const SECTORS: usize = 24;
 const LEAST_SECTORS: usize = 5;
 const LEAST_TWICE: usize = 4;
 
-/// Where a thing stands.
+/// Position and radius of an object.
 pub struct Thing {
     middle: Point2<f64>,
     radius_m: f64,
 }
 
-/// Clusters of readings that are neither too large nor too small.
+/// Clusters of readings within the limits of size.
 pub fn find(scans: &[Scan]) -> Result<Vec<Thing>, ObserveError> {
     let mut cells: BTreeMap<(i64, i64), usize> = BTreeMap::new();
     for scan in scans {
@@ -52,7 +52,7 @@ pub fn find(scans: &[Scan]) -> Result<Vec<Thing>, ObserveError> {
     Ok(euclidean(&flat, APART_M, 4)?.into_iter().filter_map(of).collect())
 }
 
-/// Two sets of scans of a thing that have none in common; none if it was not scanned from enough sides.
+/// Two disjoint sets of scans of an object; none if it was not scanned from enough sides.
 pub fn two_sets(scans: &[Scan], thing: &Thing) -> Result<Option<[Vec<PosedScan>; 2]>, ObserveError> {
     let far_m = |scan: &Scan| (scan.map_from_laser.translation.vector - thing.middle.coords).norm();
     let near: Vec<Scan> = scans.iter().filter(|s| far_m(s) < NEAR_M).cloned().collect();

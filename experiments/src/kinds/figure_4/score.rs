@@ -14,8 +14,8 @@ use super::views::Taken;
 use super::{Figure4, row};
 use crate::Row;
 
-/// A percept is where a thing is if it stands no farther from it, metres: less than the radius of the smallest cup with the
-/// gap beside it.
+/// Maximum distance of a percept from its object, metres: less than the radius of the smallest cup plus the
+/// gap around it.
 const SAME_PLACE_M: f64 = 0.05;
 /// Minimum number of pixels on a handle for it to count as seen: 2 by 2 cm at 1.4 m with a Kinect.
 const HANDLE_PIXELS: usize = 60;
@@ -53,8 +53,8 @@ pub(super) fn rows(experiment: &Figure4, taken: &Taken) -> Vec<Row> {
     rows
 }
 
-/// From where the views have it to where it is: errors of localisation are no errors of recognition. The first view that
-/// was merged tells.
+/// Transform from the merged cloud to the true scene, by the first merged view, so that localisation errors
+/// do not count as recognition errors.
 fn aligned(merged: &Merged, map_from_camera: &[Isometry3<f64>]) -> Isometry3<f64> {
     let used = merged.fits.iter().zip(map_from_camera).find(|(fit, _)| fit.used);
     used.map_or(Isometry3::identity(), |(fit, truth)| truth * fit.world_from_camera.inverse())

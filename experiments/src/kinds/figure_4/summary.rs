@@ -1,4 +1,4 @@
-//! The figure, the tables beside it, and the calibration.
+//! The figure with its tables, and the calibration.
 
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ const MODES: [&str; 2] = ["single", "merged"];
 const BINS: usize = 10;
 const NOTE: &str = "Shares with 95 % intervals, bootstrapped over arrangements.";
 
-/// A measure of a cell: its name and what it is.
+/// A measure of a cell, with its name.
 type Measure = (&'static str, fn(&Cell) -> Option<Estimate>);
 
 const MEASURES: [Measure; 2] = [("precision", precision), ("recall", recall)];
@@ -99,7 +99,7 @@ fn numbers(curve: &[Cell]) -> Value {
     Value::Object(values)
 }
 
-/// Precision and recall by number of views, a plot a recogniser in the manner of the paper's figure.
+/// Precision and recall by number of views: a plot for each recogniser, in the style of the paper's figure.
 fn figures(experiment: &Figure4, set: &str, of_set: &OfSet<'_>) -> Vec<Section> {
     let kind = &experiment.text.of_kind;
     let plot = |recogniser: &String| {

@@ -16,37 +16,37 @@ use crate::kinds::runtime;
 use descry_agent::body::Body;
 use descry_domains::abilities::searching::perceive;
 
-/// Tried in turn where the footprint does not fit.
+/// Radial offsets tried in turn where the footprint does not fit, metres.
 const OUTWARDS_M: [f64; 6] = [0.0, 0.1, 0.2, -0.1, 0.3, 0.4];
-/// A point so far beyond the wall of a vessel is its handle.
+/// Distance beyond the wall of a vessel from which a point belongs to the handle, metres.
 const BEYOND_WALL_M: f64 = 0.003;
 
 /// Views of one arrangement, with the true scene.
 pub(super) struct Taken {
-    /// In the order in which they were taken.
+    /// Views, in the order in which they were taken.
     pub views: Vec<View>,
     /// True pose of the camera for each view.
     pub map_from_camera: Vec<Isometry3<f64>>,
-    /// Pixels of the handle of each object in each view, as an ideal camera sees them; no entry for what has no handle,
-    /// nor for a body other than our simulator.
+    /// Pixels of the handle of each object in each view of an ideal camera; no entry for objects without a
+    /// handle, nor for bodies other than the simulator.
     pub handles: BTreeMap<String, Vec<usize>>,
     /// True scene.
     pub truth: Truth,
-    /// Options of merging and of segmentation, as the agent uses them.
+    /// Options of merging and of segmentation, as in the agent.
     pub options: (MergeOptions, SceneOptions),
 }
 
-/// A body before an arrangement.
+/// A body in front of an arrangement.
 pub(super) struct Staged {
     body: Body,
     ideal: Option<Ideal>,
 }
 
-/// Our simulator, which shows what an ideal camera sees, and the things with a handle: number and name.
+/// The simulator as an ideal camera, and the objects with a handle: number and name.
 type Ideal = (Arc<SimRobot>, Vec<(usize, String)>);
 
 impl Staged {
-    /// Any body that says how everything really stands.
+    /// Any body that reports the ground truth.
     pub fn of(body: Body) -> Self {
         Self { body, ideal: None }
     }
@@ -56,7 +56,7 @@ impl Staged {
     }
 }
 
-/// Our simulator in an arrangement of a scene.
+/// The simulator with an arrangement of a scene.
 pub(super) fn simulated(spec: &SceneSpec, seed: u64) -> Result<Staged, String> {
     let scene = arrange(spec, seed).map_err(|e| e.to_string())?;
     let handled = (0..).zip(&scene.objects).filter(|(_, o)| has_handle(&o.shape));
@@ -65,7 +65,7 @@ pub(super) fn simulated(spec: &SceneSpec, seed: u64) -> Result<Staged, String> {
     Ok(Staged { body: Body::simulated(Arc::clone(&robot)), ideal: Some((robot, handled)) })
 }
 
-/// Drives around the body's first surface and looks at its middle from every pose.
+/// Drives around the body's first surface and looks at its centre from every pose.
 pub(super) fn take(staged: &Staged, poses: usize, distance_m: f64) -> Result<Taken, String> {
     let robot = &*staged.body.robot;
     let surface = robot.surfaces().first().cloned().ok_or("the scene has no surface to look at")?;
@@ -111,7 +111,7 @@ fn middle(surface: &SurfaceHint) -> Point3<f64> {
     Point3::new(sum[0] / n, sum[1] / n, surface.height_m)
 }
 
-/// The k-th of the poses around the middle, the first one on the side where the body stands first.
+/// The k-th pose around the centre; the first is on the side of the start.
 async fn place(
     robot: &dyn Robot,
     middle: &Point3<f64>,
@@ -132,7 +132,7 @@ async fn place(
     fits.map(|n| tries[n].clone()).ok_or_else(|| format!("pose {} of {poses} cannot be reached", k + 1))
 }
 
-/// Pixels of an object's handle in the frame that an ideal camera takes now.
+/// Pixels of an object's handle in the current frame of an ideal camera.
 fn handle_pixels(robot: &SimRobot, truth: &Truth, index: usize, map_from_camera: &Isometry3<f64>) -> usize {
     let frame = robot.true_frame();
     let object = &truth.objects[index];

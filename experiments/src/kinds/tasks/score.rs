@@ -1,4 +1,4 @@
-//! Judges runs: is the goal truly achieved, and is the answer true?
+//! Scoring of runs against the ground truth: achievement of the goal, and truth of the answer.
 
 use descry_domains::answer::Verdict;
 use descry_robots::truth::{TrueObject, Truth};
@@ -10,15 +10,15 @@ use crate::Row;
 use crate::kinds::trial::{Lived, is_among};
 use descry_agent::report::Report;
 
-/// When a goal is right.
+/// Criterion by which a goal is truly achieved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Truly {
-    /// It says where the target stands: the right surface, and near enough.
+    /// The answer states the target's position: on the right surface, within the tolerance.
     Found,
-    /// It says of every target in the room (or anywhere) where it stands, and of nothing else that it is one.
+    /// The answer states the position of every target in the room (or anywhere), and of nothing else.
     AllFound,
-    /// A question: whether the target stands on the surface.
+    /// The answer to a yes-no question is true: the target stands on the surface, or does not.
     Answered,
     /// The target is in the hand.
     Held,
@@ -63,16 +63,16 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
     row
 }
 
-/// A verdict held against the truth.
+/// A verdict compared with the truth.
 #[derive(Debug, PartialEq)]
 pub(super) struct Scored {
     /// True if the verdict is right: achieved and said so, or impossible and said so.
     pub right: bool,
-    /// It was said that it is so, and it is not.
+    /// True if a yes is false.
     pub false_yes: bool,
-    /// It was said that it is not there (or not so), and it is.
+    /// True if the target is said to be absent (or the condition false), wrongly.
     pub false_not_there: bool,
-    /// Greatest distance of the things from their stated places; none unless all are within the
+    /// Maximum distance of the objects from their stated positions, metres; none unless all are within the
     /// tolerance.
     pub error_m: Option<f64>,
 }
@@ -110,10 +110,10 @@ impl Scored {
     }
 }
 
-/// Stated place of a thing: middle of its body in the map, metres, and name of its surface.
+/// Stated position of an object: centre of its body in the map frame, metres, and name of its surface.
 type Place = ([f64; 3], Option<String>);
 
-/// Places that the report states for the targets.
+/// Positions that the report states for the targets.
 fn named(report: &Report) -> Vec<Place> {
     match report.object {
         Some(_) => report.position_m.map(|at| (at, report.on.clone())).into_iter().collect(),
@@ -124,8 +124,7 @@ fn named(report: &Report) -> Vec<Place> {
     }
 }
 
-/// Distance of an object from a place along the floor, metres; none if it stands on another
-/// surface.
+/// Distance of an object from a position along the floor, metres; none if it stands on another surface.
 fn distance_m((at, on): &Place, object: &TrueObject) -> Option<f64> {
     (object.surface == *on).then(|| (object.centre_m.x - at[0]).hypot(object.centre_m.y - at[1]))
 }

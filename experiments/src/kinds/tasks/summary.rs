@@ -1,5 +1,5 @@
-//! Summary of the runs by goal, policy and case: shares of right and false answers, means of looks,
-//! metres and seconds.
+//! Summary of the runs by goal, policy and case: shares of right and false answers, means of views, metres
+//! and seconds.
 
 use serde_json::{Map, Value, json};
 
@@ -32,7 +32,7 @@ struct Run<'a> {
     case: &'a str,
     policy: &'a str,
     group: u64,
-    /// None: it ended with an error.
+    /// Measurements; none if the run ended with an error.
     row: Option<&'a Row>,
 }
 
@@ -144,7 +144,7 @@ pub(super) fn summarise(experiment: &Tasks, finished: &[Numbered<'_>]) -> Summar
     Summary { values: values.as_object().cloned().unwrap_or_default(), sections }
 }
 
-/// Share of runs in which each action was carried out; none if no goal names stages.
+/// Share of runs with a completed execution of each action; none if no goal names stages.
 fn stages(experiment: &Tasks, runs: &[Run<'_>]) -> Option<Table> {
     let text = &experiment.text;
     let head = ["goal", "policy", "stage", "runs", "carried out"];

@@ -104,7 +104,7 @@ const HEAD: [&str; 10] = [
     "ECE",
 ];
 
-/// A part of the runs: the name of what it is a part by, and of the part.
+/// A part of the runs: the name of the criterion, the name of the part, and its filter.
 type Part<'a> = (&'static str, String, Box<dyn Fn(&Run<'_>) -> bool + 'a>);
 
 fn parts(experiment: &WhereToLook) -> Vec<Part<'_>> {
@@ -190,7 +190,7 @@ fn in_words(experiment: &WhereToLook, ours: &Figures) -> String {
     )
 }
 
-/// Ours against others in the same scenes with the same poses: differences and savings.
+/// Our policy against others in the same scenes with the same viewpoints: differences and savings.
 fn comparisons(experiment: &WhereToLook, runs: &[Run<'_>]) -> (Table, Value) {
     let note = "Runs in the same scene with the same poses in pairs; intervals of 95 % bootstrapped over scenes. Saved is one less \
                 the ratio of the means.";

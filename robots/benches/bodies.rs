@@ -1,4 +1,4 @@
-//! What a frame and a table of routes cost: `cargo bench -p descry-robots`.
+//! Cost of a frame and of a table of routes: `cargo bench -p descry-robots`.
 
 use descry_robots::nalgebra::Point3;
 use descry_robots::program::{Limits, ProgramRobot};
@@ -29,7 +29,7 @@ fn flat() -> Option<Scene> {
     arrange(&SceneSpec::parse("flat.toml", FLAT).ok()?, 1).ok()
 }
 
-/// Poses before the surfaces of the flat.
+/// Poses in front of the surfaces of the flat.
 fn stands(scene: &Scene) -> Vec<Pose2> {
     let router = Router::new(&scene.map(), 0.3, body::SPEEDS);
     let pose = |s: &SurfaceSpec, k: usize| {
@@ -57,7 +57,7 @@ fn render_frame(bencher: Bencher) {
     bencher.bench_local(|| render(&scene.room, &solids, &camera, &body::intrinsics(), 0));
 }
 
-/// From the middle of the hall of a flat, through a door.
+/// Renders a view from the centre of the flat's hall through a door.
 #[divan::bench]
 fn render_flat_frame(bencher: Bencher) {
     let (Some(scene), head) = (flat(), body::HEAD) else { return };
@@ -82,7 +82,7 @@ fn arrange_the_default_scene(bencher: Bencher) {
     bencher.bench_local(|| arrange(&spec, 1));
 }
 
-/// Every route between so many poses, the visibility graph built anew.
+/// All routes between `poses` poses, including the construction of the visibility graph.
 #[divan::bench(args = [5, 16, 100])]
 fn routes_between(bencher: Bencher, poses: usize) {
     let Some(scene) = scene() else { return };
@@ -90,7 +90,7 @@ fn routes_between(bencher: Bencher, poses: usize) {
     bencher.bench_local(|| Router::new(&map, 0.3, speeds).travel_table(&poses));
 }
 
-/// A program in Python that has its frames ready: what the protocol costs.
+/// Protocol overhead of a Python program that holds its frames ready.
 fn program(bencher: Bencher, ask: impl AsyncFn(&ProgramRobot)) {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/programs/frames.py");
     let Ok(robot) = ProgramRobot::start(&format!("python3 '{file}'"), Limits::default()) else {
@@ -108,7 +108,7 @@ fn ask_a_program_where_it_is(bencher: Bencher) {
     });
 }
 
-/// 640x480 depths of 16 bits, to a cloud.
+/// Converts 640x480 depths of 16 bits to a cloud.
 #[divan::bench]
 fn take_a_frame_of_a_program(bencher: Bencher) {
     program(bencher, async |robot| {
@@ -116,7 +116,7 @@ fn take_a_frame_of_a_program(bencher: Bencher) {
     });
 }
 
-/// Every route between the poses before the surfaces of the flat; first with a new router, then with one that is there.
+/// All routes between the poses in front of the flat's surfaces, with a new router for each table if `anew`.
 #[divan::bench(args = [true, false])]
 fn routes_in_the_flat(bencher: Bencher, anew: bool) {
     let Some(scene) = flat() else { return };
@@ -128,7 +128,7 @@ fn routes_in_the_flat(bencher: Bencher, anew: bool) {
     });
 }
 
-/// One question for the way to each of the poses before the surfaces of the flat.
+/// Routes from one pose to each pose in front of the flat's surfaces, in one query.
 #[divan::bench]
 fn routes_from_one_pose_in_the_flat(bencher: Bencher) {
     let Some(scene) = flat() else { return };
@@ -137,7 +137,7 @@ fn routes_from_one_pose_in_the_flat(bencher: Bencher) {
     bencher.bench_local(|| router.travel_to_each(&scene.start, &poses));
 }
 
-/// The same from one pose to 16 around the table of the tabletop.
+/// Routes from one pose to 16 poses around the table of the tabletop, in one query.
 #[divan::bench]
 fn routes_from_one_pose(bencher: Bencher) {
     let Some(scene) = scene() else { return };

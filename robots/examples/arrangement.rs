@@ -1,5 +1,5 @@
-//! What stands where in a scene once a seed has arranged it, as JSON: `cargo run --release -p descry-robots --example arrangement -- SCENE.toml SEED [VISIT]`.
-//! For scoring runs on the simulated body: nothing that decides may ask.
+//! Prints the arrangement of a scene for a seed, as JSON: `cargo run --release -p descry-robots --example
+//! arrangement -- SCENE.toml SEED [VISIT]`. For scoring runs on the simulated body; no decision may use it.
 
 use descry_robots::sim::{SceneSpec, arrange};
 use std::process::ExitCode;

@@ -8,10 +8,10 @@ use descry_robots::{Failure, Place, Pose2, Robot, SurfaceHint, Watch};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Poses on a ring of this radius, metres.
+/// Radius of the ring of poses, metres.
 const RING_M: f64 = 1.3;
 const RING_POSES: usize = 5;
-/// Drives that are tried to get somewhere: a door may be shut.
+/// Maximum number of drives to a pose, as doors may be shut.
 const TRIES: usize = 20;
 
 #[tokio::main(flavor = "current_thread")]
@@ -63,7 +63,7 @@ async fn look_around(robot: &SimRobot, surface: &SurfaceHint, out: &Path) -> Res
     Ok(())
 }
 
-/// Drives there and opens what is shut.
+/// Drives to a place and opens shut doors on the way.
 async fn go(robot: &SimRobot, place: &Place) -> Result<(), Failure> {
     for _ in 0..TRIES {
         match robot.drive_to(place, &Watch::default()).await {
@@ -77,7 +77,7 @@ async fn go(robot: &SimRobot, place: &Place) -> Result<(), Failure> {
     Err(Failure::Unreachable { because: "the doors stay shut".into() })
 }
 
-/// The map, four pixels a cell.
+/// Picture of the map, four pixels a cell.
 fn map(robot: &SimRobot) -> GrayImage {
     let Some(map) = robot.map() else { return GrayImage::new(1, 1) };
     GrayImage::from_fn(4 * map.width as u32, 4 * map.height as u32, |u, v| {

@@ -19,37 +19,37 @@ pub use tokio_util::sync::CancellationToken;
 /// Nanoseconds on the body's clock.
 pub type Stamp = i64;
 
-/// A surface that the map knows: things may stand on it.
+/// A support surface in the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceHint {
-    /// As people call it: `table`.
+    /// Name for people: `table`.
     pub name: String,
     /// Outline in the map, corners in order, metres.
     pub outline_m: Vec<Point2<f64>>,
-    /// Roughly, above the floor, metres.
+    /// Approximate height above the floor, metres.
     pub height_m: f64,
-    /// The room that it is in, if the map knows rooms.
+    /// The room that contains it, if the map has rooms.
     #[serde(default)]
     pub room: Option<String>,
 }
 
-/// A room that the map knows.
+/// A room in the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Room {
-    /// As people call it: `kitchen`.
+    /// Name for people: `kitchen`.
     pub name: String,
     /// Outline of its floor in the map, corners in order, metres.
     pub outline_m: Vec<Point2<f64>>,
 }
 
-/// A door that the map knows. Whether it is open, only being there tells.
+/// A door in the map; its state is only known on the spot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Door {
-    /// As people call it: `kitchen door`.
+    /// Name for people: `kitchen door`.
     pub name: String,
-    /// Middle of the opening, in the map, metres.
+    /// Centre of the opening, map frame, metres.
     pub centre_m: Point2<f64>,
-    /// Along the wall, counter-clockwise from the map's x, radians.
+    /// Direction of the wall, counter-clockwise from the map's x, radians.
     pub along_rad: f64,
     /// Width of the opening, metres.
     pub width_m: f64,
@@ -60,7 +60,7 @@ pub struct Door {
 /// Stated pose of the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseEstimate {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
     /// Stated pose of the base.
     pub map_from_base: Isometry3<f64>,
@@ -68,12 +68,12 @@ pub struct PoseEstimate {
     pub sigma_m: f64,
     /// Standard deviation about each axis, radians.
     pub sigma_rad: f64,
-    /// The station it stands at, if the body has stations.
+    /// Name of the current station, if the body has stations.
     pub station: Option<String>,
 }
 
 impl PoseEstimate {
-    /// The same as somewhere to go from or to.
+    /// The estimate as a place to drive from or to.
     pub fn place(&self) -> Place {
         match &self.station {
             Some(name) => Place::Station(name.clone()),
@@ -94,31 +94,32 @@ pub struct Travel {
 /// A drive that arrived.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Driven {
-    /// As odometry counted it, metres.
+    /// Distance by odometry, metres.
     pub distance_m: f64,
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
     /// Stated pose of the base after the drive.
     pub map_from_base: Isometry3<f64>,
 }
 
-/// The head has turned.
+/// A completed turn of the head.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Looked {
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
-    /// Angle between the line of sight and the point asked for, radians; above zero where the head's limits ended the turn.
+    /// Angle between the line of sight and the requested point, radians; positive where the head's limits
+    /// ended the turn.
     pub miss_rad: f64,
 }
 
-/// One frame's place in another at one time.
+/// Transform between two frames at one time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StampedTransform {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
-    /// The frame that `parent_from_child` takes points to.
+    /// Frame that `parent_from_child` maps to.
     pub parent: String,
-    /// The frame that it takes points from.
+    /// Frame that `parent_from_child` maps from.
     pub child: String,
     /// The transform.
     pub parent_from_child: Isometry3<f64>,
@@ -133,31 +134,31 @@ pub struct Colour {
     pub registered: bool,
 }
 
-/// One frame of the camera with all that is needed to place it.
+/// A camera frame with its transforms.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensed {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
     /// Organised, in the optical frame, metres; NaN is "no return".
     pub cloud: Cloud,
     /// Depth along z, metres, row by row; NaN is "no return".
     pub depth_m: Vec<f32>,
-    /// If the camera has colour.
+    /// Colour image, if the camera has colour.
     pub colour: Option<Colour>,
     /// The camera.
     pub intrinsics: Intrinsics,
-    /// The chain map -> base -> camera at that time, as the body believes it.
+    /// The chain map -> base -> camera at that time, as estimated by the body.
     pub transforms: Vec<StampedTransform>,
-    /// The chain multiplied out.
+    /// Product of the chain.
     pub map_from_camera: Isometry3<f64>,
-    /// Standard deviation of that position along each axis, metres.
+    /// Standard deviation of the camera position along each axis, metres.
     pub pose_sigma_m: f64,
-    /// Standard deviation of that orientation about each axis, radians.
+    /// Standard deviation of the camera orientation about each axis, radians.
     pub pose_sigma_rad: f64,
 }
 
 impl Sensed {
-    /// The frame as perception takes it.
+    /// Converts the frame to a view for perception.
     pub fn view(&self) -> View {
         View {
             stamp_ns: self.stamp_ns,
@@ -170,79 +171,79 @@ impl Sensed {
     }
 }
 
-/// One sweep of the laser with all that is needed to place it.
+/// A laser sweep with its transforms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scanned {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
-    /// The readings, and where the laser was as the body believes.
+    /// The readings, with the estimated pose of the laser.
     pub scan: Scan,
-    /// The chain map -> base -> laser at that time, as the body believes it.
+    /// The chain map -> base -> laser at that time, as estimated by the body.
     pub transforms: Vec<StampedTransform>,
-    /// Standard deviation of that position along each axis, metres.
+    /// Standard deviation of the laser position along each axis, metres.
     pub pose_sigma_m: f64,
-    /// Standard deviation of that orientation about each axis, radians.
+    /// Standard deviation of the laser orientation about each axis, radians.
     pub pose_sigma_rad: f64,
 }
 
-/// Reading of a sense.
+/// Reading of a custom sensor.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
-    /// Anything that JSON can say, as [`Sense::about`](crate::Sense::about) tells.
+    /// Any JSON value; [`Sense::about`](crate::Sense::about) describes it.
     pub said: serde_json::Value,
 }
 
-/// A push against one object, so that what is behind it can be seen.
+/// A push against one object, which uncovers what is behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Push {
-    /// Centre of the object, in the map, metres.
+    /// Centre of the object, map frame, metres.
     pub object: Point3<f64>,
-    /// Direction in the map; its length does not matter.
+    /// Direction in the map frame; its length is ignored.
     pub direction: Vector2<f64>,
     /// Length of the push, metres.
     pub distance_m: f64,
 }
 
-/// A push that ended.
+/// A completed push.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pushed {
     /// Distance that the hand moved in contact with the object, metres.
     pub moved_m: f64,
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
 }
 
-/// A grasp of one object that stands free.
+/// A grasp of one free-standing object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasp {
-    /// Middle of the object's body, in the map, metres.
+    /// Centre of the object's body, map frame, metres.
     pub object: Point3<f64>,
     /// Required opening of the hand, metres.
     pub width_m: f64,
 }
 
-/// A grasp that ended with the object lifted.
+/// A completed grasp, with the object lifted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grasped {
     /// Opening of the hand around the object, metres.
     pub width_m: f64,
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
 }
 
-/// Place for the object in the hand.
+/// A placement of the held object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placing {
-    /// Place of the object's foot, in the map, metres.
+    /// Position of the object's base, map frame, metres.
     pub foot: Point3<f64>,
 }
 
-/// Something was put down.
+/// A completed placement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Placed {
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
 }
 
@@ -253,48 +254,48 @@ pub struct Hand {
     pub holds: bool,
 }
 
-/// A door was opened.
+/// A completed opening of a door.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Opened {
-    /// On the body's clock, seconds.
+    /// Duration on the body's clock, seconds.
     pub duration_s: f64,
 }
 
-/// Progress of a request that takes time.
+/// Progress of a long request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
-    /// On the body's clock since the start, seconds.
+    /// Time on the body's clock since the start, seconds.
     pub elapsed_s: f64,
-    /// Done so far, 0 to 1.
+    /// Completed fraction, 0 to 1.
     pub fraction: f64,
-    /// Driven so far, metres.
+    /// Distance driven so far, metres.
     pub distance_m: f64,
 }
 
-/// Who watches over something that takes time: stops it, limits it, hears of it.
+/// Supervision of a long request: cancellation, time limit, progress reports.
 #[derive(Clone)]
 pub struct Watch<'a> {
-    /// Stops it as soon as possible, with [`Failure::Cancelled`].
+    /// Cancels the request as soon as possible, with [`Failure::Cancelled`].
     pub cancel: CancellationToken,
-    /// Ends it with [`Failure::TimedOut`], seconds on the body's clock.
+    /// Time limit, seconds on the body's clock; exceeding it ends with [`Failure::TimedOut`].
     pub time_limit_s: f64,
-    /// Called now and then.
+    /// Receives occasional progress reports.
     pub progress: &'a (dyn Fn(&Progress) + Send + Sync),
 }
 
 fn nobody_listens(_: &Progress) {}
 
 impl Default for Watch<'_> {
-    /// Nobody stops it, five minutes are enough, nobody listens.
+    /// No cancellation, a limit of five minutes, no reports.
     fn default() -> Self {
         Watch { cancel: CancellationToken::new(), time_limit_s: 300.0, progress: &nobody_listens }
     }
 }
 
-/// A body: simulated, recorded or real. Passing `conformance::check` is part of being one.
+/// A body: simulated, recorded or real. Every implementation must pass `conformance::check`.
 ///
-/// What takes time is `async`, can be stopped and has a limit; what is only asked is not. After a failure the body stands still
-/// and can be asked again, unless it said [`Failure::Broken`].
+/// Requests that take time are `async`, can be cancelled and have a limit; queries are neither. After a
+/// failure the body stands still and accepts further requests, unless it reported [`Failure::Broken`].
 #[async_trait::async_trait]
 pub trait Robot: Send + Sync {
     /// Parts and abilities of the body.
@@ -303,36 +304,37 @@ pub trait Robot: Send + Sync {
     /// The body's clock. Simulated and recorded time advances by driving, looking and sensing, not by waiting.
     fn now_ns(&self) -> Stamp;
 
-    /// The room as known from mapping; `None` if the body has no map (a recording).
+    /// The map of the room; `None` for a body without a map, such as a recording.
     fn map(&self) -> Option<&OccupancyGrid>;
 
-    /// True of a simulation or a recording in this process: opened again, it stands where it stood, and does the same when it is asked
-    /// the same. Any other body is where it is, and nothing is asked of it twice.
+    /// True for a simulation or a recording in this process: reopened, it starts in the same state and
+    /// answers the same requests identically. Any other body stays where it is, and no request is repeated.
     fn begins_again(&self) -> bool {
         false
     }
 
-    /// Surfaces that the map knows.
+    /// Surfaces in the map.
     fn surfaces(&self) -> &[SurfaceHint];
 
-    /// `Some` if the body can stand at these poses only.
+    /// The only poses where the body can stand; `None` if it can stand anywhere.
     fn stations(&self) -> Option<&[Station]>;
 
-    /// Rooms that the map knows.
+    /// Rooms in the map.
     fn rooms(&self) -> &[Room] {
         &[]
     }
 
-    /// Doors that the map knows.
+    /// Doors in the map.
     fn doors(&self) -> &[Door] {
         &[]
     }
 
-    /// Predicts the drives from one place to each of the others on the map: nothing moves. Every
-    /// door counts as open but those named in `shut`.
+    /// Predicts the drives from one place to each of the others on the map, without moving. All doors count
+    /// as open except those named in `shut`.
     ///
     /// # Errors
-    /// Each entry by itself: [`Failure::Unreachable`] with the reason.
+    ///
+    /// Separately for each entry: [`Failure::Unreachable`] with the reason.
     fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>>;
 
     /// Predicts the camera's pose (`map_from_camera`) with the base at `place` and the head turned
@@ -353,13 +355,17 @@ pub trait Robot: Send + Sync {
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn pose(&self) -> Result<PoseEstimate, Failure>;
 
-    /// Drives there along a route on the map. A body without [`Description::base`] is where it is: any other place is unreachable.
+    /// Drives to a place along a route on the map. A body without [`Description::base`] cannot move: any
+    /// other place is unreachable.
     ///
     /// # Errors
-    /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
+    ///
+    /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`],
+    /// [`Failure::Lost`], [`Failure::Broken`].
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure>;
 
-    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by how much it misses.
+    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by
+    /// how much it misses.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] if a coordinate is no number;
@@ -379,9 +385,10 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Camera))
     }
 
-    /// Sweeps the laser once.
+    /// Takes one laser sweep.
     ///
     /// # Errors
+    ///
     /// [`Failure::Unable`] without [`Description::laser`]; [`Failure::SensorDropped`], [`Failure::TimedOut`],
     /// [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {
@@ -389,7 +396,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Laser))
     }
 
-    /// Reads one of [`Description::senses`], by its name.
+    /// Reads one of [`Description::senses`] by name.
     ///
     /// # Errors
     /// [`Failure::Unable`] if there is none of that name; [`Failure::SensorDropped`], [`Failure::TimedOut`],
@@ -409,7 +416,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Arm))
     }
 
-    /// Opens a door from where the base stands, near it.
+    /// Opens a nearby door from the current pose of the base.
     ///
     /// # Errors
     /// [`Failure::Unable`] if it cannot open doors; [`Failure::Unreachable`] if no door of that name is in reach;
@@ -419,7 +426,7 @@ pub trait Robot: Send + Sync {
         Err(Failure::Unable { because: format!("{} does not open doors", self.description().name) })
     }
 
-    /// Takes an object into the hand and lifts it.
+    /// Grasps an object and lifts it.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Arm::hand`](crate::Arm::hand), if the hand is full, or if the object is too wide;
@@ -430,7 +437,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Hand))
     }
 
-    /// Puts what the hand holds down.
+    /// Puts down the held object.
     ///
     /// # Errors
     /// [`Failure::Unable`] if the hand is empty; [`Failure::Unreachable`] if the place is out of reach; [`Failure::Blocked`] if
@@ -440,7 +447,7 @@ pub trait Robot: Send + Sync {
         Err(self.description().lacks(Part::Hand))
     }
 
-    /// State of the hand now.
+    /// Current state of the hand.
     ///
     /// # Errors
     /// [`Failure::Unable`] without a hand; [`Failure::Broken`].

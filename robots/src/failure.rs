@@ -1,4 +1,4 @@
-//! Failures of a body. Each kind teaches the belief something else.
+//! Failures of a body. Each kind updates the belief differently.
 
 use crate::body::Stamp;
 use serde::{Deserialize, Serialize};
@@ -13,56 +13,56 @@ pub enum Failure {
         /// Obstacle, or missing destination.
         because: String,
     },
-    /// Something that the map does not know stood in the way; another route or a later try may work.
+    /// An obstacle missing in the map blocked the way; another route or a later try may work.
     #[error("blocked: {because}")]
     Blocked {
         /// Place and obstacle, as far as the body knows.
         because: String,
-        /// The door or thing of the map that it was, by name, if the body knows.
+        /// Name of the door or mapped object in the way, if the body knows it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         by: Option<String>,
     },
-    /// The time limit passed. The body stands still, wherever it got to.
+    /// The time limit passed. The body stands still at its current place.
     #[error("timed out: {because}")]
     TimedOut {
         /// Request and the time that it took.
         because: String,
     },
-    /// Somebody stopped it.
+    /// The request was cancelled.
     #[error("cancelled: {because}")]
     Cancelled {
         /// Stopped request.
         because: String,
     },
-    /// No frame came although one was due.
+    /// A frame or sweep failed to arrive.
     #[error("no frame: {because}")]
     SensorDropped {
         /// Missing frame.
         because: String,
-        /// When it was due, on the body's clock.
+        /// Time at which it was due, on the body's clock.
         stamp_ns: Stamp,
     },
     /// The body does not know where it is.
     #[error("lost: {because}")]
     Lost {
-        /// Sign by which it noticed.
+        /// Sign of the lost localisation.
         because: String,
     },
-    /// The hand did not do what it was asked to; the scene may have changed nevertheless.
+    /// The hand failed to do what was requested; the scene may have changed nevertheless.
     #[error("slipped: {because}")]
     Slipped {
-        /// Event, as far as the body felt it.
+        /// Description of the event, as felt by the body.
         because: String,
         /// Distance that the hand moved in contact with the object, metres.
         moved_m: f64,
     },
-    /// This body cannot do that at all (see [`Description`](crate::Description)).
+    /// This body lacks the ability (see [`Description`](crate::Description)).
     #[error("not able to: {because}")]
     Unable {
         /// Missing part.
         because: String,
     },
-    /// The body is broken for good; nothing more can be asked of it.
+    /// The body has failed permanently; no further request is possible.
     #[error("broken: {because}")]
     Broken {
         /// Broken part.

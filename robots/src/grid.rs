@@ -1,4 +1,4 @@
-//! The room as cells that are free or not.
+//! Occupancy grid of the floor.
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ pub struct OccupancyGrid {
     pub width: usize,
     /// Cells along y.
     pub height: usize,
-    /// Row by row (x fastest); true where something stands.
+    /// Row by row (x fastest); true for occupied cells.
     pub occupied: Vec<bool>,
 }
 
@@ -42,7 +42,7 @@ impl OccupancyGrid {
         )
     }
 
-    /// True if something stands there; everything outside is occupied.
+    /// True for an occupied cell, and for every point outside the grid.
     pub fn is_occupied(&self, p: &Point2<f64>) -> bool {
         self.cell(p).is_none_or(|(c, r)| self.occupied[r * self.width + c])
     }
@@ -52,7 +52,7 @@ impl OccupancyGrid {
         self.occupy_in([(0, self.width), (0, self.height)], inside);
     }
 
-    /// Marks the cells whose centres satisfy `inside`, which none does that is farther than `reach_m` from `middle`.
+    /// Marks the cells whose centres satisfy `inside`, all of which lie within `reach_m` of `middle`.
     pub fn occupy_near(&mut self, middle: &Point2<f64>, reach_m: f64, inside: impl Fn(&Point2<f64>) -> bool) {
         let span = |k: usize, size: usize| {
             let at = |p: f64| ((p - self.origin_m[k]) / self.resolution_m).clamp(0.0, size as f64);

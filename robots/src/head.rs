@@ -1,4 +1,4 @@
-//! The head that turns the camera: pan about the base's z, then tilt.
+//! Kinematics of the head that turns the camera: pan about the base's z, then tilt.
 
 use crate::parts::Head;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -6,13 +6,14 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 /// Direction of the head, in the base frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gaze {
-    /// Counter-clockwise from the base's x.
+    /// Pan angle, counter-clockwise from the base's x.
     pub pan_rad: f64,
-    /// Downwards from level.
+    /// Tilt angle, downwards from horizontal.
     pub tilt_rad: f64,
 }
 
-/// The gaze towards a point in the base frame, within the head's limits, and by what angle the line of sight misses it.
+/// The gaze towards a point in the base frame, within the head's limits, and the remaining angle between line
+/// of sight and point, radians.
 pub fn aim(head: &Head, base_point: &Point3<f64>) -> (Gaze, f64) {
     let line = base_point - head.base_from_head;
     if line.norm() < 1e-9 {
@@ -45,7 +46,8 @@ pub fn base_from_camera(head: &Head, gaze: &Gaze) -> Isometry3<f64> {
     )
 }
 
-/// `map_from_camera` for a base at `map_from_base` whose head looks towards a point in the map; straight ahead and level if `None`.
+/// `map_from_camera` for a base at `map_from_base` with the head turned towards a point in the map; straight
+/// ahead and horizontal if `None`.
 pub fn camera_towards(
     head: &Head,
     map_from_base: &Isometry3<f64>,

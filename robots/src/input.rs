@@ -1,4 +1,4 @@
-//! A mistake in a file that a person wrote or recorded: where, what was expected, how to mend it.
+//! Errors in files that people write: the place, the expectation, and a fix.
 
 use serde::de::DeserializeOwned;
 use std::fs::{File, FileType};
@@ -12,24 +12,24 @@ use toml::de::{DeTable, DeValue};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.drawn())]
 pub struct InputError {
-    /// The file or folder, as it was given.
+    /// The file or folder, as given.
     pub file: String,
-    /// Line, from 1; 0 if the mistake is not in one line.
+    /// Line, from 1; 0 for an error of the whole file.
     pub line: usize,
     /// Column in characters, from 1; 0 with `line` 0.
     pub column: usize,
-    /// The line itself, as much of it as a person reads around the mistake.
+    /// The line, clipped around the error.
     pub excerpt: String,
-    /// Column of the mistake within the excerpt, in characters, from 1.
+    /// Column of the error within the excerpt, in characters, from 1.
     caret: usize,
     /// Found and expected values.
     pub problem: String,
-    /// Mend.
+    /// Suggested fix.
     pub mend: String,
 }
 
 impl InputError {
-    /// A mistake of the file as a whole.
+    /// An error of the whole file.
     pub fn whole(file: impl Into<String>, problem: impl Into<String>, mend: impl Into<String>) -> Self {
         InputError {
             file: file.into(),
@@ -42,7 +42,7 @@ impl InputError {
         }
     }
 
-    /// A mistake at a byte of the text.
+    /// An error at a byte offset of the text.
     pub fn at(
         file: &str,
         text: &str,
@@ -80,10 +80,10 @@ impl InputError {
     }
 }
 
-/// Most characters of a line that an error shows. From: chosen, twice the width of a terminal.
+/// Maximum length of an excerpt, characters. From: chosen, twice the width of a terminal.
 const EXCERPT: usize = 240;
 
-/// A line as an error shows it: the beginning, and a mark where more follows.
+/// Clips a line for an error, with a mark for the rest.
 pub fn clipped(line: &str) -> String {
     match line.char_indices().nth(EXCERPT) {
         Some((end, _)) => format!("{}…", &line[..end]),
@@ -91,13 +91,15 @@ pub fn clipped(line: &str) -> String {
     }
 }
 
-/// Bytes of the longest text that a person writes: a domain, a scene, settings. From: chosen.
+/// Maximum size of a text written by a person: a domain, a scene, settings, bytes. From: chosen.
 pub const MOST_TEXT_BYTES: u64 = 16 << 20;
 
-/// Reads a file of at most so many bytes. Named pipes, devices and sockets are refused before anything is awaited from them.
+/// Reads a file of at most `most` bytes. Named pipes, devices and sockets are refused without waiting for
+/// them.
 ///
 /// # Errors
-/// The system's, or the reason why it is not read.
+///
+/// The system's error, or the reason for the refusal.
 pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
@@ -115,10 +117,11 @@ pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text that a person wrote.
+/// Reads a text file.
 ///
 /// # Errors
-/// As [`read_bytes`], and if it is no UTF-8.
+///
+/// As [`read_bytes`], and if it is not UTF-8.
 pub fn read_text(path: &Path) -> std::io::Result<String> {
     String::from_utf8(read_bytes(path, MOST_TEXT_BYTES)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
@@ -126,7 +129,7 @@ pub fn read_text(path: &Path) -> std::io::Result<String> {
     })
 }
 
-/// Kind of what is no file, in words.
+/// Description of a file type other than a regular file.
 pub fn kind_of(file_type: FileType) -> &'static str {
     match file_type {
         kind if kind.is_dir() => "a folder",
@@ -146,18 +149,18 @@ pub enum Step {
     Index(usize),
 }
 
-/// A value that the format allows and the meaning does not.
+/// An invalid value in a well-formed document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Objection {
     /// Path in the document.
     pub path: Vec<Step>,
     /// Found and expected values.
     pub problem: String,
-    /// Mend.
+    /// Suggested fix.
     pub mend: String,
 }
 
-/// Reads a TOML text; mistakes of form are drawn under it.
+/// Parses TOML; syntax errors are drawn under the text.
 pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
@@ -181,7 +184,7 @@ fn mend_of(problem: &str) -> &'static str {
         .map_or("this is no TOML from here on", |(_, mend)| mend)
 }
 
-/// Draws an objection under the deepest part of its path that stands in the text.
+/// Draws an objection under the deepest part of its path that exists in the text.
 pub fn draw(file: &str, text: &str, objection: Objection) -> InputError {
     let span = span_of(text, &objection.path).unwrap_or(0..0);
     InputError::at(file, text, span.start, objection.problem, objection.mend)

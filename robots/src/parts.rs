@@ -1,21 +1,21 @@
-//! Parts of a body: base, head, arm with a hand, sensors, each of which may be missing.
+//! Parts of a body: base, head, arm with a hand, sensors, any of which may be missing.
 
 use crate::failure::Failure;
 use descry_perception::Intrinsics;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Parts and abilities of a body. Constant while it lives.
+/// Parts and abilities of a body, constant over its lifetime.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Description {
-    /// For people and records.
+    /// Name, for people and records.
     pub name: String,
     /// True if the world is simulated too.
     pub simulated: bool,
-    /// Base; `None` if the body stays at its one station.
+    /// Base; `None` if the body stays at its only station.
     pub base: Option<Base>,
-    /// Head that turns the camera; `None` if the camera looks where the base's pose says.
+    /// Head that turns the camera; `None` if the camera's direction follows the base's pose.
     pub head: Option<Head>,
     /// Arm that pushes and opens doors.
     pub arm: Option<Arm>,
@@ -23,12 +23,12 @@ pub struct Description {
     pub camera: Option<Camera>,
     /// The laser.
     pub laser: Option<Laser>,
-    /// Other sensors: what they say is read by the programs of a domain.
+    /// Other sensors, whose readings the programs of a domain interpret.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub senses: Vec<Sense>,
-    /// Names of frames that are no sensor's.
+    /// Names of the frames without a sensor.
     pub frames: Frames,
-    /// Direction of "up" in the map, if it is known.
+    /// Upward direction in the map frame, if known.
     pub up: Option<Vector3<f64>>,
     /// Standard deviation of localisation along each axis, metres.
     pub pose_sigma_m: f64,
@@ -36,7 +36,7 @@ pub struct Description {
     pub pose_sigma_rad: f64,
 }
 
-/// A part that a body may have.
+/// An optional part of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// [`Description::base`].
@@ -75,10 +75,11 @@ impl Description {
         }
     }
 
-    /// Refuses what needs a part that the body does not have.
+    /// Checks that the body has a part.
     ///
     /// # Errors
-    /// [`Failure::Unable`].
+    ///
+    /// [`Failure::Unable`] without it.
     pub fn need(&self, part: Part) -> Result<(), Failure> {
         if self.has(part) { Ok(()) } else { Err(self.lacks(part)) }
     }
@@ -98,28 +99,28 @@ impl Description {
         self.arm.as_ref()?.hand.as_ref()
     }
 
-    /// Reach of the arm from the base's middle, metres.
+    /// Reach of the arm from the base's centre, metres.
     pub fn reach_m(&self) -> Option<f64> {
         self.arm.as_ref().map(|arm| arm.reach_m)
     }
 
-    /// Duration of a straight drive, seconds, as [`Speeds::duration_s`]; none without a base.
+    /// Duration of a straight drive, seconds, as [`Speeds::duration_s`]; 0 without a base.
     pub fn duration_s(&self, distance_m: f64, turned_rad: f64) -> f64 {
         self.base.as_ref().map_or(0.0, |base| base.speeds.duration_s(distance_m, turned_rad))
     }
 
-    /// Radius of the base, metres; 0 if there is none.
+    /// Radius of the base, metres; 0 without one.
     pub fn radius_m(&self) -> f64 {
         self.base.as_ref().map_or(0.0, |base| base.footprint.radius_m())
     }
 }
 
-/// Base that drives.
+/// Mobile base.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Base {
     /// Outline on the floor.
     pub footprint: Footprint,
-    /// For costs and time limits.
+    /// Speeds, for costs and time limits.
     pub speeds: Speeds,
 }
 
@@ -129,18 +130,19 @@ pub struct Base {
 pub enum Footprint {
     /// A disc around the base's origin.
     Disc {
-        /// Metres.
+        /// Radius, metres.
         radius_m: f64,
     },
     /// Corners in order, metres.
     Polygon {
-        /// At least three.
+        /// The corners, at least three.
         corners_m: Vec<Point2<f64>>,
     },
 }
 
 impl Footprint {
-    /// Radius of the least disc around the base's origin that holds the footprint, metres: a base that turns anywhere needs this much room.
+    /// Radius of the smallest disc around the base's origin that contains the footprint, metres: the
+    /// clearance of a base at any heading.
     pub fn radius_m(&self) -> f64 {
         match self {
             Footprint::Disc { radius_m } => *radius_m,
@@ -152,14 +154,14 @@ impl Footprint {
 /// Speeds of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Speeds {
-    /// Along the ground, metres a second.
+    /// Driving speed, metres a second.
     pub linear_m_s: f64,
-    /// Turning on the spot, radians a second.
+    /// Speed of turning on the spot, radians a second.
     pub angular_rad_s: f64,
 }
 
 impl Speeds {
-    /// A body that is slower never arrives.
+    /// Minimum speeds; a slower body would never arrive.
     pub const LEAST: Speeds = Speeds { linear_m_s: 0.001, angular_rad_s: 0.0001 };
 
     /// Duration of a straight drive during which the base turns: max(ds/v, dθ/ω), seconds.
@@ -171,20 +173,20 @@ impl Speeds {
 /// The head that carries the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// Centre of rotation of the head, in the base frame, metres. The camera looks from there.
+    /// Centre of rotation of the head and position of the camera, base frame, metres.
     pub base_from_head: Point3<f64>,
-    /// Greatest turn to either side, radians.
+    /// Maximum pan to either side, radians.
     pub pan_limit_rad: f64,
-    /// Greatest turn down, radians.
+    /// Maximum tilt down, radians.
     pub tilt_down_rad: f64,
-    /// Greatest turn up, radians.
+    /// Maximum tilt up, radians.
     pub tilt_up_rad: f64,
 }
 
 /// An arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Arm {
-    /// Reach from the base's middle, metres.
+    /// Reach from the base's centre, metres.
     pub reach_m: f64,
     /// Gripper at its end; `None` if it only pushes.
     pub hand: Option<Gripper>,
@@ -193,7 +195,7 @@ pub struct Arm {
 /// A hand.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gripper {
-    /// The widest thing that it takes, metres.
+    /// Maximum width of a graspable object, metres.
     pub opening_m: f64,
 }
 
@@ -204,12 +206,12 @@ pub struct Camera {
     pub frame: String,
     /// Pixels, focal lengths and principal point.
     pub intrinsics: Intrinsics,
-    /// Least and greatest depth that it measures, metres.
+    /// Minimum and maximum depth, metres.
     pub range_m: (f64, f64),
     /// True if frames may have a colour image.
     pub colour: bool,
-    /// Longest time by which a frame's stamp may lie before the request for it, seconds: drivers with a buffer answer with a frame
-    /// that is there already.
+    /// Maximum time by which a frame's stamp may precede its request, seconds: drivers with a buffer return
+    /// an existing frame.
     #[serde(default)]
     pub latency_s: f64,
 }
@@ -226,7 +228,7 @@ impl Camera {
     }
 }
 
-/// A laser that sweeps in a plane level with the floor.
+/// A laser that sweeps in a horizontal plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Laser {
     /// Name of its frame, x straight ahead.
@@ -239,21 +241,21 @@ pub struct Laser {
     pub step_rad: f64,
     /// Readings in a sweep.
     pub readings: usize,
-    /// Nothing farther returns, metres.
+    /// Maximum range, metres.
     pub reach_m: f64,
 }
 
-/// A sensor that is neither camera nor laser: a reader of labels, a microphone, a switch in the hand.
+/// A sensor other than camera and laser: a label reader, a microphone, a switch in the hand.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sense {
-    /// As people and domains call it: `label reader`.
+    /// Name for people and domains: `label reader`.
     pub name: String,
-    /// Meaning and form of its readings, in a line; the record has it beside each reading.
+    /// One line on the meaning and form of its readings, stored with each reading in the record.
     pub about: String,
 }
 
-/// Names of the frames in transforms that are no sensor's.
+/// Names of the frames without a sensor.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Frames {
     /// The room.

@@ -10,7 +10,7 @@ use descry_perception::{Cloud, Intrinsics};
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 
-/// Something that a body was asked to do.
+/// A request to a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Request {
@@ -39,7 +39,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Its name in the protocol of programs.
+    /// Name of the request in the protocol of programs.
     pub fn name(&self) -> &'static str {
         match self {
             Request::Pose => "pose",
@@ -56,8 +56,8 @@ impl Request {
         }
     }
 
-    /// The part without which a body is unable to do it, if it takes one that may be missing. (A drive to where the body stands
-    /// takes no base, a door may open itself, and which senses there are the body says by name.)
+    /// The optional part that the request needs, if any. (A drive to the current place needs no base, a door
+    /// may open itself, and custom sensors are checked by name.)
     pub fn needs(&self) -> Option<Part> {
         match self {
             Request::Pose | Request::DriveTo(_) | Request::Read(_) | Request::OpenDoor(_) => None,
@@ -68,7 +68,7 @@ impl Request {
         }
     }
 
-    /// Asks a body to do it. A frame's pixels come apart.
+    /// Sends the request to a body. The pixels of a frame are returned separately.
     pub async fn ask(&self, body: &dyn Robot, watch: &Watch<'_>) -> (Answer, Option<Sensed>) {
         let answer = match self {
             Request::Pose => body.pose().await.map(Answer::Pose),
@@ -134,11 +134,11 @@ pub enum Answer {
     Placed(Placed),
     /// To [`Request::Hand`].
     Hand(Hand),
-    /// It could not be done.
+    /// The request failed.
     Failed(Failure),
 }
 
-/// A frame without its pixels, which are kept apart.
+/// A frame without its pixels, which are stored separately.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
     /// See [`Sensed::stamp_ns`].
@@ -156,7 +156,7 @@ pub struct Exposure {
 }
 
 impl Answer {
-    /// The same on a clock that is so much ahead.
+    /// Shifts the time stamps of the answer by `by_ns`.
     pub(crate) fn later(mut self, by_ns: Stamp) -> Self {
         match &mut self {
             Answer::Pose(pose) => pose.stamp_ns += by_ns,
@@ -186,7 +186,7 @@ impl Answer {
 }
 
 impl Exposure {
-    /// All of a frame but its pixels.
+    /// Takes everything but the pixels from a frame.
     pub fn of(sensed: &Sensed) -> Self {
         Exposure {
             stamp_ns: sensed.stamp_ns,
@@ -198,7 +198,7 @@ impl Exposure {
         }
     }
 
-    /// The frame with its pixels.
+    /// Completes the frame with its pixels.
     pub fn with(self, pixels: Pixels) -> Sensed {
         Sensed {
             stamp_ns: self.stamp_ns,
@@ -219,6 +219,6 @@ impl Exposure {
 pub struct Pixels {
     /// Organised, in the optical frame, metres; NaN is "no return".
     pub cloud: Cloud,
-    /// If the camera has colour.
+    /// Colour image, if the camera has colour.
     pub colour: Option<Colour>,
 }

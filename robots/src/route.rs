@@ -1,9 +1,10 @@
 //! Routes of a body on its map, and their cost.
 //!
-//! The map is inflated by the footprint. Shortest any-angle routes bend only at convex corners of what is blocked, so the search runs
-//! on those corners (a visibility graph, Lozano-Pérez and Wesley 1979) and a pair of poses costs a few lines of sight. Duration after
-//! TFD/M's navigation module: Σ max(ds/v, dθ/ω) over the steps of the route, where a base that turns on the spot makes each turn and
-//! each straight line a step of its own.
+//! The map is inflated by the footprint. Shortest any-angle routes bend only at convex corners of obstacles,
+//! so the search runs on those corners (a visibility graph, Lozano-Pérez and Wesley 1979), and a pair of
+//! poses costs a few lines of sight. Duration after TFD/M's navigation module: Σ max(ds/v, dθ/ω) over the
+//! steps of the route, where a base that turns on the spot makes each turn and each straight line a separate
+//! step.
 
 use crate::body::{Pose2, Travel};
 use crate::failure::Failure;
@@ -15,31 +16,32 @@ use std::collections::{BTreeMap, HashMap};
 use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// Farthest that a start inside the inflated zone is moved to free floor, metres: localisation may well say that a base which stands
-/// beside a table stands in it.
+/// Maximum distance by which a start inside the inflated zone is moved to free floor, metres: localisation
+/// may place a base beside a table within it.
 const START_SLACK_M: f64 = 0.35;
 
-/// Sums of lengths along a route may fall short of the straight line by this share.
+/// Relative tolerance by which summed lengths may fall short of the straight line.
 const ROUNDING: f64 = 1e-9;
-/// Points whose lines of sight are kept; beyond that all are found anew.
+/// Maximum number of points with cached lines of sight; the cache is cleared beyond that.
 const MOST_ACCESSES: usize = 4096;
-/// Pairs of poses whose ways are kept; beyond that all are found anew.
+/// Maximum number of pose pairs with cached routes; the cache is cleared beyond that.
 const MOST_WAYS: usize = 1 << 20;
 
 /// The bits of the coordinates and the heading of a pose.
 type PoseBits = [u64; 3];
 
-/// A way to go.
+/// A route with its cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
-    /// From the start to the goal, both included; straight lines between, turns on the spot at each.
+    /// Waypoints from the start to the goal, both included; straight lines between, turns on the spot at
+    /// each.
     pub points_m: Vec<Point2<f64>>,
-    /// Cost, the turns at both ends included.
+    /// Cost, including the turns at both ends.
     pub travel: Travel,
 }
 
-/// Answers questions about routes on one map for one footprint. Distances between corners, and which corners a point sees, are computed
-/// once, when first needed.
+/// Route queries on one map for one footprint. Distances between corners, and the corners visible from a
+/// point, are computed once on demand.
 #[derive(Debug)]
 pub struct Router {
     blocked: OccupancyGrid,
@@ -49,13 +51,13 @@ pub struct Router {
     corners: Vec<Point2<f64>>,
     seen: Vec<OnceLock<Vec<u32>>>,
     rows: Vec<OnceLock<Vec<Option<Leg>>>>,
-    /// Accesses by the bits of the coordinates.
+    /// Cached accesses by the bits of the coordinates.
     accesses: Mutex<BTreeMap<[u64; 2], Arc<Access>>>,
-    /// What going from one pose to another takes, found once a map; none where no way leads.
+    /// Cached costs between poses; none where there is no route.
     ways: Mutex<HashMap<(PoseBits, PoseBits), Option<(Travel, Via)>>>,
 }
 
-/// The shortest route from one corner to another: what the search for a pair of poses needs of it.
+/// The shortest route from one corner to another, reduced to what the search for a pair of poses needs.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
     distance_m: f64,
@@ -65,7 +67,7 @@ struct Leg {
     previous: u32,
 }
 
-/// Access of a pose to the corners: straight lines to those that it sees.
+/// Access of a pose to the corners: straight lines to the visible ones.
 #[derive(Debug)]
 struct Access {
     point: Point2<f64>,
@@ -80,7 +82,7 @@ enum Via {
 }
 
 impl Router {
-    /// Inflates the map by `radius_m` (footprint and safety margin) and finds the corners of what is left.
+    /// Inflates the map by `radius_m` (footprint and safety margin) and finds its convex corners.
     pub fn new(map: &OccupancyGrid, radius_m: f64, speeds: Speeds) -> Self {
         let blocked = inflate(map, radius_m);
         let corners = convex_corners(&blocked);
@@ -102,15 +104,16 @@ impl Router {
         &self.blocked
     }
 
-    /// The map that it was made from.
+    /// The original map.
     pub fn map(&self) -> &OccupancyGrid {
         &self.map
     }
 
-    /// Checks that the base can stand there.
+    /// Checks that the base can stand at a point.
     ///
     /// # Errors
-    /// [`Failure::Unreachable`] that names what is in the way.
+    ///
+    /// [`Failure::Unreachable`] with the obstacle.
     pub fn fits(&self, p: &Point2<f64>) -> Result<(), Failure> {
         if !(p.x.is_finite() && p.y.is_finite()) {
             return Err(unreachable(format!("({}, {}) is no place", p.x, p.y)));
@@ -165,9 +168,10 @@ impl Router {
         poses.iter().map(|from| row(from, &self.start_access(from))).collect()
     }
 
-    /// The way itself.
+    /// The route with its waypoints.
     ///
     /// # Errors
+    ///
     /// [`Failure::Unreachable`] with the reason.
     pub fn route(&self, from: &Pose2, to: &Pose2) -> Result<Route, Failure> {
         let start = self.start_access(from)?;
@@ -244,7 +248,7 @@ impl Router {
         best.map(|(_, centre)| centre)
     }
 
-    /// The quickest way between two poses, looked up where it is known.
+    /// The quickest route between two poses, cached.
     fn best(&self, from: &Pose2, start: &Access, to: &Pose2, end: &Access) -> Result<(Travel, Via), Failure> {
         let key = (bits(from), bits(to));
         let known = self.known_ways().get(&key).copied();
@@ -303,8 +307,8 @@ impl Router {
         self.best_bent(heading_rad, start, to.yaw_rad, end, total)
     }
 
-    /// The quickest way around corners, `total` of metres and radians; of those that take the same the one whose corners come first.
-    /// Corners are asked by what they take at least, and not at all once that is more than the best.
+    /// The quickest route around corners; `total` is the cost of metres and radians, and ties go to the first
+    /// corners. Corners are tried in the order of a lower bound on their cost, until it exceeds the best.
     fn best_bent(
         &self,
         heading_rad: f64,
@@ -362,7 +366,7 @@ impl Router {
         })
     }
 
-    /// Shortest routes from one corner to every other.
+    /// Shortest routes from one corner to all others.
     fn row(&self, from: u32) -> &[Option<Leg>] {
         self.rows[from as usize].get_or_init(|| {
             let micrometres = |a: u32, b: u32| {
@@ -476,7 +480,7 @@ fn unreachable(because: String) -> Failure {
     Failure::Unreachable { because }
 }
 
-/// Least angle between two headings, 0 to π.
+/// Absolute angle between two headings, 0 to π.
 pub fn turn(from_rad: f64, to_rad: f64) -> f64 {
     let full = std::f64::consts::TAU;
     let d = (to_rad - from_rad).rem_euclid(full);
@@ -521,7 +525,8 @@ fn inflate(map: &OccupancyGrid, radius_m: f64) -> OccupancyGrid {
     blocked
 }
 
-/// Centres of the free cells that touch a blocked one with a corner only: where shortest routes bend.
+/// Convex corners of the obstacles, where shortest routes bend: centres of the free cells that touch a
+/// blocked one with a corner only.
 fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
     let mut corners = Vec::new();
     for row in 0..blocked.height as i64 {
@@ -540,7 +545,7 @@ fn convex_corners(blocked: &OccupancyGrid) -> Vec<Point2<f64>> {
     corners
 }
 
-/// Centre of the occupied cell nearest to a point within `reach_m`, and how far its side is, metres.
+/// Centre of the occupied cell nearest to a point within `reach_m`, and the distance to its side, metres.
 fn nearest_occupied(map: &OccupancyGrid, p: &Point2<f64>, reach_m: f64) -> Option<(Point2<f64>, f64)> {
     let half_m = 0.5 * map.resolution_m;
     let cells = (reach_m / map.resolution_m).ceil() as usize + 1;

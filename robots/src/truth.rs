@@ -1,5 +1,4 @@
-//! True state of a scene, as a simulator states it: for scoring and reports only. No decision may
-//! read it.
+//! Ground truth of a scene from a simulator, for scoring and reports only. No decision may read it.
 
 use crate::body::{Pose2, Stamp};
 use nalgebra::{Isometry3, Point3};
@@ -9,74 +8,75 @@ use std::path::Path;
 /// The true state of a scene at one time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
     /// Pose of the base.
     pub base: Pose2,
-    /// Every object of the scene, in the order of the scene file; then the obstacles that the map does not show.
+    /// All objects, in the order of the scene file, then the obstacles missing in the map.
     pub objects: Vec<TrueObject>,
-    /// Every door, in the order of the scene file.
+    /// All doors, in the order of the scene file.
     #[serde(default)]
     pub doors: Vec<TrueDoor>,
-    /// Name of the object that the arrangement was chosen for.
+    /// Name of the target of the arrangement.
     #[serde(default)]
     pub target: Option<String>,
-    /// Share of it that the camera saw from the start.
+    /// Share of the target visible from the start.
     #[serde(default)]
     pub target_visible_from_start: Option<f64>,
-    /// Faults and others' deeds so far.
+    /// Faults and actions of others so far.
     #[serde(default)]
     pub events: Vec<Event>,
 }
 
-/// An object as it really is.
+/// True state of an object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrueObject {
     /// Unique in the scene.
     pub name: String,
     /// Kind.
     pub kind: String,
-    /// The surface it stands on; none in the hand, on the floor or taken away.
+    /// The surface of the object; none in the hand, on the floor or taken away.
     pub surface: Option<String>,
-    /// The room it is in, if the scene names rooms; none once it has been taken away.
+    /// The room of the object, if the scene names rooms; none if taken away.
     #[serde(default)]
     pub room: Option<String>,
-    /// True while the body holds it.
+    /// True while it is held by the body.
     #[serde(default)]
     pub in_hand: bool,
     /// False once it has been taken away.
     pub present: bool,
     /// Pose of its base, in the map.
     pub map_from_object: Isometry3<f64>,
-    /// Middle of its body (a handle left out), in the map, metres.
+    /// Centre of its body without a handle, map frame, metres.
     pub centre_m: Point3<f64>,
-    /// Sides of the box around it in its own frame, a handle included, metres.
+    /// Size of its bounding box in its own frame, including a handle, metres.
     pub size_m: [f64; 3],
 }
 
-/// A door as it really is.
+/// True state of a door.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TrueDoor {
-    /// As people call it.
+    /// Name for people.
     pub name: String,
     /// True if it is shut.
     pub shut: bool,
 }
 
-/// Something that happened in the simulated room.
+/// An event in the simulated room.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
-    /// Event, in one sentence.
+    /// Description, in one sentence.
     pub what: String,
 }
 
 impl Truth {
-    /// Reads what a program's simulator has written, as `robots/PROTOCOL.md` says.
+    /// Reads the ground truth written by a program's simulator, in the format of `robots/PROTOCOL.md`.
     ///
     /// # Errors
-    /// Names the file, and what is wrong with it.
+    ///
+    /// The fault, with the name of the file.
     pub fn read(file: &Path) -> Result<Truth, String> {
         let place = file.display();
         let text = crate::input::read_text(file).map_err(|e| format!("{place}: {e}"))?;

@@ -1,4 +1,4 @@
-//! What bodies promise, from outside: one program, so that what all tests share is built and linked once.
+//! Integration tests of bodies, in one binary.
 
 mod camera;
 mod conformance;

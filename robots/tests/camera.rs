@@ -1,4 +1,5 @@
-//! The simulated camera: ideal frames against the geometry of the scene, noisy ones against the published figures.
+//! The simulated camera: ideal frames compared with the geometry of the scene, noisy ones with published
+//! figures.
 
 use descry_robots::head;
 use descry_robots::nalgebra::{Isometry3, Point3};
@@ -44,7 +45,7 @@ fn scene(seed: u64) -> Scene {
     arrange(&SceneSpec::parse("scene.toml", SCENE).unwrap(), seed).unwrap()
 }
 
-/// The camera on a ring around the table, looking at its middle.
+/// Pose of the camera on a ring around the table, looking at its centre.
 fn camera_pose(angle_rad: f64, radius_m: f64) -> Isometry3<f64> {
     let pose = Pose2::facing(radius_m * angle_rad.cos(), radius_m * angle_rad.sin(), &[0.0, 0.0].into());
     let head = body::HEAD;
@@ -60,7 +61,8 @@ fn picture(scene: &Scene, map_from_camera: &Isometry3<f64>, camera: &Intrinsics)
     render(&scene.room, &scene.solids(), map_from_camera, camera, 0)
 }
 
-/// How far inside the object's outer skin a point is, metres (roughly; below zero outside), the inside of cups taken as outside.
+/// Depth of a point below the object's surface, metres (approximate; negative outside); the cavity of a cup
+/// counts as outside.
 fn inside(o: &Object, map_point: &Point3<f64>) -> f64 {
     let p = o.map_from_object.inverse_transform_point(map_point);
     let ring = p.x.hypot(p.y);

@@ -1,4 +1,4 @@
-//! Every body of this crate keeps the promises of bodies, and a body that does not is found out.
+//! Every body of this crate passes the conformance test, and violations are detected.
 
 use crate::{folders, scenes};
 use descry_robots::conformance;
@@ -36,7 +36,7 @@ async fn a_real_recording_conforms() {
     conformance::check(&RecordedRobot::open(&path).unwrap()).await.unwrap();
 }
 
-/// A body that breaks one promise and keeps the others.
+/// A body that violates one promise and keeps the others.
 struct Liar {
     honest: SimRobot,
     lie: Lie,
@@ -152,7 +152,7 @@ impl Robot for Liar {
     }
 }
 
-/// Takes each pixel of a frame from elsewhere in it.
+/// Permutes the pixels of a frame.
 fn shuffle(sensed: &mut Sensed, from: impl Fn(usize, usize, (usize, usize)) -> (usize, usize)) {
     let size = (sensed.intrinsics.width, sensed.intrinsics.height);
     let moved = |pixel: usize| {

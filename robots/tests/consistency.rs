@@ -1,4 +1,4 @@
-//! Looks of cameras and bodies that lie, held against the map; and of honest ones.
+//! Views of wrong cameras and bodies compared with the map, and of correct ones.
 
 use crate::scenes::on_a_table;
 use descry_perception::consistency::{Fault, Inconsistency, MapSurface, judge};
@@ -29,7 +29,7 @@ fn table() -> (Scene, MapSurface) {
     (scene, map)
 }
 
-/// A pose that looks from one point at another.
+/// A camera pose at one point, looking at another.
 fn towards(eye: Point3<f64>, at: Point3<f64>) -> Isometry3<f64> {
     let forward = (at - eye).normalize();
     let right = forward.cross(&Vector3::z()).normalize();
@@ -38,7 +38,7 @@ fn towards(eye: Point3<f64>, at: Point3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(eye.coords), turn)
 }
 
-/// What cameras all around the table see of it: depths, and true poses.
+/// Depths and true poses of cameras all around the table.
 fn looks(scene: &Scene, middle: Point3<f64>) -> Vec<(Vec<f32>, Isometry3<f64>)> {
     let look = |n: usize| {
         let angle = std::f64::consts::TAU * (n as f64 + 0.3) / LOOKS as f64;
@@ -49,7 +49,7 @@ fn looks(scene: &Scene, middle: Point3<f64>) -> Vec<(Vec<f32>, Isometry3<f64>)> 
     (0..LOOKS).map(look).collect()
 }
 
-/// A camera and a body, as they say they are.
+/// Claims of a camera and a body about themselves.
 #[derive(Clone, Copy)]
 struct Claims {
     depth: f32,

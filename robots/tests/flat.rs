@@ -1,4 +1,4 @@
-//! A flat: rooms, walls and doors, boards, a hand that carries, and what can go wrong there.
+//! A flat: rooms, walls and doors, boards, a hand, and faults.
 
 use descry_robots::conformance;
 use descry_robots::nalgebra::{Point2, Point3};
@@ -90,7 +90,7 @@ async fn drive(robot: &SimRobot, place: &Place) -> Result<(), Failure> {
     robot.drive_to(place, &Watch::default()).await.map(|_| ())
 }
 
-/// Opens a door however often the hand slips.
+/// Opens a door, retrying after slips.
 async fn open(robot: &SimRobot, door: &str) {
     for _ in 0..20 {
         match robot.open_door(door, &Watch::default()).await {
@@ -191,7 +191,7 @@ fn the_map_knows_rooms_doors_and_surfaces() {
     assert!(robot.truth().doors.iter().all(|d| d.shut), "the truth is another matter");
 }
 
-/// A shut door fills its opening in the picture, an open one lets the view through.
+/// A shut door fills its opening in the image, an open one is transparent.
 #[tokio::test]
 async fn doors_and_boards_are_seen() {
     for (text, range_m) in [(FLAT.to_string(), 5.0..6.0), (both_shut(), 1.3..1.5)] {

@@ -1,4 +1,4 @@
-//! The flat of the built-in domain, whatever the seed.
+//! The flat of the built-in domain, for any seed.
 
 use descry_robots::Pose2;
 use descry_robots::nalgebra::Point2;
@@ -16,7 +16,7 @@ fn router(scene: &Scene) -> Router {
     Router::new(&scene.map(), RADIUS_M + SAFETY_M, SPEEDS)
 }
 
-/// Poses at least a metre apart around a surface from which a body can look at it, reachable with every door open.
+/// Reachable viewpoints of a surface, at least a metre apart, with every door open.
 fn stands(scene: &Scene, router: &Router, centre: &Point2<f64>) -> Vec<Pose2> {
     let mut found: Vec<Pose2> = Vec::new();
     for ring in 0..8 {

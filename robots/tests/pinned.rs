@@ -1,4 +1,4 @@
-//! What seeds made of the scenes of the tabletop stays what it is: arrangements and frames, to the bit.
+//! Regression test: arrangements and frames of the tabletop scenes are fixed for their seeds, bit by bit.
 
 use descry_robots::nalgebra::Point3;
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};

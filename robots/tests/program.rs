@@ -1,4 +1,4 @@
-//! Programs as bodies: the template conforms; whatever a program does that it must not is a failure with its reason.
+//! Programs as bodies: the template conforms, and every violation is a failure with its reason.
 
 use descry_robots::conformance;
 use descry_robots::nalgebra::{Point3, Vector2};
@@ -9,7 +9,7 @@ use descry_robots::{
 use std::path::Path;
 use std::time::Duration;
 
-/// Limits that a test can wait for.
+/// Limits short enough for tests.
 const HURRIED: Limits = Limits {
     hello_s: 60.0,
     silence_s: 2.0,
@@ -37,7 +37,7 @@ fn far() -> Place {
     Place::Pose(Pose2::new(-2.0, 1.5, 1.0))
 }
 
-/// A program that has been started by somebody else.
+/// A program started externally.
 struct Elsewhere(std::process::Child);
 
 impl Drop for Elsewhere {
@@ -47,7 +47,7 @@ impl Drop for Elsewhere {
     }
 }
 
-/// Starts a Python file that listens there, and connects once it does.
+/// Starts a Python file that listens at an address, and connects once it does.
 fn reached(
     file: &str,
     what: &[&str],
@@ -100,7 +100,7 @@ fn where_nobody_listens_the_reason_says_so() {
     check("robot", "expected HOST:PORT");
 }
 
-/// The same over a socket as over pipes, but that nothing is known of how a program ended.
+/// A socket gives the same failures as pipes, without the exit status of the program.
 #[tokio::test]
 async fn a_rogue_program_on_a_socket_is_a_failure_with_its_reason() {
     if !has_python() {
@@ -145,7 +145,7 @@ async fn the_template_conforms() {
     conformance::check(&robot).await.unwrap();
 }
 
-/// A program that cannot be a robot is refused, and the reason holds these words.
+/// Checks that an invalid program is refused, with these words in the reason.
 fn check_refused(what: &str, words: &[&str]) {
     let limits = Limits { hello_s: if what == "no hello" { 0.5 } else { 60.0 }, ..HURRIED };
     let failure =
@@ -186,7 +186,7 @@ fn what_is_no_robot_is_refused_with_the_reason() {
     check_refused("no map", &["neither a map nor stations"]);
 }
 
-/// What a program does when it is asked; the kind of failure that comes of it, and what the reason says.
+/// Checks the kind of failure, and words of its reason, for a misbehaving program.
 async fn check_rogue(what: &str, kind: &str, words: &[&str]) {
     check_rogue_body(&ProgramRobot::start(&rogue(what), HURRIED).unwrap(), what, kind, words).await;
 }
@@ -252,7 +252,7 @@ async fn a_rogue_program_is_a_failure_with_its_reason() {
     check_rogue("sweep of yesterday", "broken", &["a sweep of -1 ns"]).await;
 }
 
-/// What a body does not have is refused with the reason, and its program never hears of it.
+/// Requests for missing parts fail with the reason, without reaching the program.
 #[tokio::test]
 async fn a_body_without_head_arm_and_laser_conforms_and_says_what_it_lacks() {
     if !has_python() {
@@ -279,7 +279,7 @@ async fn a_body_without_head_arm_and_laser_conforms_and_says_what_it_lacks() {
     assert!(robot.look_at(&behind, &watch).await.unwrap().miss_rad > 2.0);
 }
 
-/// A body whose part is not there conforms, and what takes the part is refused with the reason.
+/// Checks that a body without a part conforms, and that requests for the part fail with the reason.
 async fn check_without(what: &str, request: Request, part: &str) {
     let robot = ProgramRobot::start(&rogue(what), HURRIED).unwrap();
     conformance::check(&robot).await.unwrap();
@@ -305,7 +305,7 @@ async fn every_part_may_be_missing() {
     assert_eq!(stays, [Ok(Travel { distance_m: 0.0, duration_s: 0.0 })]);
 }
 
-/// Any other sensor says what JSON can say, when it is read.
+/// A custom sensor returns any JSON value.
 #[tokio::test]
 async fn a_sense_is_read_by_its_name() {
     if !has_python() {
@@ -323,7 +323,7 @@ async fn a_sense_is_read_by_its_name() {
     assert!(failure.because().contains("a reading of"), "{failure}");
 }
 
-/// What a program may do: it answers, and what is asked next is answered too.
+/// Behaviour that is allowed: the program answers, and the next request is answered as well.
 #[tokio::test]
 async fn what_is_allowed_does_not_end_a_program() {
     if !has_python() {

@@ -1,4 +1,4 @@
-//! Reading recordings: what they hold, and what is said about those that are wrong.
+//! Reading of recordings: contents, and messages about faults.
 
 use crate::folders;
 use descry_robots::nalgebra::{Point3, Vector3};
@@ -53,7 +53,7 @@ async fn lists_are_read() {
     assert!(looked.miss_rad < 1e-6);
 }
 
-/// One thing done to a good folder, and the words that must be said about it.
+/// Checks the message for one fault in a valid folder.
 fn check_mistake(make: fn() -> tempfile::TempDir, spoil: &dyn Fn(&Path), line: usize, words: &[&str]) {
     let folder = make();
     spoil(folder.path());
@@ -123,7 +123,7 @@ fn mistakes_beside_frames_are_named() {
     check(&put("recording.toml", "folder = \"elsewhere\"\n"), 1, &["no folder", "elsewhere"]);
 }
 
-/// A surface in `recording.toml`, and the words that must be said about it.
+/// Checks the message for a surface in `recording.toml`.
 fn check_surface(outline: &str, height: &str, line: usize, words: &[&str]) {
     let text = format!("[[surface]]\nname = \"table\"\noutline_m = {outline}\nheight_m = {height}\n");
     let spoil = |folder: &Path| fs::write(folder.join("recording.toml"), &text).unwrap();

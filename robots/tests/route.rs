@@ -1,4 +1,4 @@
-//! Routes on drawn maps: where they lead, what they cost, why there is none.
+//! Routes on drawn maps: waypoints, costs, and reasons for having none.
 
 use descry_robots::nalgebra::Point2;
 use descry_robots::route::{Router, turn};
@@ -6,7 +6,7 @@ use descry_robots::{Failure, OccupancyGrid, Pose2, Speeds};
 
 const SPEEDS: Speeds = Speeds { linear_m_s: 0.5, angular_rad_s: 1.0 };
 
-/// One character a cell of 0.1 m, the first line on top; `#` is occupied.
+/// Parses a map, one character a cell of 0.1 m, the top row first; `#` is occupied.
 fn map(drawing: &[&str]) -> OccupancyGrid {
     let (width, height) = (drawing[0].len(), drawing.len());
     let mut grid = OccupancyGrid::covering(
@@ -63,7 +63,8 @@ fn around_a_table_is_the_shortest_way() {
     assert!(length >= 1.5);
 }
 
-/// Length of the shortest route over the eight neighbours of each cell: never shorter than the any-angle one.
+/// Length of the shortest route over the eight neighbours of each cell: an upper bound on the any-angle
+/// route.
 fn shortest_by_grid(router: &Router, from: &Pose2, to: &Pose2) -> f64 {
     let grid = router.blocked();
     let start = grid.cell(&from.point()).unwrap();

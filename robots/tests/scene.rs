@@ -1,4 +1,4 @@
-//! Scenes: mistakes in them, and what seeds make of them.
+//! Scenes: errors in them, and their arrangements by seeds.
 
 use crate::scenes::on_a_table;
 use descry_robots::Pose2;
@@ -80,7 +80,7 @@ fn scenes() -> Vec<(String, SceneSpec)> {
     files.iter().map(read).collect()
 }
 
-/// Is a point of the table, in the map, under the object?
+/// True if a point of the table, map frame, is under the object.
 fn covers(o: &Object, p: &Point3<f64>) -> bool {
     let q = o.map_from_object.inverse_transform_point(p);
     match &o.shape {
@@ -148,7 +148,7 @@ fn the_target_hides_from_the_start_and_not_from_everywhere() {
     }
 }
 
-/// Occlusion levels as experiments ask for them, in every scene that has something to hide behind.
+/// All occlusion levels of the experiments, in every scene with occluders.
 #[test]
 fn every_level_of_occlusion_can_be_arranged() {
     for (name, spec) in
@@ -192,7 +192,7 @@ fn a_target_can_be_left_out() {
     assert!(arrange(&spec, 1).unwrap().object("cup").is_none());
 }
 
-/// Two tables, and things that come, go and move.
+/// Two tables, with objects that appear, disappear and move.
 const VISITS: &str = "
 visits = 3
 [start]

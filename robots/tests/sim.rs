@@ -1,4 +1,4 @@
-//! The simulated body: driving and its errors, mishaps, pushing, and that a seed fixes it all.
+//! The simulated body: driving and its errors, faults, pushing, and determinism for a seed.
 
 use crate::scenes::on_a_table;
 use descry_robots::nalgebra::{Isometry3, Point3, Vector2};
@@ -33,7 +33,7 @@ async fn drive(robot: &SimRobot, place: &Place) -> Result<f64, Failure> {
     robot.drive_to(place, &Watch::default()).await.map(|d| d.distance_m)
 }
 
-/// Where the body is against where it believes to be, in its own frame.
+/// Error of the estimated pose, in the body's own frame.
 async fn error_of(robot: &SimRobot) -> Isometry3<f64> {
     robot.truth().base.isometry().inv_mul(&robot.pose().await.unwrap().map_from_base)
 }
@@ -60,7 +60,7 @@ async fn localisation_is_off_by_what_is_described() {
     assert!(mean_m.abs() < 0.005, "{mean_m} m on average");
 }
 
-/// The frame shows what is really there, while its chain says where the body believes to be.
+/// A frame shows the true scene, while its transforms give the estimated pose.
 #[tokio::test]
 async fn frames_show_the_truth_from_a_believed_pose() {
     let mut robot = robot_in(SCENE, 2, "");
@@ -112,7 +112,7 @@ async fn a_seed_fixes_a_run_to_the_bit() {
     assert!(run(3).await != run(4).await);
 }
 
-/// What a mishap does to two drives with a frame after each: `ok` or the kind of failure.
+/// Effect of a fault on two drives with a frame after each: `ok` or the kind of failure.
 #[tokio::test]
 async fn mishaps_happen_as_declared() {
     for (fault, expected) in [
@@ -206,7 +206,8 @@ async fn an_unknown_obstacle_stops_the_base_and_is_driven_around_then() {
     assert!((robot.truth().base.point() - nalgebra_point(0.3, 1.6)).norm() < 0.2);
 }
 
-/// What the base touches already holds it only in the direction of what it touches: it turns on the spot and drives away.
+/// An obstacle that the base touches stops only motion towards it: the base turns on the spot and drives
+/// away.
 #[tokio::test]
 async fn a_base_that_touches_an_obstacle_gets_away() {
     for seed in 0..20 {

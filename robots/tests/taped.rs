@@ -1,4 +1,4 @@
-//! A body on tape answers again what it answered, goes on where the tape ends, and says where it cannot.
+//! A taped body replays its answers, resumes at the end of the tape, and reports where it cannot.
 
 use crate::{folders, scenes};
 use descry_robots::Pixels;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-/// A tape in memory, through the text that a record would hold.
+/// A tape in memory, serialised as in a record.
 #[derive(Default)]
 struct Memory {
     entries: Mutex<Vec<String>>,
@@ -23,7 +23,7 @@ impl Memory {
         self.entries.lock().unwrap().iter().map(|text| serde_json::from_str(text).unwrap()).collect()
     }
 
-    /// An empty tape that has the pixels of this one.
+    /// An empty tape with the pixels of this one.
     fn with_pixels_alone(&self) -> Memory {
         Memory { pixels: Mutex::new(self.pixels.lock().unwrap().clone()), ..Memory::default() }
     }
@@ -45,7 +45,7 @@ impl Tape for Memory {
     }
 }
 
-/// The second frame does not come: failures are answers, too.
+/// A simulated body that loses its second frame, since failures are answers as well.
 fn simulated(seed: u64) -> Arc<dyn Robot> {
     let scene = scenes::cup_on_a_table(5);
     let text = "[[fault]]\nkind = \"dropped_frame\"\nat = 2\n";
@@ -53,12 +53,12 @@ fn simulated(seed: u64) -> Arc<dyn Robot> {
     Arc::new(SimRobot::new(scene, SimOptions { seed, faults, ..SimOptions::default() }))
 }
 
-/// Frames of a few pixels; there is no fourth one.
+/// A recorded body with frames of a few pixels, and no fourth one.
 fn recorded(folder: &Path) -> Arc<dyn Robot> {
     Arc::new(RecordedRobot::open(folder).unwrap())
 }
 
-/// The drive and the look of a step: where a body can stand at stations only, to its stations and one that it does not have.
+/// The drive and the look of a step; for a body with stations, to its stations and one that does not exist.
 fn step(robot: &dyn Robot, n: usize) -> (Place, Point3<f64>) {
     let place = match robot.stations() {
         None => Place::Pose(Pose2::new(-2.0 + 0.1 * n as f64, 0.3, 0.0)),
@@ -67,7 +67,7 @@ fn step(robot: &dyn Robot, n: usize) -> (Place, Point3<f64>) {
     (place, Point3::new(0.0, 0.1 * n as f64, 0.7))
 }
 
-/// Drives, looks and takes frames; says all that it was told, as text.
+/// Drives, looks and takes frames; returns all answers as text.
 async fn tour(robot: &dyn Robot, tape: &Memory, steps: std::ops::Range<usize>) -> Vec<String> {
     let mut told = vec![format!("{:?}", robot.pose().await)];
     let watch = Watch::default();
@@ -108,7 +108,7 @@ async fn a_run_goes_on_where_its_tape_ends() {
     }
 }
 
-/// Cut anywhere, a run on a recording comes to the same answers and the same tape.
+/// Checks that a run on a recording, cut anywhere, comes to the same answers and the same tape.
 async fn check_goes_on(folder: &Path) {
     let tape = Arc::new(Memory::default());
     let whole = TapedRobot::begin(recorded(folder), tape.clone());

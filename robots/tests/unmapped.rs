@@ -1,4 +1,4 @@
-//! A body in a scene that it has no map of: it knows nothing, and walls and tables stop it.
+//! A body in a scene without a map: it knows nothing, and walls and tables stop it.
 
 use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::{Failure, Place, Pose2, Robot, Watch};

@@ -1,21 +1,21 @@
-//! Places: poses on the floor, and stations that a body knows by name.
+//! Places: poses on the floor, and named stations.
 
 use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// A pose on the floor, in the map.
+/// Planar pose in the map frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
-    /// Metres.
+    /// Position along x, metres.
     pub x_m: f64,
-    /// Metres.
+    /// Position along y, metres.
     pub y_m: f64,
-    /// Heading, counter-clockwise from the map's x.
+    /// Heading, counter-clockwise from the map's x, radians.
     pub yaw_rad: f64,
 }
 
 impl Pose2 {
-    /// A pose on the floor.
+    /// Creates a pose.
     pub fn new(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
         Pose2 { x_m, y_m, yaw_rad }
     }
@@ -30,7 +30,7 @@ impl Pose2 {
         Point2::new(self.x_m, self.y_m)
     }
 
-    /// The same in space: z is zero, upright.
+    /// The pose in space: z is zero, upright.
     pub fn isometry(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.x_m, self.y_m, 0.0),
@@ -38,7 +38,7 @@ impl Pose2 {
         )
     }
 
-    /// The pose in space laid on the floor: height, roll and pitch are dropped.
+    /// Projects a pose onto the floor: height, roll and pitch are dropped.
     pub fn from_isometry(map_from_base: &Isometry3<f64>) -> Self {
         let forward = map_from_base.rotation * Vector3::x();
         let at = map_from_base.translation.vector;
@@ -46,7 +46,7 @@ impl Pose2 {
     }
 }
 
-/// Somewhere a body can be asked to go.
+/// A destination for a body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {

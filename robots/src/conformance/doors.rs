@@ -1,4 +1,4 @@
-//! Promises of bodies that know doors.
+//! Conformance of bodies with doors in their map.
 
 use super::{Breach, done, ensure, places};
 use crate::body::{CancellationToken, Place, Pose2, Robot, Watch};
@@ -7,7 +7,7 @@ use nalgebra::Vector2;
 
 /// Distance of the base from the middle of a door to open it, metres.
 const BEFORE_M: f64 = 0.7;
-/// Hands slip now and then, not always.
+/// Maximum number of tries, as hands may slip.
 const TRIES: usize = 8;
 
 pub(super) async fn check_doors(robot: &dyn Robot) -> Result<(), Breach> {
@@ -45,7 +45,7 @@ fn check_map(robot: &dyn Robot) -> Result<(), Breach> {
     Ok(())
 }
 
-/// With doors shut no way is shorter.
+/// Checks that shut doors make no route shorter.
 async fn check_shut_routes(robot: &dyn Robot) -> Result<(), Breach> {
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     let to = places(robot);

@@ -1,4 +1,4 @@
-//! Promises of bodies with a hand, and of those without.
+//! Conformance of bodies with a hand, and of those without.
 
 use super::{Breach, done, ensure};
 use crate::body::{CancellationToken, Grasp, Place, Placing, Robot, Watch};
@@ -6,12 +6,12 @@ use crate::failure::Failure;
 use crate::parts::Gripper;
 use nalgebra::Point3;
 
-/// Hands slip now and then, not always.
+/// Maximum number of tries, as hands may slip.
 const TRIES: usize = 8;
 /// Point without anything to grasp, in the base frame, metres.
 const THIN_AIR: [f64; 3] = [0.5, 0.0, 1.9];
 
-/// The hand is empty before and after.
+/// Checks the hand, which must be empty; it is empty again afterwards.
 pub(super) async fn check_hand(robot: &dyn Robot) -> Result<(), Breach> {
     let watch = Watch::default();
     let estimate = done(robot.pose().await, "a body knows where it is")?;
@@ -62,10 +62,12 @@ async fn feels(robot: &dyn Robot, holds: bool) -> Result<(), Breach> {
     ensure(hand.holds == holds, "a hand feels whether it holds something", || format!("{hand:?}"))
 }
 
-/// Runs the checks that need an object: from `stand` the body can grasp it, and put it down free at `placing`.
+/// Runs the checks that need an object: from `stand` the body can grasp it, and put it down freely at
+/// `placing`.
 ///
 /// # Errors
-/// The first promise that is not kept, and how.
+///
+/// The first violated promise, with the observation.
 pub async fn check_carrying(
     robot: &dyn Robot,
     stand: &Place,

@@ -1,4 +1,4 @@
-//! Promises of a body with a laser; a body without one says so.
+//! Conformance of bodies with a laser, and of those without.
 
 use super::{Breach, ROUNDING, done, ensure, gap};
 use crate::body::{CancellationToken, Pose2, Robot, Scanned, Watch};

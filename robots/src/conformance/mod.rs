@@ -1,7 +1,8 @@
-//! Conformance test: the promises of every body, for the tests of any implementation of [`Robot`].
+//! Conformance test for any implementation of [`Robot`]: the promises of every body.
 //!
-//! The body is driven, looks, takes frames and sweeps its laser; it needs one place besides its own that it can reach, open doors, an empty hand, and no
-//! mishaps. [`check_carrying`] is for bodies with a hand and needs to be told of an object.
+//! The body is driven, looks, takes frames and sweeps its laser; it needs one reachable place besides its
+//! own, open doors, an empty hand, and no faults. [`check_carrying`] is for bodies with a hand and needs an
+//! object.
 
 mod doors;
 mod hand;
@@ -20,7 +21,7 @@ use nalgebra::{Isometry3, Point3, Vector2};
 use std::pin::Pin;
 use std::sync::Mutex;
 
-/// A promise that a body did not keep.
+/// A violated promise.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{promise}: {found}")]
 pub struct Breach {
@@ -30,16 +31,17 @@ pub struct Breach {
     pub found: String,
 }
 
-/// All promises that a body did not keep, in the order of the checks.
+/// All violated promises, in the order of the checks.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
 pub struct Breaches(pub Vec<Breach>);
 
-/// Transforms that should be equal may differ by this much (rounding), metres and radians.
+/// Tolerance on transforms that should be equal, for rounding, metres and radians.
 const ROUNDING: f64 = 1e-6;
-/// A body that has arrived believes to be this near to its goal, in standard deviations of its localisation.
+/// Maximum distance of the estimated pose from the goal after a drive, in standard deviations of the
+/// localisation.
 const ARRIVED_SIGMAS: f64 = 5.0;
-/// Free places of the map that are asked for routes.
+/// Number of free places of the map used for route queries.
 const PLACES: usize = 40;
 
 fn ensure(holds: bool, promise: &'static str, found: impl FnOnce() -> String) -> Result<(), Breach> {
@@ -50,12 +52,12 @@ fn done<T>(answer: Result<T, Failure>, promise: &'static str) -> Result<T, Breac
     answer.map_err(|f| Breach { promise, found: f.to_string() })
 }
 
-/// A check that is under way.
+/// A running check.
 type Checking<'a> = Pin<Box<dyn Future<Output = Result<(), Breach>> + Send + 'a>>;
-/// Begins a check of a body.
+/// A check of a body.
 type Check = for<'a> fn(&'a dyn Robot) -> Checking<'a>;
 
-/// Every check by its name, in the order in which a body goes through them.
+/// All checks with their names, in the order of execution.
 pub const CHECKS: [(&str, Check); 12] = [
     ("what it is", |robot| Box::pin(async { check_description(robot).and_then(|()| check_stations(robot)) })),
     ("a frame", |robot| Box::pin(check_frame(robot))),
@@ -79,10 +81,11 @@ pub const CHECKS: [(&str, Check); 12] = [
     ("a frame after it was stopped", |robot| Box::pin(check_frame(robot))),
 ];
 
-/// Runs every check, also after one has failed.
+/// Runs every check, even after a failure.
 ///
 /// # Errors
-/// The promises that are not kept, one a check at most, and how; in the order of the checks.
+///
+/// The violated promises with the observations, at most one a check, in the order of the checks.
 pub async fn check(robot: &dyn Robot) -> Result<(), Breaches> {
     let mut breaches = Vec::new();
     for (_, begin) in CHECKS {
@@ -152,7 +155,7 @@ fn check_stations(robot: &dyn Robot) -> Result<(), Breach> {
     })
 }
 
-/// Distance of two transforms: metres or radians, whichever is more.
+/// Distance between two transforms: the larger of metres and radians.
 fn gap(a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let moved = (a.translation.vector - b.translation.vector).norm();
     moved.max(a.rotation.angle_to(&b.rotation))
@@ -234,7 +237,7 @@ fn check_chain(robot: &dyn Robot, described: &Camera, sensed: &Sensed) -> Result
     ensure(off < ROUNDING, "the chain multiplies to the camera's pose", || format!("{off} off"))
 }
 
-/// Places to ask about: the stations, or places all over the map.
+/// Places for queries: the stations, or places all over the map.
 fn places(robot: &dyn Robot) -> Vec<Place> {
     if let Some(stations) = robot.stations() {
         return stations.iter().map(|s| Place::Station(s.name.clone())).collect();
@@ -367,7 +370,7 @@ async fn check_refusals(robot: &dyn Robot) -> Result<(), Breach> {
     Ok(())
 }
 
-/// Whatever takes a part that the body does not have, it says that it is unable.
+/// Checks that requests for missing parts fail with [`Failure::Unable`].
 async fn check_missing_parts(robot: &dyn Robot, map_from_base: &Isometry3<f64>) -> Result<(), Breach> {
     let object = map_from_base * Point3::new(0.5, 0.0, 0.8);
     let requests = [
@@ -398,7 +401,7 @@ async fn check_missing_parts(robot: &dyn Robot, map_from_base: &Isometry3<f64>) 
     )
 }
 
-/// Each sense says something, now.
+/// Checks that each custom sensor returns a current reading.
 async fn check_senses(robot: &dyn Robot) -> Result<(), Breach> {
     for sense in &robot.description().senses {
         let before_ns = robot.now_ns();

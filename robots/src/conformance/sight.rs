@@ -1,4 +1,4 @@
-//! Promises of bodies whose map has surfaces: the camera shows them where they are.
+//! Conformance of bodies with surfaces in their map: the camera must see them in place.
 
 use super::{Breach, done, ensure};
 use crate::body::{Place, Pose2, Robot, Sensed, SurfaceHint, Watch};
@@ -7,25 +7,25 @@ use descry_perception::consistency::{Inconsistency, MapSurface, judge};
 use nalgebra::{Isometry3, Point2, Point3, Vector2};
 use std::f64::consts::TAU;
 
-/// Places from which a surface is looked at, at most.
+/// Maximum number of viewpoints for a surface.
 const PLACES: usize = 4;
-/// Distances from a surface's middle at which a place is looked for, metres.
+/// Distances of candidate viewpoints from a surface's centre, metres.
 const AWAY_M: [f64; 3] = [1.4, 1.7, 2.0];
-/// Directions in which a place is looked for.
+/// Number of directions of candidate viewpoints.
 const DIRECTIONS: usize = 8;
-/// Points of a surface along each direction that a look is asked for.
+/// Number of sample points on a surface along each direction.
 const GRID: usize = 12;
-/// What lies this much farther than it should was looked through, metres, and standard deviations of the pose.
+/// Excess range from which a point was seen through, metres, and standard deviations of the pose.
 const FARTHER_M: f64 = 0.05;
 const SIGMAS: f64 = 3.0;
-/// Fewest points that tell, and the least share of them at which the surface must be.
+/// Minimum number of informative points, and minimum share of them at which the surface must be seen.
 const FEWEST: usize = 20;
 const LEAST_SHARE: f64 = 0.5;
 
 const PROMISE: &str = "the camera shows the surfaces of the map where they are";
 
-/// Looks at the first surface of the map that can be looked at, from several places and past its corners: a mirrored, scaled or
-/// upside-down image shows it elsewhere.
+/// Looks at the first visible surface of the map from several places and past its corners: a mirrored, scaled
+/// or upside-down image shows it elsewhere.
 pub(super) async fn check_sight(robot: &dyn Robot) -> Result<(), Breach> {
     if robot.description().camera.is_none() {
         return Ok(());
@@ -40,7 +40,7 @@ pub(super) async fn check_sight(robot: &dyn Robot) -> Result<(), Breach> {
     Ok(())
 }
 
-/// Where the body can stand to look at a surface: its stations, or places around it.
+/// Places from which the body can look at a surface: its stations, or places around the surface.
 async fn places(robot: &dyn Robot, surface: &SurfaceHint) -> Result<Vec<Place>, Breach> {
     let here = done(robot.pose().await, "a body knows where it is")?.place();
     if robot.description().base.is_none() {
@@ -74,7 +74,7 @@ fn middle(surface: &SurfaceHint) -> Point2<f64> {
     Point2::from(sum / surface.outline_m.len().max(1) as f64)
 }
 
-/// One look from each place, each towards another corner.
+/// One view from each place, each towards another corner.
 async fn looks(robot: &dyn Robot, surface: &SurfaceHint, places: &[Place]) -> Result<Vec<Sensed>, Breach> {
     let watch = Watch::default();
     let mut looks = Vec::new();
@@ -126,8 +126,8 @@ fn view(look: &Sensed) -> View {
     }
 }
 
-/// At how many points within its outline a look shows a surface, and at how many it shows something behind it. What stands on it, or
-/// before it, tells nothing.
+/// The number of points within a surface's outline at which a view shows it, and at which it shows something
+/// behind it. Objects on or in front of the surface do not count.
 fn shown(surface: &SurfaceHint, look: &Sensed) -> (usize, usize) {
     let middle = middle(surface);
     let (mut there, mut through) = (0, 0);

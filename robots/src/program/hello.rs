@@ -1,4 +1,4 @@
-//! The first message: what the body is and what its map knows.
+//! First message of a program: description of the body, and its map.
 
 use crate::body::{Door, Room, Stamp, Station, SurfaceHint};
 use crate::grid::OccupancyGrid;
@@ -9,23 +9,23 @@ use descry_perception::Intrinsics;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::Deserialize;
 
-/// The version of the protocol that is spoken here.
+/// Supported version of the protocol.
 pub const PROTOCOL: u32 = 1;
-/// Most pixels of an image, and most cells of a map.
+/// Maximum number of pixels in an image, and of cells in a map.
 const MOST_CELLS: usize = 1 << 25;
-/// Most readings of a sweep: a tenth of a millimetre apart at a metre all around.
+/// Maximum number of readings in a sweep: a tenth of a millimetre apart at a metre all around.
 const MOST_READINGS: usize = 65_536;
-/// Most surfaces, rooms, doors or stations.
+/// Maximum number of surfaces, rooms, doors or stations.
 const MOST_NAMES: usize = 10_000;
 
 /// First message of a program.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Hello {
-    /// Checked before the rest is read.
+    /// Version of the protocol, checked before the rest is read.
     #[serde(rename = "protocol")]
     _protocol: u32,
-    /// For people and records.
+    /// Name, for people and records.
     name: String,
     /// True if the world is simulated too.
     #[serde(default)]
@@ -33,7 +33,7 @@ pub(super) struct Hello {
     /// Start of its clock, nanoseconds.
     #[serde(default)]
     now_ns: Stamp,
-    /// Base; left out by a body that stays at its one station.
+    /// Base; left out for a body that stays at its only station.
     base: Option<Base>,
     /// The depth camera; left out if there is none.
     camera: Option<Camera>,
@@ -41,15 +41,15 @@ pub(super) struct Hello {
     head: Option<Head>,
     /// Arm that pushes and grasps; left out if there is none.
     arm: Option<Arm>,
-    /// A laser that sweeps level; left out if there is none.
+    /// Horizontal laser; left out if there is none.
     laser: Option<Laser>,
-    /// Sensors that are neither.
+    /// Other sensors.
     #[serde(default)]
     senses: Vec<Sense>,
     /// Names of its frames in records.
     #[serde(default)]
     frames: BodyFrames,
-    /// Direction of "up" in the map; left out if it is not known.
+    /// Upward direction in the map frame; left out if unknown.
     up: Option<Vector3<f64>>,
     /// Standard deviation of localisation along each axis, metres.
     pose_sigma_m: f64,
@@ -57,16 +57,16 @@ pub(super) struct Hello {
     pose_sigma_rad: f64,
     /// The map of the floor; its cells follow as bytes.
     map: Option<Map>,
-    /// Surfaces that the map knows: things may stand on them.
+    /// Support surfaces in the map.
     #[serde(default)]
     surfaces: Vec<SurfaceHint>,
-    /// Rooms that the map knows.
+    /// Rooms in the map.
     #[serde(default)]
     rooms: Vec<Room>,
-    /// Doors that the map knows.
+    /// Doors in the map.
     #[serde(default)]
     doors: Vec<Door>,
-    /// The only places where it stands, for a body that does not stand anywhere else.
+    /// The only places where the body can stand; left out if it can stand anywhere.
     stations: Option<Vec<Station>>,
 }
 
@@ -79,7 +79,7 @@ struct Base {
     linear_m_s: f64,
     /// Speed of turning on the spot, radians a second.
     angular_rad_s: f64,
-    /// Kept between the footprint and what the map shows, metres.
+    /// Distance to keep between the footprint and mapped obstacles, metres.
     #[serde(default = "default_clearance_m")]
     clearance_m: f64,
 }
@@ -103,7 +103,7 @@ struct Camera {
     cx: f64,
     /// Row of the principal point.
     cy: f64,
-    /// Least and greatest depth that it measures, metres.
+    /// Minimum and maximum depth, metres.
     range_m: (f64, f64),
     /// Length of one unit of depth, metres.
     #[serde(default = "default_unit_m")]
@@ -111,7 +111,7 @@ struct Camera {
     /// True if a colour image of the same pixels follows the depths.
     #[serde(default)]
     colour: bool,
-    /// Longest time by which a frame's stamp may lie before the request for it, seconds.
+    /// Maximum time by which a frame's stamp may precede its request, seconds.
     #[serde(default)]
     latency_s: f64,
     /// Name of its frame in records.
@@ -121,7 +121,7 @@ struct Camera {
     base_from_camera: Option<Isometry3<f64>>,
 }
 
-/// No driver buffers frames for longer, seconds: more is taken for milliseconds.
+/// Maximum plausible latency, seconds; a larger value was probably meant as milliseconds.
 const MOST_LATENCY_S: f64 = 2.0;
 
 fn default_unit_m() -> f64 {
@@ -135,9 +135,9 @@ fn default_camera_frame() -> String {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Arm {
-    /// Reach from the base's middle, metres.
+    /// Reach from the base's centre, metres.
     reach_m: f64,
-    /// The widest thing that the hand takes, metres; left out if it only pushes.
+    /// Maximum width of a graspable object, metres; left out for an arm that only pushes.
     hand_opening_m: Option<f64>,
 }
 
@@ -152,7 +152,7 @@ struct Laser {
     step_rad: f64,
     /// Readings in a sweep.
     readings: usize,
-    /// Nothing farther returns, metres.
+    /// Maximum range, metres.
     reach_m: f64,
     /// Name of its frame in records.
     #[serde(default = "default_laser_frame")]
@@ -192,11 +192,11 @@ struct Map {
     height: usize,
 }
 
-/// A hello that was understood and holds.
+/// A parsed and checked hello.
 pub(super) struct Greeting {
     pub known: Known,
     pub clearance_m: f64,
-    /// Pose of a camera that no head turns.
+    /// Pose of a fixed camera on the base.
     pub base_from_camera: Isometry3<f64>,
     pub pixels: PixelFormat,
 }
@@ -209,7 +209,7 @@ pub(super) struct PixelFormat {
 }
 
 impl PixelFormat {
-    /// Bytes of a frame with that many pixels: 16 bits of depth each, then red, green and blue.
+    /// Size of a frame with this many pixels, bytes: 16 bits of depth each, then red, green and blue.
     pub fn bytes(&self, pixels: usize) -> usize {
         pixels * if self.colour { 5 } else { 2 }
     }
@@ -219,7 +219,8 @@ impl Hello {
     /// Checks the message, with the bytes after its line: the cells of the map.
     ///
     /// # Errors
-    /// What in it cannot be.
+    ///
+    /// The first invalid value.
     pub fn check(self, cells: &[u8]) -> Result<Greeting, String> {
         if self.now_ns < 0 {
             return Err(format!("now_ns is {}, expected nanoseconds from 0", self.now_ns));
@@ -487,7 +488,7 @@ impl Laser {
 
 impl Map {
     fn grid(&self, cells: &[u8]) -> Result<OccupancyGrid, String> {
-        /// Sides that cells may have, metres. From: chosen.
+        /// Range of valid cell sides, metres. From: chosen.
         const CELLS_M: (f64, f64) = (0.001, 10.0);
         if !(CELLS_M.0..=CELLS_M.1).contains(&self.resolution_m) {
             let (least, most) = CELLS_M;
@@ -516,10 +517,10 @@ impl Map {
     }
 }
 
-/// No body is wider or reaches farther, keeps farther away from what is around it, or knows its place less well, and no door is wider,
-/// metres. From: chosen.
+/// Maximum plausible width or reach of a body, clearance, standard deviation of localisation, and width of a
+/// door, metres. From: chosen.
 const MOST_M: f64 = 10.0;
-/// A body that knows its heading less well knows none, radians. From: chosen, a third of a half turn.
+/// Maximum plausible standard deviation of the heading, radians. From: chosen, a third of a half turn.
 const MOST_SIGMA_RAD: f64 = 1.0;
 
 fn at_most(numbers: &[(&str, f64)], most: f64, unit: &str) -> Result<(), String> {

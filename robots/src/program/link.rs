@@ -1,4 +1,4 @@
-//! Lines and bytes to and from a program: each way has a thread, and what has not been taken yet is bounded.
+//! Lines and bytes to and from a program: one thread for each direction, with a bounded buffer.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::sync::Arc;
@@ -8,11 +8,11 @@ use std::thread;
 use std::time::Duration;
 use tokio::sync::mpsc;
 
-/// Longest line, bytes.
+/// Maximum length of a line, bytes.
 const LONGEST_LINE: u64 = 4 << 20;
-/// Most bytes after the hello: the cells of a map.
+/// Maximum number of bytes after the hello: the cells of a map.
 const MOST_HELLO_BYTES: usize = 1 << 25;
-/// Messages that wait to be taken; a program that says more waits itself.
+/// Number of buffered messages; the program blocks beyond that.
 const WAITING: usize = 16;
 
 /// A line with the bytes after it.
@@ -21,7 +21,7 @@ pub(super) struct Message {
     pub bytes: Vec<u8>,
 }
 
-/// End of the stream, or a breach of the protocol.
+/// End of the stream, or a violation of the protocol.
 #[derive(Clone, Debug)]
 pub(super) enum Ended {
     Closed,
@@ -30,12 +30,12 @@ pub(super) enum Ended {
 
 type Heard = Result<Message, Ended>;
 
-/// The way to a program.
+/// Sender of lines to a program.
 #[derive(Clone)]
 pub(super) struct Lines(Sender<String>);
 
 impl Lines {
-    /// Sends a line. If the program no longer reads, the next reading says so.
+    /// Sends a line. If the program no longer reads, the next read reports it.
     pub fn send(&self, message: &impl serde::Serialize) {
         if let Ok(mut line) = serde_json::to_string(message) {
             line.push('\n');
@@ -44,7 +44,7 @@ impl Lines {
     }
 }
 
-/// Both ways to a program.
+/// Both directions to a program.
 pub(super) struct Link {
     lines: Lines,
     heard: mpsc::Receiver<Heard>,
@@ -52,10 +52,11 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Begins to read and to write, and takes the first message.
+    /// Starts both threads, and receives the first message.
     ///
     /// # Errors
-    /// If none comes in time, or something else.
+    ///
+    /// If none arrives in time, or the stream ends or violates the protocol.
     pub fn open(
         from: impl Read + Send + 'static,
         to: impl Write + Send + 'static,
@@ -80,20 +81,21 @@ impl Link {
         }
     }
 
-    /// From now on a message has this many bytes at most.
+    /// Sets the maximum number of bytes of further messages.
     pub fn allow_bytes(&self, most: usize) {
         self.most_bytes.store(most, Ordering::Relaxed);
     }
 
-    /// The way to the program.
+    /// The sender of lines.
     pub fn lines(&self) -> Lines {
         self.lines.clone()
     }
 
-    /// The next message.
+    /// Receives the next message.
     ///
     /// # Errors
-    /// Why there is none.
+    ///
+    /// The end of the stream, or a violation of the protocol.
     pub async fn next(&mut self) -> Heard {
         self.heard.recv().await.unwrap_or(Err(Ended::Closed))
     }
@@ -164,7 +166,7 @@ fn read_line(from: &mut impl BufRead) -> Result<String, Ended> {
     String::from_utf8(line).map_err(|_| Ended::Breach("a line is not UTF-8".into()))
 }
 
-/// The start of what was said, short enough to be shown.
+/// Start of a line, shortened for display.
 pub(super) fn start_of(line: &str) -> String {
     const SHOWN: usize = 120;
     let start: String = line.trim_end().chars().take(SHOWN).collect();

@@ -1,4 +1,4 @@
-//! The lines that go to and fro, and what in them cannot be.
+//! Messages of the protocol, with their checks.
 
 use crate::body::{Grasp, Place, Placing, Push, Stamp};
 use crate::failure::Failure;
@@ -7,9 +7,9 @@ use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// The latest stamp that a program may say: what comes later leaves no room to reckon with.
+/// Maximum time stamp of a program, nanoseconds, which leaves headroom for arithmetic.
 const LATEST_NS: Stamp = 4_000_000_000_000_000_000;
-/// Greatest deviation of a quaternion's length from 1.
+/// Maximum deviation of a quaternion's length from 1.
 const QUATERNION_TOLERANCE: f64 = 1e-3;
 
 /// A request as a line.
@@ -36,7 +36,7 @@ pub(super) enum Arguments<'a> {
 }
 
 impl<'a> Arguments<'a> {
-    /// Arguments of a request; for a drive also the way on the map.
+    /// Arguments of a request; for a drive also the route on the map.
     pub fn of(request: &'a Request, route_m: &'a [Point2<f64>]) -> Self {
         match request {
             Request::Pose | Request::Sense | Request::Scan | Request::Hand => Arguments::Nothing {},
@@ -51,7 +51,7 @@ impl<'a> Arguments<'a> {
     }
 }
 
-/// Stops a request.
+/// Cancellation of a request.
 #[derive(Serialize)]
 pub(super) struct Cancel {
     pub cancel: u64,
@@ -60,9 +60,9 @@ pub(super) struct Cancel {
 /// A line of the program after its hello.
 #[derive(Debug, Deserialize)]
 pub(super) struct Said {
-    /// The request that is answered.
+    /// The request that this line answers.
     pub id: u64,
-    /// The body's clock, nanoseconds; it never goes back.
+    /// The body's clock, nanoseconds; monotonic.
     pub now_ns: Stamp,
     #[serde(flatten)]
     pub what: What,
@@ -71,31 +71,32 @@ pub(super) struct Said {
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum What {
-    /// It has understood the request and begins.
+    /// The request is understood and begins.
     Accepted(serde::de::IgnoredAny),
     /// Progress.
     Feedback(Feedback),
-    /// It is done; what is in it depends on the request.
+    /// The request is completed; the content depends on the request.
     Done(serde_json::Value),
-    /// It could not be done.
+    /// The request failed.
     Failed(Failure),
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Feedback {
-    /// Done share, 0 to 1.
+    /// Completed fraction, 0 to 1.
     pub fraction: f64,
-    /// Driven so far, metres.
+    /// Distance driven so far, metres.
     #[serde(default)]
     pub distance_m: f64,
 }
 
 impl Said {
-    /// Checks what holds for every line: the clock does not go back, numbers are some.
+    /// Checks what holds for every line: a monotonic clock, finite numbers.
     ///
     /// # Errors
-    /// What cannot be.
+    ///
+    /// The first invalid value.
     pub fn check(&self, before_ns: Stamp) -> Result<(), String> {
         if self.now_ns < before_ns || self.now_ns > LATEST_NS {
             return Err(format!("its clock went from {before_ns} to {} ns", self.now_ns));
@@ -117,9 +118,9 @@ impl Said {
 pub(super) struct PoseSaid {
     /// Stated pose of the base now.
     pub map_from_base: Isometry3<f64>,
-    /// Standard deviation along each axis, metres; as the hello says if left out.
+    /// Standard deviation along each axis, metres; the hello's if left out.
     pub sigma_m: Option<f64>,
-    /// Standard deviation of the heading, radians; as the hello says if left out.
+    /// Standard deviation of the heading, radians; the hello's if left out.
     pub sigma_rad: Option<f64>,
     /// Name of its station, if it has stations.
     pub station: Option<String>,
@@ -129,7 +130,7 @@ pub(super) struct PoseSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct DrivenSaid {
-    /// As odometry counted it, metres.
+    /// Distance by odometry, metres.
     pub distance_m: f64,
     /// Stated pose of the base now.
     pub map_from_base: Isometry3<f64>,
@@ -147,7 +148,7 @@ pub(super) struct LookedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensedSaid {
-    /// When the frame was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
+    /// Time stamp of the frame, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
     /// Pose of the base at that time.
     pub map_from_base: Isometry3<f64>,
@@ -159,7 +160,7 @@ pub(super) struct SensedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ScannedSaid {
-    /// When the sweep was taken, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
+    /// Time stamp of the sweep, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
     /// Pose of the base at that time.
     pub map_from_base: Isometry3<f64>,
@@ -169,7 +170,7 @@ pub(super) struct ScannedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReadSaid {
-    /// When it was read, nanoseconds on the body's clock; as the answer's `now_ns` if left out.
+    /// Time stamp of the reading, nanoseconds on the body's clock; the answer's `now_ns` if left out.
     pub stamp_ns: Option<Stamp>,
     /// Reading.
     pub said: serde_json::Value,
@@ -179,7 +180,7 @@ pub(super) struct ReadSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PushedSaid {
-    /// Distance that the thing was moved, metres.
+    /// Distance that the object was moved, metres.
     pub moved_m: f64,
 }
 
@@ -187,7 +188,7 @@ pub(super) struct PushedSaid {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraspedSaid {
-    /// Opening of the hand around the thing, metres.
+    /// Opening of the hand around the object, metres.
     pub width_m: f64,
 }
 
@@ -196,18 +197,20 @@ pub(super) struct GraspedSaid {
 #[serde(deny_unknown_fields)]
 pub(super) struct NothingSaid {}
 
-/// The answer that a request has.
+/// Parses the answer to a request.
 ///
 /// # Errors
-/// What is missing or cannot be read.
+///
+/// The missing or malformed part.
 pub(super) fn answer<T: DeserializeOwned>(request: &str, value: serde_json::Value) -> Result<T, String> {
     serde_json::from_value(value).map_err(|e| format!("its answer to {request} is none: {e}"))
 }
 
-/// The transform as one whose rotation is exact.
+/// Checks a transform and normalises its rotation.
 ///
 /// # Errors
-/// If its numbers are none, or its quaternion no rotation.
+///
+/// If a number is not finite, or the quaternion is not a rotation.
 pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String> {
     let quaternion = said.rotation.into_inner();
     let length = quaternion.norm();
@@ -218,10 +221,11 @@ pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String>
     Ok(Isometry3::from_parts(said.translation, UnitQuaternion::new_normalize(quaternion)))
 }
 
-/// A length or an angle, from 0.
+/// Checks a length or an angle.
 ///
 /// # Errors
-/// If it is none.
+///
+/// If it is negative or not finite.
 pub(super) fn amount(what: &str, x: f64) -> Result<f64, String> {
     if x.is_finite() && x >= 0.0 { Ok(x) } else { Err(format!("{what} is {x}, expected a number from 0")) }
 }

@@ -1,8 +1,9 @@
-//! A robot that is a program in any language: one JSON line a message, raw bytes after it for maps and images, over its standard
-//! input and output or a socket. The protocol is `robots/PROTOCOL.md`.
+//! Robot as a program in any language: one JSON message a line, followed by raw bytes for maps and images,
+//! over standard input and output or a socket. `robots/PROTOCOL.md` describes the protocol.
 //!
-//! A program is not trusted: it has limits on time, on what it may send and on memory, it sees no secrets of the environment, and
-//! whatever it does that the protocol does not allow ends it, with [`Failure::Broken`](crate::Failure::Broken) that says what.
+//! A program is not trusted: it has limits on time, output and memory, it sees no secrets of the environment,
+//! and any violation of the protocol ends it, with [`Failure::Broken`](crate::Failure::Broken) and the
+//! reason.
 
 mod hello;
 mod link;

@@ -1,16 +1,16 @@
-//! Who is at the other end: a program of our own, or one that was there before.
+//! The other end of the protocol: a child process, or a running program.
 
 use crate::program::process::Process;
 use crate::program::socket::Socket;
 
-/// The other end. Dropping it ends a program of our own, and closes the connection to another.
+/// The other end. Dropping it ends a child process, or closes the connection to a running program.
 pub(super) enum Peer {
     Started(Process),
     Reached(Socket),
 }
 
 impl Peer {
-    /// Meaning of the end of its output.
+    /// Message for the end of its output.
     pub fn farewell(&self) -> &'static str {
         match self {
             Self::Started(_) => "the program has ended",
@@ -18,7 +18,8 @@ impl Peer {
         }
     }
 
-    /// True if it has ended although its output may still be open. A connection says so itself.
+    /// True if the process has ended although its output may still be open. A connection reports its end
+    /// itself.
     pub fn has_ended(&self) -> bool {
         match self {
             Self::Started(process) => process.has_ended(),

@@ -1,5 +1,5 @@
-//! Predictions that need no question to the program: reachable places, their cost, poses of the
-//! camera. Planning asks thousands of them.
+//! Predictions without a question to the program: reachable places, their cost, poses of the camera. Planning
+//! makes thousands of them.
 
 use crate::body::{Door, Place, Pose2, Station, Travel};
 use crate::failure::Failure;
@@ -12,13 +12,13 @@ use nalgebra::{Isometry3, Point2, Point3, Rotation2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Routers that are kept; beyond that all are made anew.
+/// Maximum number of cached routers; the cache is cleared beyond that.
 const MOST_ROUTERS: usize = 64;
 
-/// The map of a program's hello, with the routes on it.
+/// Routes on the map of a program's hello.
 pub(super) struct Places {
     clearance_m: f64,
-    /// Pose of a camera that no head turns.
+    /// Pose of a fixed camera on the base.
     base_from_camera: Isometry3<f64>,
     /// Doors that ended a drive and were not opened since.
     shut: Mutex<BTreeSet<String>>,
@@ -27,12 +27,12 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Nothing is computed before it is asked for.
+    /// Creates the predictions; everything is computed on demand.
     pub fn new(clearance_m: f64, base_from_camera: Isometry3<f64>) -> Self {
         Places { clearance_m, base_from_camera, shut: Mutex::default(), routers: Mutex::default() }
     }
 
-    /// Keeps in mind whether a door is shut.
+    /// Records the state of a door.
     pub fn met_door(&self, name: &str, is_shut: bool) {
         let mut shut = self.shut.lock().unwrap_or_else(PoisonError::into_inner);
         if is_shut {
@@ -42,7 +42,7 @@ impl Places {
         }
     }
 
-    /// The router with some doors shut.
+    /// The router with these doors shut.
     fn router(&self, known: &Known, (map, speeds): (&OccupancyGrid, Speeds), shut: &[String]) -> Arc<Router> {
         let mut key = shut.to_vec();
         key.sort_unstable();
@@ -85,10 +85,11 @@ impl Places {
         goals.into_iter().zip(found).map(|(goal, travel)| goal.and(travel)).collect()
     }
 
-    /// The way to a place for the base to follow, metres: around the doors that are known to be shut, up to one of them if no other
-    /// leads there. None without a map.
+    /// The route to a place for the base to follow, metres: around the doors known to be shut, up to one of
+    /// them if there is no other route. None without a map.
     ///
     /// # Errors
+    ///
     /// [`Failure::Unreachable`] with the reason.
     pub fn route(
         &self,
@@ -123,14 +124,14 @@ impl Places {
         Ok(turned.unwrap_or(base * self.base_from_camera))
     }
 
-    /// Angle by which a camera that no head turns misses a point, radians.
+    /// Angle between the axis of a fixed camera and a point, radians.
     pub fn miss_rad(&self, map_from_base: &Isometry3<f64>, point: &Point3<f64>) -> f64 {
         let seen = (map_from_base * self.base_from_camera).inverse_transform_point(point);
         seen.coords.angle(&Vector3::z())
     }
 }
 
-/// Map and speeds to drive with; none without a map or a base.
+/// Map and speeds for driving; none without a map or a base.
 fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
     Some((known.map.as_ref()?, known.description.base.as_ref()?.speeds))
 }
@@ -138,7 +139,9 @@ fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
 /// Pose of the base at a place.
 ///
 /// # Errors
-/// [`Failure::Unreachable`] for a station that there is not, a pose where only stations are, and numbers that are none.
+///
+/// [`Failure::Unreachable`] for an unknown station, a pose where only stations exist, and numbers that are
+/// not finite.
 pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Failure> {
     let name = &known.description.name;
     let because = match (place, known.stations.as_deref()) {
@@ -160,14 +163,14 @@ pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Fail
     Err(Failure::Unreachable { because })
 }
 
-/// A straight line at constant speed while turning.
+/// Cost of a straight drive at constant speed while turning.
 fn straight(body: &Description, from: &Isometry3<f64>, to: &Isometry3<f64>) -> Travel {
     let distance_m = (from.translation.vector - to.translation.vector).norm();
     let turned_rad = from.rotation.angle_to(&to.rotation);
     Travel { distance_m, duration_s: body.duration_s(distance_m, turned_rad) }
 }
 
-/// Occupies a door's opening, half a cell thick to either side.
+/// Marks a door's opening as occupied, one cell thick to either side.
 fn close(map: &mut OccupancyGrid, door: &Door) {
     let door_from_map = Rotation2::new(-door.along_rad);
     let (half_width_m, half_depth_m) = (0.5 * door.width_m, map.resolution_m);

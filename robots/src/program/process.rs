@@ -1,4 +1,4 @@
-//! The program itself: started with little, ended as a whole.
+//! Child process of a robot program: restricted at the start, ended with all its children.
 
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 use std::collections::VecDeque;
@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Environment variables that a program sees. Keys, tokens and logins are not among them.
+/// Environment variables passed to a program; keys, tokens and logins are not among them.
 const ENVIRONMENT: [&str; 12] = [
     "PATH",
     "HOME",
@@ -24,11 +24,11 @@ const ENVIRONMENT: [&str; 12] = [
     "VIRTUAL_ENV",
     "LD_LIBRARY_PATH",
 ];
-/// Bytes of standard error that are kept.
+/// Number of bytes of standard error that are kept.
 const LAST_WORDS: usize = 4096;
-/// Lines of them that are shown.
+/// Number of lines of standard error that are shown.
 const SHOWN_LINES: usize = 6;
-/// Time for a program to end by itself once its input is closed.
+/// Time for a program to exit by itself once its input is closed.
 const PARTING: Duration = Duration::from_millis(500);
 /// Interval between checks for its end.
 const GLANCE: Duration = Duration::from_millis(5);
@@ -40,7 +40,7 @@ pub(super) struct Process {
 }
 
 impl Process {
-    /// Starts a command line of the shell, with `memory_bytes` of address space for each of its processes.
+    /// Starts a shell command line, with `memory_bytes` of address space for each of its processes.
     ///
     /// # Errors
     /// Why it could not be started.
@@ -62,12 +62,13 @@ impl Process {
         Ok((process, stdin, stdout))
     }
 
-    /// True if the program has ended; a process that it has started may live on.
+    /// True if the program has ended; its child processes may live on.
     pub fn has_ended(&self) -> bool {
         self.ends_within(Duration::ZERO)
     }
 
-    /// Waits until the program has ended, for a while; true if it has. It is not reaped, so that its group keeps its number.
+    /// Waits for the end of the program up to a limit; true if it has ended. It is not reaped, so that its
+    /// process group keeps its number.
     fn ends_within(&self, limit: Duration) -> bool {
         let Some(pid) = pid(&self.child) else { return true };
         let deadline = Instant::now() + limit;
@@ -81,8 +82,8 @@ impl Process {
         }
     }
 
-    /// Exit status and last words, after it closed its output or broke the protocol; ends the rest
-    /// of its processes.
+    /// Exit status and last lines of standard error, after it closed its output or violated the protocol;
+    /// kills its remaining processes.
     pub fn epitaph(&mut self) -> String {
         let by_itself = self.ends_within(GLANCE * 20);
         let status = self.kill();
@@ -113,7 +114,7 @@ impl Process {
 }
 
 impl Drop for Process {
-    /// Kills its process group, after a moment to stop the body; its input is closed by now.
+    /// Kills the process group, after a short time for stopping the body; the input is closed by now.
     fn drop(&mut self) {
         self.ends_within(PARTING);
         self.kill();
@@ -124,7 +125,7 @@ fn pid(child: &Child) -> Option<Pid> {
     Pid::from_raw(i32::try_from(child.id()).ok()?)
 }
 
-/// Keeps the end of what a program writes to standard error.
+/// Keeps the end of a program's standard error.
 fn listen(mut stderr: ChildStderr, last_words: &Mutex<VecDeque<u8>>) {
     let mut chunk = [0; 1024];
     while let Ok(n @ 1..) = stderr.read(&mut chunk) {

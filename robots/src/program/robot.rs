@@ -1,4 +1,4 @@
-//! The body that a program is.
+//! Robot trait for a program.
 
 use crate::body::{
     Colour, Door, Driven, Grasp, Grasped, Hand, Looked, Opened, Place, Placed, Placing, Pose2, PoseEstimate,
@@ -26,18 +26,18 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 use tokio::sync::Mutex;
 
-/// Limits of a program: seconds on the wall, bytes of output, memory.
+/// Limits on a program: wall-clock seconds, output, memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// From the start to the hello.
+    /// Time until the hello, seconds.
     pub hello_s: f64,
-    /// Longest silence while it carries a request out.
+    /// Maximum silence during a request, seconds.
     pub silence_s: f64,
-    /// From being told to stop to the end of the request.
+    /// Time from a cancellation to the end of the request, seconds.
     pub stop_s: f64,
-    /// Beyond a request's own limit, which counts on the body's clock.
+    /// Wall-clock time beyond a request's own limit, which counts on the body's clock, seconds.
     pub overrun_s: f64,
-    /// Most messages of feedback in one request.
+    /// Maximum number of progress messages in one request.
     pub feedback: usize,
     /// Address space of each of its processes, bytes.
     pub memory_bytes: u64,
@@ -62,7 +62,7 @@ impl Limits {
     }
 }
 
-/// A program as a robot. When it is dropped the program is told by the end of its input, and killed with all that it has started.
+/// A program as a robot. On drop its input is closed, and it is killed with all its child processes.
 pub struct ProgramRobot {
     known: Known,
     places: Places,
@@ -72,21 +72,23 @@ pub struct ProgramRobot {
 }
 
 impl ProgramRobot {
-    /// Starts a command line of the shell as a robot and hears what it is.
+    /// Starts a shell command line as a robot and receives its hello.
     ///
     /// # Errors
-    /// [`Failure::Broken`] if it does not start, or its hello does not come or hold.
+    ///
+    /// [`Failure::Broken`] if it does not start, or its hello is missing or invalid.
     pub fn start(command_line: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("`{command_line}`: {because}") };
         let (process, stdin, stdout) = Process::start(command_line, limits.memory_bytes).map_err(broken)?;
         Self::greet(Peer::Started(process), stdout, stdin, limits).map_err(broken)
     }
 
-    /// Connects to a robot that runs already, at `HOST:PORT` or the path of a Unix socket, and hears what it is. When it is dropped the
-    /// connection is closed. What is said there is neither encrypted nor does anybody show who they are.
+    /// Connects to a running robot at `HOST:PORT` or the path of a Unix socket, and receives its hello. On
+    /// drop the connection is closed. The connection is neither encrypted nor authenticated.
     ///
     /// # Errors
-    /// [`Failure::Broken`] if nobody answers there, or its hello does not come or hold.
+    ///
+    /// [`Failure::Broken`] if nobody answers there, or its hello is missing or invalid.
     pub fn connect(address: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("{address}: {because}") };
         let socket = Socket::connect(address, limits.hello()).map_err(broken)?;
@@ -116,12 +118,12 @@ impl ProgramRobot {
         })
     }
 
-    /// Asks the program, if the body has the part that it takes.
+    /// Sends a request, if the body has the required part.
     async fn ask(&self, request: &Request, watch: &Watch<'_>) -> Result<Done, Failure> {
         self.ask_along(request, &[], watch).await
     }
 
-    /// The same, of a drive with a way on the map.
+    /// Sends a drive with its route on the map.
     async fn ask_along(
         &self,
         request: &Request,
@@ -145,7 +147,7 @@ impl ProgramRobot {
         done
     }
 
-    /// The answer as what it should be; one that is not ends the program.
+    /// Passes on a valid answer; an invalid one ends the program.
     async fn hold<T>(&self, checked: Result<T, String>) -> Result<T, Failure> {
         match checked {
             Ok(answer) => Ok(answer),
@@ -200,7 +202,7 @@ impl ProgramRobot {
     }
 }
 
-/// The stamp that was said, or else when the request was done.
+/// Stamp of an answer: the stated one, or else the end of the request.
 fn stamp(what: &str, said_ns: Option<Stamp>, (before_ns, now_ns): (Stamp, Stamp)) -> Result<Stamp, String> {
     let stamp_ns = said_ns.unwrap_or(now_ns);
     match (before_ns..=now_ns).contains(&stamp_ns) {
@@ -213,13 +215,13 @@ fn link(stamp_ns: Stamp, parent: &str, child: &str, parent_from_child: Isometry3
     StampedTransform { stamp_ns, parent: parent.into(), child: child.into(), parent_from_child }
 }
 
-/// A pose as it is in the plane of the floor.
+/// Projects a pose onto the floor.
 fn level(pose: &Isometry3<f64>) -> Isometry2<f64> {
     let Pose2 { x_m, y_m, yaw_rad } = Pose2::from_isometry(pose);
     Isometry2::new(Vector2::new(x_m, y_m), yaw_rad)
 }
 
-/// Four bytes a reading, a float, little endian. What is beyond the reach is nothing within reach.
+/// Decodes ranges, a little-endian `f32` each. Ranges beyond the reach mean no return.
 fn read_ranges(laser: &Laser, bytes: &[u8]) -> Result<Vec<f64>, String> {
     if bytes.len() != 4 * laser.readings {
         return Err(format!("a sweep of {} bytes, expected {}", bytes.len(), 4 * laser.readings));
@@ -460,7 +462,7 @@ impl ProgramRobot {
         self.known.description.lacks(part)
     }
 
-    /// Checks that there is a hand, and that the point is finite.
+    /// Checks that the body has a hand, and that the point is finite.
     fn hand_for(&self, point: &Point3<f64>) -> Result<(), Failure> {
         self.known.description.need(Part::Hand)?;
         match point.iter().all(|x| x.is_finite()) {

@@ -1,11 +1,11 @@
-//! A program that somebody else has started, reached over a socket.
+//! Connection to a running robot program.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream, ToSocketAddrs};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-/// A connection. Dropping it closes it.
+/// A connection, closed on drop.
 pub(super) enum Socket {
     Unix(UnixStream),
     Tcp(TcpStream),
@@ -17,10 +17,11 @@ type Reader = Box<dyn Read + Send>;
 type Writer = Box<dyn Write + Send>;
 
 impl Socket {
-    /// Connects to `HOST:PORT`, or to the path of a Unix socket, which holds a `/`.
+    /// Connects to `HOST:PORT`, or to the path of a Unix socket, which contains a `/`.
     ///
     /// # Errors
-    /// Why not, and what an address is.
+    ///
+    /// The reason, and the expected form of an address.
     pub fn connect(address: &str, limit: Duration) -> Result<Self, String> {
         let refused = |e: std::io::Error| format!("nobody answers there: {e}\n  start the robot first");
         if address.contains('/') {
@@ -43,9 +44,10 @@ impl Socket {
         Err(last.unwrap_or_else(|| "no address has this name".into()))
     }
 
-    /// Both ways.
+    /// Streams of both directions.
     ///
     /// # Errors
+    ///
     /// If the system has no more handles.
     pub fn ways(&self) -> Result<(Reader, Writer), String> {
         let both = match self {
@@ -59,7 +61,7 @@ impl Socket {
         both.map_err(|e| e.to_string())
     }
 
-    /// Closes the connection, whoever still reads or writes; it may be closed already.
+    /// Closes the connection for all readers and writers; it may be closed already.
     pub fn close(&self) {
         let _ = match self {
             Self::Unix(stream) => stream.shutdown(Shutdown::Both),

@@ -1,4 +1,5 @@
-//! One request at a time: asked, followed while it runs, stopped when it must be, and answered, or the program is at an end.
+//! Exchange with a program, one request at a time: sent, followed while it runs, cancelled if necessary, and
+//! answered; or the program is ended.
 
 use crate::body::{Stamp, Watch};
 use crate::failure::Failure;
@@ -9,9 +10,9 @@ use crate::program::robot::Limits;
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
-/// The longest limit of a request, seconds: no limit in practice, and a number in any language.
+/// Maximum limit of a request, seconds: unlimited in practice, but representable in any language.
 const LONGEST_S: f64 = 1e9;
-/// A request may take this much longer on the body's clock than its limit: the last step before it is stopped.
+/// Slack on a request's limit on the body's clock: the last step before it is cancelled.
 const CLOCK_SLACK_NS: Stamp = 50_000_000;
 
 /// Interval between checks of a silent program.
@@ -39,11 +40,11 @@ pub(super) struct Talk {
     limits: Limits,
     pub now_ns: Stamp,
     next_id: u64,
-    /// A request that is not answered yet.
+    /// The request without an answer so far.
     open: Option<u64>,
 }
 
-/// Who waits for an answer: going away without one stops the request.
+/// Waiter for an answer; dropping it early cancels the request.
 struct Asker {
     id: u64,
     lines: Lines,
@@ -76,7 +77,7 @@ impl Talk {
         Talk { line: Some((link, peer)), ended: String::new(), limits, now_ns, next_id: 1, open: None }
     }
 
-    /// The program did what it must not, or is gone: it is killed (a connection is closed), and stays broken.
+    /// Ends the program after a violation or its exit: kills it (or closes the connection); it stays broken.
     pub fn end(&mut self, because: String) -> Failure {
         if let Some((link, mut peer)) = self.line.take() {
             drop(link);
@@ -85,7 +86,7 @@ impl Talk {
         Failure::Broken { because: self.ended.clone() }
     }
 
-    /// Carries a request out.
+    /// Carries out a request.
     pub async fn ask(
         &mut self,
         request: &'static str,
@@ -108,7 +109,7 @@ impl Talk {
         done
     }
 
-    /// Waits for the end of a request whose asker went away before its answer.
+    /// Waits for the end of a request whose waiter was dropped.
     async fn settle(&mut self) -> Result<(), Failure> {
         let Some(id) = self.open else { return Ok(()) };
         let by = self.within(self.limits.stop_s);
@@ -201,7 +202,7 @@ impl Talk {
         Stopping { by: self.within(self.limits.stop_s), failure }
     }
 
-    /// A failure as the program says it; being stopped has the reason for which it was stopped.
+    /// The failure reported by the program; for a cancellation, the reason for cancelling.
     fn failed(&mut self, failure: Failure, stopping: Option<Stopping>) -> Failure {
         match (failure, stopping) {
             (Failure::Cancelled { .. }, Some(stop)) => stop.failure,
@@ -217,7 +218,8 @@ impl Talk {
         Instant::now() + Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(far).min(far)
     }
 
-    /// The next message. A program that has ended is noticed even if something that it has started holds its output open.
+    /// Receives the next message. The end of the program is noticed even if one of its child processes keeps
+    /// the output open.
     async fn message(&mut self, by: Instant) -> Result<Message, Silence> {
         let Some((link, peer)) = &mut self.line else { return Err(Silence::Gone) };
         let mut gone = false;
@@ -232,10 +234,12 @@ impl Talk {
         }
     }
 
-    /// The next message about a request.
+    /// Receives the next message about a request.
     ///
     /// # Errors
-    /// [`Failure::TimedOut`] if none comes in time and there is no `complaint`; otherwise the program is at an end.
+    ///
+    /// [`Failure::TimedOut`] if none arrives in time and there is no `complaint`; otherwise the program is
+    /// ended.
     async fn hear(&mut self, id: u64, by: Instant, complaint: &str) -> Result<(Said, Vec<u8>), Failure> {
         let message = match self.message(by).await {
             Ok(message) => message,
@@ -263,7 +267,7 @@ impl Talk {
     }
 }
 
-/// Reads a line about the open request.
+/// Parses a line about the open request.
 fn read(message: &Message, id: u64, before_ns: Stamp) -> Result<Said, String> {
     let said: Said = serde_json::from_str(&message.line).map_err(|e| {
         format!(

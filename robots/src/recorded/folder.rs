@@ -1,4 +1,4 @@
-//! Finding the frames of a recording on disk.
+//! Files of a recording.
 
 use crate::input::InputError;
 use crate::recorded::pose::{self, MaybePose};
@@ -10,7 +10,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Name of the file that says what a folder does not.
+/// Name of the settings file.
 const SETTINGS_FILE: &str = "recording.toml";
 /// Name of the file with the camera matrix.
 const CAMERA_FILE: &str = "camera-intrinsics.txt";
@@ -20,28 +20,28 @@ const COLOUR_SUFFIXES: [&str; 3] = [".color.jpg", ".color.jpeg", ".color.png"];
 const LIST_DEPTH_ENDINGS: [&str; 2] = ["pgm", "png"];
 const LIST_COLOUR_ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// No typical station lies farther from the first, metres.
+/// Maximum distance of a typical station from the first, metres.
 const FARTHEST_TYPICAL_M: f64 = 100.0;
 
-/// A frame on disk and where it was taken.
+/// A frame on disk with its pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredFrame {
     /// The station's name.
     pub name: String,
-    /// 16 bits a pixel.
+    /// Depth image, 16 bits a pixel.
     pub depth: PathBuf,
-    /// If there is one.
+    /// Colour image, if there is one.
     pub colour: Option<PathBuf>,
     /// Pose of the camera.
     pub world_from_camera: Isometry3<f64>,
 }
 
-/// A folder of frames, found and checked; pixels are read when they are asked for.
+/// A folder of frames, checked; pixels are read on demand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// For people.
+    /// Name for people.
     pub name: String,
-    /// In the order of their names (numbers by value). At least one.
+    /// Frames, at least one, in natural order of their names (numbers by value).
     pub frames: Vec<StoredFrame>,
     /// The depth camera.
     pub intrinsics: Intrinsics,
@@ -49,7 +49,7 @@ pub struct Recording {
     pub start: usize,
     /// Contents of `recording.toml`.
     pub settings: Settings,
-    /// Frames without a pose because tracking was lost: they are no stations.
+    /// Frames without a pose because tracking was lost; they are not stations.
     pub lost: Vec<String>,
 }
 
@@ -65,7 +65,8 @@ impl Recording {
     /// Opens a folder of frames, or a `recording.toml` that names one.
     ///
     /// # Errors
-    /// What is missing or wrong: the file, the line, what was expected, what to add.
+    ///
+    /// A missing or invalid part, with the file, the line, the expectation and a fix.
     pub fn open(path: &Path) -> Result<Recording, InputError> {
         let (folder, settings) = find(path)?;
         let candidates =
@@ -122,10 +123,11 @@ impl Recording {
         Ok(Recording { name, frames, intrinsics, start, settings, lost })
     }
 
-    /// Depths along z of a frame, metres, row by row; NaN where nothing returned.
+    /// Depths along z of a frame, metres, row by row; NaN without a return.
     ///
     /// # Errors
-    /// If the file cannot be read or holds no 16-bit image.
+    ///
+    /// If the file cannot be read or is not a 16-bit image.
     pub fn depth_m(&self, frame: &StoredFrame) -> Result<Vec<f32>, InputError> {
         let image = decode(&frame.depth)?;
         let image::DynamicImage::ImageLuma16(image) = image else {
@@ -162,7 +164,7 @@ fn read(path: &Path) -> Result<String, InputError> {
     })
 }
 
-/// The folder of the frames and what is said about it.
+/// Finds the folder of the frames and its settings.
 fn find(path: &Path) -> Result<(PathBuf, Settings), InputError> {
     let (folder, file) = if path.is_dir() {
         (path.to_path_buf(), path.join(SETTINGS_FILE))
@@ -186,7 +188,7 @@ fn find(path: &Path) -> Result<(PathBuf, Settings), InputError> {
     Ok((folder, settings))
 }
 
-/// Names in a folder in the order in which people count: `9` before `10`.
+/// Names in a folder in natural order: `9` before `10`.
 fn names(folder: &Path) -> Result<Vec<String>, InputError> {
     let listed = fs::read_dir(folder).and_then(|entries| {
         entries
@@ -200,7 +202,7 @@ fn names(folder: &Path) -> Result<Vec<String>, InputError> {
     Ok(names)
 }
 
-/// A name in pieces: text, then the value of the digits that follow, and so on.
+/// Key for natural order: alternating text and numbers.
 fn by_number(name: &str) -> Vec<(String, u128)> {
     let mut pieces = Vec::new();
     let mut rest = name;
@@ -300,12 +302,13 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
     Ok(files.into_iter().zip(poses).map(candidate).collect())
 }
 
-/// The name of a file without its ending.
+/// The name of a file without its extension.
 fn stem(file: &str) -> &str {
     Path::new(file).file_stem().and_then(OsStr::to_str).unwrap_or(file)
 }
 
-/// Refuses poses that are not in metres: most of them lie farther from the first than any building is wide.
+/// Rejects poses that are not in metres: most of them lie farther from the first than the extent of any
+/// building.
 fn check_distances(folder: &Path, frames: &[StoredFrame]) -> Result<(), InputError> {
     let Some((first, others)) = frames.split_first() else { return Ok(()) };
     let at = |frame: &StoredFrame| frame.world_from_camera.translation.vector;
@@ -362,7 +365,7 @@ fn start_of(frames: &[StoredFrame], settings: &Settings, path: &Path) -> Result<
     })
 }
 
-/// Columns and rows of a depth image, by its head alone.
+/// Columns and rows of a depth image, from its header alone.
 fn size_of(path: &Path) -> Result<(usize, usize), InputError> {
     let head = open(path)?.into_decoder().map_err(|e| no_image(path, &e))?;
     if head.color_type() != ColorType::L16 {
@@ -376,7 +379,7 @@ fn decode(path: &Path) -> Result<image::DynamicImage, InputError> {
     open(path)?.decode().map_err(|e| no_image(path, &e))
 }
 
-/// Bytes of the largest image of a camera. From: chosen.
+/// Maximum size of an image file, bytes. From: chosen.
 const MOST_IMAGE_BYTES: u64 = 256 << 20;
 
 fn open(path: &Path) -> Result<ImageReader<std::io::Cursor<Vec<u8>>>, InputError> {

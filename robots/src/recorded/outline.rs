@@ -1,25 +1,26 @@
-//! Outlines that a person or a program wrote down: what can be one.
+//! Checks of outlines from files and programs.
 
 use nalgebra::Point2;
 
-/// No table, counter or shelf is as wide, metres: an outline of more is in other units.
+/// Maximum width of a surface, metres; a wider outline is in other units.
 pub(crate) const WIDEST_SURFACE_M: f64 = 30.0;
-/// No room is as wide, metres.
+/// Maximum width of a room, metres.
 pub(crate) const WIDEST_ROOM_M: f64 = 300.0;
-/// No surface lies as far above or below the map's origin, metres.
+/// Maximum height of a surface above or below the map's origin, metres.
 const HIGHEST_M: f64 = 100.0;
-/// Less than the foot of the smallest thing covers, square metres.
+/// Minimum area, square metres: less than the footprint of any object.
 const LEAST_AREA_M2: f64 = 1e-4;
-/// Most corners: each edge is held against each other.
+/// Maximum number of corners, since every pair of edges is compared.
 const MOST_CORNERS: usize = 1000;
 
-/// Fault, and its mend.
+/// Description of a fault, and the expected form.
 pub(crate) type Fault = (String, &'static str);
 
-/// Checks the corners of an outline, in order around it, metres.
+/// Checks the corners of an outline, in order, metres.
 ///
 /// # Errors
-/// If it is none, is wider than `widest_m`, has no area, or crosses itself.
+///
+/// If it is malformed, wider than `widest_m`, without area, or crosses itself.
 pub(crate) fn check(corners: &[Point2<f64>], widest_m: f64) -> Result<(), Fault> {
     const CORNERS: &str = "at least three corners, [x, y] in metres";
     if corners.len() < 3 || corners.iter().any(|p| !(p.x.is_finite() && p.y.is_finite())) {
@@ -50,7 +51,8 @@ pub(crate) fn check(corners: &[Point2<f64>], widest_m: f64) -> Result<(), Fault>
 /// Checks the height of a surface, metres.
 ///
 /// # Errors
-/// If it is none.
+///
+/// If it is not finite or implausible.
 pub(crate) fn check_height(height_m: f64) -> Result<(), Fault> {
     if height_m.is_finite() && height_m.abs() <= HIGHEST_M {
         return Ok(());
@@ -65,7 +67,7 @@ fn area(corners: &[Point2<f64>]) -> f64 {
     doubled.abs() / 2.0
 }
 
-/// The first two edges that cross, by the corners where they begin, counted from 1.
+/// The first two crossing edges, by their starting corners, counted from 1.
 fn crossing(corners: &[Point2<f64>]) -> Option<(usize, usize)> {
     let n = corners.len();
     let edge = |i: usize| (corners[i], corners[(i + 1) % n]);

@@ -4,16 +4,16 @@ use crate::input::InputError;
 use crate::recorded::settings::CameraSettings;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// A rotation may differ from an exact one by this much in any entry: written with few digits it is still one.
+/// Tolerance on the entries of a rotation matrix, as they may be written with few digits.
 const ROTATION_TOLERANCE: f64 = 0.03;
 
-/// The fixed entries of a camera matrix may differ from 0 and 1 by this much.
+/// Tolerance on the fixed entries of a camera matrix.
 const CAMERA_TOLERANCE: f64 = 1e-6;
 
-/// A pose, or that tracking was lost when the frame was taken (entries that are not finite).
+/// A pose; none if tracking was lost (entries that are not finite).
 pub(crate) type MaybePose = Option<Isometry3<f64>>;
 
-/// The numbers of each line that is neither empty nor a comment, with the byte where the line starts.
+/// The numbers of each line that is neither empty nor a comment, with the byte offset of the line.
 fn rows(file: &str, text: &str) -> Result<Vec<(usize, Vec<f64>)>, InputError> {
     let mut rows = Vec::new();
     let mut start = 0;
@@ -52,7 +52,7 @@ fn matrix(file: &str, text: &str, size: usize, what: &str) -> Result<Vec<(usize,
     Ok(rows)
 }
 
-/// A 4x4 `world_from_camera`.
+/// Parses a 4x4 `world_from_camera`.
 pub(crate) fn matrix_pose(file: &str, text: &str) -> Result<MaybePose, InputError> {
     let rows = matrix(file, text, 4, "the 4x4 matrix world_from_camera")?;
     if rows.iter().flat_map(|(_, row)| row).any(|x| !x.is_finite()) {
@@ -87,7 +87,7 @@ pub(crate) fn matrix_pose(file: &str, text: &str) -> Result<MaybePose, InputErro
     Ok(Some(Isometry3::from_parts(translation, UnitQuaternion::from_rotation_matrix(&rotation))))
 }
 
-/// Lines `tx ty tz qx qy qz qw`, each a `world_from_camera`.
+/// Parses lines `tx ty tz qx qy qz qw`, each a `world_from_camera`.
 pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, InputError> {
     rows(file, text)?
         .into_iter()
@@ -110,7 +110,7 @@ pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, Inp
         .collect()
 }
 
-/// A 3x3 camera matrix, of images with that many columns and rows.
+/// Parses a 3x3 camera matrix for images of this size.
 pub(crate) fn camera_matrix(
     file: &str,
     text: &str,

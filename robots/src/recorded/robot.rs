@@ -1,4 +1,4 @@
-//! The body that a recording is.
+//! Robot trait for a recording.
 
 use crate::body::{
     Colour, Door, Driven, Looked, Place, PoseEstimate, Progress, Robot, Room, Sensed, Stamp,
@@ -15,19 +15,20 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// From asking to having a frame, on the body's clock, seconds.
+/// Time for a frame on the body's clock, seconds.
 const FRAME_S: f64 = 0.1;
 
-/// Frames that somebody took, one at each station.
+/// Recorded frames, one at each station.
 pub trait Footage: Send + Sync {
-    /// Measurements of the camera at a station.
+    /// Pixels of the frame at a station.
     ///
     /// # Errors
-    /// Why the frame cannot be read.
+    ///
+    /// The reason for which the frame cannot be read.
     fn pixels(&self, station: usize) -> Result<Pixels, String>;
 }
 
-/// A recording as a robot. Its base is the camera; it stands at one of its frames and knows no map.
+/// A recording as a robot. Its base is the camera; it stands at one of its frames and has no map.
 pub struct RecordedRobot {
     frames: Box<dyn Footage>,
     description: Description,
@@ -52,7 +53,7 @@ impl RecordedRobot {
         Ok(RecordedRobot::new(Recording::open(path)?))
     }
 
-    /// The body that stands at the recording's first station.
+    /// A body at the recording's first station.
     pub fn new(recording: Recording) -> RecordedRobot {
         let settings = &recording.settings;
         let description = Description {
@@ -105,8 +106,8 @@ impl RecordedRobot {
         Self::of(known, start, Box::new(recording))
     }
 
-    /// The body that stands where frames were taken, at the station of number `start` first. There is at least one station; a head,
-    /// an arm or a map that is known does not count.
+    /// A body with recorded frames, starting at the station with index `start`. There must be at least one
+    /// station; head, arm and map of `known` are ignored.
     pub fn of(known: Known, start: usize, frames: Box<dyn Footage>) -> RecordedRobot {
         let description =
             Description { head: None, arm: None, laser: None, senses: Vec::new(), ..known.description };
@@ -139,7 +140,7 @@ impl RecordedRobot {
         Err(Failure::Unreachable { because })
     }
 
-    /// A straight line at constant speed while turning: max(ds/v, dθ/ω).
+    /// Cost of a straight drive at constant speed while turning: max(ds/v, dθ/ω).
     fn cost(&self, from: usize, to: usize) -> Travel {
         let (a, b) = (&self.stations[from].map_from_base, &self.stations[to].map_from_base);
         let distance_m = (a.translation.vector - b.translation.vector).norm();
@@ -258,7 +259,8 @@ impl Robot for RecordedRobot {
         })
     }
 
-    /// A body that is stopped on its way is back where it came from: between stations it cannot stand.
+    /// Drives to a station. A cancelled drive returns to its start, since the body cannot stand between
+    /// stations.
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure> {
         go_on(watch, "the drive")?;
         let goal = self.index(to)?;

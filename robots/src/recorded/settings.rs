@@ -1,4 +1,4 @@
-//! Settings of a folder of frames that the frames do not tell.
+//! Settings of a folder of frames, for facts that the frames do not contain.
 
 use crate::input::{self, InputError, Objection, Step};
 use crate::parts::Speeds;
@@ -6,22 +6,22 @@ use crate::recorded::outline;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// A body that turns slower never has turned, degrees a second.
+/// Minimum turning speed, degrees a second; a slower body would never finish a turn.
 const LEAST_ANGULAR_DEG_S: f64 = 0.01;
 
-/// The contents of `recording.toml`; everything may be left out.
+/// Contents of `recording.toml`; every key is optional.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// For people; the folder's name if left out.
+    /// Name for people; the folder's name if left out.
     pub name: Option<String>,
-    /// Folder of the frames, from the file's own folder.
+    /// Folder of the frames, relative to this file.
     pub folder: Option<String>,
     /// Units of a depth image in a metre.
     pub depth_scale: f64,
     /// Name of the first station.
     pub start: Option<String>,
-    /// Direction of "up" in the world of the poses.
+    /// Upward direction in the world of the poses.
     pub up: Option<[f64; 3]>,
     /// True if pixels of colour and depth are the same.
     pub registered: bool,
@@ -29,24 +29,24 @@ pub struct Settings {
     pub pose_sigma_m: f64,
     /// Standard deviation of the orientations about each axis, degrees.
     pub pose_sigma_deg: f64,
-    /// For what driving between stations takes, metres a second.
+    /// Driving speed between stations, metres a second.
     pub linear_m_s: f64,
-    /// For what turning between stations takes, degrees a second.
+    /// Turning speed between stations, degrees a second.
     pub angular_deg_s: f64,
-    /// Least and greatest depth that the camera measures, metres.
+    /// Minimum and maximum depth of the camera, metres.
     pub range_m: [f64; 2],
     /// The camera.
     pub camera: Option<CameraSettings>,
-    /// Surfaces whose place in the world of the poses is known, where z is up.
+    /// Surfaces at known positions in the world of the poses, where z is up.
     #[serde(rename = "surface")]
     pub surfaces: Vec<SurfaceSettings>,
 }
 
-/// A surface that is known beforehand: which of several is called what.
+/// A known surface, which gets its name by its position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSettings {
-    /// As people call it.
+    /// Name for people.
     pub name: String,
     /// Corners in order around it, along the world's x and y, metres.
     pub outline_m: Vec<[f64; 2]>,
@@ -69,7 +69,8 @@ pub struct CameraSettings {
 }
 
 impl Default for Settings {
-    /// Millimetres, poses good to 3 cm and 1°, a body as slow as the published navigation module (0.3 m/s, 30°/s).
+    /// Depths in millimetres, poses good to 3 cm and 1°, a body as slow as the published navigation module
+    /// (0.3 m/s, 30°/s).
     fn default() -> Self {
         Settings {
             name: None,
@@ -90,10 +91,11 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Reads a `recording.toml`. `file` is its name for messages.
+    /// Parses a `recording.toml`. `file` is its name for messages.
     ///
     /// # Errors
-    /// The first mistake, with its place in the text and how to mend it.
+    ///
+    /// The first fault, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<Settings, InputError> {
         let settings: Settings = input::parse_toml(file, text)?;
         settings.check().map_err(|objection| input::draw(file, text, objection))?;
@@ -174,7 +176,8 @@ impl CameraSettings {
         Ok(())
     }
 
-    /// If the principal point lies outside an image of that many columns and rows: along which axis, and what is wrong.
+    /// The axis along which the principal point lies outside an image of this size, with a description; none
+    /// if it is inside.
     pub(crate) fn off_image(&self, size: (usize, usize)) -> Option<(usize, String)> {
         let axes = [("cx", self.cx, size.0, "columns"), ("cy", self.cy, size.1, "rows")];
         let off = axes.into_iter().position(|(_, at, most, _)| !(0.0..=most as f64).contains(&at))?;

@@ -1,4 +1,4 @@
-//! Requests to a body and their answers, in order: enough to play the run again.
+//! Requests to a body and their answers, in order: sufficient to replay the run.
 
 use crate::body::{Door, Place, Robot, Room, Stamp, Station, SurfaceHint, Travel};
 use crate::failure::Failure;
@@ -44,15 +44,15 @@ impl Known {
     }
 }
 
-/// Something that was only asked: nothing moved.
+/// A query to a body, which moves nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Question {
     /// [`Robot::travel`].
     Travel {
-        /// From here.
+        /// Start.
         from: Place,
-        /// To each of these.
+        /// Destinations.
         to: Vec<Place>,
         /// Doors that count as shut.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -67,7 +67,7 @@ pub enum Question {
     },
 }
 
-/// Answer of the body to a question.
+/// Reply of the body to a query.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reply {
@@ -77,29 +77,31 @@ pub enum Reply {
     CameraAt(Result<Isometry3<f64>, Failure>),
 }
 
-/// A request with its answer, and what was asked since the request before.
+/// A request with its answer, and the queries since the previous request.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
-    /// Answers of the map that were new since the last message.
+    /// New replies since the previous entry.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub replies: Vec<(Question, Reply)>,
     /// The request and its answer; none at the end of a run.
     pub done: Option<(Request, Answer)>,
-    /// The body's clock when it had answered.
+    /// The body's clock after the answer.
     pub now_ns: Stamp,
 }
 
-/// Keeper of a body's answers.
+/// Storage for a body's answers.
 pub trait Tape: Send + Sync {
-    /// Keeps an entry: when this returns it is safe, but a frame only with its pixels, which come next.
+    /// Stores an entry durably; for a frame, durability also needs its pixels, which come next.
     ///
     /// # Errors
-    /// Why it cannot be kept.
+    ///
+    /// The reason for which it cannot be stored.
     fn keep(&self, entry: &Entry) -> Result<(), String>;
 
-    /// The pixels of a frame that was kept.
+    /// The pixels of a stored frame.
     ///
     /// # Errors
-    /// Why they cannot be had.
+    ///
+    /// The reason for which they cannot be read.
     fn pixels(&self, stamp_ns: Stamp) -> Result<Pixels, String>;
 }

@@ -1,4 +1,4 @@
-//! A body whose every answer is kept on a tape, and which first gives the answers that are on it already.
+//! A body with all answers stored on a tape, which first replays the answers already on it.
 
 use super::tape::{Entry, Known, Question, Reply, Tape};
 use crate::body::{
@@ -14,58 +14,58 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A body on tape. Its clock stands still between two answers, so that who asks it the same again finds the same again.
+/// A body on tape. Its clock stands still between two answers, so that repeated queries get the same answer.
 ///
 /// | a run | answers on the tape | live body |
 /// |---|---|---|
-/// | begins | none | there |
-/// | is played again | all | none |
-/// | goes on | those before it was cut off | there: it does again what the tape says that it did if it [begins again](Robot::begins_again), else it is asked where it is |
+/// | starts | none | yes |
+/// | is replayed | all | none |
+/// | resumes | those before the interruption | yes: repeats the requests on the tape if it [begins again](Robot::begins_again), else it is asked for its pose |
 pub struct TapedRobot {
     known: Known,
     live: Option<Arc<dyn Robot>>,
     tape: Arc<dyn Tape>,
-    /// Seconds of the body's clock that pass in one second; none: as fast as it goes.
+    /// Seconds of the body's clock for each second of replay; none: as fast as possible.
     speed: Option<f64>,
     state: Mutex<State>,
 }
 
-/// A body that stands so near to where it was left has not moved, beyond what localisation errs.
+/// Tolerance on the pose of a body that has not moved since the tape ended, beyond its localisation error.
 const SAME_PLACE_M: f64 = 0.05;
 const SAME_PLACE_RAD: f64 = 0.05;
 
 struct State {
     now_ns: Stamp,
     played: VecDeque<Entry>,
-    /// Answers of the map by question (as JSON), as far as the tape has been read.
+    /// Replies by query (as JSON), as far as the tape has been read.
     replies: BTreeMap<String, Reply>,
-    /// Questions with news since the last answer.
+    /// New replies since the last answer.
     pending: Vec<(Question, Reply)>,
     ended: Option<String>,
     /// Last stated pose of the base.
     at: Option<Isometry3<f64>>,
     /// Target of the head, if nothing else has moved since.
     gaze: Option<Point3<f64>>,
-    /// True if the live body was asked for its pose since the tape ended.
+    /// True if the live body was asked for its pose after the end of the tape.
     met: bool,
-    /// Lead of the run's clock over the live body's.
+    /// Lead of the run's clock over the live body's, nanoseconds.
     ahead_ns: Stamp,
 }
 
 impl TapedRobot {
-    /// A body whose answers are kept.
+    /// Starts a tape of a body's answers.
     pub fn begin(live: Arc<dyn Robot>, tape: Arc<dyn Tape>) -> Self {
         Self::go_on(live, tape, Vec::new())
     }
 
-    /// A body that goes on where the tape ends. `live` stands where it stood when the tape began, or where it is by now. In that case its clock
-    /// is taken to go on where the tape ends, and if it stands elsewhere than where the tape leaves it, the first request fails with
-    /// [`Failure::Lost`].
+    /// Resumes a run at the end of its tape. `live` stands where it stood at the start of the tape, or where
+    /// it is by now. In the latter case its clock is shifted to continue at the end of the tape, and if it is
+    /// not at the last pose of the tape, the first request fails with [`Failure::Lost`].
     pub fn go_on(live: Arc<dyn Robot>, tape: Arc<dyn Tape>, entries: Vec<Entry>) -> Self {
         Self::new(Known::of(&*live), Some(live), tape, entries)
     }
 
-    /// A body that there is on the tape alone. It is broken where the tape ends.
+    /// Replays a tape without a live body; it is broken at the end of the tape.
     pub fn replay(known: Known, tape: Arc<dyn Tape>, entries: Vec<Entry>, speed: Option<f64>) -> Self {
         Self { speed, ..Self::new(known, None, tape, entries) }
     }
@@ -92,16 +92,17 @@ impl TapedRobot {
         &self.known
     }
 
-    /// Reason for which it could play no further: the tape ends there, or differs from the
-    /// requests. None if it could.
+    /// The reason for which the replay stopped: the tape ends there, or differs from the requests. None if it
+    /// did not stop.
     pub fn ended(&self) -> Option<String> {
         self.lock().ended.clone()
     }
 
-    /// Keeps what was asked since the last answer: the end of a run.
+    /// Stores the queries since the last answer, at the end of a run.
     ///
     /// # Errors
-    /// [`Failure::Broken`] if it cannot be kept.
+    ///
+    /// [`Failure::Broken`] if they cannot be stored.
     pub fn finish(&self) -> Result<(), Failure> {
         let entry = {
             let mut state = self.lock();
@@ -124,7 +125,7 @@ impl TapedRobot {
         self.tape.keep(entry).map_err(|because| Failure::Broken { because })
     }
 
-    /// The next answer on the tape, if it has one to this request.
+    /// The next answer on the tape, if it matches this request.
     fn next(&self, request: &Request) -> Result<Option<Entry>, Failure> {
         let mut state = self.lock();
         let on_tape = state.played.front().map(|entry| entry.done.clone());
@@ -150,7 +151,7 @@ impl TapedRobot {
         Err(self.end(because))
     }
 
-    /// The tape cannot be played further. What is kept behind that says where it was.
+    /// Stops the replay; the tape stores where.
     fn end(&self, because: String) -> Failure {
         let mut state = self.lock();
         let entry = Entry { replies: Vec::new(), done: None, now_ns: state.now_ns };
@@ -163,7 +164,8 @@ impl TapedRobot {
         Failure::Broken { because }
     }
 
-    /// Answers from the tape or, beyond its end, from the live body; either way the answer is kept.
+    /// Answers a request from the tape or, beyond its end, from the live body; either way the answer is
+    /// stored.
     async fn ask(&self, request: Request, watch: &Watch<'_>) -> Result<(Answer, Option<Sensed>), Failure> {
         if watch.cancel.is_cancelled() {
             return Err(Failure::Cancelled { because: format!("it was asked to {request}") });
@@ -229,7 +231,7 @@ impl TapedRobot {
         Ok((Entry { replies, done, now_ns: live.now_ns() + ahead_ns }, sensed))
     }
 
-    /// Asks a body that is where it is, once, where that is.
+    /// Asks a live body, once, whether it is where the tape left it.
     async fn meet(&self, live: &dyn Robot) -> Result<Met, Failure> {
         if std::mem::replace(&mut self.lock().met, true) {
             return Ok(Met::Here);
@@ -248,7 +250,7 @@ impl TapedRobot {
         Ok(Met::Elsewhere(Failure::Lost { because }))
     }
 
-    /// A body that begins again does again what the tape says that it did.
+    /// Repeats a replayed request on a body that begins again.
     async fn follow(&self, request: &Request, entry: Entry, watch: &Watch<'_>) -> Result<Entry, Failure> {
         let Some(live) = self.live.as_ref().filter(|live| live.begins_again()) else { return Ok(entry) };
         request.ask(&**live, watch).await;
@@ -271,7 +273,7 @@ impl TapedRobot {
         }
     }
 
-    /// Answers a question from the live body if there is one, else from the tape.
+    /// Answers a query from the live body if there is one, else from the tape.
     fn reply(&self, question: Question, live: impl FnOnce(&dyn Robot) -> Reply) -> Option<Reply> {
         let mut state = self.lock();
         let key = serde_json::to_string(&question).unwrap_or_default();
@@ -296,7 +298,7 @@ impl TapedRobot {
 }
 
 impl State {
-    /// Takes in what the tape has up to the next answer.
+    /// Reads the replies on the tape up to the next answer.
     fn hear_replies(&mut self) {
         let Some(next) = self.played.front() else { return };
         for (question, reply) in &next.replies {
@@ -305,11 +307,11 @@ impl State {
     }
 }
 
-/// Meeting of the live body where the tape ends.
+/// State of the live body at the end of the tape.
 enum Met {
-    /// At the end of the tape, or after an earlier meeting.
+    /// At the last pose of the tape, or checked earlier.
     Here,
-    /// There, and the last that it did was to look at this.
+    /// At the last pose of the tape, whose last request was to look at this point.
     Looking(Point3<f64>),
     /// Elsewhere.
     Elsewhere(Failure),

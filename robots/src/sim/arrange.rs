@@ -1,4 +1,4 @@
-//! A seed makes a scene out of what was written: places that do not overlap, and a target hidden as far as was asked for.
+//! Arrangement of a scene by a seed: places without overlap, and a target with the requested occlusion.
 
 use crate::body::Pose2;
 use crate::head;
@@ -17,22 +17,24 @@ use nalgebra::{Isometry2, Point2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Whole arrangements tried before a scene is given up.
+/// Maximum number of arrangements tried.
 const ROUNDS: usize = 400;
-/// Places tried for one object within an arrangement.
+/// Maximum number of places tried for one object within an arrangement.
 const PLACES: usize = 60;
-/// Places tried for the target among the others.
+/// Maximum number of places tried for the target among the others.
 const TARGET_PLACES: usize = 40;
-/// Every how many-th pixel decides about visibility; final shares are measured with all.
+/// Stride of the pixels used to test visibility; final shares use all pixels.
 const COARSE_STRIDE: usize = 3;
-/// Poses asked whether some view shows the target: on a ring around its surface's centre, in the middle of the published 1.2 to 1.6 m.
+/// Poses used to test whether some view shows the target: on a ring around its surface's centre, in the
+/// middle of the published 1.2 to 1.6 m.
 const RING_M: f64 = 1.4;
 const RING_POSES: usize = 16;
 
-/// Chooses what the scene leaves open. The same seed gives the same scene.
+/// Draws everything that the scene leaves open. The same seed gives the same scene.
 ///
 /// # Errors
-/// If no arrangement fits: what was tried and which demand failed most.
+///
+/// If no arrangement fits: the number of tries, and the most frequent obstacle.
 pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let doors = hang_doors(spec, seed);
@@ -86,7 +88,7 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
     Err(failures.report(spec, seed))
 }
 
-/// Things on the floor in their places; they draw by themselves, as doors do.
+/// Places the obstacles on the floor, with random draws of their own, as for doors.
 fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, InputError> {
     let mut rng = ChaCha8Rng::seed_from_u64(mix(seed ^ 0xf100));
     let outline = |o: &ObstacleSpec| Outline::Rectangle { half_m: [0.5 * o.size_m[0], 0.5 * o.size_m[1]] };
@@ -123,7 +125,8 @@ fn stand_on_floor(spec: &SceneSpec, seed: u64) -> Result<Vec<ObstacleSpec>, Inpu
     ))
 }
 
-/// Each door draws by itself: an arrangement does not depend on how many doors there are.
+/// Draws the state of each door, with random draws of its own, so that arrangements do not depend on the
+/// number of doors.
 fn hang_doors(spec: &SceneSpec, seed: u64) -> Vec<HungDoor> {
     let hang = |(i, door): (usize, &DoorSpec)| {
         let drawn = mix(mix(seed ^ 0xd00f) ^ i as u64);
@@ -183,8 +186,8 @@ impl Failures {
     }
 }
 
-/// Places the objects of the visit asked for: an object that comes or moves is placed beside those
-/// that are there, by draws of its own, so that all others stay.
+/// Places the objects for the requested visit: an object that arrives or moves is placed among the present
+/// ones, with random draws of its own, so that all others stay.
 fn visits(spec: &SceneSpec, seed: u64) -> Option<Vec<Object>> {
     let mut there: Vec<Option<Object>> = vec![None; spec.objects.len()];
     let mut asked = Vec::new();
@@ -243,7 +246,7 @@ fn place_all(spec: &SceneSpec, scene: &mut Scene, rng: &mut ChaCha8Rng) -> bool 
     true
 }
 
-/// An object on its surface, beside the others that stand there; none if no place was found.
+/// Places an object on its surface among the others there; none if no place was found.
 fn place<'a>(
     o: &ObjectSpec,
     shape: Shape,
@@ -269,7 +272,7 @@ fn place<'a>(
     found.then_some(object)
 }
 
-/// For each object one of the surfaces that it may stand on, by their weights; nothing is drawn where there is one.
+/// Draws for each object one of its possible surfaces by their weights; nothing is drawn for a single one.
 fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<&'a SurfaceSpec>> {
     let mut chosen: Vec<&SurfaceSpec> = Vec::new();
     for o in &spec.objects {
@@ -280,7 +283,7 @@ fn choose_surfaces<'a>(spec: &'a SceneSpec, rng: &mut ChaCha8Rng) -> Option<Vec<
     Some(chosen)
 }
 
-/// One of the surfaces that an object may stand on, by their weights, but not `taken`.
+/// Draws one of the possible surfaces of an object by their weights, except `taken`.
 fn choose_surface<'a>(
     spec: &'a SceneSpec,
     o: &ObjectSpec,
@@ -320,7 +323,7 @@ fn move_somewhere(o: &ObjectSpec, surface: &SurfaceSpec, object: &mut Object, rn
     object.map_from_object = surface.map_from_top() * upright(x, y, 0.0, yaw_rad);
 }
 
-/// True if the object stands on its surface as a whole and keeps its gap to the others.
+/// True if the object lies completely on its surface and keeps its gap to the others.
 pub(crate) fn fits<'a>(
     object: &Object,
     surface: &SurfaceSpec,
@@ -334,7 +337,7 @@ pub(crate) fn fits<'a>(
     on_top && keeps_apart(object, others, gap_m)
 }
 
-/// True if the object keeps its gap to the others that stand on the same surface.
+/// True if the object keeps its gap to the others on the same surface.
 pub(crate) fn keeps_apart<'a>(
     object: &Object,
     mut others: impl Iterator<Item = &'a Object>,
@@ -363,7 +366,8 @@ fn corners(outline: &Outline, at: &Isometry2<f64>) -> Vec<(Point2<f64>, f64)> {
     }
 }
 
-/// Gap between two outlines, metres; zero or below where they overlap. For two boxes by separating axes: never more than the true gap.
+/// Gap between two outlines, metres; zero or negative where they overlap. For two boxes, a lower bound by
+/// separating axes.
 pub(crate) fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b: &Isometry2<f64>) -> f64 {
     match (a, b) {
         (Outline::Disc { radius_m: ra }, Outline::Disc { radius_m: rb }) => {
@@ -399,7 +403,8 @@ pub(crate) fn gap_between(a: &Outline, at_a: &Isometry2<f64>, b: &Outline, at_b:
     }
 }
 
-/// Moves the target among the others until it is hidden as asked for; its share seen from the start.
+/// Moves the target among the others until it is occluded as requested; returns its share visible from the
+/// start.
 fn settle_target(
     spec: &SceneSpec,
     target: &TargetSpec,

@@ -12,13 +12,14 @@ pub const HEAD: Head = Head {
     tilt_down_rad: 1.2,
     tilt_up_rad: 0.8,
 };
-/// Kept between the footprint and what the map shows, metres: about two standard deviations of localisation.
+/// Clearance between the footprint and mapped obstacles, metres: about two standard deviations of
+/// localisation.
 pub const SAFETY_M: f64 = 0.05;
 /// Reach of the arm from the base's origin, metres.
 pub const REACH_M: f64 = 1.8;
-/// The widest thing that the hand takes, metres.
+/// Maximum width of a graspable object, metres.
 pub const HAND_OPENING_M: f64 = 0.12;
-/// The base is round, metres.
+/// Radius of the round base, metres.
 pub const RADIUS_M: f64 = 0.25;
 /// Speeds of the base.
 pub const SPEEDS: Speeds = Speeds { linear_m_s: 0.4, angular_rad_s: 0.8 };

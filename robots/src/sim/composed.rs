@@ -1,4 +1,4 @@
-//! Things composed of several solids, painted with patterns: what a household has besides cups and boxes.
+//! Objects composed of several solids, painted with patterns: household objects besides cups and boxes.
 
 use crate::sim::shape::{Part, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -6,43 +6,43 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-/// Several solids as one rigid thing.
+/// Several solids as one rigid object.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Composed {
-    /// The solids; where they overlap only the outer surface is seen.
+    /// The solids; where they overlap, only the outer surface is visible.
     pub parts: Vec<Piece>,
 }
 
-/// One of the solids of a composed thing.
+/// One of the solids of a composed object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Piece {
-    /// Its solid, the origin at the centre of its base.
+    /// Its solid, with the origin at the centre of its base.
     pub shape: Shape,
-    /// Position of that origin in the thing, metres.
+    /// Position of that origin in the object, metres.
     #[serde(default)]
     pub at_m: [f64; 3],
-    /// Turned about the thing's x, then y, then z axis, degrees.
+    /// Rotation about the object's x, then y, then z axis, degrees.
     #[serde(default)]
     pub turn_deg: [f64; 3],
-    /// Red, green, blue; that of the object if left out.
+    /// Red, green, blue; the colour of the object if left out.
     #[serde(default)]
     pub colour: Option<[u8; 3]>,
-    /// Pattern that is printed on it.
+    /// Printed pattern.
     #[serde(default)]
     pub pattern: Option<Pattern>,
 }
 
-/// Random patches of colours around the colour that it is printed on.
+/// Random patches of colour around the base colour.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pattern {
-    /// Side of the larger patches, metres; smaller ones within them have two fifths of it.
+    /// Side of the larger patches, metres; the smaller ones within them have two fifths of it.
     pub size_m: f64,
-    /// Greatest difference of red, green and blue.
+    /// Maximum deviation of red, green and blue.
     pub spread: f64,
-    /// Another one for another print.
+    /// Seed of the pattern.
     #[serde(default)]
     pub seed: u64,
 }
@@ -52,18 +52,18 @@ pub struct Pattern {
 pub struct Paint {
     /// Red, green, blue.
     pub colour: [u8; 3],
-    /// Pattern that is printed on it.
+    /// Printed pattern.
     pub pattern: Option<Pattern>,
 }
 
-/// Shares of the colour's change by larger and by smaller patches; and the side of the smaller ones
-/// as a share of the larger.
+/// Weights of larger and smaller patches in the colour deviation; and the side of the smaller ones relative
+/// to the larger.
 const LARGER: f64 = 0.7;
 const SMALLER: f64 = 0.5;
 const SMALLER_SIDE: f64 = 0.4;
 
 impl Paint {
-    /// The colour at a place of the solid's frame.
+    /// The colour at a point in the solid's frame.
     pub fn at(&self, p: &Point3<f64>) -> [u8; 3] {
         let Some(pattern) = self.pattern else { return self.colour };
         let larger = patch(p, pattern.size_m, pattern.seed);
@@ -75,7 +75,7 @@ impl Paint {
     }
 }
 
-/// Three draws from -1 to 1 that belong to the cube around a place.
+/// Three random values from -1 to 1 for the cube around a point.
 fn patch(p: &Point3<f64>, size_m: f64, seed: u64) -> [f64; 3] {
     let cell = |key: u64, c: f64| super::noise::mix(key ^ ((c / size_m + 0.37).floor() as i64 as u64));
     let key = p.iter().fold(super::noise::mix(seed), |key, c| cell(key, *c));
@@ -91,7 +91,7 @@ impl Piece {
         )
     }
 
-    /// Corners of the box around it in the thing's frame.
+    /// Corners of its bounding box in the object's frame.
     fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let thing_from_piece = self.thing_from_piece();
         let (low, high) = self.shape.bounds();
@@ -108,13 +108,13 @@ impl Piece {
 }
 
 impl Composed {
-    /// Corners of the box around it.
+    /// Corners of its bounding box.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         let all = self.parts.iter().map(Piece::bounds);
         all.reduce(|(low, high), (l, h)| (low.inf(&l), high.sup(&h))).unwrap_or_default()
     }
 
-    /// Greatest distance from its axis, metres.
+    /// Maximum distance from its axis, metres.
     pub fn radius_m(&self) -> f64 {
         let reach = |(low, high): (Point3<f64>, Point3<f64>)| {
             low.x.abs().max(high.x.abs()).hypot(low.y.abs().max(high.y.abs()))
@@ -122,7 +122,7 @@ impl Composed {
         self.parts.iter().map(|piece| reach(piece.bounds())).fold(0.0, f64::max)
     }
 
-    /// The same, larger.
+    /// The object scaled by a factor.
     pub fn scaled(&self, factor: f64) -> Composed {
         let piece = |p: &Piece| Piece {
             shape: p.shape.scaled(factor),
@@ -132,7 +132,7 @@ impl Composed {
         Composed { parts: self.parts.iter().map(piece).collect() }
     }
 
-    /// The surfaces that a ray can meet, with their colours; `colour` is that of pieces that say none.
+    /// The surfaces for ray casting, with their colours; `colour` is for pieces without one.
     pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
         let of = |piece: &Piece| -> Vec<(Part, Paint)> {
             let own = piece.colour.unwrap_or(colour);
@@ -147,16 +147,16 @@ impl Composed {
     }
 }
 
-/// Rigid things of a household, by name, in the form in which a scene file composes its own.
+/// Rigid household objects by name, in the format of scene files.
 pub static HOUSEHOLD: LazyLock<BTreeMap<String, Composed>> =
     LazyLock::new(|| toml::from_str(include_str!("household.toml")).unwrap_or_default());
 
-/// The names of the things of a household.
+/// The names of the household objects.
 pub fn household() -> impl Iterator<Item = &'static str> {
     HOUSEHOLD.keys().map(String::as_str)
 }
 
-/// The thing of a household of that name.
+/// The household object of this name.
 pub(crate) fn named(name: &str) -> Option<&'static Composed> {
     HOUSEHOLD.get(name)
 }

@@ -1,4 +1,4 @@
-//! Motion of the simulated base: along a route in its own estimate of the map, while the truth is a little elsewhere.
+//! Motion of the simulated base: along a route in its own estimate, while its true pose deviates.
 
 use crate::body::Pose2;
 use crate::parts::Speeds;
@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point2, Translation3, UnitQuaternion, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// Straight lines are driven in steps of this length, metres; between two the base can be stopped.
+/// Length of the steps of a straight drive, metres; the base can be stopped between two.
 const STEP_M: f64 = 0.05;
 
 /// One step of a drive.
@@ -21,8 +21,8 @@ pub struct Step {
     pub metres: f64,
 }
 
-/// The steps of a route: a turn on the spot, then straight on, for each line; a turn to the goal's heading at the end. Their seconds
-/// add up to the duration of the route.
+/// The steps of a route: for each line a turn on the spot, then straight on; finally a turn to the goal's
+/// heading. Their durations add up to that of the route.
 pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<Step> {
     let mut steps = Vec::new();
     let mut heading_rad = from.yaw_rad;
@@ -62,9 +62,10 @@ pub struct Localisation {
     pub sigma_m: f64,
     /// Standard deviation of its heading, radians.
     pub sigma_rad: f64,
-    /// Standard deviation of where it stops against where it wants to, along x and y, metres. The estimate shows it.
+    /// Standard deviation of the stopping position relative to the goal, along x and y, metres. The estimate
+    /// includes it.
     pub stop_sigma_m: f64,
-    /// The same for the heading, radians.
+    /// Standard deviation of the heading at a stop, radians.
     pub stop_sigma_rad: f64,
 }
 
@@ -81,7 +82,7 @@ impl Default for Localisation {
 }
 
 impl Localisation {
-    /// The estimate at a stop: the pose that the base meant to take, give or take.
+    /// Draws the estimated pose at a stop, around the intended one.
     pub fn stop(&self, wanted: &Pose2, rng: &mut ChaCha8Rng) -> Pose2 {
         Pose2::new(
             wanted.x_m + self.stop_sigma_m * normal(rng),
@@ -90,12 +91,13 @@ impl Localisation {
         )
     }
 
-    /// `estimate_from_truth` at a stop. It stays while the base stands: asking again does not average it out.
+    /// Draws `estimate_from_truth` at a stop. It is constant while the base stands, so repeated queries do
+    /// not average it out.
     pub fn error(&self, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         shift(self.sigma_m * normal(rng), self.sigma_m * normal(rng), self.sigma_rad * normal(rng))
     }
 
-    /// `estimate_from_truth` when localisation is wrong: 10 cm and 6° in directions that the seed chooses.
+    /// Draws `estimate_from_truth` for a failed localisation: 10 cm and 6° in random directions.
     pub fn bad_error(rng: &mut ChaCha8Rng) -> Isometry3<f64> {
         let direction: f64 = std::f64::consts::TAU * rand::Rng::random::<f64>(rng);
         let sign = if rand::Rng::random::<bool>(rng) { 1.0 } else { -1.0 };

@@ -30,29 +30,29 @@ use crate::sim::noise::{mix, share};
 use crate::sim::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
-/// A kind of mishap.
+/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
-    /// Somebody stands in the way: the drive ends on its way.
+    /// A person stands in the way: the drive ends early.
     BlockedPath,
-    /// The goal cannot be reached, now or later, though the map says so.
+    /// The goal cannot be reached, now or later, although the map shows a route.
     UnreachablePose,
-    /// The drive takes all the time it was given and ends on its way.
+    /// The drive uses up its time limit and ends early.
     TimedOutDrive,
-    /// A frame does not come.
+    /// A frame is lost.
     DroppedFrame,
-    /// After the drive the body is 10 cm and 6° off where it believes to be.
+    /// After the drive the estimated pose is wrong by 10 cm and 6°.
     BadLocalisation,
-    /// During the drive somebody moves an object on its surface.
+    /// During the drive someone moves an object on its surface.
     ObjectMoved,
-    /// During the drive somebody takes an object away.
+    /// During the drive someone takes an object away.
     ObjectTaken,
-    /// During the drive somebody puts an object on another surface.
+    /// During the drive someone puts an object on another surface.
     ObjectRelocated,
-    /// During the drive what the hand holds falls to the floor.
+    /// During the drive the held object falls to the floor.
     ObjectDropped,
-    /// As the drive begins somebody shuts a door.
+    /// At the start of the drive someone shuts a door.
     DoorShut,
     /// The grasp slips.
     GraspSlips,
@@ -75,28 +75,28 @@ impl FaultKind {
     ];
 }
 
-/// One mishap: which, when, to what.
+/// A fault: its kind, time and object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
     /// Kind of the fault.
     pub kind: FaultKind,
-    /// At the drive (or frame, or grasp) of this number, from 1.
+    /// Number of the drive (or frame, or grasp) at which it happens, from 1.
     #[serde(default)]
     pub at: Option<u64>,
-    /// Or at each with this chance.
+    /// Or the probability at each.
     #[serde(default)]
     pub chance: Option<f64>,
-    /// The object that is moved or taken; the seed chooses if left out.
+    /// The object to move or take; drawn by the seed if left out.
     #[serde(default)]
     pub object: Option<String>,
-    /// The surface that it is put on; the seed chooses if left out.
+    /// The surface to put it on; drawn by the seed if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to: Option<String>,
-    /// The door that is shut; the seed chooses if left out.
+    /// The door to shut; drawn by the seed if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub door: Option<String>,
-    /// Distance that it is moved, metres.
+    /// Distance of the move, metres.
     #[serde(default = "default_by_m")]
     pub by_m: f64,
 }
@@ -105,20 +105,21 @@ fn default_by_m() -> f64 {
     0.2
 }
 
-/// All mishaps of a run.
+/// All faults of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FaultPlan {
-    /// In the order in which they are asked.
+    /// Faults, in the order in which they are applied.
     #[serde(default, rename = "fault")]
     pub faults: Vec<Fault>,
 }
 
 impl FaultPlan {
-    /// Reads `[[fault]]` entries. `file` is the name for messages.
+    /// Parses `[[fault]]` entries. `file` is the name for messages.
     ///
     /// # Errors
-    /// The first mistake, with its place in the text and how to mend it.
+    ///
+    /// The first error, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<FaultPlan, InputError> {
         let plan: FaultPlan = input::parse_toml(file, text)?;
         plan.check().map_err(|objection| input::draw(file, text, objection))?;
@@ -130,9 +131,10 @@ impl FaultPlan {
         FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
     }
 
-    /// Checks that every fault says when.
+    /// Checks that every fault has a time.
     ///
     /// # Errors
+    ///
     /// The first objection, with its path in the document.
     pub fn check(&self) -> Result<(), Objection> {
         for (i, fault) in self.faults.iter().enumerate() {
@@ -169,7 +171,7 @@ impl FaultPlan {
         Ok(())
     }
 
-    /// The faults of that kind that happen at drive (or frame, or grasp) `number`, from 1.
+    /// The faults of a kind that happen at the drive (or frame, or grasp) `number`, from 1.
     pub fn strike(&self, kind: FaultKind, number: u64, seed: u64) -> impl Iterator<Item = &Fault> {
         let of_kind = self.faults.iter().enumerate().filter(move |(_, f)| f.kind == kind);
         let happens = move |(i, fault): &(usize, &Fault)| {

@@ -1,4 +1,4 @@
-//! Taking an object into the hand and putting it down.
+//! Grasping and placing of objects.
 
 use crate::sim::arrange::{fits, keeps_apart};
 use crate::sim::drive::normal;
@@ -9,23 +9,23 @@ use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Chance that what the hand closes on slides out of it.
+/// Probability that a grasped object slips.
 const SLIP_CHANCE: f64 = 0.08;
-/// The hand finds an object whose middle is at most this far beside where it was said to be, metres.
+/// Maximum horizontal distance of an object's centre from the stated point for the hand to find it, metres.
 const FIND_M: f64 = 0.12;
-/// The hand reaches this far above and below the object for its middle, metres.
+/// Tolerance of the hand above and below the object, metres.
 const FIND_HEIGHT_M: f64 = 0.05;
-/// Greatest displacement of an object that slides out of the hand, metres.
+/// Maximum displacement of a slipped object, metres.
 const SLIDE_M: f64 = 0.05;
-/// Directions tried for it.
+/// Number of directions tried for the displacement.
 const SLIDE_TRIES: usize = 8;
-/// Standard deviation of where things are put down, along x and y, metres.
+/// Standard deviation of a placement along x and y, metres.
 const PLACE_SIGMA_M: f64 = 0.01;
-/// The hand finds a surface whose height is at most this far from where it was said to be, metres.
+/// Maximum difference between true and stated height of a surface for the hand to find it, metres.
 const SURFACE_HEIGHT_M: f64 = 0.1;
-/// Overhang that is corrected by putting the object a little further inside, metres.
+/// Maximum overhang that is corrected by moving the object inwards, metres.
 const EDGE_M: f64 = 0.05;
-/// Position of the held object's foot, in the base frame.
+/// Position of the held object's base, base frame, metres.
 pub(crate) const BASE_FROM_HAND: Vector3<f64> = Vector3::new(0.35, 0.0, 0.9);
 
 /// Result of a grasp.
@@ -35,13 +35,13 @@ pub(crate) enum Taken {
     Nothing,
     /// The object is wider than the hand opens.
     TooWide(usize),
-    /// The object slid out of the hand and stands, perhaps a little elsewhere.
+    /// The object slipped and stands, perhaps slightly displaced.
     Slid(usize),
     /// The object is in the hand.
     Held(usize),
 }
 
-/// Takes what stands at a point of the map (true coordinates): the object there that is nearest and about as wide as expected.
+/// Grasps at a point of the map (true coordinates): the nearest object there of about the expected width.
 pub(crate) fn take(
     scene: &mut Scene,
     at: &Point3<f64>,
@@ -86,20 +86,20 @@ fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Reason for which an object is not put down.
+/// Reason for which an object cannot be placed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoPlace {
     /// There is no surface.
     NoSurface,
-    /// The surface is too small for it there.
+    /// The surface ends too close.
     Edge(String),
     /// Another surface is too low above it.
     Under(String),
-    /// Something stands there.
+    /// Another object is in the way.
     Taken,
 }
 
-/// Puts an object down with its foot at a point of the map (true coordinates), more or less; the surface's name.
+/// Places an object near a point of the map (true coordinates); returns the surface's name.
 pub(crate) fn put(
     scene: &mut Scene,
     object: usize,

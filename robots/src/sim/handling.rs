@@ -11,23 +11,23 @@ use crate::sim::state::State;
 use nalgebra::{Point2, Point3};
 use rand::Rng;
 
-/// A push without the way that the hand moves with the object, seconds.
+/// Duration of a push without the motion in contact, seconds.
 const PUSH_S: f64 = 8.0;
 /// Speed of the hand while it pushes, metres a second.
 const HAND_M_S: f64 = 0.1;
-/// A hand that moved less than this share of what was asked for reports that it slipped.
+/// Share of the requested distance below which the hand reports a slip.
 const SLIPPED_SHARE: f64 = 0.5;
-/// From the first move of the arm until the object is lifted, seconds.
+/// Duration of a grasp, from the first move of the arm until the object is lifted, seconds.
 const GRASP_S: f64 = 12.0;
-/// From the first move of the arm until the object stands and the hand is away, seconds.
+/// Duration of a placement, from the first move of the arm until the hand is withdrawn, seconds.
 const PLACE_S: f64 = 10.0;
 /// Opening a door, seconds.
 const DOOR_S: f64 = 6.0;
-/// Greatest distance of the base from the middle of a door to open it, metres.
+/// Maximum distance of the base from the centre of a door to open it, metres.
 const DOOR_REACH_M: f64 = 1.2;
-/// Chance that the hand slips off a door.
+/// Probability that the hand slips off a door.
 const DOOR_SLIP_CHANCE: f64 = 0.08;
-/// While the arm works it can be stopped this often, seconds.
+/// Interval at which the arm can be stopped, seconds.
 const WORK_STEP_S: f64 = 0.5;
 
 fn unreachable(because: impl Into<String>) -> Failure {
@@ -95,7 +95,7 @@ impl SimRobot {
         }
     }
 
-    /// The arm works for so long, unless it is stopped.
+    /// Lets the arm work for a duration, unless it is stopped.
     async fn work(&self, what: &str, seconds: f64, watch: &Watch<'_>) -> Result<(), Failure> {
         let mut elapsed_s = 0.0;
         while elapsed_s < seconds {

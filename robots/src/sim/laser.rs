@@ -1,4 +1,5 @@
-//! A planar laser in the scene: level rays against room and solids at one height, and the noise of a SICK LMS 200.
+//! Planar laser in the scene: horizontal rays against room and solids at one height, and the noise of a SICK
+//! LMS 200.
 
 use crate::body::Pose2;
 use crate::parts;
@@ -9,7 +10,7 @@ use nalgebra::{Isometry2, Isometry3, Point3, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-/// A laser that sweeps in a plane.
+/// A laser that sweeps in a horizontal plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Laser {
     /// Angle of the first reading, anticlockwise from straight ahead.
@@ -20,11 +21,11 @@ pub struct Laser {
     pub readings: usize,
     /// Height of the plane above the floor.
     pub height_m: f64,
-    /// Nothing farther returns.
+    /// Maximum range.
     pub reach_m: f64,
-    /// Spread of a range.
+    /// Standard deviation of a range.
     pub sigma_m: f64,
-    /// Ranges are told in steps of this; 0 for exact ones.
+    /// Resolution of ranges; 0 for exact ones.
     pub precision_m: f64,
 }
 
@@ -44,7 +45,7 @@ impl Default for Laser {
 }
 
 impl Laser {
-    /// The laser as a part of a body, above the middle of its base.
+    /// The laser as a part of a body, above the centre of its base.
     pub fn part(&self) -> parts::Laser {
         parts::Laser {
             frame: "laser".into(),
@@ -95,7 +96,7 @@ fn told(laser: &Laser, exact_m: f64, noise: f64) -> f64 {
     steps.max(laser.precision_m)
 }
 
-/// Solids that reach through the plane, with the way from the map into their own frames.
+/// Solids that intersect the plane, with the transform from the map into their own frames.
 fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
     scene
         .solids()
@@ -109,7 +110,7 @@ fn crossing(scene: &Scene, height_m: f64) -> Vec<(Isometry3<f64>, Solid)> {
         .collect()
 }
 
-/// Range of a level ray; infinite without a hit.
+/// Range of a horizontal ray; infinite without a hit.
 fn nearest_m(
     room: &RoomSpec,
     solids: &[(Isometry3<f64>, Solid)],
@@ -124,7 +125,7 @@ fn nearest_m(
     })
 }
 
-/// To the walls around it all from inside them.
+/// Range to the outer walls from inside.
 fn wall_m(room: &RoomSpec, eye: &Point3<f64>, along: &Vector3<f64>) -> f64 {
     let (low, high) = (room.low(), room.high());
     let to = |axis: usize| match along[axis] {

@@ -1,5 +1,5 @@
-//! Simulated rooms with tables, shelves and doors: scenes, the depth camera, driving, the hand, faults. The only place that reads the
-//! truth.
+//! Simulated rooms with tables, shelves and doors: scenes, the depth camera, driving, the hand, faults. The
+//! only module that reads the ground truth.
 
 pub mod arrange;
 pub mod body;

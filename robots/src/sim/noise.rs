@@ -10,15 +10,15 @@ use std::sync::OnceLock;
 /// Parameters of a depth camera's noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthNoise {
-    /// Between projector and camera; what only one of them sees is lost in a shadow. Metres.
+    /// Distance between projector and camera, metres; points seen by only one of them are lost in shadow.
     pub baseline_m: f64,
-    /// Steps of disparity in one pixel.
+    /// Number of disparity steps in one pixel.
     pub disparity_steps: f64,
     /// Share of pixels lost beside a depth edge.
     pub edge_loss: f64,
     /// Factor on both standard deviations; 0 leaves quantisation and lost pixels.
     pub scale: f64,
-    /// Share of the returns that are lost besides, in patches: at steep faces and depth edges first.
+    /// Share of the returns lost in patches, at steep faces and depth edges first.
     pub holes: f64,
 }
 
@@ -29,14 +29,14 @@ impl Default for DepthNoise {
     }
 }
 
-/// Nothing returns from surfaces that are seen at a steeper angle, degrees.
+/// Incidence angle beyond which nothing returns, degrees.
 const STEEPEST_DEG: f64 = 85.0;
-/// Depths of neighbouring pixels that differ by more than this share of the depth are an edge.
+/// Relative depth difference of neighbouring pixels from which there is an edge.
 const EDGE_SHARE: f32 = 0.02;
-/// Across the patches in which returns are lost, pixels.
+/// Size of the patches of lost returns, pixels.
 const PATCH_PX: usize = 10;
 
-/// θ/(90° − θ) by cosine of θ; infinite beyond [`STEEPEST_DEG`].
+/// θ/(90° − θ) by cosine of θ; infinite beyond `STEEPEST_DEG`.
 fn steepness(cosine: f32) -> f32 {
     const CELLS: usize = 2048;
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
@@ -82,7 +82,7 @@ fn quantile(share: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Sixty-four well mixed bits for a key (the finaliser of SplitMix64).
+/// Sixty-four well-mixed bits for a key (the finaliser of SplitMix64).
 pub fn mix(key: u64) -> u64 {
     let mut z = key.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -90,12 +90,12 @@ pub fn mix(key: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A share from 0 to 1 (1 left out) for well mixed bits.
+/// A number in [0, 1) from well-mixed bits.
 pub fn share(bits: u64) -> f64 {
     (bits >> 11) as f64 / ((1u64 << 53) as f64)
 }
 
-/// Turns an ideal frame into the camera's: depths along z in metres, NaN without a return.
+/// Applies the camera's noise to an ideal frame: depths along z in metres, NaN without a return.
 ///
 /// σ_axial = 1.2 mm + 1.9 mm/m²·(z − 0.4 m)² + 0.1 mm·θ²/(√z·(90° − θ)²), σ_lateral = 0.8 px + 0.034 px·θ/(90° − θ).
 pub fn observe(
@@ -127,8 +127,8 @@ pub fn observe(
     out
 }
 
-/// Takes a share of the returns away: those with the greatest sum of a field that is smooth over [`PATCH_PX`], of steepness, and of
-/// being at a depth edge.
+/// Removes a share of the returns: those with the greatest sum of a random field smooth over `PATCH_PX`, of
+/// steepness, and of a bonus for depth edges.
 fn lose_patches(frame: &Frame, holes: f64, key: u64, depths_m: &mut [f32]) {
     let width = frame.intrinsics.width.max(1);
     let corner = |column: usize, row: usize| normal(mix(mix(key ^ (column as u64) << 32) ^ row as u64));
@@ -184,7 +184,7 @@ fn pixel(
     if quantised >= range_m.0 && quantised <= range_m.1 { quantised as f32 } else { f32::NAN }
 }
 
-/// True if a neighbour to the side or above or below is nearer or farther by [`EDGE_SHARE`].
+/// True if a horizontal or vertical neighbour differs in depth by [`EDGE_SHARE`].
 #[inline]
 fn is_edge(frame: &Frame, column: usize, row: usize) -> bool {
     let (width, height) = (frame.intrinsics.width, frame.intrinsics.height);
@@ -200,7 +200,8 @@ fn is_edge(frame: &Frame, column: usize, row: usize) -> bool {
         || (row + 1 < height && jumps(here + width))
 }
 
-/// Marks the pixels of a row that the projector, one baseline to the right, does not light: a ray of it meets something nearer first.
+/// Marks the pixels of a row that the projector, one baseline to the right, does not light because its ray
+/// hits a nearer surface first.
 fn cast_shadow(depth_m: &[f32], focal_baseline: f64, shadow: &mut [bool]) {
     let mut least = f64::INFINITY;
     for column in (0..depth_m.len()).rev() {

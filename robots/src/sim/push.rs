@@ -7,19 +7,20 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Chance that the hand slides off.
+/// Probability that the hand slides off.
 const SLIP_CHANCE: f64 = 0.08;
-/// Standard deviation of the distance, as a share of it.
+/// Relative standard deviation of the distance.
 const DISTANCE_SIGMA: f64 = 0.08;
 /// Standard deviation of the direction, radians.
 const DIRECTION_SIGMA_RAD: f64 = 0.08;
-/// Standard deviation of how far the object turns, radians.
+/// Standard deviation of the object's rotation, radians.
 const TURN_SIGMA_RAD: f64 = 0.15;
-/// The hand finds an object whose centre is at most this far beside where it was said to be, metres.
+/// Maximum horizontal distance of an object's centre from the stated point for the hand to find it, metres.
 const FIND_M: f64 = 0.15;
-/// The hand finds it this far above its top or below its foot, metres: not what stands on another board.
+/// Tolerance of the hand above an object's top and below its base, metres, which excludes objects on other
+/// boards.
 const FIND_HEIGHT_M: f64 = 0.05;
-/// The push goes on in steps of this length, metres, each looked at for what is in the way.
+/// Step of a push, metres; obstacles are checked at each.
 const STEP_M: f64 = 0.005;
 
 /// Effect of a push.
@@ -27,18 +28,19 @@ const STEP_M: f64 = 0.005;
 pub enum Effect {
     /// There was no object.
     Nothing,
-    /// The object moved; the hand felt so, or felt something in the way, or slid off.
+    /// The object moved, until the distance was reached, an obstacle was felt, or the hand slid off.
     Moved {
         /// Index of the object.
         object: usize,
         /// Distance, metres.
         moved_m: f64,
-        /// Reason for which the push was shorter than asked for.
+        /// Reason for a push shorter than requested.
         stopped: Option<&'static str>,
     },
 }
 
-/// Pushes what stands at a point of the map (true coordinates). The object keeps to its surface and does not push others.
+/// Pushes the object at a point of the map (true coordinates). It stays on its surface and does not push
+/// others.
 pub fn push(
     scene: &mut Scene,
     at: &Point3<f64>,

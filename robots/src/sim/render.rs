@@ -1,7 +1,7 @@
-//! The ideal depth camera: every pixel's ray against every solid that can be in its way, in closed form.
+//! Ideal depth camera: analytic ray casting of every pixel against all relevant solids.
 //!
-//! A ray has depth 1 along z, so that its parameter *is* the depth. Each solid is asked only within the rectangle of pixels that its
-//! bounding box covers. Rows are rendered in parallel; no pixel depends on another.
+//! A ray has depth 1 along z, so that its parameter *is* the depth. Each solid is tested only within the
+//! pixel rectangle of its projected bounding box. Rows are rendered in parallel; pixels are independent.
 
 use crate::body::Stamp;
 use crate::sim::scene::RoomSpec;
@@ -11,14 +11,14 @@ use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
 
-/// Frame of an ideal camera; row by row.
+/// Image of an ideal camera, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// The camera.
     pub intrinsics: Intrinsics,
-    /// When.
+    /// Time stamp.
     pub stamp_ns: Stamp,
-    /// Depth along z, metres; infinite where there is nothing.
+    /// Depth along z, metres; infinite without a hit.
     pub depth_m: Vec<f32>,
     /// Cosine of the angle between the ray and the surface's normal.
     pub cosine: Vec<f32>,
@@ -38,23 +38,23 @@ impl Frame {
     }
 }
 
-/// A solid as the camera sees it.
+/// A solid in the camera's frame.
 struct Placed<'a> {
     solid: &'a Solid,
     origin: Point3<f64>,
     solid_from_camera: Rotation3<f64>,
     columns: (usize, usize),
     rows: (usize, usize),
-    /// No part of it is nearer along the line of sight, metres.
+    /// Lower bound on its depth, metres.
     near_m: f64,
 }
 
-/// Depths are compared with the near side of a bounding box with this slack, for rounding, metres.
+/// Slack in comparing depths with the near side of a bounding box, for rounding, metres.
 const SLACK_M: f64 = 1e-6;
-/// Nearer than this to the camera's plane a bounding box is taken to cover the whole image, metres.
+/// Distance to the camera's plane below which a bounding box counts as covering the whole image, metres.
 const NEAR_M: f64 = 0.02;
 const FLOOR_COLOUR: [u8; 3] = [120, 115, 110];
-/// Towards the lamp, in the map.
+/// Direction to the lamp, map frame.
 const LIGHT: Vector3<f64> = Vector3::new(0.32, -0.24, 0.917);
 
 impl<'a> Placed<'a> {
@@ -156,7 +156,7 @@ pub fn render(
     frame
 }
 
-/// One row of the frame while it is drawn.
+/// A row of the frame during rendering.
 struct Line<'a> {
     depth: &'a mut [f64],
     cosine: &'a mut [f32],
@@ -164,7 +164,7 @@ struct Line<'a> {
     colour: &'a mut [[u8; 3]],
 }
 
-/// The floor and the walls around it all: the inside of a box without a lid.
+/// Draws the floor and the outer walls: the inside of a box without a lid.
 fn draw_room(
     room: &RoomSpec,
     map_from_camera: &Isometry3<f64>,
@@ -227,8 +227,8 @@ fn shade(colour: [u8; 3], normal: &Vector3<f64>) -> [u8; 3] {
     colour.map(|c| (f64::from(c) * light).min(255.0) as u8)
 }
 
-/// Share of a solid that nothing hides from the camera: pixels where it is seen over pixels that it would cover alone, every
-/// `stride`-th column and row. `None` if it covers no pixel of the image at all.
+/// Visible share of a solid: pixels where it is seen over pixels that it would cover alone, at every
+/// `stride`-th column and row. `None` if it covers no pixel of the image.
 pub fn visible_share(
     scene: &Scene,
     label: u16,

@@ -25,16 +25,16 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// From the trigger to the frame, seconds.
+/// Time from the trigger to the frame, seconds.
 const FRAME_S: f64 = 0.1;
 
-/// From the trigger to the sweep, seconds.
+/// Time from the trigger to the sweep, seconds.
 const SWEEP_S: f64 = 0.03;
 
 /// Options of the simulator besides the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SimOptions {
-    /// Fixes noise, localisation and mishaps. The arrangement has a seed of its own.
+    /// Seed of noise, localisation and faults. The arrangement has a separate seed.
     pub seed: u64,
     /// Injected faults.
     pub faults: FaultPlan,
@@ -46,7 +46,8 @@ pub struct SimOptions {
     pub laser: Laser,
 }
 
-/// A simulated body in a scene. The truth is asked of [`SimRobot::truth`]; the [`Robot`] trait shows only what a real body would.
+/// A simulated body in a scene. [`SimRobot::truth`] gives the ground truth; the [`Robot`] trait exposes only
+/// what a real body would.
 pub struct SimRobot {
     description: Description,
     camera: Camera,
@@ -63,7 +64,7 @@ pub struct SimRobot {
 struct Departure {
     number: u64,
     steps: Vec<drive::Step>,
-    /// After how many steps it ends early, and why.
+    /// Number of steps after which the drive ends early, and the reason.
     end: Option<(usize, End)>,
 }
 
@@ -72,7 +73,7 @@ struct Trip {
     at: Option<Pose2>,
     elapsed_s: f64,
     distance_m: f64,
-    /// Steps that were done.
+    /// Number of completed steps.
     done: usize,
     failure: Option<Failure>,
 }
@@ -139,13 +140,13 @@ impl SimRobot {
         }
     }
 
-    /// True state of the scene. For scoring and reports: no decision may read it.
+    /// True state of the scene, for scoring and reports only; no decision may read it.
     pub fn truth(&self) -> Truth {
         let state = self.lock();
         Truth::of(&state.scene, state.now_ns, &state.map_from_base(), &state.events)
     }
 
-    /// Share of an object that nothing hides from the camera at a pose when the head looks at it; 0 if it is not there. For the oracle
+    /// Visible share of an object from a pose with the head turned to it; 0 if it is absent. For the oracle
     /// of experiments and for reports.
     pub fn true_visible_share(&self, object: &str, pose: &Pose2) -> f64 {
         let state = self.lock();
@@ -158,7 +159,7 @@ impl SimRobot {
         visible_share(&state.scene, label, &map_from_camera, &self.camera.intrinsics, 1).unwrap_or(0.0)
     }
 
-    /// The ideal frame that the camera would take now, with what each pixel really shows. For reports and tests.
+    /// The ideal frame at the current time, with a label for each pixel. For reports and tests.
     pub fn true_frame(&self) -> Frame {
         let state = self.lock();
         self.render(&state)
@@ -183,7 +184,7 @@ impl SimRobot {
         }
     }
 
-    /// All that goes wrong in a way at a drive, frame or grasp.
+    /// The faults of a kind at a drive, frame or grasp.
     fn strike(&self, kind: FaultKind, number: u64) -> impl Iterator<Item = &Fault> {
         self.options.faults.strike(kind, number, self.options.seed)
     }
@@ -285,7 +286,7 @@ impl SimRobot {
         }
     }
 
-    /// Applies faults that happen during a drive: what others do, and what falls on the way.
+    /// Applies the faults during a drive: actions of others, and a dropped object.
     fn disturb(&self, departure: &Departure, trip: &Trip) {
         for kind in [FaultKind::ObjectMoved, FaultKind::ObjectTaken, FaultKind::ObjectRelocated] {
             for fault in self.strike(kind, departure.number) {
@@ -316,7 +317,7 @@ impl SimRobot {
         Ok(Looked { duration_s, miss_rad })
     }
 
-    /// The number of a frame or a sweep that is due after `seconds`, unless it is lost.
+    /// Triggers a frame or a sweep that is due after `seconds`; returns its number unless it is lost.
     fn trigger(&self, state: &mut State, seconds: f64) -> Result<u64, Failure> {
         state.pass(seconds);
         state.frames += 1;

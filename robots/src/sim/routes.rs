@@ -1,4 +1,4 @@
-//! Map of the simulated body, with a router for each set of doors that counts as shut.
+//! Map of the simulated body, with a router for each set of shut doors.
 
 use crate::grid::OccupancyGrid;
 use crate::parts::Speeds;
@@ -9,13 +9,13 @@ use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Routers that are kept; beyond that all are made anew.
+/// Maximum number of cached routers; the cache is cleared beyond that.
 const MOST_ROUTERS: usize = 64;
 
-/// Doors by number.
+/// Set of doors, by index.
 pub(crate) type Doors = BTreeSet<usize>;
 
-/// The body's own map and what follows from it.
+/// The body's own map with its routers.
 pub(crate) struct Routes {
     map: OccupancyGrid,
     doors: Vec<Doorway>,
@@ -25,12 +25,12 @@ pub(crate) struct Routes {
 }
 
 impl Routes {
-    /// Ways on a map for a base that needs `radius_m` of room.
+    /// Routes on a map for a base that needs `radius_m` of clearance.
     pub fn new(map: OccupancyGrid, doors: Vec<Doorway>, radius_m: f64, speeds: Speeds) -> Routes {
         Routes { map, doors, radius_m, speeds, routers: BTreeMap::new() }
     }
 
-    /// The router on which these doors are walls.
+    /// The router with these doors as walls.
     pub fn with_shut(&mut self, shut: &Doors) -> Arc<Router> {
         if let Some(router) = self.routers.get(shut) {
             return router.clone();
@@ -51,7 +51,7 @@ impl Routes {
         router
     }
 
-    /// Draws something on the map.
+    /// Marks an area of the map as occupied.
     pub fn occupy(&mut self, inside: impl Fn(&Point2<f64>) -> bool) {
         self.map.occupy(inside);
         self.routers.clear();

@@ -1,4 +1,4 @@
-//! The solids that stand in a scene, and where rays meet them. Frame of a shape: origin at the centre of its base, z up.
+//! Shapes of objects, and their ray intersections. Frame of a shape: origin at the centre of its base, z up.
 
 mod part;
 
@@ -12,25 +12,25 @@ pub use part::{Hit, Part};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// Open at the top, hollow, without a handle.
+    /// Cup: open at the top, hollow, without a handle.
     Cup(Cup),
-    /// A cup with a handle towards its x axis.
+    /// Mug: a cup with a handle towards its x axis.
     Mug(Mug),
-    /// Closed; may taper.
+    /// Closed cylinder; may taper.
     Cylinder(Cylinder),
-    /// A cylinder under a lid.
+    /// A cylinder with a lid.
     Canister(Canister),
-    /// A box along its axes.
+    /// An axis-aligned box.
     Box(Cuboid),
-    /// An ellipsoid along its axes.
+    /// An axis-aligned ellipsoid.
     Ball(Ball),
-    /// An upright rod, round at its ends.
+    /// An upright rod with rounded ends.
     Rod(Rod),
-    /// Half a ring that stands upright towards its x axis: a handle.
+    /// An upright half ring towards its x axis: a handle.
     Bow(Bow),
-    /// Several solids as one rigid thing.
+    /// Several solids as one rigid object.
     Composed(Composed),
-    /// A composed thing of a household, by name: kettle, teddy, ….
+    /// A composed household object, by name: kettle, teddy, ….
     Household(String),
 }
 
@@ -38,11 +38,11 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cup {
-    /// At the rim.
+    /// Diameter at the rim.
     pub diameter_m: f64,
-    /// At the base; as at the rim if left out.
+    /// Diameter at the base; as at the rim if left out.
     pub base_diameter_m: Option<f64>,
-    /// From base to rim.
+    /// Height from base to rim.
     pub height_m: f64,
     /// Thickness of wall and base.
     #[serde(default = "default_wall_m")]
@@ -53,16 +53,16 @@ pub struct Cup {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mug {
-    /// At the rim.
+    /// Diameter at the rim.
     pub diameter_m: f64,
-    /// At the base; as at the rim if left out.
+    /// Diameter at the base; as at the rim if left out.
     pub base_diameter_m: Option<f64>,
-    /// From base to rim.
+    /// Height from base to rim.
     pub height_m: f64,
     /// Thickness of wall and base.
     #[serde(default = "default_wall_m")]
     pub wall_m: f64,
-    /// Reach of the handle from the wall: half a ring of this outer radius.
+    /// Reach of the handle from the wall: outer radius of the half ring.
     #[serde(default = "default_handle_m")]
     pub handle_m: f64,
     /// Thickness of the handle.
@@ -74,11 +74,11 @@ pub struct Mug {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cylinder {
-    /// At the base.
+    /// Diameter at the base.
     pub diameter_m: f64,
-    /// At the top; as at the base if left out.
+    /// Diameter at the top; as at the base if left out.
     pub top_diameter_m: Option<f64>,
-    /// From base to top.
+    /// Height from base to top.
     pub height_m: f64,
 }
 
@@ -88,11 +88,11 @@ pub struct Cylinder {
 pub struct Canister {
     /// Diameter of the body.
     pub diameter_m: f64,
-    /// From base to the top of the lid.
+    /// Height from base to the top of the lid.
     pub height_m: f64,
     /// Diameter of the lid.
     pub lid_diameter_m: f64,
-    /// Height of the lid alone.
+    /// Height of the lid.
     pub lid_height_m: f64,
 }
 
@@ -100,7 +100,7 @@ pub struct Canister {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
-    /// Along x, y and z.
+    /// Size along x, y and z.
     pub size_m: [f64; 3],
 }
 
@@ -108,17 +108,17 @@ pub struct Cuboid {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ball {
-    /// Its diameters along x, y and z.
+    /// Diameters along x, y and z.
     pub size_m: [f64; 3],
 }
 
-/// A rod that is round at its ends.
+/// A rod with rounded ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rod {
-    /// From end to end.
+    /// Length from end to end.
     pub length_m: f64,
-    /// Across.
+    /// Diameter.
     pub diameter_m: f64,
 }
 
@@ -126,9 +126,9 @@ pub struct Rod {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bow {
-    /// Across the ring, which is how high it stands.
+    /// Outer diameter of the ring, which is the height.
     pub height_m: f64,
-    /// Thickness of the rod that is bent.
+    /// Thickness of the bent rod.
     pub thickness_m: f64,
 }
 
@@ -142,15 +142,15 @@ fn default_handle_thickness_m() -> f64 {
     0.01
 }
 
-/// Footprint that keeps two shapes apart on a table.
+/// Footprint for keeping two shapes apart on a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
-    /// Around the origin.
+    /// Disc around the origin.
     Disc {
-        /// Metres.
+        /// Radius, metres.
         radius_m: f64,
     },
-    /// Along the axes, around the origin.
+    /// Axis-aligned rectangle around the origin.
     Rectangle {
         /// Half the sides, metres.
         half_m: [f64; 2],
@@ -181,7 +181,7 @@ impl Shape {
         }
     }
 
-    /// Corners of the box around it in its own frame.
+    /// Corners of its bounding box in its own frame.
     pub fn bounds(&self) -> (Point3<f64>, Point3<f64>) {
         if let Some(composed) = self.composed() {
             return composed.bounds();
@@ -214,7 +214,7 @@ impl Shape {
         }
     }
 
-    /// Required opening of a hand around its body, a handle left out, metres.
+    /// Required opening of a hand around its body, without a handle, metres.
     pub fn width_m(&self) -> f64 {
         match self {
             Shape::Ball(_) | Shape::Bow(_) | Shape::Composed(_) | Shape::Household(_) => {
@@ -226,7 +226,7 @@ impl Shape {
         }
     }
 
-    /// The same shape, larger.
+    /// The shape scaled by a factor.
     pub fn scaled(&self, factor: f64) -> Shape {
         let mut shape = self.clone();
         match &mut shape {
@@ -285,7 +285,7 @@ impl Shape {
         0.5 * diameter
     }
 
-    /// The surfaces that a ray can meet, with their colours; `colour` is that of those that say none.
+    /// The surfaces for ray casting, with their colours; `colour` is for those without one.
     pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
         match self.composed() {
             Some(composed) => composed.painted(colour),
@@ -293,7 +293,7 @@ impl Shape {
         }
     }
 
-    /// The surfaces that a ray can meet.
+    /// The surfaces for ray casting.
     pub fn parts(&self) -> Vec<Part> {
         match self {
             Shape::Composed(_) | Shape::Household(_) => {
@@ -352,7 +352,7 @@ impl Shape {
     }
 }
 
-/// Distance of the handle's ring centre from the axis: on the wall at half height.
+/// Distance of the handle's ring centre from the axis, metres: on the wall at half height.
 fn handle_centre_m(m: &Mug) -> f64 {
     0.25 * (m.diameter_m + m.base_diameter_m.unwrap_or(m.diameter_m))
 }

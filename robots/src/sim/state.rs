@@ -17,14 +17,14 @@ use nalgebra::{Isometry3, Point2, Point3, Translation3, Vector2, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Range within which the base's own scanner sees what stops it, metres.
+/// Range of the base's own safety scanner, metres.
 const SCANNER_M: f64 = 0.8;
-/// Range within which the laser's hits are remembered, metres; hits close to a wall are left out.
+/// Range within which laser hits are added to the map, metres; hits close to a wall are left out.
 const NOTICED_M: f64 = 2.5;
 const NEAR_WALL_M: f64 = 0.2;
-/// Goals within this distance of one that was found unreachable are unreachable too, metres.
+/// Distance within which goals share the outcome of an unreachable one, metres.
 const SAME_GOAL_M: f64 = 0.1;
-/// Directions tried for an object that somebody moves.
+/// Number of directions tried for an object that someone moves.
 const MOVE_TRIES: usize = 40;
 
 /// The changing part of the simulator.
@@ -34,21 +34,21 @@ pub(crate) struct State {
     pub events: Vec<Event>,
     pub rng: ChaCha8Rng,
     pub routes: Routes,
-    /// Doors that the base stopped before and nobody has opened since, as far as the body knows.
+    /// Doors that stopped the base and were not opened since, as far as the body knows.
     pub seen_shut: Doors,
     pub estimate: Pose2,
-    /// `estimate = truth · error`: wrong in the body's own frame.
+    /// `estimate = truth · error`: an error in the body's own frame.
     pub error: Isometry3<f64>,
     pub gaze: Gaze,
     pub drives: u64,
     pub frames: u64,
     pub grasps: u64,
     pub unreachable: Vec<Pose2>,
-    /// Obstacles that the base's map does not show.
+    /// Obstacles missing in the base's map.
     pub unknown: Vec<ObstacleSpec>,
 }
 
-/// Reason for which a drive ends on its way.
+/// Reason for which a drive ends early.
 pub(crate) enum End {
     Person,
     Stuck,
@@ -67,7 +67,7 @@ impl State {
         estimate.isometry() * self.error.inverse()
     }
 
-    /// `truth_from_estimate` for points of the map that the body names.
+    /// `truth_from_estimate` for map points given by the body.
     pub fn truth_from_estimate(&self) -> Isometry3<f64> {
         self.map_from_base() * self.estimate.isometry().inverse()
     }
@@ -86,7 +86,7 @@ impl State {
         self.events.push(Event { stamp_ns: self.now_ns, what: what.into() });
     }
 
-    /// Checks a goal against those that were tried in vain.
+    /// Rejects a goal near an unreachable one.
     pub fn known_unreachable(&self, goal: &Pose2) -> Result<(), Failure> {
         let same = |tried: &&Pose2| (tried.point() - goal.point()).norm() <= SAME_GOAL_M;
         match self.unreachable.iter().find(same) {
@@ -97,8 +97,9 @@ impl State {
         }
     }
 
-    /// The first step that brings the footprint into something that the map does not show, and which obstacle that is. What it touches already stops
-    /// only what goes nearer, and no turn on the spot: a turn moves where a base with a wrong estimate really is, and not the base.
+    /// The first step that brings the footprint into an unmapped obstacle, and the obstacle's index. A
+    /// touched obstacle stops only steps towards it, and no turns: a turn on the spot shifts the modelled
+    /// true position of a base with a wrong estimate, although the base does not move.
     pub fn first_bump(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
@@ -120,12 +121,12 @@ impl State {
         self.scene.objects.iter().position(|o| o.stands == Stand::Hand)
     }
 
-    /// The door of that name.
+    /// Index of the door of this name.
     pub fn door(&self, name: &str) -> Option<usize> {
         self.scene.doors.iter().position(|d| d.doorway.name == name)
     }
 
-    /// The doors of those names.
+    /// Indices of the doors of these names.
     pub fn doors(&self, names: &[String]) -> Result<Doors, Failure> {
         let known = |name: &String| {
             let because = || format!("the map has no door \"{name}\"");
@@ -134,7 +135,7 @@ impl State {
         names.iter().map(known).collect()
     }
 
-    /// The route to a goal around the doors that the body knows to be shut; up to one of them if no other leads there.
+    /// The route to a goal around the doors known to be shut; up to one of them if there is no other route.
     pub fn plan(&mut self, goal: &Pose2) -> Result<Route, Failure> {
         let around = self.routes.with_shut(&self.seen_shut).route(&self.estimate, goal);
         match around {
@@ -145,8 +146,8 @@ impl State {
         }
     }
 
-    /// The first step that would bring the footprint into a shut door, and which door that is. The base sees a door where its map has
-    /// it: the step counts as planned.
+    /// The first step that brings the footprint into a shut door, and the door's index. The base detects
+    /// doors where its map has them, so the planned pose counts.
     pub fn first_shut_door(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.estimate.point();
         for (i, step) in steps.iter().enumerate() {
@@ -163,8 +164,8 @@ impl State {
         None
     }
 
-    /// Keeps in mind what ended a drive: a shut door, or on the body's own map what its scanner sees of an obstacle, placed by where
-    /// the body believes to be.
+    /// Records what ended a drive: a shut door, or the scanned part of an obstacle on the body's own map,
+    /// placed by the estimated pose.
     pub fn learn(&mut self, end: &End) {
         let obstacle = match end {
             End::Door(door) => {
@@ -182,7 +183,7 @@ impl State {
         });
     }
 
-    /// Keeps in mind, on the body's own map, what its laser meets nearby that the map of the room does not show.
+    /// Adds nearby laser hits to the body's own map where the map of the room shows nothing.
     pub fn notice(&mut self, scan: &Scan, map: &OccupancyGrid) {
         let on_map = |p: &Point2<f64>| {
             (-1..=1).any(|i| {
@@ -201,7 +202,7 @@ impl State {
         }
     }
 
-    /// Stops where the base means to be; draws by how much it misses that and by how much it is wrong about where it is.
+    /// Stops at the intended pose; draws the stopping error and the error of the estimate.
     pub fn stop(&mut self, wanted: &Pose2, localisation: &Localisation, misled: bool) {
         self.estimate = localisation.stop(wanted, &mut self.rng);
         self.error = localisation.error(&mut self.rng);
@@ -211,7 +212,7 @@ impl State {
         }
     }
 
-    /// Somebody takes or moves an object.
+    /// Lets someone take or move an object.
     pub fn disturb(&mut self, fault: &Fault) {
         let present: Vec<usize> =
             (0..self.scene.objects.len()).filter(|&i| self.scene.objects[i].is_in_place()).collect();
@@ -242,7 +243,7 @@ impl State {
         }
     }
 
-    /// Drops the held object to the floor where the base was on its way.
+    /// Drops the held object to the floor at a point of the base's way.
     pub fn drop_held(&mut self, on_the_way: Option<&Pose2>) {
         let Some(i) = self.held() else { return };
         let at = on_the_way.map_or(self.map_from_base(), |pose| self.really(pose)).translation;
@@ -253,7 +254,7 @@ impl State {
         self.note(format!("\"{name}\" falls out of the hand"));
     }
 
-    /// Somebody shuts a door, unless the base stands in it.
+    /// Lets someone shut a door, unless the base stands in it.
     pub fn shut_a_door(&mut self, fault: &Fault, radius_m: f64) {
         let here = self.map_from_base().translation.vector.xy().into();
         let free = |d: &HungDoor| !d.shut && d.doorway.distance_m(&here) > radius_m;
@@ -271,7 +272,7 @@ impl State {
         self.note(format!("somebody shuts \"{}\"", self.scene.doors[i].doorway.name));
     }
 
-    /// Puts an object somewhere on another surface; its name.
+    /// Moves an object to a random place on another surface; returns the surface's name.
     fn relocate_object(&mut self, i: usize, to: Option<&str>) -> Option<String> {
         let o = &self.scene.objects[i];
         let goes = |s: &&SurfaceSpec| {

@@ -1,8 +1,7 @@
-//! Noise of a stereo camera on an ideal frame: error of the disparity, and no depth on bare
-//! surfaces.
+//! Noise of a stereo camera on an ideal frame: disparity errors, and no depth on bare surfaces.
 //!
-//! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads. Which spots of a surface are bare depends on
-//! where they are: they are bare from every side.
+//! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads.
+//! Bare spots of a surface are fixed by position, so they are bare from every viewpoint.
 
 use crate::sim::noise::{mix, normal, share};
 use crate::sim::render::Frame;
@@ -10,17 +9,17 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// A pair of cameras: σ_z = z²·σ_d/(f·b).
+/// A stereo camera: σ_z = z²·σ_d/(f·b).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stereo {
-    /// Between the two (b), metres.
+    /// Baseline (b), metres.
     pub baseline_m: f64,
     /// Standard deviation of the disparity (σ_d), pixels.
     pub disparity_sigma_px: f64,
-    /// Share of the spots of floor and walls that show enough to be matched.
+    /// Share of the spots on floor and walls with enough texture for matching.
     pub textured: f64,
-    /// Least and greatest depth that is measured, metres.
+    /// Minimum and maximum depth, metres.
     #[serde(default = "default_range_m")]
     pub range_m: (f64, f64),
 }
@@ -29,13 +28,14 @@ fn default_range_m() -> (f64, f64) {
     (0.45, 6.0)
 }
 
-/// Side of a spot that is bare or not, metres.
+/// Side of a textured or bare spot, metres.
 const SPOT_M: f64 = 0.15;
-/// Nothing is matched on surfaces that are seen at a steeper angle: cosine of 85 degrees.
+/// Incidence angle beyond which nothing is matched: cosine of 85 degrees.
 const STEEPEST: f32 = 0.087;
 
 impl Stereo {
-    /// Depths along z in metres, NaN where nothing was matched. `is_bare` says of a label whether its surfaces have bare spots.
+    /// Depths along z in metres, NaN without a match. `is_bare` is true for labels whose surfaces have bare
+    /// spots.
     pub fn observe(
         &self,
         frame: &Frame,
@@ -66,7 +66,8 @@ impl Stereo {
     }
 }
 
-/// A share from 0 to 1 for the spot of a surface that a point is in. A point lies half-way into its spot whatever rounding does to a wall's own coordinate.
+/// A number in [0, 1) for the surface spot around a point. An offset keeps the coordinates of walls away from
+/// spot borders, against rounding.
 fn spot(at: &Point3<f64>) -> f64 {
     let whole = at.map(|c| ((c + 0.013) / SPOT_M).floor() as i64 as u64);
     share(mix(mix(mix(whole.x) ^ whole.y) ^ whole.z))

@@ -1,4 +1,4 @@
-//! The truth of a simulated scene.
+//! Ground truth of a simulated scene.
 
 use crate::body::{Pose2, Stamp};
 use crate::sim::hand;

@@ -1,33 +1,33 @@
-//! The walls of a flat, as they follow from its rooms and doors: all that is neither floor nor opening.
+//! Walls of a flat, derived from its rooms and doors: everything that is neither floor nor opening.
 
 use crate::sim::scene::{Doorway, RoomSpec};
 use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
-/// A box of wall along the map's axes.
+/// An axis-aligned box of wall.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wall {
-    /// Least corner, in the map, metres; above the floor where it is the lintel of a door.
+    /// Minimum corner, map frame, metres; above the floor for the lintel of a door.
     pub low: Point3<f64>,
-    /// Greatest corner.
+    /// Maximum corner, map frame, metres.
     pub high: Point3<f64>,
 }
 
 impl Wall {
-    /// True if it stands on the floor and a point is in it or at most `margin_m` beside it.
+    /// True if it stands on the floor and contains a point, within a margin of `margin_m`.
     pub fn blocks(&self, p: &Point2<f64>, margin_m: f64) -> bool {
         let within = |k: usize| p[k] >= self.low[k] - margin_m && p[k] <= self.high[k] + margin_m;
         self.low.z <= 0.0 && within(0) && within(1)
     }
 }
 
-/// Edges nearer to each other than this are one, metres.
+/// Distance below which two edges coincide, metres.
 const SAME_EDGE_M: f64 = 1e-6;
 
-/// The plane cut at every edge of a room or a door: no cell is part of one.
+/// Subdivision of the plane at every edge of a room or a door.
 struct Cells {
     edges: [Vec<f64>; 2],
-    /// Row by row: how high above the floor the wall begins, metres; none where there is floor.
+    /// Height of the wall's lower end above the floor for each cell, row by row, metres; none for floor.
     from_m: Vec<Option<f64>>,
 }
 
@@ -63,7 +63,7 @@ impl Cells {
         self.edges[1].len() - 1
     }
 
-    /// Takes the largest run of equal cells from a cell on, to the right and then up.
+    /// Removes and returns the largest block of equal cells from a cell on, growing to the right and then up.
     fn take(&mut self, column: usize, row: usize) -> Option<(f64, [usize; 2])> {
         let from_m = self.from_m[row * self.width() + column]?;
         let same = |cells: &Cells, c: usize, r: usize| cells.from_m[r * cells.width() + c] == Some(from_m);
@@ -78,7 +78,8 @@ impl Cells {
     }
 }
 
-/// The walls between rooms, up to the height of the rectangle around them. One room has its walls in that rectangle.
+/// The walls between rooms, up to the height of their bounding rectangle. A single room has only the walls of
+/// that rectangle.
 pub fn walls(rooms: &[RoomSpec], doors: &[Doorway]) -> Vec<Wall> {
     if rooms.len() < 2 {
         return Vec::new();

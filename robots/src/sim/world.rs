@@ -1,4 +1,4 @@
-//! A scene in which everything has its place, and the solids that a ray can meet in it.
+//! Arranged scene, and its solids for ray casting.
 
 use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
@@ -17,35 +17,35 @@ pub const MAP_RESOLUTION_M: f64 = 0.05;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stand {
-    /// On the surface of that name.
+    /// On this surface.
     On(String),
-    /// On the floor, where it fell.
+    /// Fallen to the floor.
     Floor,
-    /// In the body's hand.
+    /// In the hand of the body.
     Hand,
-    /// Somebody took it away.
+    /// Taken away.
     Away,
 }
 
-/// An object in its place.
+/// A placed object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Object {
     /// Unique in the scene.
     pub name: String,
     /// Kind.
     pub kind: String,
-    /// Its solid.
+    /// Shape of the object.
     pub shape: Shape,
     /// Red, green, blue.
     pub colour: [u8; 3],
     /// State.
     pub stands: Stand,
-    /// Pose of its base; the last one while it is in the hand or taken away.
+    /// Pose of its base; the last one while it is held or taken away.
     pub map_from_object: Isometry3<f64>,
 }
 
 impl Object {
-    /// Middle of the box around it, handle left out, in the map.
+    /// Centre of its bounding box without a handle, map frame, metres.
     pub fn centre_m(&self) -> Point3<f64> {
         let middle = match &self.shape {
             Shape::Composed(_) | Shape::Household(_) => {
@@ -70,7 +70,7 @@ impl Object {
         matches!(self.stands, Stand::On(_) | Stand::Floor)
     }
 
-    /// True if the height of a point is between foot and top, or at most `margin_m` above or below.
+    /// True if a height is between base and top, within a margin of `margin_m`.
     pub fn is_at_height(&self, z_m: f64, margin_m: f64) -> bool {
         let above_m = z_m - self.map_from_object.translation.z;
         above_m >= -margin_m && above_m <= self.shape.height_m() + margin_m
@@ -86,14 +86,14 @@ pub struct HungDoor {
     pub shut: bool,
 }
 
-/// A scene in which the seed has chosen.
+/// An arranged scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// One line for people.
+    /// Title for people.
     pub title: String,
-    /// The rectangle around all rooms.
+    /// The bounding rectangle of all rooms.
     pub room: RoomSpec,
-    /// The rooms that have names.
+    /// The rooms with names.
     pub rooms: Vec<RoomSpec>,
     /// Walls between them.
     pub walls: Vec<Wall>,
@@ -103,41 +103,41 @@ pub struct Scene {
     pub surfaces: Vec<SurfaceSpec>,
     /// Boxes on the floor.
     pub obstacles: Vec<ObstacleSpec>,
-    /// Pose of the robot at first.
+    /// Initial pose of the robot.
     pub start: Pose2,
     /// Objects in the order of the scene file.
     pub objects: Vec<Object>,
-    /// Required visibility by which the arrangement was chosen.
+    /// Visibility required of the arrangement.
     pub target: Option<TargetSpec>,
     /// Share of the target that the camera sees from the start.
     pub target_visible_from_start: Option<f64>,
-    /// False if the body has no map of it.
+    /// False if the body has no map of the scene.
     pub mapped: bool,
-    /// The pair of cameras, if the body has one instead of the depth camera.
+    /// Stereo camera, if it replaces the depth camera.
     pub stereo: Option<Stereo>,
     /// Number of the visit.
     pub visit: usize,
 }
 
-/// Label of a pixel without anything.
+/// Label of pixels without a hit.
 pub const LABEL_NOTHING: u16 = 0;
-/// Floor, walls and doors.
+/// Label of floor, walls and doors.
 pub const LABEL_ROOM: u16 = 1;
-/// Surfaces and obstacles.
+/// Label of surfaces and obstacles.
 pub const LABEL_FURNITURE: u16 = 2;
-/// Object `i` has the label `LABEL_OBJECT + i`.
+/// Label of the first object; object `i` has the label `LABEL_OBJECT + i`.
 pub const LABEL_OBJECT: u16 = 3;
 
-/// One rigid thing made of parts.
+/// A rigid object of several surfaces.
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// Pose of its frame.
     pub map_from_solid: Isometry3<f64>,
     /// Its surfaces.
     pub parts: Vec<Part>,
-    /// Their colours, in the same order; none: all are of the one colour.
+    /// Their colours, in the same order; empty: all have `colour`.
     pub paints: Vec<Paint>,
-    /// The box around it in its own frame.
+    /// Its bounding box in its own frame.
     pub bounds: (Point3<f64>, Point3<f64>),
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -152,7 +152,7 @@ impl Solid {
         self.meet(o, d, before).map(|(hit, _)| hit)
     }
 
-    /// The same, and the number of the part that is hit.
+    /// The first hit of a ray in the solid's own frame, with the index of the part.
     #[inline]
     pub fn meet(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<(Hit, usize)> {
         let mut nearest = None;
@@ -166,7 +166,7 @@ impl Solid {
         nearest
     }
 
-    /// The colour of a part at a place of the solid's own frame.
+    /// The colour of a part at a point in the solid's own frame.
     pub fn colour_at(&self, part: usize, p: &Point3<f64>) -> [u8; 3] {
         self.paints.get(part).map_or(self.colour, |paint| paint.at(p))
     }
@@ -187,7 +187,7 @@ impl Solid {
     }
 }
 
-/// Upright at a place in the map.
+/// Upright pose at a point of the map.
 pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
         Translation3::new(x_m, y_m, z_m),
@@ -197,11 +197,12 @@ pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f
 
 /// Side of a table's legs, metres.
 const LEG_M: f64 = 0.05;
-/// Thickness of a shelf's uprights, beside its boards and below their tops: a board ends where the map says so, metres.
+/// Thickness of a shelf's uprights, metres, beside its boards and below their tops, so that boards end where
+/// the map shows it.
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;
-/// A body without a map may think of going so far beyond the walls, metres.
+/// Margin beyond the walls in the initial map of a body without one, metres.
 const BEYOND_M: f64 = 10.0;
 /// Thickness of a seat on legs, metres.
 const SEAT_M: f64 = 0.06;
@@ -257,7 +258,7 @@ impl HungDoor {
 }
 
 impl ObstacleSpec {
-    /// A box that no map shows.
+    /// An obstacle box that is missing in the map.
     fn block(name: &str, position_m: [f64; 2], size_m: [f64; 3]) -> ObstacleSpec {
         ObstacleSpec {
             name: name.into(),
@@ -314,7 +315,7 @@ impl ObstacleSpec {
         self.distance_m(p) < radius_m
     }
 
-    /// From a point of the floor to the box around it; 0 inside.
+    /// Distance of a floor point from its bounding box, metres; 0 inside.
     pub fn distance_m(&self, p: &Point2<f64>) -> f64 {
         let local = self.map_from_obstacle().inverse_transform_point(&Point3::new(p.x, p.y, 0.0));
         let gap = |at: f64, size: f64| (at.abs() - 0.5 * size).max(0.0);
@@ -323,7 +324,7 @@ impl ObstacleSpec {
 }
 
 impl Scene {
-    /// The walls between the rooms, and the doors that are shut.
+    /// The walls between the rooms, and the shut doors.
     fn partitions(&self) -> impl Iterator<Item = Solid> {
         let walls = self.walls.iter().map(|w| Solid::of_room(w.low, w.high, WALL_COLOUR));
         walls.chain(self.doors.iter().filter(|d| d.shut).map(HungDoor::panel))
@@ -337,7 +338,7 @@ impl Scene {
         })
     }
 
-    /// Everything that a ray can meet but the floor and the walls around it all; objects carry their labels.
+    /// All solids for ray casting except the floor and the outer walls; objects carry their labels.
     pub fn solids(&self) -> Vec<Solid> {
         let surfaces = self.surfaces.iter().flat_map(SurfaceSpec::solids);
         let mut solids: Vec<Solid> = self.partitions().chain(surfaces).collect();
@@ -350,7 +351,8 @@ impl Scene {
         solids
     }
 
-    /// The rooms as the robot knows them from mapping: surfaces and known obstacles down to the floor, walls with every door open.
+    /// The map that mapping would give: surfaces and mapped obstacles projected to the floor, walls with
+    /// every door open.
     pub fn map(&self) -> OccupancyGrid {
         let mut grid = OccupancyGrid::covering(self.room.low(), self.room.high(), MAP_RESOLUTION_M);
         // A cell is taken if anything reaches into it, so outlines grow by half a cell.
@@ -372,8 +374,7 @@ impl Scene {
         grid
     }
 
-    /// Map of the floor that the body begins with: the rooms, or without a map an unknown area far
-    /// beyond all walls.
+    /// Initial map of the body: the rooms, or without a map a free area far beyond all walls.
     pub fn known_map(&self) -> OccupancyGrid {
         if self.mapped {
             return self.map();
@@ -428,7 +429,7 @@ impl Scene {
 }
 
 impl Object {
-    /// The object as something that a ray can meet.
+    /// The object as a solid for ray casting.
     pub fn solid(&self, label: u16) -> Solid {
         let (parts, paints) = self.shape.painted(self.colour).into_iter().unzip();
         Solid {

@@ -1,11 +1,11 @@
-//! Small recordings that the tests make themselves.
+//! Small synthetic recordings.
 
 use descry_robots::image::{ImageBuffer, Luma, Rgb, RgbImage};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// Pixels of a frame.
+/// Size of a frame, pixels.
 pub const SIZE: (u32, u32) = (16, 12);
 /// Depth of pixel (column, row) of frame `k`, millimetres; the first pixel has no return, the second an overflow.
 pub fn depth_mm(k: usize, column: u32, row: u32) -> u16 {

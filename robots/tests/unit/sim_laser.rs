@@ -37,7 +37,7 @@ fn look(laser: &Laser, pose: Pose2, seed: u64) -> Scan {
     sweep(&lab(), laser, &pose, &pose, &mut ChaCha8Rng::seed_from_u64(seed))
 }
 
-/// The range straight along a heading, exact.
+/// Checks the exact range straight ahead.
 fn check(height_m: f64, pose: Pose2, expected_m: f64) {
     let laser = Laser { height_m, sigma_m: 0.0, precision_m: 0.0, ..Laser::default() };
     let ahead = look(&laser, pose, 1).ranges_m[90];

@@ -10,7 +10,7 @@ use descry_robots::sim::world::LABEL_ROOM;
 use nalgebra::{Isometry3, Point3};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Frames of the bare wall of a room from a distance, by a level camera.
+/// Frames of a bare room wall at a distance, by a horizontal camera.
 fn facing_wall(distance_m: f64, aside_m: f64, seed: u64) -> (Frame, Vec<f32>, Isometry3<f64>) {
     let spec = SceneSpec::parse("room", "[start]\nposition_m = [0.0, 0.0]\n").unwrap();
     let scene = arrange(&spec, 1).unwrap();

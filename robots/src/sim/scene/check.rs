@@ -1,4 +1,4 @@
-//! Checks that all parts of a scene share: lengths, numbers, names.
+//! Checks common to all parts of a scene: lengths, numbers, names.
 
 use crate::input::{Objection, Step};
 
@@ -24,7 +24,7 @@ pub(super) fn finite(values: &[f64], path: &[Step]) -> Result<(), Objection> {
     }
 }
 
-/// A name that is there and not that of an earlier one.
+/// Checks that a name is neither empty nor used earlier.
 pub(super) fn unique<'a>(
     what: &str,
     name: &str,

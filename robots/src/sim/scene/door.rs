@@ -12,30 +12,30 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DoorState {
-    /// The panel is in the wall.
+    /// The panel is slid into the wall.
     Open,
     /// The panel fills the opening.
     Shut,
 }
 
-/// A door as written. The wall that it is in, and the rooms on either side, follow from where it is.
+/// A door in a scene file. Its wall, and the rooms on either side, follow from its position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DoorSpec {
     /// Unique among the doors.
     pub name: String,
-    /// Middle of the opening, in the map, within the wall.
+    /// Centre of the opening, map frame, within the wall.
     pub position_m: [f64; 2],
-    /// Width of the opening, along the wall.
+    /// Width of the opening along the wall.
     #[serde(default = "default_width_m")]
     pub width_m: f64,
-    /// Height of the opening, above the floor.
+    /// Height of the opening above the floor.
     #[serde(default = "default_height_m")]
     pub height_m: f64,
-    /// State at first; open if neither this nor `shut_chance` is given.
+    /// Initial state; open if neither this nor `shut_chance` is given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<DoorState>,
-    /// Or the chance, chosen by the seed, that it is shut at first.
+    /// Or the probability of being shut initially, drawn by the seed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shut_chance: Option<f64>,
 }
@@ -47,21 +47,21 @@ fn default_height_m() -> f64 {
     2.0
 }
 
-/// Walls are at most this thick where there is a door, metres.
+/// Maximum thickness of a wall with a door, metres.
 const THICKEST_M: f64 = 0.6;
 
-/// The opening of a door, as it follows from the rooms.
+/// The opening of a door, derived from the rooms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Doorway {
-    /// As people call it.
+    /// Name for people.
     pub name: String,
-    /// Middle of the opening, in the map, metres.
+    /// Centre of the opening, map frame, metres.
     pub centre_m: Point2<f64>,
-    /// The axis of the map that the wall runs along: 0 for x, 1 for y.
+    /// Axis of the map parallel to the wall: 0 for x, 1 for y.
     pub along: usize,
-    /// Along the wall, metres.
+    /// Width along the wall, metres.
     pub width_m: f64,
-    /// Above the floor, metres.
+    /// Height above the floor, metres.
     pub height_m: f64,
     /// Thickness of the wall, metres.
     pub thickness_m: f64,
@@ -70,7 +70,7 @@ pub struct Doorway {
 }
 
 impl Doorway {
-    /// Half the opening along the map's axes, metres.
+    /// Half extents of the opening along the map's axes, metres.
     pub fn half_m(&self) -> Vector2<f64> {
         let mut half = Vector2::repeat(0.5 * self.thickness_m);
         half[self.along] = 0.5 * self.width_m;
@@ -88,7 +88,7 @@ impl Doorway {
         }
     }
 
-    /// Distance of a point from the line in the floor that the shut panel stands on, metres.
+    /// Distance of a floor point from the base line of the shut panel, metres.
     pub fn distance_m(&self, p: &Point2<f64>) -> f64 {
         let off = p - self.centre_m;
         (off[self.along].abs() - 0.5 * self.width_m).max(0.0).hypot(off[1 - self.along])
@@ -96,7 +96,7 @@ impl Doorway {
 }
 
 impl DoorSpec {
-    /// The nearest room on each side of the door across a wall that runs along `axis`, with the gap between them.
+    /// The nearest room on each side of the door across a wall along `axis`, with the gap between them.
     fn sides<'a>(&self, rooms: &'a [RoomSpec], axis: usize) -> Option<([&'a RoomSpec; 2], [f64; 2])> {
         let across = 1 - axis;
         let half_m = 0.5 * self.width_m;
@@ -113,7 +113,7 @@ impl DoorSpec {
         (wall[1] - wall[0] <= THICKEST_M).then_some(([below, above], wall))
     }
 
-    /// The opening, if the door is in the wall between two rooms that reach along all of it.
+    /// The opening, if the door lies in a wall between two rooms that both extend along all of it.
     pub fn doorway(&self, rooms: &[RoomSpec]) -> Option<Doorway> {
         let (along, (sides, wall)) = [0, 1].into_iter().find_map(|k| Some((k, self.sides(rooms, k)?)))?;
         let mut centre_m = Point2::from(self.position_m);

@@ -118,46 +118,46 @@ use check::{finite, object, positive};
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-/// A scene as written: what is fixed and what a seed may choose.
+/// A scene file: fixed values, and ranges for a seed to choose from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSpec {
-    /// One line for people.
+    /// Title for people.
     #[serde(default)]
     pub title: String,
     /// One room, or several with walls between them.
     #[serde(default = "room::one_room", rename = "room", with = "one_or_many")]
     pub rooms: Vec<RoomSpec>,
-    /// Doors in those walls.
+    /// Doors in the walls between rooms.
     #[serde(default, rename = "door", skip_serializing_if = "Vec::is_empty")]
     pub doors: Vec<DoorSpec>,
-    /// Surfaces; things stand on them.
+    /// Support surfaces.
     #[serde(default, rename = "surface")]
     pub surfaces: Vec<SurfaceSpec>,
-    /// Things on the floor.
+    /// Obstacles on the floor.
     #[serde(default, rename = "obstacle")]
     pub obstacles: Vec<ObstacleSpec>,
-    /// Pose of the robot at first.
+    /// Initial pose of the robot.
     pub start: StartSpec,
-    /// Things on surfaces.
+    /// Objects on surfaces.
     #[serde(default, rename = "object")]
     pub objects: Vec<ObjectSpec>,
-    /// Least gap between things on a surface, metres.
+    /// Minimum gap between objects on a surface, metres.
     #[serde(default = "default_gap_m")]
     pub gap_m: f64,
     /// Required visibility of one object.
     #[serde(default)]
     pub target: Option<TargetSpec>,
-    /// False if the body has no map of it.
+    /// False if the body has no map of the scene.
     #[serde(default = "default_true")]
     pub mapped: bool,
-    /// A pair of cameras instead of the depth camera.
+    /// Stereo camera in place of the depth camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stereo: Option<Stereo>,
-    /// Number of visits; between them things come, go and move.
+    /// Number of visits, between which objects appear, disappear and move.
     #[serde(default = "default_one")]
     pub visits: usize,
-    /// Number of this visit.
+    /// Number of the current visit.
     #[serde(default = "default_one")]
     pub visit: usize,
     /// Injected faults.
@@ -173,13 +173,13 @@ fn default_true() -> bool {
     true
 }
 
-/// Pose of the robot at first.
+/// Initial pose of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StartSpec {
-    /// In the map.
+    /// Position in the map frame.
     pub position_m: [f64; 2],
-    /// Counter-clockwise from the map's x.
+    /// Heading, counter-clockwise from the map's x.
     #[serde(default)]
     pub yaw_deg: f64,
 }
@@ -192,10 +192,11 @@ fn default_grey() -> [u8; 3] {
 }
 
 impl SceneSpec {
-    /// Reads a scene. `file` is its name for messages.
+    /// Parses a scene. `file` is its name for messages.
     ///
     /// # Errors
-    /// The first mistake, with its place in the text and how to mend it.
+    ///
+    /// The first error, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<SceneSpec, InputError> {
         let spec: SceneSpec = input::parse_toml(file, text)?;
         match spec.check() {
@@ -204,7 +205,8 @@ impl SceneSpec {
         }
     }
 
-    /// The scene without an object (or all objects of that kind): for questions about what is not there. Its `[target]` goes with it.
+    /// The scene without an object (or all objects of a kind), for questions about absent things; a
+    /// `[target]` about it is removed as well.
     pub fn without(&self, name_or_kind: &str) -> SceneSpec {
         let mut spec = self.clone();
         spec.objects.retain(|o| o.name != name_or_kind && o.kind.as_deref() != Some(name_or_kind));
@@ -216,9 +218,10 @@ impl SceneSpec {
         spec
     }
 
-    /// Checks what the format cannot: sizes above zero, names unique and known, things within the room.
+    /// Checks what the format cannot: positive sizes, unique and known names, everything within the room.
     ///
     /// # Errors
+    ///
     /// The first objection, with its path in the document.
     pub fn check(&self) -> Result<(), Objection> {
         self.check_rooms()?;
@@ -242,7 +245,7 @@ impl SceneSpec {
         self.check_target()
     }
 
-    /// True if an object that is there in the given visits (none: in all) is there now.
+    /// True if an object with these visits (empty: all) is present in `visit`.
     pub(crate) fn is_there(&self, visits: &[usize], visit: usize) -> bool {
         visits.is_empty() || visits.contains(&visit)
     }

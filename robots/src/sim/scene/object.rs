@@ -1,4 +1,4 @@
-//! Things on surfaces, and what an arrangement of them must show and hide.
+//! Objects on surfaces, and the visibility required of their arrangement.
 
 use super::check::{finite, object, positive};
 use super::surface::headroom_m;
@@ -8,7 +8,7 @@ use crate::sim::composed::{Composed, household};
 use crate::sim::shape::{Cuboid, Shape};
 use serde::{Deserialize, Serialize};
 
-/// A thing on a surface.
+/// An object on a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectSpec {
@@ -17,39 +17,39 @@ pub struct ObjectSpec {
     /// Kind; the name if left out.
     #[serde(default)]
     pub kind: Option<String>,
-    /// Its solid.
+    /// Shape of the object.
     pub shape: Shape,
-    /// The surface it stands on, or several of which the seed chooses one; the first if left out.
+    /// The surface of the object, or several for the seed to choose from; the first of the scene if left out.
     #[serde(default, with = "one_or_many", skip_serializing_if = "Vec::is_empty")]
     pub on: Vec<String>,
-    /// Probability of each of the surfaces, as shares of their sum; equal if left out.
+    /// Weight of each surface; equal if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Vec<f64>>,
-    /// An object that comes earlier; this one stands on another surface than that.
+    /// An earlier object; this one is placed on another surface than that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub apart_from: Option<String>,
-    /// Fixes it: from the centre of the surface, along its axes.
+    /// Fixed position, from the centre of the surface along its axes.
     #[serde(default)]
     pub position_m: Option<[f64; 2]>,
-    /// Fixes its turn on the surface.
+    /// Fixed rotation on the surface.
     #[serde(default)]
     pub yaw_deg: Option<f64>,
-    /// Arranged within this rectangle, along the surface's axes; all of the surface if left out.
+    /// Rectangle for the arrangement, along the surface's axes; the whole surface if left out.
     #[serde(default)]
     pub area_m: Option<[f64; 2]>,
     /// Centre of that rectangle, from the centre of the surface.
     #[serde(default)]
     pub area_centre_m: [f64; 2],
-    /// Least and greatest factor on its size, chosen by the seed.
+    /// Minimum and maximum scale factor, drawn by the seed.
     #[serde(default)]
     pub scale: Option<[f64; 2]>,
     /// Red, green, blue.
     #[serde(default = "default_grey")]
     pub colour: [u8; 3],
-    /// The visits in which it is there; all if left out.
+    /// The visits in which the object is present; all if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<usize>,
-    /// The visits in which it stands elsewhere than in the one before.
+    /// The visits in which the object stands elsewhere than in the previous one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub moves: Vec<usize>,
 }
@@ -60,10 +60,11 @@ pub struct ObjectSpec {
 pub struct TargetSpec {
     /// Name of the object.
     pub object: String,
-    /// Least and greatest share of it that is not occluded from the start, when the camera looks there. 0 to 0 hides it.
+    /// Minimum and maximum share visible from the start, with the camera turned to the object. 0 to 0 hides
+    /// it.
     #[serde(default = "default_any_share")]
     pub visible_from_start: [f64; 2],
-    /// Some pose around its surface must see at least this share of it; 0 asks for nothing.
+    /// Minimum share visible from some pose around its surface; 0 requires nothing.
     #[serde(default = "default_some_share")]
     pub visible_from_some: f64,
 }
@@ -117,7 +118,7 @@ impl SceneSpec {
         finite(&[o.yaw_deg.unwrap_or(0.0)], &at("yaw_deg"))
     }
 
-    /// Its surfaces are known, high enough for it, and have weights.
+    /// Checks that its surfaces exist, have enough headroom, and have weights.
     fn check_on(&self, o: &ObjectSpec, at: &impl Fn(&'static str) -> Vec<Step>) -> Result<(), Objection> {
         let known: Vec<&str> = self.surfaces.iter().map(|s| s.name.as_str()).collect();
         if known.is_empty() && o.on.is_empty() {
@@ -192,7 +193,7 @@ impl SceneSpec {
         Ok(())
     }
 
-    /// The surfaces that an object may stand on.
+    /// The possible surfaces of an object.
     pub(crate) fn surfaces_of(&self, o: &ObjectSpec) -> Vec<&SurfaceSpec> {
         if o.on.is_empty() {
             return self.surfaces.iter().take(1).collect();

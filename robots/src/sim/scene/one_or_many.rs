@@ -1,4 +1,4 @@
-//! A key that holds one thing or a list of them.
+//! Serialisation of a key with one value or a list of them.
 
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer, StrDeserializer};
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};

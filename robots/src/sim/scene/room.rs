@@ -1,4 +1,4 @@
-//! Rooms: rectangles of floor. What lies between them, within the rectangle around them all, is wall.
+//! Rooms: rectangles of floor. The space between them, within their common bounding rectangle, is wall.
 
 use super::SceneSpec;
 use super::check::{finite, object, positive, unique};
@@ -10,15 +10,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSpec {
-    /// Unique among the rooms; empty for a scene's only room.
+    /// Unique among the rooms; empty for the only room of a scene.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub name: String,
-    /// Centre, in the map.
+    /// Centre, map frame.
     #[serde(default)]
     pub position_m: [f64; 2],
-    /// Inside, along x and y.
+    /// Inner size along x and y.
     pub size_m: [f64; 2],
-    /// Height of the walls; the highest holds for all.
+    /// Height of the walls; the maximum over all rooms applies.
     #[serde(default = "default_wall_height_m")]
     pub wall_height_m: f64,
 }
@@ -42,18 +42,18 @@ pub(super) fn one_room() -> Vec<RoomSpec> {
     vec![RoomSpec::default()]
 }
 
-/// A map is held in cells of a few centimetres: this is millions of them.
+/// Maximum extent of a room, metres, which limits the map to millions of cells.
 const LARGEST_M: f64 = 100.0;
-/// Rooms that are nearer to each other than this touch: there is no wall between them.
+/// Distance below which two rooms touch, without a wall between them, metres.
 pub(crate) const TOUCHING_M: f64 = 1e-6;
 
 impl RoomSpec {
-    /// The corner with the least coordinates.
+    /// The minimum corner.
     pub fn low(&self) -> Point2<f64> {
         Point2::new(self.position_m[0] - 0.5 * self.size_m[0], self.position_m[1] - 0.5 * self.size_m[1])
     }
 
-    /// The corner with the greatest coordinates.
+    /// The maximum corner.
     pub fn high(&self) -> Point2<f64> {
         Point2::new(self.position_m[0] + 0.5 * self.size_m[0], self.position_m[1] + 0.5 * self.size_m[1])
     }
@@ -69,7 +69,7 @@ impl RoomSpec {
         (0..2).all(|k| (p[k] - self.position_m[k]).abs() <= 0.5 * self.size_m[k] + margin_m)
     }
 
-    /// The smallest rectangle around rooms, nameless.
+    /// The smallest rectangle around rooms, without a name.
     pub fn around(rooms: &[RoomSpec]) -> RoomSpec {
         if let [one] = rooms {
             return RoomSpec { name: String::new(), ..one.clone() };
@@ -93,7 +93,7 @@ impl RoomSpec {
 }
 
 impl SceneSpec {
-    /// Path of a room in the document: `[room]` is no list.
+    /// Path of a key of a room in the document: a single `[room]` is not a list.
     fn room_path(&self, i: usize, key: &'static str) -> Vec<Step> {
         match self.rooms.as_slice() {
             [one] if one.name.is_empty() => vec![Step::Key("room"), Step::Key(key)],
@@ -144,7 +144,7 @@ impl SceneSpec {
         Ok(())
     }
 
-    /// The rooms that have names.
+    /// The rooms with names.
     pub(crate) fn named_rooms(&self) -> impl Iterator<Item = &RoomSpec> {
         self.rooms.iter().filter(|r| !r.name.is_empty())
     }

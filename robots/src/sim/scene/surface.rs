@@ -1,4 +1,4 @@
-//! Surfaces that things stand on, and boxes on the floor.
+//! Support surfaces, and obstacles on the floor.
 
 use super::check::{finite, object, positive, unique};
 use super::room::RoomSpec;
@@ -14,32 +14,32 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SurfaceKind {
-    /// On four legs.
+    /// Four legs.
     #[default]
     Table,
-    /// Board by a wall, or between uprights at its ends: a shelf board, a counter.
+    /// A wall, or uprights at the ends: a shelf board, a counter.
     Board,
 }
 
-/// A surface that things stand on.
+/// A support surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
     /// Unique among the surfaces.
     pub name: String,
-    /// Support.
+    /// Kind of support.
     #[serde(default)]
     pub kind: SurfaceKind,
-    /// Sides from the floor to a board, at both ends of its own x.
+    /// True for side panels from the floor to a board, at both ends of its own x.
     #[serde(default)]
     pub uprights: bool,
-    /// Centre, in the map.
+    /// Centre, map frame.
     #[serde(default)]
     pub position_m: [f64; 2],
-    /// Counter-clockwise.
+    /// Rotation, counter-clockwise.
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Along its own x and y.
+    /// Size along its own x and y.
     pub size_m: [f64; 2],
     /// Height of the top above the floor.
     pub height_m: f64,
@@ -51,35 +51,35 @@ pub struct SurfaceSpec {
     pub colour: [u8; 3],
 }
 
-/// A box on the floor, its corners rounded perhaps, or a seat on four legs.
+/// A box on the floor, optionally with rounded edges, or a seat on four legs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleSpec {
-    /// For messages.
+    /// Name for messages.
     pub name: String,
-    /// Centre, in the map.
+    /// Centre, map frame.
     pub position_m: [f64; 2],
-    /// The seed moves it within this rectangle around that, and turns it.
+    /// Rectangle around that position within which the seed places and turns it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_m: Option<[f64; 2]>,
-    /// Least gap to the other obstacles where the seed places it.
+    /// Minimum gap to the other obstacles where the seed places it.
     #[serde(default)]
     pub gap_m: f64,
-    /// Counter-clockwise.
+    /// Rotation, counter-clockwise.
     #[serde(default)]
     pub yaw_deg: f64,
-    /// Along its own x and y, and its height.
+    /// Size along its own x and y, and its height.
     pub size_m: [f64; 3],
-    /// Radius of its upright edges.
+    /// Radius of its vertical edges.
     #[serde(default)]
     pub corner_m: f64,
-    /// A seat on four legs this thick, not a box.
+    /// Thickness of the legs of a seat; left out for a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub legs_m: Option<f64>,
-    /// Height of the back above such a seat, metres; none: no back.
+    /// Height of the back above the seat, metres; left out for a seat without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub back_m: Option<f64>,
-    /// The visits in which it is there; all if left out.
+    /// The visits in which it is present; all if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub visits: Vec<usize>,
     /// True if the robot's map shows it.
@@ -100,7 +100,7 @@ fn default_wood() -> [u8; 3] {
     [170, 130, 90]
 }
 
-/// Corners of surfaces may lie this far inside a wall: rounding, not building.
+/// Tolerance by which corners of surfaces may lie inside a wall, for rounding, metres.
 const IN_WALL_M: f64 = 1e-3;
 
 impl SurfaceSpec {
@@ -109,7 +109,7 @@ impl SurfaceSpec {
         upright(self.position_m[0], self.position_m[1], self.height_m, self.yaw_deg.to_radians())
     }
 
-    /// Middle of it, on the floor of the map.
+    /// Centre, projected onto the floor of the map.
     pub fn centre_m(&self) -> Point2<f64> {
         Point2::from(self.position_m)
     }
@@ -124,7 +124,7 @@ impl SurfaceSpec {
             .collect()
     }
 
-    /// True if a point of the map, whatever its height, is over or under the top or at most `margin_m` beside it.
+    /// True if a point of the map, at any height, is above or below the top or at most `margin_m` beside it.
     pub fn covers(&self, p: &Point2<f64>, margin_m: f64) -> bool {
         let local = self.map_from_top().inverse_transform_point(&Point3::new(p.x, p.y, self.height_m));
         local.x.abs() <= 0.5 * self.size_m[0] + margin_m && local.y.abs() <= 0.5 * self.size_m[1] + margin_m
@@ -196,7 +196,8 @@ impl SceneSpec {
     }
 }
 
-/// Height that things on a surface can have: up to the lowest of `surfaces` above any part of it, metres; infinite if there is none.
+/// Headroom above a surface, up to the lowest of `surfaces` above any part of it, metres; infinite if there
+/// is none.
 pub(crate) fn headroom_m(surfaces: &[SurfaceSpec], below: &SurfaceSpec) -> f64 {
     let overlaps = |other: &&SurfaceSpec| {
         let at = |s: &SurfaceSpec| {

@@ -1,8 +1,8 @@
-//! The surfaces of solids, and where rays meet them.
+//! Surfaces of solids, with their ray intersections.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A surface with a closed answer for rays (the handle: to a tenth of a millimetre).
+/// A surface with a closed-form ray intersection (the handle: to a tenth of a millimetre).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Part {
     /// Side of a cone around z between two heights: radius = `axis_m` + `slope`·z.
@@ -16,7 +16,7 @@ pub enum Part {
         /// Upper end.
         high_m: f64,
     },
-    /// A level ring.
+    /// A horizontal ring.
     Disc {
         /// Height.
         z_m: f64,
@@ -25,34 +25,34 @@ pub enum Part {
         /// Outer radius.
         outer_m: f64,
     },
-    /// Half of a torus that stands upright in the x-z plane, on the side away from the axis.
+    /// Half of an upright torus in the x-z plane, on the side away from the axis.
     Handle {
         /// Centre of the ring.
         centre: Point3<f64>,
-        /// From the ring's centre to the middle of the rod.
+        /// Radius from the ring's centre to the centre of the rod.
         major_m: f64,
         /// Half the thickness of the rod.
         minor_m: f64,
     },
-    /// A box around the z axis that stands on z = 0, its upright edges rounded.
+    /// A box around the z axis, standing on z = 0, with rounded vertical edges.
     Rounded {
-        /// Greatest corner of the box around it.
+        /// Maximum corner of its bounding box.
         high: Point3<f64>,
         /// Radius of the edges.
         corner_m: f64,
     },
     /// A box.
     Cuboid {
-        /// Least corner.
+        /// Minimum corner.
         low: Point3<f64>,
-        /// Greatest corner.
+        /// Maximum corner.
         high: Point3<f64>,
     },
     /// An ellipsoid.
     Ball {
-        /// Its middle.
+        /// Centre.
         middle: Point3<f64>,
-        /// Half its diameters.
+        /// Half axes.
         half: Vector3<f64>,
     },
     /// Another surface in a frame of its own.
@@ -67,13 +67,13 @@ pub enum Part {
 /// Hit of a ray on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// In units of the ray's direction.
+    /// Ray parameter, in units of the ray's direction.
     pub t: f64,
-    /// Outward or inward, unit length.
+    /// Unit normal, outward or inward.
     pub normal: Vector3<f64>,
 }
 
-/// Hits nearer than this are the ray's own start, in units of its direction.
+/// Minimum ray parameter of a hit, which excludes the ray's own start.
 const NEAREST_T: f64 = 1e-6;
 const HANDLE_TOLERANCE_M: f64 = 1e-4;
 const HANDLE_STEPS: usize = 64;
@@ -84,12 +84,12 @@ impl Part {
         Part::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
     }
 
-    /// An ellipsoid that touches the level `low_m` from above.
+    /// An ellipsoid that touches the plane z = `low_m` from above.
     pub(super) fn ball(half: &Vector3<f64>, low_m: f64) -> Part {
         Part::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
     }
 
-    /// The surface in another frame than its own.
+    /// The surface in another frame.
     pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Part {
         Part::Turned { part_from_here, part: Box::new(self) }
     }
@@ -199,7 +199,7 @@ fn cuboid_hit(
     Some(Hit { t, normal })
 }
 
-/// In the frame in which its half diameters are one it is a ball of radius 1.
+/// Intersects an ellipsoid, by scaling it to the unit sphere.
 #[inline]
 fn ball_hit(
     o: &Point3<f64>,
@@ -219,7 +219,8 @@ fn ball_hit(
     (t < before).then(|| Hit { t, normal: (from + along * t).component_div(half).normalize() })
 }
 
-/// The body is convex, two boxes and four cylinders together: from outside a ray enters it where it enters the first of them.
+/// Intersects a rounded box: the convex union of two boxes and four cylinders, which a ray from outside
+/// enters where it enters the first of them.
 fn rounded_hit(
     o: &Point3<f64>,
     d: &Vector3<f64>,
@@ -242,7 +243,8 @@ fn rounded_hit(
     boxes.chain(edges).min_by(|a, b| a.t.total_cmp(&b.t))
 }
 
-/// Sphere tracing: the distance to half a torus is known exactly, so no step can pass through it.
+/// Intersects a handle by sphere tracing: the distance to half a torus is exact, so no step passes through
+/// it.
 fn handle_hit(
     o: &Point3<f64>,
     d: &Vector3<f64>,

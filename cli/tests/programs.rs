@@ -13,7 +13,7 @@ fn has_python() -> bool {
     found
 }
 
-/// Runs descry and expects an exit code and words in what it says.
+/// Runs descry and expects an exit code and words in its output.
 fn check(arguments: &[&str], exit: i32, words: &[&str]) {
     let folder = TempDir::new().expect("a folder can be made");
     let mut command = Command::cargo_bin("descry").expect("the binary is built");

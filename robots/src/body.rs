@@ -339,7 +339,7 @@ pub trait Robot: Send + Sync {
 
     /// Predicts the camera's pose (`map_from_camera`) with the base at `place` and the head turned
     /// towards `look_at` (straight ahead if `None`), within the head's limits. A body without a
-    /// head looks where the place says.
+    /// head looks in the direction of its base.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] for an unknown station, or a pose where only
@@ -364,8 +364,8 @@ pub trait Robot: Send + Sync {
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure>;
 
-    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head says by
-    /// how much it misses.
+    /// Turns the head towards a point in the map, as far as its limits allow. A body without a head
+    /// reports the angle by which it misses.
     ///
     /// # Errors
     /// [`Failure::Unable`] without [`Description::camera`]; [`Failure::Unreachable`] if a coordinate is no number;

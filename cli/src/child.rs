@@ -66,7 +66,6 @@ impl Child {
     /// Runs a descry command line; `begun` receives the process ID, `tell` each line of narration.
     ///
     /// # Errors
-    ///
     /// The process cannot be started or waited for.
     pub(crate) fn carry_out(
         &self,

@@ -7,7 +7,6 @@ use descry_planner::Findings;
 /// The findings in a domain's folder, and the grounding of each of its words.
 ///
 /// # Errors
-///
 /// [`LoadError`] for reasons other than findings.
 pub fn of_folder(loaded: Result<Domain, LoadError>) -> Result<(Findings, Vec<String>), LoadError> {
     let domain = match loaded {

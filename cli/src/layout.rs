@@ -5,7 +5,6 @@ use descry_planner::{Findings, Plan, Source, pddl};
 /// Formats a text.
 ///
 /// # Errors
-///
 /// The findings that prevent parsing; such a text is left unchanged.
 pub fn laid_out(source: &Source) -> Result<String, Findings> {
     if is_plan(&source.text) { Plan::format(source) } else { pddl::format(source) }

@@ -35,7 +35,6 @@ use texts::Texts;
 /// Serves an editor over standard input and output until it disconnects.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the editor violates the protocol, or disconnects without a shutdown.
 pub fn serve() -> Result<(), CommandError> {
     let (connection, threads) = Connection::stdio();
@@ -47,7 +46,6 @@ pub fn serve() -> Result<(), CommandError> {
 /// Serves an editor over a connection until it disconnects.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the editor violates the protocol, or disconnects without a shutdown.
 pub fn serve_over(connection: &Connection) -> Result<(), CommandError> {
     let capabilities = serde_json::to_value(capabilities()).map_err(|e| CommandError::Bug(e.to_string()))?;

@@ -45,7 +45,6 @@ pub(crate) struct Served {
 /// Serves until the input ends.
 ///
 /// # Errors
-///
 /// If the input cannot be read.
 pub(crate) fn serve(served: Served) -> io::Result<()> {
     let mut server = Server { served: Arc::new(served), calls: BTreeMap::new(), threads: Vec::new() };

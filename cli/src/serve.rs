@@ -56,7 +56,6 @@ struct Inner {
 /// Serves at an address until an error; `ready` receives the bound address.
 ///
 /// # Errors
-///
 /// The folder or the address cannot be used.
 pub(crate) fn serve(served: Served, address: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Result<()> {
     let mut goals = Goals::of(&served.folder)?;

@@ -21,7 +21,6 @@ pub struct Cluster {
 /// The script of a Slurm job array, for `sbatch`.
 ///
 /// # Errors
-///
 /// [`ExperimentError`] if the file is not an experiment, or has fewer jobs than shards.
 pub fn slurm(source: &Source, cluster: &Cluster) -> Result<String, ExperimentError> {
     let kind = checked(source, cluster)?;
@@ -58,7 +57,6 @@ exec "${{DESCRY:-descry}}" experiment {file} --out {out} \
 /// An indexed Kubernetes job that includes the experiment's text, for `kubectl apply`.
 ///
 /// # Errors
-///
 /// As [`slurm`].
 pub fn kubernetes(source: &Source, cluster: &Cluster) -> Result<String, ExperimentError> {
     let kind = checked(source, cluster)?;

@@ -43,7 +43,6 @@ impl Journal {
     /// lines.
     ///
     /// # Errors
-    ///
     /// [`ExperimentError`] if it belongs to another experiment, another process holds it, or the disk
     /// refuses.
     pub fn open(folder: &Path, header: &Header) -> Result<(Self, Done, usize), ExperimentError> {
@@ -73,7 +72,6 @@ impl Journal {
     /// Appends a finished job, durably.
     ///
     /// # Errors
-    ///
     /// [`ExperimentError::File`] if the disk refuses.
     pub fn append(&mut self, finished: &Finished) -> Result<(), ExperimentError> {
         self.write(finished)

@@ -103,7 +103,6 @@ impl Source {
     /// Reads an experiment file.
     ///
     /// # Errors
-    ///
     /// [`ExperimentError::File`] if it is missing or not a text.
     pub fn read(path: &Path) -> Result<Self, ExperimentError> {
         let text = descry_robots::input::read_text(path).map_err(|e| {
@@ -119,7 +118,6 @@ impl Source {
     /// value.
     ///
     /// # Errors
-    ///
     /// [`ExperimentError::Input`] if the file has no such key, or the text is not an assignment.
     pub fn set(&mut self, assignment: &str) -> Result<(), ExperimentError> {
         let refused = |problem: &str, mend: String| {
@@ -294,7 +292,6 @@ impl ExperimentError {
 /// Runs the unfinished jobs of an experiment, and writes the results once every job is finished.
 ///
 /// # Errors
-///
 /// [`ExperimentError`]. A failed job is a row with its error instead.
 pub fn run(source: &Source, options: &Options) -> Result<Ended, ExperimentError> {
     carry_out(&*kinds::read(source)?, source, options)

@@ -26,7 +26,6 @@ impl Batch {
     /// The batch of a file with its results in a folder.
     ///
     /// # Errors
-    ///
     /// [`ExperimentError`] if the file or the folder cannot be used.
     pub fn of(source: &Source, out: PathBuf) -> Result<Self, ExperimentError> {
         let kind = kinds::read(source)?;

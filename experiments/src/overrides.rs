@@ -8,7 +8,6 @@ use toml::de::{DeTable, DeValue};
 /// list from 0.
 ///
 /// # Errors
-///
 /// The existing keys where the path leaves the file; empty if the text is not TOML.
 pub(crate) fn value_at(text: &str, path: &str) -> Result<Range<usize>, Vec<String>> {
     let document = DeTable::parse(text).map_err(|_| Vec::new())?;

@@ -23,7 +23,6 @@ const LINE_EVERY: Duration = Duration::from_secs(15);
 /// On a stop, jobs under way do not count. Returns the finished jobs in the order in which they ended.
 ///
 /// # Errors
-///
 /// [`ExperimentError::File`] if the journal cannot be written, [`ExperimentError::NoRoom`] if a job fails
 /// with less than `least_free_bytes` free; no further job starts then.
 pub fn run(

@@ -40,7 +40,6 @@ pub struct Perceived {
 /// Reads the evidence from a record, as far as the record holds it.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record) -> Result<Basis, CommandError> {
     let mut lost = Vec::new();

@@ -78,7 +78,6 @@ pub enum Deed {
 /// Reads the plans of a run, with a message for each lost part. `resumed` lists its resumptions.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(
     record: &Record,

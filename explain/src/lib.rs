@@ -82,7 +82,6 @@ pub struct Told {
 /// Explains a run from its record, its header, and its report if it has one.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<Explanation, CommandError> {
     let states = States::of(record)?;
@@ -137,7 +136,6 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
 /// does not hold any. `goal` is in PDDL.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(i64, String)>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;
@@ -159,7 +157,6 @@ pub struct Sought {
 /// History of each number in the goal, at every plan and look. `goal` is in PDDL.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn sought(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<Sought>, CommandError> {
     let (chapters, _) = chapters::of(record, &States::of(record)?, &[])?;

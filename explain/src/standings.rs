@@ -56,7 +56,6 @@ impl<'a> Standings<'a> {
     /// Opens the states of a run, as far as the record holds them.
     ///
     /// # Errors
-    ///
     /// [`CommandError::Broken`] if the record cannot be read.
     pub fn of(record: &'a Record, states: &'a States) -> Result<Self, CommandError> {
         let (found, _) = record.find_whole(&Query::of_kind("belief")).map_err(CommandError::broken)?;

@@ -112,7 +112,6 @@ impl States {
     /// Reads the states, as far as the record holds them.
     ///
     /// # Errors
-    ///
     /// [`CommandError::Broken`] if the record cannot be read.
     pub fn of(record: &Record) -> Result<Self, CommandError> {
         let (problems, _) = record.find_whole(&Query::of_kind("problem")).map_err(CommandError::broken)?;

@@ -41,7 +41,6 @@ pub struct Words<'a> {
 /// Sentences on the evidence.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn rests_on(
     record: &Record,

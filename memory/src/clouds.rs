@@ -100,7 +100,6 @@ pub fn pack(cloud: &Cloud, stride: usize) -> Vec<u8> {
 /// Decodes the sensor behind a cloud.
 ///
 /// # Errors
-///
 /// A description of the mismatch in the layout.
 pub fn sensing(info: &BlobInfo) -> Result<Sensing, String> {
     let layout = Layout::deserialize(&info.layout);
@@ -110,7 +109,6 @@ pub fn sensing(info: &BlobInfo) -> Result<Sensing, String> {
 /// Decodes a cloud from its blob.
 ///
 /// # Errors
-///
 /// A description of the mismatch in the layout.
 pub fn decode(info: &BlobInfo, data: &[u8]) -> Result<(Cloud, Sensing), String> {
     let layout: Layout =

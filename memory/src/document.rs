@@ -193,7 +193,6 @@ impl Draft<'_> {
     /// The document as it will be stored.
     ///
     /// # Errors
-    ///
     /// [`Error::Input`] if a part of it could not be found or read again.
     pub(crate) fn document(&self, id: RecordId, robot: &str) -> Result<Document, Error> {
         self.check()?;

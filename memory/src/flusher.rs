@@ -103,7 +103,6 @@ impl Flusher {
     /// Waits until everything is written, and retries failed batches.
     ///
     /// # Errors
-    ///
     /// The failure of a write; its batch is kept for the next attempt.
     pub fn drain(&self) -> Result<(), Error> {
         if let Some(jobs) = &self.jobs {

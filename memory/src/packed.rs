@@ -34,7 +34,6 @@ pub struct Packed {
 /// minimum corner are left out.
 ///
 /// # Errors
-///
 /// Those of the serialiser.
 pub fn serialize<S: Serializer>(cloud: &Cloud, writer: S) -> Result<S::Ok, S::Error> {
     pack(&cloud.finite()).serialize(writer)
@@ -43,7 +42,6 @@ pub fn serialize<S: Serializer>(cloud: &Cloud, writer: S) -> Result<S::Ok, S::Er
 /// Deserialises a cloud.
 ///
 /// # Errors
-///
 /// Malformed text.
 pub fn deserialize<'de, D: Deserializer<'de>>(reader: D) -> Result<Cloud, D::Error> {
     unpack(&Packed::deserialize(reader)?).map_err(D::Error::custom)

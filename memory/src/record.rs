@@ -148,7 +148,6 @@ impl Record {
     /// again.
     ///
     /// # Errors
-    ///
     /// As [`Record::open`].
     pub fn resume(dir: &Path, options: Options) -> Result<Self, Error> {
         Self::open(dir, options)?.retracing()
@@ -157,7 +156,6 @@ impl Record {
     /// Starts retracing on a record of any store; see [`Record::resume`].
     ///
     /// # Errors
-    ///
     /// If the store cannot be read.
     pub fn retracing(mut self) -> Result<Self, Error> {
         self.retrace = Some(Retrace::of(&*self.store, &self.options.robot)?);
@@ -225,7 +223,6 @@ impl Record {
     /// disk. It is acknowledged with that record, or by [`Record::sync`].
     ///
     /// # Errors
-    ///
     /// If the store cannot be read.
     pub fn put_soon(&self, draft: Draft<'static>) -> Result<(), Error> {
         if let Some(retrace) = &self.retrace
@@ -272,7 +269,6 @@ impl Record {
     /// Flushes everything to the disk, open groups of transforms included.
     ///
     /// # Errors
-    ///
     /// If a write fails; the data is kept for another attempt.
     pub fn sync(&self) -> Result<(), Error> {
         self.flush_open()?;
@@ -336,7 +332,6 @@ impl Record {
     /// together with the transforms of their time.
     ///
     /// # Errors
-    ///
     /// [`Error::Missing`] if a record does not exist; then none is pinned.
     pub fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
         self.store.pin(&self.with_their_place(ids)?, by)
@@ -345,7 +340,6 @@ impl Record {
     /// Replaces the pins of `by` by these records, pinned as by [`Record::pin`].
     ///
     /// # Errors
-    ///
     /// [`Error::Missing`] if a record does not exist; then the former pins stay.
     pub fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error> {
         let ids = self.with_their_place(ids)?;

@@ -79,7 +79,6 @@ impl Remembered {
     /// Reads the memory from a store; empty for a new store.
     ///
     /// # Errors
-    ///
     /// [`Error`] if it cannot be read.
     pub fn recall(store: &Record) -> Result<Self, Error> {
         let Some(document) = store.newest(KIND)? else { return Ok(Self::default()) };
@@ -92,7 +91,6 @@ impl Remembered {
     /// Writes the memory to a store.
     ///
     /// # Errors
-    ///
     /// [`Error`] if it cannot be written.
     pub fn keep(&self, store: &Record, now_unix_s: f64) -> Result<(), Error> {
         let body = serde_json::to_value(self).map_err(|e| Error::Input {

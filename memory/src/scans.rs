@@ -30,7 +30,6 @@ impl Layout {
 /// Encodes a sweep as a blob, without its pose.
 ///
 /// # Errors
-///
 /// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced.
 pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
     let fail = |what: String| Error::Input { what, mend: "give one range an angle, at even steps".into() };
@@ -51,7 +50,6 @@ pub fn encode(scan: &Scan) -> Result<Blob<'static>, Error> {
 /// Decodes a sweep taken at a pose.
 ///
 /// # Errors
-///
 /// A description of the mismatch in the layout.
 pub fn decode(info: &BlobInfo, data: &[u8], map_from_laser: Isometry2<f64>) -> Result<Scan, String> {
     let layout: Layout =

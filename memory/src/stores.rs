@@ -82,7 +82,6 @@ impl Fault {
     /// Converts the error of a damaged record to a fault.
     ///
     /// # Errors
-    ///
     /// Any other error, unchanged.
     pub(crate) fn of(record: RecordId, error: Error) -> Result<Self, Error> {
         match error {
@@ -164,7 +163,6 @@ pub trait Store: Send + Sync {
     /// Documents that match a query, in its order.
     ///
     /// # Errors
-    ///
     /// [`Error::Damaged`] if any of them is damaged; if the store cannot be read.
     fn find(&self, query: &Query) -> Result<Vec<Document>, Error>;
 
@@ -207,7 +205,6 @@ pub trait Store: Send + Sync {
     /// Pins records on behalf of `by`, so that they are never pruned. Durable on return.
     ///
     /// # Errors
-    ///
     /// [`Error::Missing`] if one does not exist; then none is pinned.
     fn pin(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
@@ -215,7 +212,6 @@ pub trait Store: Send + Sync {
     /// on return.
     ///
     /// # Errors
-    ///
     /// [`Error::Missing`] if one does not exist; then nothing changes.
     fn hold(&self, ids: &[RecordId], by: &str) -> Result<(), Error>;
 
@@ -234,14 +230,12 @@ pub trait Store: Send + Sync {
     /// Returns once everything recorded is on the disk.
     ///
     /// # Errors
-    ///
     /// If a write fails.
     fn sync(&self) -> Result<(), Error>;
 
     /// Prunes down to the limits now; recording does so by itself. Returns the number of removed records.
     ///
     /// # Errors
-    ///
     /// If the store cannot be written.
     fn prune(&self, retention: &Retention) -> Result<u64, Error>;
 
@@ -254,7 +248,6 @@ pub trait Store: Send + Sync {
     /// Verifies every record.
     ///
     /// # Errors
-    ///
     /// If the store itself cannot be read; damaged records are faults in the report instead.
     fn verify(&self) -> Result<Report, Error>;
 }

@@ -185,7 +185,6 @@ impl Transforms {
     /// Inserts a measurement; a second one of the same link and stamp replaces the first.
     ///
     /// # Errors
-    ///
     /// [`TransformError::Invalid`] for numbers that are not finite, an invalid rotation, or a frame that is
     /// its own parent.
     pub fn insert(

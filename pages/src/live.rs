@@ -42,7 +42,6 @@ pub trait Shown: Send + Sync + 'static {
     /// Content at a path, the page itself at `/`; none if the path does not exist.
     ///
     /// # Errors
-    ///
     /// [`CommandError`] if the content is unavailable now; a later call may succeed.
     fn at(&self, path: &str) -> Result<Option<Found>, CommandError>;
 }
@@ -77,7 +76,6 @@ impl Port {
     /// Binds a port; 0 selects a free one.
     ///
     /// # Errors
-    ///
     /// [`CommandError::BadInput`] if the port cannot be bound.
     pub fn take(port: u16) -> Result<Self, CommandError> {
         let refused = |e: std::io::Error| {
@@ -99,7 +97,6 @@ impl Port {
     /// Starts to serve a page on the port.
     ///
     /// # Errors
-    ///
     /// [`CommandError::Broken`] if the system cannot start a thread.
     pub fn show(self, shown: Arc<dyn Shown>) -> Result<Live, CommandError> {
         let broken = |e: std::io::Error| CommandError::broken(format!("the page cannot be served: {e}"));

@@ -23,7 +23,6 @@ const SCRIPT: &str = include_str!("page/page.js");
 /// Renders the page of a run from its record, with its report if the run has finished.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, CommandError> {
     let story = story::of(record, report, &mut story::Looks::default())?;

@@ -23,7 +23,6 @@ const TINTS: [[u8; 3]; 6] =
 /// Renders the picture as SVG: pixels, with labels over them.
 ///
 /// # Errors
-///
 /// [`CommandError::Bug`] if the pixels cannot be encoded.
 pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<String, CommandError> {
     let (width, height, places) = places(cloud, surface);

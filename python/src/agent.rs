@@ -148,7 +148,6 @@ pub fn pursue(
 /// Carries out a run while other Python threads proceed.
 ///
 /// # Errors
-///
 /// The cause of an early end: an exception of a function, Ctrl-C, or the error of the run.
 pub fn carried_out<T: Send>(
     py: Python<'_>,

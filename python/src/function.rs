@@ -106,7 +106,6 @@ pub type Given = Option<BTreeMap<String, Py<PyAny>>>;
 /// Replaces programs of a domain by functions.
 ///
 /// # Errors
-///
 /// `InputError` for a name without a program in `domain.toml`.
 pub fn bind(
     py: Python<'_>,

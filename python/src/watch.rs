@@ -78,7 +78,6 @@ impl Watch {
     /// True if the work was ended early.
     ///
     /// # Errors
-    ///
     /// The exception that ended the work.
     pub fn end(&self, py: Python<'_>) -> PyResult<bool> {
         py.check_signals()?;

@@ -333,7 +333,6 @@ pub trait Robot: Send + Sync {
     /// as open except those named in `shut`.
     ///
     /// # Errors
-    ///
     /// Separately for each entry: [`Failure::Unreachable`] with the reason.
     fn travel(&self, from: &Place, to: &[Place], shut: &[String]) -> Vec<Result<Travel, Failure>>;
 
@@ -359,7 +358,6 @@ pub trait Robot: Send + Sync {
     /// other place is unreachable.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unreachable`], [`Failure::Blocked`], [`Failure::TimedOut`], [`Failure::Cancelled`],
     /// [`Failure::Lost`], [`Failure::Broken`].
     async fn drive_to(&self, to: &Place, watch: &Watch<'_>) -> Result<Driven, Failure>;
@@ -388,7 +386,6 @@ pub trait Robot: Send + Sync {
     /// Takes one laser sweep.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unable`] without [`Description::laser`]; [`Failure::SensorDropped`], [`Failure::TimedOut`],
     /// [`Failure::Cancelled`], [`Failure::Lost`], [`Failure::Broken`].
     async fn scan(&self, watch: &Watch<'_>) -> Result<Scanned, Failure> {

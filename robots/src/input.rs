@@ -98,7 +98,6 @@ pub const MOST_TEXT_BYTES: u64 = 16 << 20;
 /// them.
 ///
 /// # Errors
-///
 /// The system's error, or the reason for the refusal.
 pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
@@ -120,7 +119,6 @@ pub fn read_bytes(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
 /// Reads a text file.
 ///
 /// # Errors
-///
 /// As [`read_bytes`], and if it is not UTF-8.
 pub fn read_text(path: &Path) -> std::io::Result<String> {
     String::from_utf8(read_bytes(path, MOST_TEXT_BYTES)?).map_err(|e| {

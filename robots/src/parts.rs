@@ -78,7 +78,6 @@ impl Description {
     /// Checks that the body has a part.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unable`] without it.
     pub fn need(&self, part: Part) -> Result<(), Failure> {
         if self.has(part) { Ok(()) } else { Err(self.lacks(part)) }

@@ -112,7 +112,6 @@ impl Router {
     /// Checks that the base can stand at a point.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unreachable`] with the obstacle.
     pub fn fits(&self, p: &Point2<f64>) -> Result<(), Failure> {
         if !(p.x.is_finite() && p.y.is_finite()) {
@@ -171,7 +170,6 @@ impl Router {
     /// The route with its waypoints.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unreachable`] with the reason.
     pub fn route(&self, from: &Pose2, to: &Pose2) -> Result<Route, Failure> {
         let start = self.start_access(from)?;

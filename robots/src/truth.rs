@@ -75,7 +75,6 @@ impl Truth {
     /// Reads the ground truth written by a program's simulator, in the format of `robots/PROTOCOL.md`.
     ///
     /// # Errors
-    ///
     /// The fault, with the name of the file.
     pub fn read(file: &Path) -> Result<Truth, String> {
         let place = file.display();

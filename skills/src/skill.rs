@@ -138,7 +138,6 @@ pub trait Skill: Send + Sync {
     /// Carries out the action. Ends within the context's time limit, and soon after its token is cancelled.
     ///
     /// # Errors
-    ///
     /// [`SkillFailure`] if the action failed; the world may have changed nevertheless.
     async fn perform(&self, context: &Context<'_>) -> Result<Outcome, SkillFailure>;
 }

@@ -108,7 +108,6 @@ impl Command {
 /// Runs a command; `stop` ends it early, if it can be stopped.
 ///
 /// # Errors
-///
 /// [`CommandError`] with its text ready for display.
 pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
     match command {

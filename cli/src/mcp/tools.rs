@@ -211,7 +211,6 @@ impl Tool {
     /// Builds the command line for a call.
     ///
     /// # Errors
-    ///
     /// A missing, unknown or invalid argument, with the expectation.
     pub(super) fn task(&self, arguments: &Value, served: &Served) -> Result<Task, String> {
         let none = Map::new();

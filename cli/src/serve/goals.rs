@@ -59,7 +59,6 @@ impl Goals {
     /// Reads the journal in a folder: the last line of a goal is its state; a truncated line is ignored.
     ///
     /// # Errors
-    ///
     /// The journal cannot be read or written.
     pub(super) fn of(folder: &Path) -> io::Result<Self> {
         let path = folder.join("goals.jsonl");
@@ -80,7 +79,6 @@ impl Goals {
     /// Adds a goal.
     ///
     /// # Errors
-    ///
     /// The journal cannot be written.
     pub(super) fn add(&mut self, goal: String, urgent: bool) -> io::Result<Goal> {
         let id = self.all.keys().next_back().map_or(1, |last| last + 1);
@@ -91,7 +89,6 @@ impl Goals {
     /// Stores the state of a goal.
     ///
     /// # Errors
-    ///
     /// The journal cannot be written.
     pub(super) fn keep(&mut self, goal: Goal) -> io::Result<Goal> {
         let line = format!("{}\n", serde_json::to_string(&goal)?);

@@ -41,7 +41,6 @@ pub trait Kind: Send + Sync {
     /// removed afterwards.
     ///
     /// # Errors
-    ///
     /// A message for people; it becomes a row.
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String>;
 
@@ -129,7 +128,6 @@ pub const ALL: &[(&str, Reader)] = &[
 /// Reads and checks an experiment file.
 ///
 /// # Errors
-///
 /// [`ExperimentError::Input`] with the place of the fault.
 pub fn read(source: &Source) -> Result<Box<dyn Kind>, ExperimentError> {
     let head: Head = parse(source)?;

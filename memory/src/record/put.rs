@@ -37,7 +37,6 @@ impl Record {
     /// Records a laser sweep in `frame`; the transforms of its time give its pose.
     ///
     /// # Errors
-    ///
     /// [`Error::Input`] if it is inconsistent, or its angles are not evenly spaced; [`Error::Full`].
     pub fn put_scan(&self, stamp_ns: i64, frame: &str, scan: &Scan, meta: Meta) -> Result<RecordId, Error> {
         let blobs = vec![scans::encode(scan)?];
@@ -55,7 +54,6 @@ impl Record {
     /// Enqueues an image to be written with the next record; see [`Record::put_soon`].
     ///
     /// # Errors
-    ///
     /// As [`Record::put_image`].
     pub fn put_image_soon(&self, stamp_ns: i64, frame: &str, image: Image, meta: Meta) -> Result<(), Error> {
         let Draft { kind, end_ns, frame, kept, meta, blobs, .. } = image_draft(stamp_ns, frame, image, meta)?;
@@ -68,7 +66,6 @@ impl Record {
     /// [`Record::sync`].
     ///
     /// # Errors
-    ///
     /// [`transforms::TransformError::Invalid`], or the failure of an earlier group to reach the disk; then
     /// this transform was not accepted.
     pub fn put_transform(
@@ -99,7 +96,6 @@ impl Record {
     /// Enqueues a transform to be written with the next record; see [`Record::put_soon`].
     ///
     /// # Errors
-    ///
     /// As [`Record::put_transform`].
     pub fn put_transform_soon(
         &self,
@@ -121,7 +117,6 @@ impl Record {
     /// True if a transform is not yet in the record.
     ///
     /// # Errors
-    ///
     /// If it is invalid, or contradicts a recorded one.
     fn is_news(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {
         let stamp_ns = sample.stamp_ns;
@@ -154,7 +149,6 @@ impl Record {
     /// Records a document of any kind, with its blobs.
     ///
     /// # Errors
-    ///
     /// [`Error::Input`] for content that could not be found again; [`Error::Full`].
     pub fn put_document(
         &self,
@@ -169,7 +163,6 @@ impl Record {
     /// Records a line of the log from the source `name`.
     ///
     /// # Errors
-    ///
     /// [`Error::Full`].
     pub fn put_log(
         &self,

@@ -208,7 +208,6 @@ impl Record {
     /// True if the retraced record holds this transform already.
     ///
     /// # Errors
-    ///
     /// [`Error::Input`] if it holds a different one at that time: data placed by one would be misplaced by
     /// the other.
     pub(super) fn is_measured(&self, parent: &str, child: &str, sample: &Sample) -> Result<bool, Error> {

@@ -131,7 +131,6 @@ impl LocalStore {
     /// the traces of a crash.
     ///
     /// # Errors
-    ///
     /// [`Error::NoRecord`], [`Error::InUse`], [`Error::Faulty`] if anything is lost, or what the system
     /// refuses.
     pub fn open(dir: &Path, robot: &str, options: LocalOptions) -> Result<Self, Error> {
@@ -143,7 +142,6 @@ impl LocalStore {
     /// locked; [`LocalStore::recovery`] reports damage.
     ///
     /// # Errors
-    ///
     /// [`Error::NoRecord`], or what the system refuses.
     pub fn open_shared(dir: &Path) -> Result<Self, Error> {
         let dir = folder(dir)?;

@@ -68,7 +68,6 @@ impl MongoStore {
     /// a killed process of that name is removed.
     ///
     /// # Errors
-    ///
     /// [`Error::Remote`] if no server answers there, [`Error::Input`] for a limit that no server can keep.
     pub fn open(address: &str, options: &MongoOptions) -> Result<Self, Error> {
         if options.retention.min_free_bytes.is_some() {

@@ -180,7 +180,6 @@ struct Object {
 /// Gathers the story of a run.
 ///
 /// # Errors
-///
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result<Story, CommandError> {
     let mut all = All { record, lost: Vec::new(), first_ns: None };

@@ -66,7 +66,6 @@ async fn feels(robot: &dyn Robot, holds: bool) -> Result<(), Breach> {
 /// `placing`.
 ///
 /// # Errors
-///
 /// The first violated promise, with the observation.
 pub async fn check_carrying(
     robot: &dyn Robot,

@@ -84,7 +84,6 @@ pub const CHECKS: [(&str, Check); 12] = [
 /// Runs every check, even after a failure.
 ///
 /// # Errors
-///
 /// The violated promises with the observations, at most one a check, in the order of the checks.
 pub async fn check(robot: &dyn Robot) -> Result<(), Breaches> {
     let mut breaches = Vec::new();

@@ -219,7 +219,6 @@ impl Hello {
     /// Checks the message, with the bytes after its line: the cells of the map.
     ///
     /// # Errors
-    ///
     /// The first invalid value.
     pub fn check(self, cells: &[u8]) -> Result<Greeting, String> {
         if self.now_ns < 0 {

@@ -55,7 +55,6 @@ impl Link {
     /// Starts both threads, and receives the first message.
     ///
     /// # Errors
-    ///
     /// If none arrives in time, or the stream ends or violates the protocol.
     pub fn open(
         from: impl Read + Send + 'static,
@@ -94,7 +93,6 @@ impl Link {
     /// Receives the next message.
     ///
     /// # Errors
-    ///
     /// The end of the stream, or a violation of the protocol.
     pub async fn next(&mut self) -> Heard {
         self.heard.recv().await.unwrap_or(Err(Ended::Closed))

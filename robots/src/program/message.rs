@@ -95,7 +95,6 @@ impl Said {
     /// Checks what holds for every line: a monotonic clock, finite numbers.
     ///
     /// # Errors
-    ///
     /// The first invalid value.
     pub fn check(&self, before_ns: Stamp) -> Result<(), String> {
         if self.now_ns < before_ns || self.now_ns > LATEST_NS {
@@ -200,7 +199,6 @@ pub(super) struct NothingSaid {}
 /// Parses the answer to a request.
 ///
 /// # Errors
-///
 /// The missing or malformed part.
 pub(super) fn answer<T: DeserializeOwned>(request: &str, value: serde_json::Value) -> Result<T, String> {
     serde_json::from_value(value).map_err(|e| format!("its answer to {request} is none: {e}"))
@@ -209,7 +207,6 @@ pub(super) fn answer<T: DeserializeOwned>(request: &str, value: serde_json::Valu
 /// Checks a transform and normalises its rotation.
 ///
 /// # Errors
-///
 /// If a number is not finite, or the quaternion is not a rotation.
 pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String> {
     let quaternion = said.rotation.into_inner();
@@ -224,7 +221,6 @@ pub(super) fn transform(said: &Isometry3<f64>) -> Result<Isometry3<f64>, String>
 /// Checks a length or an angle.
 ///
 /// # Errors
-///
 /// If it is negative or not finite.
 pub(super) fn amount(what: &str, x: f64) -> Result<f64, String> {
     if x.is_finite() && x >= 0.0 { Ok(x) } else { Err(format!("{what} is {x}, expected a number from 0")) }

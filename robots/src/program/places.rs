@@ -89,7 +89,6 @@ impl Places {
     /// them if there is no other route. None without a map.
     ///
     /// # Errors
-    ///
     /// [`Failure::Unreachable`] with the reason.
     pub fn route(
         &self,
@@ -139,7 +138,6 @@ fn floor(known: &Known) -> Option<(&OccupancyGrid, Speeds)> {
 /// Pose of the base at a place.
 ///
 /// # Errors
-///
 /// [`Failure::Unreachable`] for an unknown station, a pose where only stations exist, and numbers that are
 /// not finite.
 pub(super) fn stand(known: &Known, place: &Place) -> Result<Isometry3<f64>, Failure> {

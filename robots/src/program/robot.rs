@@ -75,7 +75,6 @@ impl ProgramRobot {
     /// Starts a shell command line as a robot and receives its hello.
     ///
     /// # Errors
-    ///
     /// [`Failure::Broken`] if it does not start, or its hello is missing or invalid.
     pub fn start(command_line: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("`{command_line}`: {because}") };
@@ -87,7 +86,6 @@ impl ProgramRobot {
     /// drop the connection is closed. The connection is neither encrypted nor authenticated.
     ///
     /// # Errors
-    ///
     /// [`Failure::Broken`] if nobody answers there, or its hello is missing or invalid.
     pub fn connect(address: &str, limits: Limits) -> Result<ProgramRobot, Failure> {
         let broken = |because: String| Failure::Broken { because: format!("{address}: {because}") };

@@ -20,7 +20,6 @@ impl Socket {
     /// Connects to `HOST:PORT`, or to the path of a Unix socket, which contains a `/`.
     ///
     /// # Errors
-    ///
     /// The reason, and the expected form of an address.
     pub fn connect(address: &str, limit: Duration) -> Result<Self, String> {
         let refused = |e: std::io::Error| format!("nobody answers there: {e}\n  start the robot first");
@@ -47,7 +46,6 @@ impl Socket {
     /// Streams of both directions.
     ///
     /// # Errors
-    ///
     /// If the system has no more handles.
     pub fn ways(&self) -> Result<(Reader, Writer), String> {
         let both = match self {

@@ -237,7 +237,6 @@ impl Talk {
     /// Receives the next message about a request.
     ///
     /// # Errors
-    ///
     /// [`Failure::TimedOut`] if none arrives in time and there is no `complaint`; otherwise the program is
     /// ended.
     async fn hear(&mut self, id: u64, by: Instant, complaint: &str) -> Result<(Said, Vec<u8>), Failure> {

@@ -65,7 +65,6 @@ impl Recording {
     /// Opens a folder of frames, or a `recording.toml` that names one.
     ///
     /// # Errors
-    ///
     /// A missing or invalid part, with the file, the line, the expectation and a fix.
     pub fn open(path: &Path) -> Result<Recording, InputError> {
         let (folder, settings) = find(path)?;
@@ -126,7 +125,6 @@ impl Recording {
     /// Depths along z of a frame, metres, row by row; NaN without a return.
     ///
     /// # Errors
-    ///
     /// If the file cannot be read or is not a 16-bit image.
     pub fn depth_m(&self, frame: &StoredFrame) -> Result<Vec<f32>, InputError> {
         let image = decode(&frame.depth)?;

@@ -19,7 +19,6 @@ pub(crate) type Fault = (String, &'static str);
 /// Checks the corners of an outline, in order, metres.
 ///
 /// # Errors
-///
 /// If it is malformed, wider than `widest_m`, without area, or crosses itself.
 pub(crate) fn check(corners: &[Point2<f64>], widest_m: f64) -> Result<(), Fault> {
     const CORNERS: &str = "at least three corners, [x, y] in metres";
@@ -51,7 +50,6 @@ pub(crate) fn check(corners: &[Point2<f64>], widest_m: f64) -> Result<(), Fault>
 /// Checks the height of a surface, metres.
 ///
 /// # Errors
-///
 /// If it is not finite or implausible.
 pub(crate) fn check_height(height_m: f64) -> Result<(), Fault> {
     if height_m.is_finite() && height_m.abs() <= HIGHEST_M {

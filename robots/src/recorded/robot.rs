@@ -23,7 +23,6 @@ pub trait Footage: Send + Sync {
     /// Pixels of the frame at a station.
     ///
     /// # Errors
-    ///
     /// The reason for which the frame cannot be read.
     fn pixels(&self, station: usize) -> Result<Pixels, String>;
 }

@@ -94,7 +94,6 @@ impl Settings {
     /// Parses a `recording.toml`. `file` is its name for messages.
     ///
     /// # Errors
-    ///
     /// The first fault, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<Settings, InputError> {
         let settings: Settings = input::parse_toml(file, text)?;

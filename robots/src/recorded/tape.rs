@@ -94,14 +94,12 @@ pub trait Tape: Send + Sync {
     /// Stores an entry durably; for a frame, durability also needs its pixels, which come next.
     ///
     /// # Errors
-    ///
     /// The reason for which it cannot be stored.
     fn keep(&self, entry: &Entry) -> Result<(), String>;
 
     /// The pixels of a stored frame.
     ///
     /// # Errors
-    ///
     /// The reason for which they cannot be read.
     fn pixels(&self, stamp_ns: Stamp) -> Result<Pixels, String>;
 }

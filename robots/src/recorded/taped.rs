@@ -101,7 +101,6 @@ impl TapedRobot {
     /// Stores the queries since the last answer, at the end of a run.
     ///
     /// # Errors
-    ///
     /// [`Failure::Broken`] if they cannot be stored.
     pub fn finish(&self) -> Result<(), Failure> {
         let entry = {

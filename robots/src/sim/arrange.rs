@@ -33,7 +33,6 @@ const RING_POSES: usize = 16;
 /// Draws everything that the scene leaves open. The same seed gives the same scene.
 ///
 /// # Errors
-///
 /// If no arrangement fits: the number of tries, and the most frequent obstacle.
 pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

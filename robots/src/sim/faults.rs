@@ -118,7 +118,6 @@ impl FaultPlan {
     /// Parses `[[fault]]` entries. `file` is the name for messages.
     ///
     /// # Errors
-    ///
     /// The first error, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<FaultPlan, InputError> {
         let plan: FaultPlan = input::parse_toml(file, text)?;
@@ -134,7 +133,6 @@ impl FaultPlan {
     /// Checks that every fault has a time.
     ///
     /// # Errors
-    ///
     /// The first objection, with its path in the document.
     pub fn check(&self) -> Result<(), Objection> {
         for (i, fault) in self.faults.iter().enumerate() {

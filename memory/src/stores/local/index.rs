@@ -114,7 +114,6 @@ impl Index {
     /// True if the index has the current format. An older one has to be rebuilt.
     ///
     /// # Errors
-    ///
     /// [`Error::Damaged`] for a newer one, which must not be overwritten.
     pub fn is_current(&self) -> Result<bool, Error> {
         let format: i64 =

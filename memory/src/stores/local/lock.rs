@@ -23,7 +23,6 @@ const TRIES: usize = 1000;
 /// Acquires the locks of the writer.
 ///
 /// # Errors
-///
 /// [`Error::InUse`] if another process holds them.
 pub(super) fn lock(dir: &Path) -> Result<Writing, Error> {
     let path = dir.join(LOCK);

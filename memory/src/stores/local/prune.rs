@@ -11,7 +11,6 @@ use std::path::Path;
 /// Free room on the disk of a folder, bytes.
 ///
 /// # Errors
-///
 /// [`Error::File`] if the system cannot report it.
 pub fn free_bytes(folder: &Path) -> Result<u64, Error> {
     let free = rustix::fs::statvfs(folder)
@@ -23,7 +22,6 @@ impl LocalStore {
     /// Makes room for drafts, under a size limit.
     ///
     /// # Errors
-    ///
     /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
     pub(super) fn make_room(
         &self,

@@ -32,7 +32,6 @@ const LOOKS: usize = 3;
 /// Opens a store for this process alone to write, and repairs the traces of a crash.
 ///
 /// # Errors
-///
 /// [`Error::Faulty`] if anything is damaged; then nothing is changed. [`Error::Damaged`] for an index of a
 /// newer version, or what the system refuses.
 pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
@@ -86,7 +85,6 @@ fn without_faults(opened: Opened) -> Result<Opened, Error> {
 /// Opens a store for reading, without any change to it.
 ///
 /// # Errors
-///
 /// As [`for_writing`].
 pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
     for _ in 0..LOOKS {

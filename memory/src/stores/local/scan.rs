@@ -145,7 +145,6 @@ impl Head {
 /// known, no write was ever completed.
 ///
 /// # Errors
-///
 /// If the file cannot be opened, or `take` fails. Damage is reported in the scan instead.
 pub(super) fn scan(
     path: &Path,

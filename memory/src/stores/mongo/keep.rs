@@ -15,7 +15,6 @@ impl MongoStore {
     /// without a size limit.
     ///
     /// # Errors
-    ///
     /// [`Error::Bounded`] if pinned records, and those of the same moment, leave too little.
     pub(super) fn make_room(&self, coming: u64, drafts: &[Draft]) -> Result<(), Error> {
         if self.retention == Retention::default() {

@@ -195,7 +195,6 @@ impl SceneSpec {
     /// Parses a scene. `file` is its name for messages.
     ///
     /// # Errors
-    ///
     /// The first error, with its place in the text and a fix.
     pub fn parse(file: &str, text: &str) -> Result<SceneSpec, InputError> {
         let spec: SceneSpec = input::parse_toml(file, text)?;
@@ -221,7 +220,6 @@ impl SceneSpec {
     /// Checks what the format cannot: positive sizes, unique and known names, everything within the room.
     ///
     /// # Errors
-    ///
     /// The first objection, with its path in the document.
     pub fn check(&self) -> Result<(), Objection> {
         self.check_rooms()?;

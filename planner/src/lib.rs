@@ -39,8 +39,9 @@ pub use attachment::{
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::{Explanation, NoPlan, Refusal};
 pub use outcome::{Options, Outcome, PlanError, Statistics};
-pub use pddl::check;
+pub use pddl::{check, nearest};
 pub use plan::{EPSILON_S, Plan, Step, number_text};
+pub use search::portfolio;
 pub use semantics::Semantics;
 pub use solve::plan;
 pub use state::State;

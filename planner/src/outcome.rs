@@ -16,6 +16,8 @@ pub struct Options {
     /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
     /// short improvement whose length is fixed by the task alone.
     pub anytime: bool,
+    /// End with the first plan, as the search has found it.
+    pub first: bool,
     /// Accept only plans whose metric (makespan or cost where there is none) is below this.
     pub bound: Option<f64>,
     /// Decides every choice that is left to chance; the search for plans without times leaves none.

@@ -277,7 +277,9 @@ fn plan_in_time(
         }
         Ok(())
     };
-    let in_time = grounded.timed.is_empty() || Earliest::new(grounded).of(&grounded.goal).is_finite();
+    let comes_and_lasts =
+        |earliest: Earliest| earliest.of(&grounded.goal).is_finite() && earliest.lasts(&grounded.goal);
+    let in_time = grounded.timed.is_empty() || comes_and_lasts(Earliest::new(grounded));
     let found = match grounded.goal_reachable && in_time {
         true => search_plans(&world, &measure(grounded), limits, stop, &mut hear),
         false => Ok(Progress {
@@ -330,6 +332,7 @@ fn ended(
 fn limits(options: &Options, memory: MemoryLimit) -> Limits {
     Limits {
         anytime: options.anytime,
+        first: options.first,
         bound: options.bound.unwrap_or(f64::INFINITY),
         evaluations: options.evaluation_limit.unwrap_or(u64::MAX),
         memory,

@@ -55,11 +55,12 @@ fn an_action_that_is_stretched_does_what_it_does_in_that_time() {
 }
 
 #[test]
-fn a_length_that_is_not_tried_is_not_proven_to_be_impossible() {
+fn a_length_is_chosen_and_none_is_proven_to_be_impossible() {
     for (used, expect) in [
         (4, Expect::Plan(2.0, false)),
         (12, Expect::Plan(6.0, false)),
-        (14, Expect::Open),
+        (14, Expect::Plan(7.0, false)),
+        (21, Expect::Open),
         (20, Expect::Plan(10.0, false)),
     ] {
         check(POUR, &format!("(:init (idle) (= (used) 0)) (:goal (= (used) {used}))"), false, expect);
@@ -102,7 +103,12 @@ fn what_only_looks_like_a_plan_without_its_times_is_none() {
     let unknown = "(:requirements :continuous-effects) (:predicates (full)) (:functions (level))
       (:durative-action fill :parameters () :duration (= ?duration 2) :effect (and (at end (full)) (increase (level) (* #t 1))))";
     for (domain, problem, expect) in [
-        (rated, format!("{rate} (:goal (and (full) (>= (level) 1) (>= (rate) 3)))"), Expect::Open),
+        // From just before 5 s on, until it has flown fast for long enough.
+        (
+            rated,
+            format!("{rate} (:goal (and (full) (>= (level) 1) (>= (rate) 3)))"),
+            Expect::Plan(20.0, false),
+        ),
         (
             stretched,
             "(:init (dry) (lit) (= (level) 0) (at 2 (lit))) (:goal (= (level) 2))".into(),

@@ -67,6 +67,11 @@ impl<'g> Earliest<'g> {
         labels.fold(0.0, f64::max)
     }
 
+    /// Whether nothing that a condition needs is over for good by the last timed literal.
+    pub(crate) fn lasts(&self, condition: &Conjunction) -> bool {
+        condition.facts.iter().all(|&fact| self.until_s[self.place(fact) as usize].is_infinite())
+    }
+
     fn place(&self, fact: Fact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }

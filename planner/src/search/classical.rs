@@ -24,6 +24,7 @@ pub(crate) fn plan_classical(
 ) -> Result<Outcome, PlanError> {
     let classical = ClassicalOptions {
         anytime: options.anytime,
+        only_first: options.first,
         soft,
         bound: options.bound,
         memory,

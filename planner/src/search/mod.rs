@@ -14,6 +14,7 @@ pub mod lookahead;
 #[doc(hidden)]
 pub mod novelty;
 mod open;
+pub mod portfolio;
 #[doc(hidden)]
 pub mod run;
 mod steer;

@@ -18,12 +18,15 @@ use super::horizon;
 use super::improve::Improve;
 use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
+use super::portfolio::{Engine, FIRST, PORTFOLIO, Proof, ROUND_FACTOR, ROUNDS, SHORT_SHARE, turns};
 
 /// How a classical task is to be solved.
 #[derive(Clone, Debug)]
 pub struct ClassicalOptions {
     /// Keep improving until stopped or nothing cheaper is left.
     pub anytime: bool,
+    /// End with the first plan, as the search has found it.
+    pub only_first: bool,
     /// A first plan leaves undone what nobody must do: search on for as long as improving it may take.
     pub soft: bool,
     /// Only plans whose cost is below this.
@@ -119,8 +122,6 @@ const WORK_PER_OPERATOR: u64 = 1500;
 const SOFT_SHARE: u64 = 20;
 /// Work of the first search before another is tried where nobody asks for less.
 pub const FIRST_WORK: u64 = 60_000_000;
-/// How much more work each round of first searches gets.
-const ROUND_FACTOR: u64 = 3;
 /// Weights of the searches for better plans, one after another (Richter and Westphal 2010).
 const WEIGHTS: [u32; 4] = [5, 3, 2, 1];
 
@@ -137,24 +138,8 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// The searches for a first plan in the order of their turns. In a first round with less work those that are quick where they fit:
-/// with lookahead and by clauses. Then, in turn, two rounds: with lookahead, by novelty (narrow, then in full), plainly, and by
-/// clauses; in the second those that order states by estimates take the newest of equally good ones first.
-const QUICK: [usize; 2] = [0, HORIZON];
-const ROUNDS: [[usize; 5]; 2] =
-    [[0, NARROW, NOVELTY, PLAIN, HORIZON], [1, NARROW, NOVELTY, PLAIN + 1, HORIZON]];
-/// How much less work a search of the first round may do.
-const QUICK_SHARE: u64 = 6;
 /// From this turn on, a search that runs out of memory is the last one: others may do with less before.
-const LAST_RESORT: usize = QUICK.len() + 3;
-/// Place of the search by novelty; before it, those with lookahead.
-const NOVELTY: usize = 2;
-/// Places of the two searches without lookahead begin here.
-const PLAIN: usize = 3;
-/// Places of searches that prove nothing by ending.
-const NARROW: usize = 5;
-const HORIZON: usize = 6;
-const PLACES: usize = 7;
+const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 
 /// A search for a first plan that can be gone on with.
 enum Kept<'a, 's> {
@@ -167,14 +152,12 @@ enum Kept<'a, 's> {
 
 impl<'a, 's> Kept<'a, 's> {
     fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
-        match place {
-            NOVELTY | NARROW => Kept::Novelty(Box::new(novelty::Search::new(shared, bound, place == NARROW))),
-            HORIZON => Kept::Horizon(Box::new(horizon::Search::new(shared, bound))),
-            _ => {
-                let (lookahead, newest) = (place < NOVELTY, matches!(place, 1 | 4));
-                // Costs mislead where what is cheap leads nowhere: only the first search counts them.
-                let counting = if place == 0 { GREEDY.counting } else { Counting::Steps };
-                let towards_landmarks = place != PLAIN;
+        match PORTFOLIO[place].engine {
+            Engine::Width { prunes } => Kept::Novelty(Box::new(novelty::Search::new(shared, bound, prunes))),
+            Engine::Satisfiability => Kept::Horizon(Box::new(horizon::Search::new(shared, bound))),
+            Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks } => {
+                let counting = if costs { GREEDY.counting } else { Counting::Steps };
+                let (newest, towards_landmarks) = (newest_first, prefers_landmarks);
                 let strategy = Strategy { bound, lookahead, newest, counting, towards_landmarks, ..GREEDY };
                 Kept::Lazy(Box::new(lazy::Search::new(shared, strategy)))
             }
@@ -236,6 +219,10 @@ impl<'a, 's> Run<'a, 's> {
             Ok(found) => found,
             Err(end) => return end,
         };
+        if self.options.only_first {
+            self.take(&plan);
+            return if self.best.is_some() { ClassicalEnd::Done } else { ClassicalEnd::Stopped };
+        }
         let budget = LEAST_WORK + WORK_PER_OPERATOR * self.task.operators() as u64;
         let mut plan = plan;
         if plain_too {
@@ -269,11 +256,11 @@ impl<'a, 's> Run<'a, 's> {
     ///
     /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
-        let mut kept: [Option<Kept<'a, 's>>; PLACES] = Default::default();
+        let mut kept: [Option<Kept<'a, 's>>; PORTFOLIO.len()] = Default::default();
         let (mut round, mut turn) = (0, 0);
-        let mut work_limit = self.options.first_work / QUICK_SHARE;
+        let mut work_limit = self.options.first_work / SHORT_SHARE;
         loop {
-            let order: &[usize] = if round == 0 { &QUICK } else { &ROUNDS[(round - 1) % ROUNDS.len()] };
+            let order = turns(round);
             let mut next = 0;
             while next < order.len() {
                 let places = &order[self.side_by_side(next, order.len())];
@@ -286,7 +273,7 @@ impl<'a, 's> Run<'a, 's> {
                         _ => Some(taken.search),
                     };
                     match taken.end {
-                        End::Plan(plan) => return Ok((plan, turn <= QUICK.len() && place == 0)),
+                        End::Plan(plan) => return Ok((plan, turn <= ROUNDS[0].len() && place == FIRST)),
                         End::Exhausted if self.proves(place) => return Err(ClassicalEnd::Exhausted),
                         End::Stopped => return Err(ClassicalEnd::Stopped),
                         End::Memory if turn >= LAST_RESORT => return Err(ClassicalEnd::Memory),
@@ -296,7 +283,7 @@ impl<'a, 's> Run<'a, 's> {
                     (turn, next) = (turn + 1, next + 1);
                 }
             }
-            let more = if round == 0 { QUICK_SHARE } else { ROUND_FACTOR };
+            let more = if round == 0 { SHORT_SHARE } else { ROUND_FACTOR };
             work_limit = work_limit.saturating_mul(more);
             round += 1;
         }
@@ -305,9 +292,10 @@ impl<'a, 's> Run<'a, 's> {
     /// Whether there is no plan once a search is exhausted: with a bound, only one that follows cheaper ways to known states proves
     /// anything.
     fn proves(&self, place: usize) -> bool {
-        match place {
-            NARROW | HORIZON => false,
-            _ => place >= PLAIN || self.bound == u32::MAX,
+        match PORTFOLIO[place].proof {
+            Proof::Nothing => false,
+            Proof::Unsolvable => true,
+            Proof::UnsolvableWithoutBound => self.bound == u32::MAX,
         }
     }
 
@@ -322,7 +310,7 @@ impl<'a, 's> Run<'a, 's> {
     /// Lets searches for a first plan go on side by side, for so much work each; what they come to, up to the first plan.
     fn take_turns(
         &self,
-        kept: &mut [Option<Kept<'a, 's>>; PLACES],
+        kept: &mut [Option<Kept<'a, 's>>; PORTFOLIO.len()],
         places: &[usize],
         work: u64,
     ) -> Vec<Taken<'a, 's>> {
@@ -332,8 +320,7 @@ impl<'a, 's> Run<'a, 's> {
         for &place in places {
             let mut search = kept[place].take().unwrap_or_else(|| Kept::new(self.shared, place, self.bound));
             let memory = self.shared.memory.beside(kept.iter().flatten().map(Kept::bytes).sum());
-            // What these do not find soon they hardly find at all: later rounds are for the others.
-            let most = if matches!(place, NARROW | HORIZON) { self.options.first_work } else { u64::MAX };
+            let most = if PORTFOLIO[place].is_capped { self.options.first_work } else { u64::MAX };
             let work = work.min(most);
             jobs.push(move |cancelled: &AtomicBool| {
                 let before = search.counts();

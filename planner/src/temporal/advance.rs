@@ -295,10 +295,42 @@ impl World<'_> {
         Ok(true)
     }
 
-    /// Whether a situation fulfils the goal.
+    /// The situation after the last timed effect, if nothing more is done; `None` while an action is in progress.
+    pub fn ended(&self, situation: &Situation) -> Result<Option<Situation>, Failure> {
+        let mut ended = situation.clone();
+        while ended.open.is_empty() && ended.timed < self.ground.timed.len() {
+            let Some(next) = self.timed(&ended)? else { return Ok(None) };
+            ended = next;
+        }
+        Ok(ended.open.is_empty().then_some(ended))
+    }
+
+    /// Whether a plan may end in a situation: the goal holds after the last timed effect (PDDL 2.2; Edelkamp and Hoffmann 2004).
     pub fn is_goal(&self, situation: &Situation) -> Result<bool, Failure> {
-        let moment = Moment { state: &situation.state, duration_s: 0.0, proposal: None, level: Level::Exact };
-        Ok(situation.open.is_empty() && self.holds(&self.ground.goal, &moment)?)
+        if !situation.open.is_empty() || !self.keeps_goal(situation) {
+            return Ok(false);
+        }
+        if situation.timed == self.ground.timed.len() {
+            return self.holds_at_end(&situation.state);
+        }
+        self.ended(situation)?.map_or(Ok(false), |ended| self.holds_at_end(&ended.state))
+    }
+
+    /// Whether the goal holds in a last state.
+    pub fn holds_at_end(&self, state: &Values) -> Result<bool, Failure> {
+        let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+        self.holds(&self.ground.goal, &moment)
+    }
+
+    /// Whether the plain facts of the goal hold after the last timed effect, each by what sets it last.
+    fn keeps_goal(&self, situation: &Situation) -> bool {
+        let at_end = |variable: u32| match self.last_given.get(&variable) {
+            Some(&(timed, value)) if timed >= situation.timed => value,
+            _ => situation.state.values[variable as usize],
+        };
+        let derived = |variable: u32| self.ground.variables[variable as usize].stratum.is_some();
+        let mut plain = self.ground.goal.facts.iter().filter(|fact| !derived(fact.variable));
+        plain.all(|fact| at_end(fact.variable) == fact.value)
     }
 }
 

@@ -32,6 +32,7 @@ pub fn classical_plan(
     }
     let options = ClassicalOptions {
         anytime: false,
+        only_first: false,
         soft: false,
         bound: None,
         memory,

@@ -16,6 +16,7 @@ use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
 use super::joined::shortened;
+use super::linear::{is_linear, linear_plan};
 use super::manner::{Counts, End, Manner};
 use super::overlap::helpful;
 use super::relaxed::{Part, Relaxed};
@@ -31,6 +32,8 @@ use super::world::World;
 pub(crate) struct Limits {
     /// Improve until stopped or proven best.
     pub anytime: bool,
+    /// End with the first plan.
+    pub first: bool,
     /// Only plans below this.
     pub bound: f64,
     /// States evaluated at most.
@@ -85,6 +88,8 @@ const FIRST_TRY: (u64, u64) = (50, 500);
 const FIRST_WORK: u64 = 2_000_000;
 /// Evaluations of a search for plans in which actions overlap themselves, at least.
 const LEAST_OVERLAPPED: u64 = 2_000;
+/// Evaluations of a search for a first plan before linear programs are tried.
+const SHORT: u64 = 500;
 /// Evaluations of one repair in the large neighbourhood search, at least.
 const REPAIR: u64 = 200;
 
@@ -102,9 +107,22 @@ pub(crate) fn search_plans(
     if inside != all {
         passes.insert(0, Pass::new(&inside, false));
     }
+    let linear = world.chooses_numbers() && is_linear(world);
+    if linear {
+        // Times that are tried serve most tasks: linear programs choose them before the others are searched at length.
+        let short = [&inside, &all].map(|apart| Pass { is_short: true, ..Pass::new(apart, false) });
+        passes.splice(0..0, short.into_iter().skip(usize::from(inside == all)));
+    }
     let mut progress =
         Progress { reason: Reason::Unproven, counts: Counts::default(), plans: 0, overlapping: Vec::new() };
+    let mut tried = !linear;
     for pass in passes {
+        if !tried && !pass.is_short {
+            tried = true;
+            if progress.plans == 0 && by_programs(world, measure, &limits, stop, &mut progress, on_plan)? {
+                break;
+            }
+        }
         let over = pass.run(world, measure, &mut limits, stop, &mut progress, on_plan)?;
         if over || progress.plans > 0 && !limits.anytime {
             break;
@@ -117,6 +135,27 @@ pub(crate) fn search_plans(
         progress.reason = Reason::Enough;
     }
     Ok(progress)
+}
+
+/// Searches for a first plan by linear programs; whether that is the end of searching.
+fn by_programs(
+    world: &World,
+    measure: &Measure,
+    limits: &Limits,
+    stop: &(dyn Fn() -> bool + Sync),
+    progress: &mut Progress,
+    on_plan: &mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
+) -> Result<bool, Failure> {
+    let space = Space::new(world, all_apart(world), measure.clone());
+    let mut relaxed = Relaxed::new(&space);
+    let left = limits.evaluations.saturating_sub(progress.counts.evaluated);
+    let (plan, evaluated) = linear_plan(&space, &mut relaxed, limits.bound, left, stop)?;
+    progress.counts.evaluated += evaluated;
+    let Some(plan) = plan else { return Ok(false) };
+    progress.plans += 1;
+    progress.reason = Reason::Enough;
+    on_plan(&plan)?;
+    Ok(true)
 }
 
 /// Looks, for as long again, for a plan in which actions run twice at once, where none without is left to be found.
@@ -146,11 +185,13 @@ struct Pass {
     exact: bool,
     /// How many times one action may run at once.
     at_once: usize,
+    /// Whether the search for a first plan ends after [`SHORT`] states.
+    is_short: bool,
 }
 
 impl Pass {
     fn new(apart: &[bool], exact: bool) -> Pass {
-        Pass { apart: apart.to_vec(), exact, at_once: 1 }
+        Pass { apart: apart.to_vec(), exact, at_once: 1, is_short: false }
     }
 
     /// Goes on from the plans and the bound of the passes before. Whether no further one can do better.
@@ -173,6 +214,7 @@ impl Pass {
             base,
             exact: self.exact,
             at_once: self.at_once,
+            most_first: if self.is_short { SHORT } else { u64::MAX },
             elsewhere: 0,
             work: u64::MAX,
             limits: *limits,
@@ -184,7 +226,7 @@ impl Pass {
             tours: OnceCell::new(),
         };
         run.first()?;
-        if run.best.is_some() {
+        if run.best.is_some() && !limits.first {
             run.improve()?;
         }
         if let Some(best) = &run.best {
@@ -218,6 +260,8 @@ struct Run<'r, 'w, 'a> {
     base: Base,
     exact: bool,
     at_once: usize,
+    /// States that the search for a first plan evaluates at most.
+    most_first: u64,
     /// States that the classical search evaluated.
     elsewhere: u64,
     /// Work that all searches together may do.
@@ -294,9 +338,11 @@ impl Run<'_, '_, '_> {
                 return Ok(());
             }
         }
-        let end = self.search(None, self.manner(None, false, u64::MAX))?;
+        let end = self.search(None, self.manner(None, false, self.most_first))?;
         if !self.took(end)? && self.progress.reason == Reason::Enough {
-            self.progress.reason = Reason::Stopped;
+            let is_left = self.progress.counts.evaluated < self.limits.evaluations;
+            let is_short = self.most_first < u64::MAX && is_left;
+            self.progress.reason = if is_short { Reason::Unproven } else { Reason::Stopped };
         }
         Ok(())
     }
@@ -331,9 +377,19 @@ impl Run<'_, '_, '_> {
         {
             (measured, steps, base) = (leaner, lean, lean_base);
         }
+        let found = steps.clone();
+        if self.limits.first {
+            return self.keep((measured, steps, base), found);
+        }
         let shorter = shortened(self.space, (measured, steps, base), self.stop)?;
         let shorter = self.rearranged(shorter)?;
-        (measured, steps, base) = tightened(self.space, shorter, self.stop)?;
+        let plan = tightened(self.space, shorter, self.stop)?;
+        self.keep(plan, found)
+    }
+
+    /// Keeps a plan if it is better than the best so far; `found` is the same as the search has found it.
+    fn keep(&mut self, plan: Replayed, found: Vec<Step>) -> Result<bool, Failure> {
+        let (measured, mut steps, base) = plan;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
         let slowness_s: f64 = goal.iter().map(|fact| ready_s[fact.variable as usize]).sum();
@@ -344,14 +400,20 @@ impl Run<'_, '_, '_> {
             steps = ordered;
         }
         let better = match &self.best {
-            None => measured < self.limits.bound,
+            // A metric without a value is no worse than any, where nothing is asked of it.
+            None => measured < self.limits.bound || measured.is_nan() && self.limits.bound.is_infinite(),
             Some(best) => measured < best.measured - tolerance(best.measured),
         };
         let nearer = |best: &Best| measured <= best.measured && slowness_s < best.slowness_s - 1e-6;
         if !better && !self.best.as_ref().is_some_and(nearer) {
             return Ok(false);
         }
-        let plan = better.then(|| schedule(self.space, &steps, self.stop));
+        let plan = better.then(|| {
+            schedule(self.space, &steps, self.stop).or_else(|| {
+                steps = found;
+                schedule(self.space, &steps, self.stop)
+            })
+        });
         if matches!(plan, Some(None)) {
             return Ok(false);
         }

@@ -12,12 +12,14 @@ mod estimate;
 mod improve;
 #[doc(hidden)]
 pub mod joined;
+mod linear;
 mod manner;
 #[doc(hidden)]
 pub mod mentions;
 #[doc(hidden)]
 pub mod order;
 mod overlap;
+mod program;
 #[doc(hidden)]
 pub mod relaxed;
 mod remaining;

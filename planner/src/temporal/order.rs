@@ -146,11 +146,14 @@ impl Order {
         }
     }
 
+    /// Whether a happening is given from outside.
+    pub fn is_given(&self, happening: usize) -> bool {
+        self.fixed.iter().any(|&(node, _)| node as usize == happening)
+    }
+
     /// The time of the last happening that is not given from outside.
     pub fn makespan_s(&self) -> f64 {
-        let given = |index: usize| self.fixed.iter().any(|&(node, _)| node as usize == index);
-        let own =
-            self.earliest_s.iter().enumerate().filter(|&(index, _)| self.fixed.is_empty() || !given(index));
+        let own = self.earliest_s.iter().enumerate().filter(|&(index, _)| !self.is_given(index));
         own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))
     }
 

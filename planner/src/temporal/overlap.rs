@@ -28,10 +28,9 @@ pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Re
 /// Which of these actions it might help to run twice at once.
 ///
 /// Of one that does nothing but bring about at its end, once and for all, what nobody ever changes again, the run that ends
-/// first is enough: a plan without the others is still a plan. Not where actions `earn` something, or where the goal waits for
-/// what is given at a time, until which one that nobody needs may have to last.
+/// first is enough: a plan without the others is still a plan. Not where actions `earn` something.
 pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32> {
-    if acts.is_empty() || earn || goal_waits(world) {
+    if acts.is_empty() || earn {
         return acts.into_iter().collect();
     }
     let kept = kept(world);
@@ -45,15 +44,6 @@ pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32
             })
     };
     acts.into_iter().filter(|&act| !once(&world.acts[act as usize])).collect()
-}
-
-/// Whether what is given at a time might fulfil a part of the goal.
-fn goal_waits(world: &World) -> bool {
-    let goal = &world.ground.goal;
-    let plain = goal.comparisons.is_empty() && goal.calls.is_empty() && world.ground.axioms.is_empty();
-    let fulfils = |outcome: &Outcome| !matches!(outcome, Outcome::Set(fact) if !goal.facts.contains(fact));
-    let mut given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);
-    !world.ground.timed.is_empty() && (!plain || given.any(fulfils))
 }
 
 /// By variable that anything changes, the value that it always gets; none where there are several.

@@ -86,7 +86,8 @@ pub fn longest_path(order: &Order) -> Vec<usize> {
         network.add_edge(node(from), node(to), -gap_s);
     });
     let Ok(paths) = bellman_ford(&network, begin) else { return Vec::new() };
-    let ends = happenings.iter().copied();
+    let own = happenings.iter().enumerate().filter(|&(index, _)| !order.is_given(index));
+    let ends = own.map(|(_, &node)| node);
     let last = ends.min_by(|a, b| paths.distances[a.index()].total_cmp(&paths.distances[b.index()]));
     let mut path = Vec::new();
     let mut node = last;

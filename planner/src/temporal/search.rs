@@ -22,6 +22,7 @@ use super::overlap::starts_again;
 use super::relaxed::{Part, Relaxed};
 use super::space::{Base, Space};
 use super::store::Store;
+use super::timed::schedule;
 use super::world::Span;
 
 /// The key of an entry in the queue, smaller first, then older or as shuffled.
@@ -110,10 +111,6 @@ struct Times {
     /// What tells equal states apart: in exact searches everything that future times depend on, else the time from the
     /// start of the action in progress that started last to the end of everything.
     mark: u64,
-    /// Whether a timed effect happens before the end that has not been taken in yet.
-    due: bool,
-    /// Whether one was taken in that comes after the end of the plan.
-    late: bool,
     /// By resource, when it is free.
     ready_s: Option<Vec<f64>>,
 }
@@ -282,18 +279,16 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
         let latest_s = track.latest_open_s();
         let exact = self.manner.exact.then(|| track.mark(self.space));
-        let (mut due, mut late) = (false, false);
         if open {
             track.close(self.space)?;
         } else {
-            (due, late) = track.timed_at_end(self.space);
             // What is given from outside comes later in every continuation: it must not be too early already.
             track.clone().pass_timed(self.space)?;
         }
         let makespan_s = track.order.makespan_s();
         let slack_s = latest_s.map_or(0.0, |start_s| makespan_s - start_s);
         let mark = exact.unwrap_or_else(|| u64::from((slack_s as f32).to_bits()));
-        Ok(Times { makespan_s, mark, due, late, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
+        Ok(Times { makespan_s, mark, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
     }
 
     /// Takes a situation in: forgets it if it is known or too dear, else evaluates and expands it.
@@ -328,12 +323,11 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
             self.steps[node as usize] = step;
             self.costs[node as usize] = costs;
         }
-        if !times.due && !too_dear && self.space.world.is_goal(&situation)? {
-            if !times.late && self.works_out(node)? {
+        if !too_dear && self.space.world.is_goal(&situation)? {
+            if self.works_out(node)? {
                 return Ok(Some(End::Found(self.path(node))));
             }
-            // What is stretched may do something else,
-            // or something that nobody needs might only have to last until then.
+            // What is stretched may do something else.
             self.lossy = true;
         }
         self.expand(node, &situation, times.ready_s.as_deref())?;
@@ -381,10 +375,13 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
 
     /// Whether a plan is one still with its times. Of what goes on from a base, its beginning is not known here.
     fn works_out(&self, node: u32) -> Result<bool, Failure> {
-        if !self.space.is_open || !self.base.track.actions.is_empty() {
+        let settled = !self.space.is_open && self.space.world.ground.timed.is_empty();
+        if settled || !self.base.track.actions.is_empty() {
             return Ok(true);
         }
-        Ok(self.space.replay_to_goal(&mut self.path(node), &|| false)?.is_some())
+        let mut path = self.path(node);
+        let reaches = self.space.replay_to_goal(&mut path, &|| false)?.is_some();
+        Ok(reaches && (self.space.is_open || schedule(self.space, &path, &|| false).is_some()))
     }
 
     /// A node on the way of a lookahead, which is not evaluated; `None` if it is known already or its times do not fit.

@@ -8,7 +8,6 @@ use rustc_hash::FxHasher;
 use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Earns, Expression, Outcome, Values, added, weights};
-use crate::validate::SEPARATION_S;
 
 use super::advance::{Accesses, Situation, Step};
 use super::order::{Clock, Inconsistent, Order};
@@ -297,11 +296,15 @@ impl<'w, 'a> Space<'w, 'a> {
         if self.stretches && self.stretch(steps, &base.track) {
             return Ok(None);
         }
-        if self.tight && base.track.timed_at_end(self) != (false, false) {
+        if !self.world.is_goal(&base.situation)? || base.track.clone().pass_timed(self).is_err() {
             return Ok(None);
         }
-        let reached = self.world.is_goal(&base.situation)? && (!self.is_open || is_valid(self, steps, stop));
-        Ok(reached.then_some((measured, base)))
+        if base.situation.timed < self.world.ground.timed.len()
+            && let Some(ended) = self.world.ended(&base.situation)?
+        {
+            measured = self.measured(base.costs, &ended.state, base.track.order.makespan_s())?;
+        }
+        Ok((!self.is_open || is_valid(self, steps, stop)).then_some((measured, base)))
     }
 
     /// Fixes how long those actions take that are stretched on a track, where something depends on it; whether there are any.
@@ -444,14 +447,6 @@ impl Track {
         let end = self.order.push_end(open.start, access, open.span)?;
         self.actions[open.step] = Some((open.start, Some(end)));
         Ok(())
-    }
-
-    /// Whether the next timed effect happens before the end of the plan, and whether the last one happens after it.
-    pub fn timed_at_end(&self, space: &Space) -> (bool, bool) {
-        let timed = &space.world.ground.timed;
-        let end_s = self.order.makespan_s() + SEPARATION_S;
-        let due = timed.get(self.timed).is_some_and(|next| next.time_s < end_s);
-        (due, timed[..self.timed].last().is_some_and(|last| last.time_s >= end_s))
     }
 
     /// Lets every timed effect that is left happen.

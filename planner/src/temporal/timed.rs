@@ -6,7 +6,7 @@ use crate::validate::validate;
 use super::advance::Step;
 use super::mentions::keep_apart;
 use super::relaxed::Part;
-use super::space::Space;
+use super::space::{Space, Track};
 use super::world::World;
 
 /// An action of a plan with its times.
@@ -20,16 +20,28 @@ pub(crate) struct Timed {
     pub duration_s: f64,
 }
 
-/// The earliest schedule of a plan; `None` if it is long and has been asked to stop.
+/// The earliest schedule of a plan; `None` if it is long and has been asked to stop, or if timed effects leave no room to keep
+/// apart what must not happen together.
 pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
     let mut track = space.track(steps).ok()?;
+    track.pass_timed(space).ok()?;
     let mut apart = track.clone();
     match keep_apart(space, steps, &mut apart, stop) {
-        Ok(true) => track = apart,
-        Ok(false) => return None,
-        // A schedule that has no room for more distance is as good as the search took it for.
-        Err(_) => {}
+        Ok(true) => Some(timed(steps, &apart)),
+        Ok(false) => None,
+        // A schedule that has no room for more distance is mostly as good as the search took it for.
+        Err(_) => {
+            let world = space.world;
+            let plan = timed(steps, &track);
+            let is_sure = world.ground.timed.is_empty();
+            let valid = || validate(world.task, world.calls.attachments(), &to_plan(world, &plan)).valid;
+            (is_sure || valid()).then_some(plan)
+        }
     }
+}
+
+/// The actions of a track at their earliest times.
+fn timed(steps: &[Step], track: &Track) -> Vec<Timed> {
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
     let mut plan: Vec<Timed> = actions
@@ -49,7 +61,7 @@ pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -
         .collect();
     plan.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
     debug_assert!(plan.iter().all(|timed| matches!(timed.step.part, Part::Whole | Part::Start)));
-    Some(plan)
+    plan
 }
 
 /// Whether a plan is one in time: where numbers flow, or effects depend on how long an action is stretched, the search knows too

@@ -3,6 +3,8 @@
 use std::cell::OnceCell;
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::attachment::Level;
 use crate::calls::{Calls, Failure};
 use crate::ground::{
@@ -122,6 +124,8 @@ pub struct World<'a> {
     derived: Vec<usize>,
     /// By variable, whether it is an object; empty where none is.
     objects: Vec<bool>,
+    /// By variable that timed effects set, the number of the last one that does, and its value.
+    pub(super) last_given: FxHashMap<u32, (usize, u32)>,
 }
 
 impl<'a> World<'a> {
@@ -181,14 +185,27 @@ impl<'a> World<'a> {
         if !objects.contains(&true) {
             objects = Vec::new();
         }
-        World { task, ground, calls, acts, complete: OnceCell::new(), proposes, strata, derived, objects }
+        let given = ground.timed.iter().enumerate();
+        let last_given = given
+            .flat_map(|(index, timed)| timed.outcomes.iter().map(move |outcome| (index, outcome)))
+            .filter_map(|(index, outcome)| match outcome {
+                Outcome::Set(fact) => Some((fact.variable, (index, fact.value))),
+                _ => None,
+            })
+            .collect();
+        let complete = OnceCell::new();
+        World { task, ground, calls, acts, complete, proposes, strata, derived, objects, last_given }
     }
 
     /// Whether the steps of the search can make every plan: no action needs a duration that is chosen for its effects, or
     /// looks at a number while it flows, and none need start or end at the very same time.
     pub fn is_complete(&self) -> bool {
-        let plain = |act: &Act| act.flow_effects.is_empty() && !chooses_effects(act);
-        *self.complete.get_or_init(|| self.acts.iter().all(plain) && !some_only_together(self))
+        *self.complete.get_or_init(|| !self.chooses_numbers() && !some_only_together(self))
+    }
+
+    /// Whether numbers depend on times: on how long an action is chosen to take, or on how long one has been running.
+    pub fn chooses_numbers(&self) -> bool {
+        self.acts.iter().any(|act| !act.flow_effects.is_empty() || chooses_effects(act))
     }
 
     /// Whether what an action adds to the metric depends on how long it is chosen to take.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::monitor::Broken;
-use super::replay;
+use super::replay::{Until, replay};
 use crate::attachment::{Attachments, FactValue, Reading};
 use crate::plan::{Plan, Step};
 use crate::semantics::Semantics;
@@ -23,7 +23,7 @@ pub fn after(
     names: &[&str],
 ) -> Result<Vec<Reading>, Box<Broken>> {
     let semantics = Semantics::new(task, attachments);
-    let replayed = match replay::replay(&semantics, &timed(&semantics, steps)) {
+    let replayed = match replay(&semantics, &timed(&semantics, steps), Until::LastStep) {
         Ok(Ok(replayed)) => replayed,
         Ok(Err(fault)) => return Err(Box::new(Broken::of_fault(task, *fault))),
         Err(failure) => return Err(Box::new(Broken::of_call(task, &failure))),

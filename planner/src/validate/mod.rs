@@ -2,7 +2,8 @@
 //!
 //! Classical plans are replayed step by step; plans with times as happenings after PDDL 2.1 (Fox and Long 2003, section 8):
 //! what happens at one time must not interfere, conditions over all hold strictly between start and end, durations
-//! meet their bounds, timed literals happen by themselves.
+//! meet their bounds, timed literals happen by themselves, and the goal is judged after the last of them (PDDL 2.2; Edelkamp and
+//! Hoffmann 2004).
 
 mod after;
 mod cause;
@@ -132,7 +133,7 @@ fn said(semantics: &Semantics<'_>, plan: &Plan) -> Verdict {
 
 /// Replays a plan and looks at the goal and the constraints.
 fn whole(semantics: &Semantics<'_>, plan: &Plan) -> Result<Result<Replayed, Box<Fault>>, CallFailure> {
-    let replayed = match replay::replay(semantics, plan)? {
+    let replayed = match replay::replay(semantics, plan, replay::Until::LastHappening)? {
         Ok(replayed) => replayed,
         Err(fault) => return Ok(Err(fault)),
     };

@@ -52,8 +52,17 @@ macro_rules! attempt {
     };
 }
 
-/// Replays a plan up to its end, without looking at the goal.
-pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed> {
+/// The last moment of a replay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Until {
+    /// The end of the last step.
+    LastStep,
+    /// The last timed literal, or the end of the last step if that is later: where PDDL 2.2 judges the goal.
+    LastHappening,
+}
+
+/// Replays a plan, without looking at the goal.
+pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan, until: Until) -> Outcome<Replayed> {
     let task = semantics.task;
     let mut bound = Vec::with_capacity(plan.steps.len());
     for (index, step) in plan.steps.iter().enumerate() {
@@ -72,7 +81,12 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed
     if let Some(fault) = without_times(task, plan, &bound, &is_durative) {
         return Ok(Err(Box::new(fault)));
     }
-    let happenings = happenings(task, plan, &is_durative);
+    let makespan_s = makespan_s(plan, &is_durative).filter(|_| !plan.steps.is_empty());
+    let until_s = match until {
+        Until::LastStep => makespan_s.unwrap_or(0.0) + SEPARATION_S,
+        Until::LastHappening => f64::INFINITY,
+    };
+    let happenings = happenings(task, plan, &is_durative, until_s);
     let state = semantics.initial()?;
     let trace = if task.constraints.is_empty() { Vec::new() } else { vec![(0.0, state.clone())] };
     let (running, violations) = (Vec::new(), vec![0.0; task.preferences.len()]);
@@ -80,7 +94,6 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan) -> Outcome<Replayed
     for happening in &happenings {
         attempt!(replay.happening(happening));
     }
-    let makespan_s = makespan_s(plan, &is_durative).filter(|_| !plan.steps.is_empty());
     let end = makespan_s.unwrap_or(plan.steps.len() as f64);
     Ok(Ok(Replayed { state: replay.state, trace: replay.trace, violations: replay.violations, end }))
 }

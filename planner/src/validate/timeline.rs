@@ -24,10 +24,11 @@ pub(super) struct Happening {
     pub events: Vec<Event>,
 }
 
-/// The happenings of a plan in order of time. `is_durative` tells of each step whether its action takes time.
+/// The happenings of a plan in order of time, timed literals before `until_s` among them. `is_durative` tells of each step whether
+/// its action takes time.
 ///
 /// In a plan without times every step is a happening of its own, at 1, 2, ….
-pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool]) -> Vec<Happening> {
+pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool], until_s: f64) -> Vec<Happening> {
     if plan.steps.iter().any(|step| step.start_s.is_none()) {
         let one = |step: usize| Happening { time_s: (step + 1) as f64, events: vec![Event::Instant(step)] };
         return (0..plan.steps.len()).map(one).collect();
@@ -42,9 +43,8 @@ pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool]) -> Vec<
             events.push((start_s, Event::Instant(index)));
         }
     }
-    let end = makespan_s(plan, is_durative).unwrap_or(0.0);
     for (index, timed) in task.init.timed.iter().enumerate() {
-        if timed.time_s < end + SEPARATION_S {
+        if timed.time_s < until_s {
             events.push((timed.time_s, Event::Timed(index)));
         }
     }

@@ -29,6 +29,8 @@ pub enum Kind {
     Classical,
     Numeric,
     Temporal,
+    /// With timed literals, which the goal speaks of.
+    Given,
 }
 
 struct Maker<'c> {
@@ -56,7 +58,7 @@ pub fn task(chance: &mut Chance, kind: Kind) -> Task {
     }
     let functions = match kind {
         Kind::Numeric => vec![vec![], vec![0]],
-        Kind::Temporal if chance.percent(40) => vec![vec![], vec![0]],
+        Kind::Temporal | Kind::Given if chance.percent(40) => vec![vec![], vec![0]],
         _ => vec![],
     };
     let task = Task {
@@ -88,10 +90,34 @@ impl Maker<'_> {
         }
         self.initial();
         self.scope.clear();
-        self.task.goal = self.formula(2);
+        self.task.goal = match self.kind {
+            Kind::Given => self.goal_of_given(),
+            _ => self.formula(2),
+        };
         if !self.task.functions.is_empty() && self.chance.percent(30) {
             self.task.metric = Some(Number::Fluent(Named { index: 0, terms: Vec::new() }));
         }
+    }
+
+    /// A goal about one or two of the facts that are given or taken away at a time, and something else.
+    fn goal_of_given(&mut self) -> Formula {
+        let mut parts = Vec::new();
+        if self.chance.percent(60) {
+            parts.push(self.formula(1));
+        }
+        for _ in 0..1 + self.chance.below(2) {
+            let given = self.task.timed.len();
+            let Some((_, index, arguments, adds)) =
+                self.task.timed.get(self.chance.below(given.max(1))).cloned()
+            else {
+                break;
+            };
+            let terms = arguments.into_iter().map(Term::Object).collect();
+            let atom = Formula::Atom(Named { index, terms });
+            let holds = if self.chance.percent(70) { adds } else { !adds };
+            parts.push(if holds { atom } else { Formula::Not(Box::new(atom)) });
+        }
+        Formula::And(parts)
     }
 
     /// Rules may use their own predicate, and the negation of those before it.
@@ -119,7 +145,7 @@ impl Maker<'_> {
     fn action(&mut self) -> Action {
         let parameters: Vec<usize> = (0..self.chance.below(3)).map(|_| self.chance.below(2)).collect();
         self.scope = parameters.clone();
-        let durative = self.kind == Kind::Temporal && self.chance.percent(80);
+        let durative = self.is_temporal() && self.chance.percent(80);
         self.families = [(); 2].map(|()| {
             self.chance.of::<&[&str]>(&[
                 &["increase", "increase", "decrease"],
@@ -205,10 +231,11 @@ impl Maker<'_> {
                 }
             }
         }
-        if self.kind != Kind::Temporal {
+        if !self.is_temporal() {
             return;
         }
-        for index in 0..[0, 0, 0, 1, 2][self.chance.below(5)] {
+        let counts = if self.kind == Kind::Given { [1, 2, 2, 3, 4] } else { [0, 0, 0, 1, 2] };
+        for index in 0..counts[self.chance.below(5)] {
             let predicate = self.chance.below(self.task.derived);
             let all = tuples(&self.task, &self.task.predicates[predicate].clone());
             if all.is_empty() {
@@ -218,6 +245,10 @@ impl Maker<'_> {
             let time_s = (1 + self.chance.below(6)) as f64 + 0.003 * (1 + index) as f64;
             self.task.timed.push((time_s, predicate, arguments, self.chance.percent(50)));
         }
+    }
+
+    fn is_temporal(&self) -> bool {
+        matches!(self.kind, Kind::Temporal | Kind::Given)
     }
 
     /// Arguments that fit as far as there are any; else the nullary predicate or function 0.

@@ -345,9 +345,8 @@ impl<'t> Oracle<'t> {
                 events.push((step.start_s + step.duration_s, Event::End(index)));
             }
         }
-        let end_s = events.iter().map(|(time_s, _)| *time_s).fold(0.0, f64::max);
         if timed {
-            let given = self.task.timed.iter().enumerate().filter(|(_, given)| given.0 < end_s + TOGETHER_S);
+            let given = self.task.timed.iter().enumerate();
             events.extend(given.map(|(index, given)| (given.0, Event::Timed(index))));
         }
         events.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -398,20 +397,16 @@ impl<'t> Oracle<'t> {
             now_s: 0.0,
             given: 0,
         };
-        if self.is_goal(&start.world.state) {
-            return Found::Plan(Vec::new());
-        }
         let mut given: Vec<usize> = (0..self.task.timed.len()).collect();
         given.sort_by(|&one, &other| self.task.timed[one].0.total_cmp(&self.task.timed[other].0));
+        if self.ends_well(&start, &given) {
+            return Found::Plan(Vec::new());
+        }
         let mut queue = VecDeque::from([start]);
         let mut made = 0;
         while let Some(epoch) = queue.pop_front() {
             for next in self.after(&epoch, &given) {
-                let last_s = epoch_end_s(&next.plan);
-                if next.world.running.is_empty()
-                    && last_s >= next.now_s - 1e-9
-                    && self.is_goal(&next.world.state)
-                {
+                if self.ends_well(&next, &given) {
                     return Found::Plan(next.plan);
                 }
                 made += 1;
@@ -421,6 +416,14 @@ impl<'t> Oracle<'t> {
             }
         }
         Found::Unknown
+    }
+
+    /// Whether the goal holds after the last of what is given at a time, if nothing more is done.
+    fn ends_well(&self, epoch: &Epoch, given: &[usize]) -> bool {
+        let mut left = given[epoch.given..].iter();
+        let last =
+            left.try_fold(epoch.world.clone(), |world, &index| self.happen(&world, &[Event::Timed(index)]));
+        epoch.world.running.is_empty() && last.is_some_and(|last| self.is_goal(&last.state))
     }
 
     fn after(&self, epoch: &Epoch, given: &[usize]) -> Vec<Epoch> {
@@ -476,10 +479,6 @@ struct Epoch {
     plan: Vec<Step>,
     now_s: f64,
     given: usize,
-}
-
-fn epoch_end_s(plan: &[Step]) -> f64 {
-    plan.iter().map(|step| step.start_s + step.duration_s).fold(0.0, f64::max)
 }
 
 fn key(state: &State) -> (u64, Vec<u64>) {

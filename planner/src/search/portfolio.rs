@@ -1,0 +1,109 @@
+//! The searches for a first plan, and the order of their turns, as data.
+
+use serde::Serialize;
+
+/// How a search of the portfolio works.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "engine")]
+pub enum Engine {
+    /// Lazy greedy best-first search with h_FF and landmark count in alternating open lists (Richter and Westphal 2010).
+    LazyGreedy {
+        /// Operator costs count in the heuristic, or every step counts one.
+        costs: bool,
+        /// Follows relaxed plans as far as they go (Vidal 2004).
+        lookahead: bool,
+        /// LIFO tie-breaking, or FIFO.
+        newest_first: bool,
+        /// Operators that achieve landmarks are preferred besides those of the relaxed plan.
+        prefers_landmarks: bool,
+    },
+    /// Best-first width search: novelty beside goal count and relaxed plan (Lipovetzky and Geffner 2017).
+    Width {
+        /// States that are not novel are pruned.
+        prunes: bool,
+    },
+    /// Planning as satisfiability with parallel steps (Rintanen, Heljanko and Niemelä 2006).
+    Satisfiability,
+}
+
+/// What the end of an exhausted search shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Proof {
+    /// There is no plan.
+    Unsolvable,
+    /// There is no plan, where no bound on its cost is given.
+    UnsolvableWithoutBound,
+    /// Nothing.
+    Nothing,
+}
+
+/// A search of the portfolio.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Configuration {
+    /// Name.
+    pub name: &'static str,
+    /// How it works.
+    #[serde(flatten)]
+    pub engine: Engine,
+    /// What its end shows.
+    pub proof: Proof,
+    /// Whether a turn takes no more work than one of the first full round: found soon, or hardly at all.
+    pub is_capped: bool,
+}
+
+const fn lazy(
+    name: &'static str,
+    costs: bool,
+    lookahead: bool,
+    newest_first: bool,
+    prefers_landmarks: bool,
+) -> Configuration {
+    let engine = Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks };
+    let proof = if lookahead { Proof::UnsolvableWithoutBound } else { Proof::Unsolvable };
+    Configuration { name, engine, proof, is_capped: false }
+}
+
+/// Every search. Costs mislead where what is cheap leads nowhere: only the first search counts them.
+pub const PORTFOLIO: [Configuration; 7] = [
+    lazy("lookahead, costs", true, true, false, true),
+    lazy("lookahead, LIFO", false, true, true, true),
+    Configuration {
+        name: "width",
+        engine: Engine::Width { prunes: false },
+        proof: Proof::UnsolvableWithoutBound,
+        is_capped: false,
+    },
+    lazy("plain", false, false, false, false),
+    lazy("plain, LIFO", false, false, true, true),
+    Configuration {
+        name: "narrow width",
+        engine: Engine::Width { prunes: true },
+        proof: Proof::Nothing,
+        is_capped: true,
+    },
+    Configuration {
+        name: "satisfiability",
+        engine: Engine::Satisfiability,
+        proof: Proof::Nothing,
+        is_capped: true,
+    },
+];
+
+/// Turns of the rounds, by place in the portfolio: the first round is a short one, then the others follow in turn. Within a round
+/// every search may do the same work.
+pub const ROUNDS: [&[usize]; 3] = [&[0, 6], &[0, 5, 2, 3, 6], &[1, 5, 2, 4, 6]];
+/// How much less work a search of the short round may do.
+pub const SHORT_SHARE: u64 = 6;
+/// How much more work each later round gets.
+pub const ROUND_FACTOR: u64 = 3;
+/// Place of the first search.
+pub const FIRST: usize = 0;
+
+/// Turns of a round.
+pub fn turns(round: usize) -> &'static [usize] {
+    match round {
+        0 => ROUNDS[0],
+        _ => ROUNDS[1 + (round - 1) % (ROUNDS.len() - 1)],
+    }
+}

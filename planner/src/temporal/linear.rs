@@ -1,0 +1,424 @@
+//! Times, durations and numbers chosen together: a sequence of happenings is kept as long as the linear program of all
+//! that it asks for has a solution (COLIN; Coles, Coles, Fox and Long 2012).
+//!
+//! Other searches try the ends of a range of durations, and look at numbers that flow only where an action ends. This one
+//! knows no more than a number's range: it is slower, and proves nothing.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use rustc_hash::FxHashSet;
+
+use crate::calls::Failure;
+use crate::ground::{Change, Conjunction, Effect, NumericId, Outcome, Relation, Values, When};
+use crate::plan::EPSILON_S;
+use crate::validate::validate;
+
+use super::advance::Step;
+use super::estimate::{From, Key};
+use super::program::{Linear, Program};
+use super::relaxed::Relaxed;
+use super::space::{Measure, Space};
+use super::timed::{Timed, to_plan};
+use super::world::{Act, Span, World};
+
+/// States that are evaluated at most.
+const MOST_EVALUATED: u64 = 1_500;
+/// Numbers that depend on times, at most, of which the range is worked out for the heuristic.
+const MOST_RANGES: usize = 8;
+/// Cost of a state from which no relaxed plan is known: its numbers may still come out otherwise.
+const FAR: f64 = 1e9;
+/// States that are evaluated for better plans, besides as many as the first one took.
+const MORE: u64 = 100;
+/// What counts as better.
+const TOLERANCE: f64 = 1e-6;
+/// Weight of the makespan beside a metric that does not count it.
+const TIME_WEIGHT: f64 = 1e-4;
+
+/// Whether numbers of this task are as linear programs have them: no attachment is asked, and no rule compares numbers.
+pub(super) fn is_linear(world: &World) -> bool {
+    world.ground.calls.is_empty()
+        && !world.proposes
+        && world.ground.axioms.iter().all(|axiom| axiom.body.comparisons.is_empty())
+}
+
+/// The best plan found by linear programs, with the states evaluated for it; below a bound of what plans are measured by.
+pub(super) fn linear_plan(
+    space: &Space,
+    relaxed: &mut Relaxed,
+    bound: f64,
+    evaluations: u64,
+    stop: &dyn Fn() -> bool,
+) -> Result<(Option<Vec<Timed>>, u64), Failure> {
+    let mut search =
+        Search { space, relaxed, bound, nodes: Vec::new(), seen: FxHashSet::default(), evaluated: 0 };
+    let plan = search.run(evaluations.min(MOST_EVALUATED), stop)?;
+    Ok((plan, search.evaluated))
+}
+
+/// An action in progress.
+#[derive(Debug, Clone)]
+struct Running {
+    act: u32,
+    end: u32,
+    duration: Linear,
+    /// Numbers that it changes now, with the change per second.
+    rates: Vec<(NumericId, f64)>,
+}
+
+/// A sequence of happenings and what it leads to.
+#[derive(Debug, Clone)]
+struct Node {
+    /// Facts; the numbers are in `numbers`.
+    state: Values,
+    numbers: Vec<Linear>,
+    open: Vec<Running>,
+    timed: usize,
+    costs: Option<Linear>,
+    /// Time of the last happening, and of the last one of an action.
+    last: Option<u32>,
+    last_own: Option<u32>,
+    program: Program,
+    /// Actions with the variables of their starts and ends.
+    steps: Vec<(u32, u32, Option<u32>)>,
+}
+
+/// What happens next.
+#[derive(Debug, Clone, Copy)]
+enum Next {
+    Start(u32),
+    End(usize),
+    Given,
+}
+
+/// What identifies a node: facts, actions in progress, timed effects, and the ranges of the numbers and of time.
+type Seen = (Vec<u32>, Vec<u32>, usize, Vec<[i64; 2]>);
+
+struct Search<'s, 'w, 'a> {
+    space: &'s Space<'w, 'a>,
+    relaxed: &'s mut Relaxed,
+    bound: f64,
+    nodes: Vec<Node>,
+    seen: FxHashSet<Seen>,
+    evaluated: u64,
+}
+
+impl<'w, 'a> Search<'_, 'w, 'a> {
+    fn run(&mut self, mut evaluations: u64, stop: &dyn Fn() -> bool) -> Result<Option<Vec<Timed>>, Failure> {
+        let state = self.space.world.initial()?;
+        let numbers = state.numbers.iter().map(|&number| Linear::constant(number)).collect();
+        let begin = Node {
+            state,
+            numbers,
+            open: Vec::new(),
+            timed: 0,
+            costs: Some(Linear::constant(0.0)),
+            last: None,
+            last_own: None,
+            program: Program::default(),
+            steps: Vec::new(),
+        };
+        let (mut queue, mut best) = (BinaryHeap::new(), None);
+        self.keep(begin, &mut queue)?;
+        while let Some(Reverse((_, index))) = queue.pop() {
+            let node = self.nodes[index as usize].clone();
+            if let Some((measured, plan)) = self.plan(&node)? {
+                if best.is_none() {
+                    evaluations = evaluations.min(2 * self.evaluated + MORE);
+                }
+                self.bound = measured;
+                best = Some(plan);
+            }
+            for next in self.successors(&node) {
+                if self.evaluated >= evaluations || stop() {
+                    return Ok(best);
+                }
+                if let Some(made) = self.after(&node, next)? {
+                    self.keep(made, &mut queue)?;
+                }
+            }
+        }
+        Ok(best)
+    }
+
+    /// Evaluates a node and puts it in the queue, unless its program has no solution or it is known.
+    fn keep(&mut self, node: Node, queue: &mut BinaryHeap<Reverse<(Key, u32)>>) -> Result<(), Failure> {
+        self.evaluated += 1;
+        let Some((now_s, states)) = states(&node) else { return Ok(()) };
+        if matches!(self.space.measure, Measure::Makespan) && now_s >= self.bound {
+            return Ok(());
+        }
+        let ends = [&states[states.len().saturating_sub(2)], &states[states.len() - 1]];
+        let rounded = |number: f64| (number * 1e3).round() as i64;
+        let ranges = (0..node.numbers.len()).map(|number| ends.map(|state| rounded(state.numbers[number])));
+        let ranges = ranges.chain([[rounded(now_s); 2]]);
+        let open: Vec<u32> = node.open.iter().map(|running| running.act).collect();
+        let seen = (node.state.values.clone(), open.clone(), node.timed, ranges.collect());
+        if !self.seen.insert(seen) {
+            return Ok(());
+        }
+        let mut cost = FAR;
+        for state in &states {
+            let from = From { state, open: &open, ready_s: None };
+            if let Some(estimate) = self.relaxed.estimate(self.space.world, &from)? {
+                cost = cost.min(estimate.cost);
+            }
+        }
+        self.nodes.push(node);
+        queue.push(Reverse((Key(cost), self.nodes.len() as u32 - 1)));
+        Ok(())
+    }
+
+    fn successors(&self, node: &Node) -> Vec<Next> {
+        let world = self.space.world;
+        let given = (node.timed < world.ground.timed.len()).then_some(Next::Given);
+        let running = |act: u32| node.open.iter().any(|open| open.act == act);
+        let starts = self.space.candidates(&node.state).into_iter();
+        let starts = starts.filter(|&act| world.acts[act as usize].share == 0.0 && !running(act));
+        (0..node.open.len()).map(Next::End).chain(given).chain(starts.map(Next::Start)).collect()
+    }
+
+    /// The node after a happening; `None` if it cannot happen, or is more than linear.
+    fn after(&self, node: &Node, next: Next) -> Result<Option<Node>, Failure> {
+        let mut made = node.clone();
+        let happens = match next {
+            Next::Start(act) => made.start(self.space.world, act),
+            Next::End(position) => made.end(self.space.world, position),
+            Next::Given => made.given(self.space.world),
+        };
+        if happens.is_none() {
+            return Ok(None);
+        }
+        self.space.world.derive(&mut made.state)?;
+        Ok(made.goes_on(self.space.world).then_some(made))
+    }
+
+    /// The plan of a node, if its goal holds after the last timed effect.
+    fn plan(&self, node: &Node) -> Result<Option<(f64, Vec<Timed>)>, Failure> {
+        if !node.open.is_empty() {
+            return Ok(None);
+        }
+        let mut last = node.clone();
+        while last.timed < self.space.world.ground.timed.len() {
+            let Some(next) = self.after(&last, Next::Given)? else { return Ok(None) };
+            last = next;
+        }
+        if !last.asks(self.space.world, &self.space.world.ground.goal, None) {
+            return Ok(None);
+        }
+        let makespan = last.last_own.map_or(Linear::constant(0.0), Linear::variable);
+        let objective = self.objective(&last, &makespan);
+        let solved = objective.and_then(|objective| last.program.minimised(&objective));
+        let Some(values) = solved.or_else(|| last.program.minimised(&makespan)) else { return Ok(None) };
+        let world = self.space.world;
+        let timed = last.steps.iter().map(|&(act, start, end)| {
+            let start_s = values[start as usize];
+            let duration_s = end.map_or(0.0, |end| values[end as usize] - start_s);
+            let span = Span { least_s: duration_s, most_s: duration_s };
+            Timed { step: Step { span, ..Step::whole(act) }, start_s, duration_s }
+        });
+        let timed: Vec<Timed> = timed.collect();
+        let verdict = validate(world.task, world.calls.attachments(), &to_plan(world, &timed));
+        let sign = if world.ground.metric.as_ref().is_none_or(|metric| metric.minimise) { 1.0 } else { -1.0 };
+        let measured = match &self.space.measure {
+            Measure::Makespan => verdict.makespan,
+            _ => verdict.metric.map(|metric| sign * metric),
+        };
+        let measured = measured.unwrap_or(f64::INFINITY);
+        let better = self.bound.is_infinite() || measured < self.bound - TOLERANCE;
+        Ok((verdict.valid && better).then_some((measured, timed)))
+    }
+
+    /// What plans are measured by, with a little of the makespan.
+    fn objective(&self, node: &Node, makespan: &Linear) -> Option<Linear> {
+        match &self.space.measure {
+            Measure::Makespan => Some(makespan.clone()),
+            Measure::Additive { sign, time_weight } => {
+                let costs = node.costs.as_ref()?.times(*sign);
+                Some(costs.plus(time_weight.max(TIME_WEIGHT), makespan))
+            }
+            Measure::Expression(expression) => {
+                let metric = Linear::of(expression, &node.numbers, None, Some(makespan))?;
+                Some(metric.plus(TIME_WEIGHT, makespan))
+            }
+        }
+    }
+}
+
+/// The earliest time of the last happening; and the state with its numbers as they are then, and where some depend on times, with these as small and as large as they can
+/// be; `None` if there is no solution.
+fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
+    let now = node.last.map_or(Linear::constant(0.0), Linear::variable);
+    let solution = node.program.minimised(&now)?;
+    let now_s = now.value(&solution);
+    let with = |value: &dyn Fn(usize, &Linear) -> f64| Values {
+        values: node.state.values.clone(),
+        numbers: node.numbers.iter().enumerate().map(|(index, number)| value(index, number)).collect(),
+    };
+    let mut states = vec![with(&|_, number| number.value(&solution))];
+    let open: Vec<usize> =
+        (0..node.numbers.len()).filter(|&index| node.numbers[index].as_constant().is_none()).collect();
+    if open.is_empty() || open.len() > MOST_RANGES {
+        return Some((now_s, states));
+    }
+    for sign in [1.0, -1.0] {
+        let extreme = |number: &Linear| {
+            let values = node.program.minimised(&number.times(sign));
+            values.map_or(-sign * FAR, |values| number.value(&values))
+        };
+        states.push(with(&|_, number| number.as_constant().unwrap_or_else(|| extreme(number))));
+    }
+    Some((now_s, states))
+}
+
+impl Node {
+    /// Lets time go on to a happening: what is in progress holds, and what flows has flown.
+    fn pass(&mut self, world: &World, now: u32) -> Option<()> {
+        let now = Linear::variable(now);
+        let Some(last) = self.last.map(Linear::variable) else { return Some(()) };
+        let apart = last.plus(1.0, &Linear::constant(EPSILON_S));
+        let mut holds = self.program.ask(&now, Relation::AtLeast, &apart) && self.holds_over_all(world);
+        let elapsed = now.plus(-1.0, &last);
+        let rates: Vec<(NumericId, f64)> = self.open.iter().flat_map(|open| open.rates.clone()).collect();
+        for &(number, rate) in &rates {
+            self.numbers[number as usize] = self.numbers[number as usize].plus(rate, &elapsed);
+        }
+        holds &= rates.is_empty() || self.holds_over_all(world);
+        holds.then_some(())
+    }
+
+    fn holds_over_all(&mut self, world: &World) -> bool {
+        let open = self.open.clone();
+        open.iter().all(|own| {
+            let numbers = Conjunction { facts: Vec::new(), ..world.acts[own.act as usize].over_all.clone() };
+            self.asks(world, &numbers, Some(&own.duration))
+        })
+    }
+
+    fn start(&mut self, world: &World, act: u32) -> Option<()> {
+        let own = &world.acts[act as usize];
+        let now = self.program.variable(0.0, f64::INFINITY);
+        self.pass(world, now)?;
+        let end = own.durative.then(|| self.program.variable(0.0, f64::INFINITY));
+        let duration = end.map(|end| Linear::variable(end).plus(-1.0, &Linear::variable(now)));
+        if let Some(duration) = &duration {
+            let least = Linear::constant(EPSILON_S);
+            let bounded = self.program.ask(duration, Relation::AtLeast, &least);
+            (bounded && self.bounds(own, duration, false)).then_some(())?;
+        }
+        self.asks(world, own.at_start, duration.as_ref()).then_some(())?;
+        let cost = Linear::of(own.cost, &self.numbers, duration.as_ref(), None);
+        self.costs = self.costs.take().zip(cost).map(|(costs, cost)| costs.plus(1.0, &cost));
+        self.apply(world, own.start_effects, duration.as_ref())?;
+        self.steps.push((act, now, end));
+        if let (Some(end), Some(duration)) = (end, duration) {
+            self.open.push(Running { act, end, duration, rates: Vec::new() });
+        }
+        (self.last, self.last_own) = (Some(now), Some(now));
+        Some(())
+    }
+
+    fn end(&mut self, world: &World, position: usize) -> Option<()> {
+        let now = self.open[position].end;
+        self.pass(world, now)?;
+        let Running { act, duration, .. } = self.open.remove(position);
+        let own = &world.acts[act as usize];
+        (self.bounds(own, &duration, true) && self.asks(world, own.at_end, Some(&duration))).then_some(())?;
+        self.apply(world, own.end_effects, Some(&duration))?;
+        (self.last, self.last_own) = (Some(now), Some(now));
+        Some(())
+    }
+
+    fn given(&mut self, world: &World) -> Option<()> {
+        let timed = world.ground.timed.get(self.timed)?;
+        let now = self.program.variable(timed.time_s, timed.time_s);
+        self.pass(world, now)?;
+        let effects: Vec<Effect> =
+            timed.outcomes.iter().map(|outcome| Effect { when: None, outcome: outcome.clone() }).collect();
+        self.apply(world, &effects, None)?;
+        self.timed += 1;
+        self.last = Some(now);
+        Some(())
+    }
+
+    fn bounds(&mut self, act: &Act, duration: &Linear, at_end: bool) -> bool {
+        act.bounds.iter().filter(|bound| bound.at_end == at_end).all(|bound| {
+            let seconds = Linear::of(&bound.seconds, &self.numbers, None, None);
+            seconds.is_some_and(|seconds| self.program.ask(duration, bound.relation, &seconds))
+        })
+    }
+
+    /// Asks a condition of the present state; whether it can hold, as far as that is seen.
+    fn asks(&mut self, world: &World, condition: &Conjunction, duration: Option<&Linear>) -> bool {
+        condition.calls.is_empty()
+            && condition.facts.iter().all(|fact| self.state.values[fact.variable as usize] == fact.value)
+            && condition.comparisons.iter().all(|&comparison| {
+                let comparison = &world.ground.comparisons[comparison as usize];
+                let side = |side| Linear::of(side, &self.numbers, duration, None);
+                match (side(&comparison.left), side(&comparison.right)) {
+                    (Some(left), Some(right)) => self.program.ask(&left, comparison.relation, &right),
+                    _ => false,
+                }
+            })
+    }
+
+    fn apply(&mut self, world: &World, effects: &[Effect], duration: Option<&Linear>) -> Option<()> {
+        let before = self.clone();
+        for effect in effects {
+            if let Some(when) = &effect.when
+                && !before.decides(world, when, duration)?
+            {
+                continue;
+            }
+            match &effect.outcome {
+                Outcome::Set(fact) => self.state.values[fact.variable as usize] = fact.value,
+                Outcome::Change { fluent, change, amount } => {
+                    let amount = Linear::of(amount, &before.numbers, duration, None)?;
+                    let number = &mut self.numbers[*fluent as usize];
+                    *number = match change {
+                        Change::Assign => amount,
+                        Change::Increase => number.plus(1.0, &amount),
+                        Change::Decrease => number.plus(-1.0, &amount),
+                        Change::ScaleUp => number.times(amount.as_constant()?),
+                        Change::ScaleDown => number.times(1.0 / amount.as_constant()?),
+                    };
+                }
+                Outcome::Flow { .. } | Outcome::Call(_) => return None,
+            }
+        }
+        Some(())
+    }
+
+    /// Whether the condition of an effect holds; `None` where that depends on times, or on what was before.
+    fn decides(&self, world: &World, when: &When, duration: Option<&Linear>) -> Option<bool> {
+        if !when.at_start.is_empty() || !when.over_all.is_empty() {
+            return None;
+        }
+        let mut trial = self.clone();
+        let holds = trial.asks(world, &when.here, duration);
+        (!holds || trial.program.rows() == self.program.rows()).then_some(holds)
+    }
+
+    /// Whether what is in progress can go on in the present state, and changes numbers at rates that are known.
+    fn goes_on(&mut self, world: &World) -> bool {
+        let facts = |open: &Running| {
+            let mut facts = world.acts[open.act as usize].over_all.facts.iter();
+            facts.all(|fact| self.state.values[fact.variable as usize] == fact.value)
+        };
+        if !self.open.iter().all(facts) {
+            return false;
+        }
+        let rate = |effect: &Effect| match &effect.outcome {
+            Outcome::Flow { fluent, rate } if effect.when.is_none() => {
+                let rate = Linear::of(rate, &self.numbers, None, None)?.as_constant()?;
+                Some((*fluent, rate))
+            }
+            _ => None,
+        };
+        let rates = |open: &Running| world.acts[open.act as usize].flow_effects.iter().map(rate).collect();
+        let rates: Option<Vec<_>> = self.open.iter().map(rates).collect();
+        let Some(rates) = rates else { return false };
+        self.open.iter_mut().zip(rates).for_each(|(open, rates)| open.rates = rates);
+        true
+    }
+}

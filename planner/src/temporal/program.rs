@@ -1,0 +1,160 @@
+//! Numbers that are linear in the times of happenings, and the linear programs of what is asked of them.
+
+use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, Variable};
+
+use crate::ground::{Expression, Relation};
+
+/// Distance that a strict comparison keeps, in the unit of what is compared: well above the tolerance of linear programs and of
+/// comparisons, 1e-7.
+const STRICTLY: f64 = 1e-6;
+
+/// A number that is linear in variables of a [`Program`].
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Linear {
+    constant: f64,
+    /// Variables with their factors, by variable; no factor is zero.
+    terms: Vec<(u32, f64)>,
+}
+
+impl Linear {
+    /// A number that depends on no variable.
+    pub fn constant(constant: f64) -> Linear {
+        Linear { constant, terms: Vec::new() }
+    }
+
+    /// A variable itself.
+    pub fn variable(variable: u32) -> Linear {
+        Linear { constant: 0.0, terms: vec![(variable, 1.0)] }
+    }
+
+    /// The number if it depends on no variable.
+    pub fn as_constant(&self) -> Option<f64> {
+        self.terms.is_empty().then_some(self.constant)
+    }
+
+    /// The sum with a multiple of another number.
+    pub fn plus(&self, factor: f64, other: &Linear) -> Linear {
+        let mut terms = self.terms.clone();
+        for &(variable, other) in &other.terms {
+            match terms.binary_search_by_key(&variable, |&(own, _)| own) {
+                Ok(place) => terms[place].1 += factor * other,
+                Err(place) => terms.insert(place, (variable, factor * other)),
+            }
+        }
+        terms.retain(|&(_, factor)| factor != 0.0);
+        Linear { constant: self.constant + factor * other.constant, terms }
+    }
+
+    /// A multiple.
+    pub fn times(&self, factor: f64) -> Linear {
+        Linear::constant(0.0).plus(factor, self)
+    }
+
+    /// The value under an assignment of the variables.
+    pub fn value(&self, values: &[f64]) -> f64 {
+        self.terms
+            .iter()
+            .fold(self.constant, |sum, &(variable, factor)| sum + factor * values[variable as usize])
+    }
+
+    /// An expression over linear numbers; `None` where it is not linear, or asks an attachment.
+    pub fn of(
+        expression: &Expression,
+        numbers: &[Linear],
+        duration: Option<&Linear>,
+        total_time: Option<&Linear>,
+    ) -> Option<Linear> {
+        let inner = |inner: &Expression| Linear::of(inner, numbers, duration, total_time);
+        Some(match expression {
+            Expression::Constant(number) => Linear::constant(*number),
+            Expression::Fluent(fluent) => numbers[*fluent as usize].clone(),
+            Expression::Duration => duration?.clone(),
+            Expression::TotalTime => total_time?.clone(),
+            Expression::Call(_) | Expression::Violated(_) => return None,
+            Expression::Sum(parts) => {
+                let mut sum = Linear::constant(0.0);
+                for part in parts {
+                    sum = sum.plus(1.0, &inner(part)?);
+                }
+                sum
+            }
+            Expression::Product(parts) => {
+                let mut product = Linear::constant(1.0);
+                for part in parts {
+                    let part = inner(part)?;
+                    product = match (product.as_constant(), part.as_constant()) {
+                        (Some(factor), _) => part.times(factor),
+                        (None, Some(factor)) => product.times(factor),
+                        (None, None) => return None,
+                    };
+                }
+                product
+            }
+            Expression::Difference(left, right) => inner(left)?.plus(-1.0, &inner(right)?),
+            Expression::Quotient(left, right) => {
+                let divisor = inner(right)?.as_constant().filter(|divisor| *divisor != 0.0)?;
+                inner(left)?.times(1.0 / divisor)
+            }
+            Expression::Negative(operand) => inner(operand)?.times(-1.0),
+        })
+    }
+}
+
+/// Bounds on variables, and comparisons of linear numbers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Program {
+    bounds: Vec<(f64, f64)>,
+    rows: Vec<(Vec<(u32, f64)>, ComparisonOp, f64)>,
+}
+
+impl Program {
+    /// A new variable between two bounds.
+    pub fn variable(&mut self, least: f64, most: f64) -> u32 {
+        self.bounds.push((least, most));
+        self.bounds.len() as u32 - 1
+    }
+
+    /// How many comparisons are asked that depend on variables.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Asks that a comparison holds; whether it can, as far as that is seen without solving anything.
+    pub fn ask(&mut self, left: &Linear, relation: Relation, right: &Linear) -> bool {
+        let difference = left.plus(-1.0, right);
+        if !difference.constant.is_finite() {
+            return false;
+        }
+        if let Some(constant) = difference.as_constant() {
+            return relation.holds(constant, 0.0);
+        }
+        let bound = -difference.constant;
+        let (comparison, bound) = match relation {
+            Relation::Less => (ComparisonOp::Le, bound - STRICTLY),
+            Relation::AtMost => (ComparisonOp::Le, bound),
+            Relation::Equal => (ComparisonOp::Eq, bound),
+            Relation::AtLeast => (ComparisonOp::Ge, bound),
+            Relation::Greater => (ComparisonOp::Ge, bound + STRICTLY),
+            // Two ranges are no linear program.
+            Relation::Unequal => return false,
+        };
+        self.rows.push((difference.terms, comparison, bound));
+        true
+    }
+
+    /// Values of the variables that make a number as small as possible; `None` if there are none.
+    pub fn minimised(&self, objective: &Linear) -> Option<Vec<f64>> {
+        let mut factors = vec![0.0; self.bounds.len()];
+        objective.terms.iter().for_each(|&(variable, factor)| factors[variable as usize] = factor);
+        let mut problem = Problem::new(OptimizationDirection::Minimize);
+        let own = self.bounds.iter().zip(factors);
+        let variables: Vec<Variable> = own.map(|(&bounds, factor)| problem.add_var(factor, bounds)).collect();
+        for (terms, comparison, bound) in &self.rows {
+            let terms: LinearExpr =
+                terms.iter().map(|&(variable, factor)| (variables[variable as usize], factor)).collect();
+            problem.add_constraint(terms, *comparison, *bound);
+        }
+        let solution = problem.solve().ok()?.into_solution().ok()?;
+        Some(variables.iter().map(|&variable| solution.var_value(variable)).collect())
+    }
+}

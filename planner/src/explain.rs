@@ -14,6 +14,7 @@ use crate::attachment::{Attachments, CallKind};
 use crate::diagnostic::{Diagnostic, Findings, Span};
 use crate::ground::{GroundTask, MissingAtom, Obstacle};
 use crate::model::walk::{self, Part};
+use crate::pddl::{defeated, without_value};
 use crate::semantics::{Binding, Semantics};
 use crate::task::{
     Action, Atom, Change, Condition, Expression, FunctionId, GroundChange, ModuleId, PredicateId, Task, Term,
@@ -177,6 +178,9 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
         }
     }
     let only_lost = list.is_empty() && could_be_had(ground);
+    if list.is_empty() {
+        list.extend(defeated(task).into_iter().chain(without_value(task)));
+    }
     if list.is_empty() {
         list.push(together(task, &parts, false, only_lost));
     }

@@ -85,7 +85,10 @@ fn findings_are_plain_data_too() {
 }
 
 /// A slip of the pen in the first action of the sound domain, and what helps.
-const PLACES: [(&str, &str, &str); 5] = [
+const PLACES: [(&str, &str, &str); 8] = [
+    ("(on ?d ?p) (hand-free))", "(on ?d ?p), (hand-free))", "it is read as a blank"),
+    ("?d - dish", "\"?d - dish", "it is read as a blank"),
+    ("(on ?d ?p) (hand-free))", "(on ?d ?p) (!= ?d ?p) (hand-free))", "is written `(not (= ?d ?p))`"),
     ("(on ?d ?p) (hand-free))", "(on d ?p) (hand-free))", "did you mean `?d`?"),
     ("(on ?d ?p) (hand-free))", "[on ?d ?p] (hand-free))", "is written `(on …)`"),
     ("(on ?d ?p) (hand-free))", "(at start (on ?d ?p)) (hand-free))", "stands in a `:durative-action` alone"),
@@ -154,4 +157,48 @@ fn a_carriage_return_alone_ends_a_line() {
         assert_eq!(places(&found), places(&expected), "{line_end:?}");
         assert_eq!(found.render(false), expected.render(false), "{line_end:?}");
     }
+}
+
+/// A whole domain and what is found in it, as code, text and help.
+fn check_domain(text: &str, expected: &[(&str, &str)]) {
+    let found = check(&Source::new("domain", format!("(define (domain d) {text})")), None);
+    let told: Vec<(&str, &str)> =
+        found.list.iter().map(|finding| (finding.code, finding.message.as_str())).collect();
+    assert_eq!(told, expected, "{text}\n{}", found.render(false));
+}
+
+#[test]
+fn what_other_planners_refuse_is_told() {
+    check_domain(
+        "(:requirements :strips) (:types room, item - object) (:predicates (at ?r - room) (in ?i - item))
+         (:action go :parameters (?r - room ?i - item) :precondition (in ?i) :effect (at ?r))",
+        &[
+            ("missing-requirement", "`:types` is used without its requirement"),
+            ("odd-sign", "`,` is no sign of PDDL"),
+        ],
+    );
+    check_domain(
+        "(:requirements :durative-actions) (:predicates (free) (done))
+         (:durative-action go :parameters () :duration (= ?duration 1) :precondition (at start (free)) :effect (at end (done)))",
+        &[("odd-keyword", "a durative action has a `:condition`, not a `:precondition`")],
+    );
+}
+
+#[test]
+fn an_action_that_defeats_itself_is_told() {
+    let action = |over_all: &str, start: &str| {
+        format!(
+            "(:requirements :durative-actions) (:predicates (free ?r) (at ?r))
+             (:durative-action move :parameters (?r ?s) :duration (= ?duration 5)
+               :condition (and {over_all} (at start (at ?r))) :effect (and {start} (at end (free ?r)) (at end (at ?s))))"
+        )
+    };
+    let told = [(
+        "self-defeating",
+        "`move` can never be taken: its start takes away `free`, which it needs over all",
+    )];
+    check_domain(&action("(over all (free ?r))", "(at start (not (free ?r)))"), &told);
+    check_domain(&action("(over all (free ?s))", "(at start (not (free ?r)))"), &[]);
+    check_domain(&action("(over all (free ?r))", "(at start (not (free ?r))) (at start (free ?r))"), &[]);
+    check_domain(&action("(at start (free ?r))", "(at start (not (free ?r)))"), &[]);
 }

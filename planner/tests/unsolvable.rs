@@ -258,3 +258,45 @@ fn numbers_that_pass_a_point_by_may_come_back_to_it() {
     let outcome = solve(domain, "(:init (= (x) 3)) (:goal (= (x) 5))");
     assert!(matches!(outcome, Ok(Outcome::Solved { .. })), "{outcome:?}");
 }
+
+#[test]
+fn the_reason_goes_on_to_what_nobody_brings_about() {
+    // From the kitchen leads a door to the hall and one back, and from the hall one to the office: none from there.
+    let problem = "(:objects cup - thing kitchen hall office - room)
+      (:init (robot-in office) (in cup kitchen) (door kitchen hall) (door hall kitchen) (door hall office))
+      (:goal (in cup office))";
+    let told = why(HOUSE, problem);
+    for said in [
+        "`(carried cup)` never holds",
+        "lacks `(robot-in kitchen)`",
+        "lacks `(robot-in hall)`",
+        "`(door office hall)` never holds",
+    ] {
+        assert!(told.contains(said), "{said}:\n{told}");
+    }
+}
+
+#[test]
+fn what_never_works_out_is_the_reason() {
+    let roads = "(:requirements :durative-actions :numeric-fluents) (:predicates (at ?r)) (:functions (dist ?a ?b))
+      (:durative-action go :parameters (?a ?b) :duration (= ?duration (dist ?a ?b)) :condition (at start (at ?a))
+        :effect (and (at start (not (at ?a))) (at end (at ?b))))";
+    let told = why(roads, "(:objects a b) (:init (at a)) (:goal (at b))");
+    assert!(told.contains("function `dist` never has a value"), "{told}");
+    let factory = "(:requirements :durative-actions) (:predicates (free ?r) (at ?r))
+      (:durative-action move :parameters (?r ?a ?b) :duration (= ?duration 5)
+        :condition (and (over all (free ?r)) (at start (at ?a)))
+        :effect (and (at start (not (at ?a))) (at start (not (free ?r))) (at end (at ?b)) (at end (free ?r))))";
+    let told = why(factory, "(:objects r a b) (:init (free r) (at a)) (:goal (at b))");
+    assert!(told.contains("`move` can never be taken"), "{told}");
+}
+
+#[test]
+fn what_is_asked_is_told_to_who_takes_it_for_proven() {
+    let roads = "(:requirements :modules) (:predicates (at ?r)) (:modules (fits ?a conditionchecker fits@l))
+      (:action go :parameters (?a ?b) :precondition (and (at ?a) ([fits ?b])) :effect (at ?b))";
+    match solve(roads, "(:objects a b) (:init (at a)) (:goal (at b))") {
+        Ok(Outcome::Unsolvable { statistics, .. }) => assert!(statistics.attachments.contains_key("fits")),
+        other => panic!("{other:?}"),
+    }
+}

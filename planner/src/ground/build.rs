@@ -88,6 +88,8 @@ pub(crate) fn ground_with(
     let _span = debug_span!("instantiate").entered();
     mark_always(task, &normal, &instances, &mut make, stop)?;
     let (mut raw, goal_possible) = instantiate(task, &normal, &rules, instances, &mut make, stop)?;
+    let halt = || if stop() { Err(GroundError::Stopped) } else { Ok(()) };
+    halt()?;
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
     let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
@@ -97,6 +99,7 @@ pub(crate) fn ground_with(
     for action in &mut raw.actions {
         action.cost = costs.of(action);
     }
+    halt()?;
     let lacks = |&literal: &u32| literal & 1 == 0 && !reached.atoms[(literal >> 1) as usize];
     let out_of_reach = !goal_possible
         || raw.goal.literals.iter().any(lacks)
@@ -106,9 +109,7 @@ pub(crate) fn ground_with(
         false => Vec::new(),
     };
     let groups = groups(&raw, &make, &reached, &rules, &normal, task, stop);
-    if stop() {
-        return Err(GroundError::Stopped);
-    }
+    halt()?;
     let everything = |wanted: bool| vec![wanted; raw.init.len()];
     let relevant = if keep {
         let unwanted = absences(&raw);
@@ -122,6 +123,7 @@ pub(crate) fn ground_with(
         asked.for_each(|(unwanted, asked)| *unwanted |= asked);
         relevant
     };
+    halt()?;
     let mut ground = assemble(task, raw, make, reached, relevant, groups, costs.metric, goal_possible);
     ground.obstacles = found;
     Ok(ground)

@@ -5,6 +5,8 @@ use super::normal::{Action_, Change_, Formula, Normal, Pattern, Term};
 
 /// Most links that are told.
 const MOST_OBSTACLES: usize = 24;
+/// Atoms that fulfil a condition, at most, of each of which is told what an action lacks with it.
+const MOST_MATCHES: usize = 4;
 
 /// An atom that no state has, and what stands in the way of all that could bring it about.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -91,7 +93,10 @@ impl Find<'_> {
             });
             for pattern in adds {
                 let Some(binding) = unify(pattern, &arguments, action.domains.len()) else { continue };
-                let missing = self.missing_of(action, &binding);
+                let mut missing = self.missing_of(action, &binding);
+                if missing.is_empty() {
+                    missing = self.missing_together(action, &binding);
+                }
                 self.enqueue(&missing);
                 obstacle.achievers.push((action.schema, missing));
                 break;
@@ -113,6 +118,82 @@ impl Find<'_> {
             .flat_map(|part| self.missing(part, binding))
             .collect()
     }
+}
+
+impl Find<'_> {
+    /// Of an action whose conditions can each be had, but not all of them: some condition, and what is lacking wherever a reached
+    /// atom fulfils it. Facts that are there from the beginning and conditions that lead on to new atoms come first.
+    fn missing_together(&self, action: &Action_, binding: &[u32]) -> Vec<MissingAtom> {
+        let mut literals: Vec<&Pattern> = Vec::new();
+        let condition = &action.condition;
+        [&condition.start, &condition.over_all, &condition.end]
+            .into_iter()
+            .for_each(|part| literals_of(part, &mut literals));
+        literals.sort_by_key(|pattern| self.is_changed(pattern.predicate));
+        let mut explaining =
+            literals.into_iter().filter_map(|pattern| self.lacking(action, pattern, binding));
+        explaining.find(|missing| missing.iter().any(|atom| !self.queue.contains(atom))).unwrap_or_default()
+    }
+
+    /// What an action lacks under every reached atom that fulfils one of its conditions; `None` if one of them leaves nothing
+    /// lacking, or if there are many.
+    fn lacking(&self, action: &Action_, pattern: &Pattern, binding: &[u32]) -> Option<Vec<MissingAtom>> {
+        let mut lacking: Vec<MissingAtom> = Vec::new();
+        let mut matches = 0;
+        for &atom in self.atoms.of(pattern.predicate) {
+            if self.reached.get(atom as usize) != Some(&true) {
+                continue;
+            }
+            let Some(bound) = extended(pattern, self.atoms.arguments(atom), binding) else { continue };
+            matches += 1;
+            let missing = self.missing_of(action, &bound);
+            if missing.is_empty() || matches > MOST_MATCHES {
+                return None;
+            }
+            lacking.extend(missing);
+        }
+        lacking.sort_unstable();
+        lacking.dedup();
+        (!lacking.is_empty()).then_some(lacking)
+    }
+
+    fn is_changed(&self, predicate: u32) -> bool {
+        let effects = self.normal.actions.iter().flat_map(|a| a.start_effects.iter().chain(&a.end_effects));
+        let mut added = effects.filter_map(|effect| match &effect.change {
+            Change_::Add(pattern) => Some(pattern.predicate),
+            _ => None,
+        });
+        added.any(|added| added == predicate)
+            || self.normal.rules.iter().any(|rule| rule.head.predicate == predicate)
+    }
+}
+
+/// The positive literals of a conjunction.
+fn literals_of<'f>(formula: &'f Formula, into: &mut Vec<&'f Pattern>) {
+    match formula {
+        Formula::And(parts) => parts.iter().for_each(|part| literals_of(part, into)),
+        Formula::Literal(pattern, true) => into.push(pattern),
+        _ => {}
+    }
+}
+
+/// The binding with what a pattern binds where it is an atom.
+fn extended(pattern: &Pattern, arguments: &[u32], binding: &[u32]) -> Option<Vec<u32>> {
+    let mut binding = binding.to_vec();
+    for (term, &argument) in pattern.terms.iter().zip(arguments) {
+        match *term {
+            Term::Object(object) if object != argument => return None,
+            Term::Object(_) => {}
+            Term::Slot(slot) => {
+                let held = &mut binding[slot as usize];
+                if *held != NONE && *held != argument {
+                    return None;
+                }
+                *held = argument;
+            }
+        }
+    }
+    Some(binding)
 }
 
 /// The binding under which the pattern is the atom, as far as the atom is known.

@@ -6,6 +6,7 @@ pub mod agreement;
 pub(crate) mod automaton;
 #[doc(hidden)]
 pub mod between;
+pub(crate) mod defeat;
 #[doc(hidden)]
 pub mod relation;
 pub(crate) mod walk;

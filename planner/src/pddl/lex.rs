@@ -189,7 +189,7 @@ pub fn read(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<D
         line_start: 0,
         fresh_line: true,
         too_deep: false,
-        odd: [false; 2],
+        odd: [false; 3],
         findings,
     };
     builder.tree.nodes.reserve(text.len() / 6);
@@ -216,7 +216,7 @@ struct Builder<'a> {
     fresh_line: bool,
     too_deep: bool,
     /// Whether it was said that blanks, and that hyphens, are not those of PDDL.
-    odd: [bool; 2],
+    odd: [bool; 3],
     findings: &'a mut Vec<Diagnostic>,
 }
 
@@ -256,6 +256,11 @@ impl Builder<'_> {
                     self.close_list(at);
                     at += 1;
                 }
+                sign @ (b',' | b'"') => {
+                    let message = format!("`{}` is no sign of PDDL", char::from(sign));
+                    self.odd(2, message, self.span(at, at + 1), "it is read as a blank; leave it out");
+                    at += 1;
+                }
                 _ => at = self.word_or_blank(at, symbols),
             }
         }
@@ -292,7 +297,7 @@ impl Builder<'_> {
     /// A word ends at a delimiter; a question mark begins the next one, so that `at?x` is read as two.
     fn word_end(&self, start: usize) -> usize {
         let rest = &self.bytes[start + 1..];
-        let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?".contains(byte);
+        let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?,\"".contains(byte);
         start + 1 + rest.iter().position(delimiter).unwrap_or(rest.len())
     }
 

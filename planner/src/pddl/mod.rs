@@ -8,10 +8,11 @@ pub mod lex;
 pub mod parse;
 
 pub use check::check;
+pub(crate) use check::{defeated, without_value};
 pub use format::format;
 
 /// The name most like `name`, if one is near enough to be meant: at most a third of its letters differ.
-pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.chars().count() / 3).max(1);
     known
         .into_iter()

@@ -4,8 +4,9 @@ use rustc_hash::FxHashSet;
 
 use super::{Checker, usage};
 use crate::diagnostic::{Diagnostic, Span};
+use crate::model::defeat::self_defeating;
 use crate::task::{
-    Atom, Change, Condition, Effect, Fact, GroundChange, ObjectId, Parameter, Task, Term, Written,
+    Action, Atom, Change, Condition, Effect, Fact, GroundChange, ObjectId, Parameter, Task, Term, Written,
 };
 
 impl Checker<'_> {
@@ -27,6 +28,23 @@ impl Checker<'_> {
         unused.extend(usage::without_value(&self.task));
         self.findings.append(&mut unused);
     }
+}
+
+/// Durative actions that take away what they need while they run.
+pub(crate) fn defeated(task: &Task) -> Vec<Diagnostic> {
+    let finding = |action: &Action| {
+        let (atom, effect) = self_defeating(action)?;
+        let name = &task.predicate(atom.predicate).name;
+        let message = format!(
+            "`{}` can never be taken: its start takes away `{name}`, which it needs over all",
+            action.name
+        );
+        let finding = Diagnostic::warning("self-defeating", message, effect, "taken away at the start");
+        let finding = finding.with_label(atom.span, "needed from right after the start on");
+        let help = "ask for it `at start`, if it is only needed then, or let the action keep it";
+        Some(finding.with_help(help))
+    };
+    task.actions.iter().filter_map(finding).collect()
 }
 
 /// Ground atoms that hold in every state in which the condition holds.

@@ -14,6 +14,9 @@ mod requirements;
 mod strata;
 mod usage;
 
+pub(crate) use lints::defeated;
+pub(crate) use usage::without_value;
+
 use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -58,6 +61,7 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     let readable = checker.findings.iter().all(|finding| finding.severity != Severity::Error);
     if lints && readable {
         checker.requirements(&domain_tree, problem_tree.as_ref());
+        checker.findings.extend(defeated(&checker.task));
         if problem_tree.is_some() {
             checker.lints();
         }

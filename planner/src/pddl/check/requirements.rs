@@ -8,6 +8,7 @@ use crate::pddl::ast::{Action, Domain, Effect, Formula, Problem};
 /// What a requirement allows, with all requirements that allow it, the narrowest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Feature {
+    Typing,
     Negation,
     Disjunction,
     Exists,
@@ -16,11 +17,18 @@ enum Feature {
 }
 
 impl Feature {
-    const ALL: [Feature; 5] =
-        [Feature::Negation, Feature::Disjunction, Feature::Exists, Feature::Forall, Feature::When];
+    const ALL: [Feature; 6] = [
+        Feature::Typing,
+        Feature::Negation,
+        Feature::Disjunction,
+        Feature::Exists,
+        Feature::Forall,
+        Feature::When,
+    ];
 
     fn word(self) -> &'static str {
         match self {
+            Feature::Typing => ":types",
             Feature::Negation => "not",
             Feature::Disjunction => "or",
             Feature::Exists => "exists",
@@ -31,6 +39,7 @@ impl Feature {
 
     fn allowed_by(self) -> &'static [&'static str] {
         match self {
+            Feature::Typing => &[":typing", ":adl", ":ucpop"],
             Feature::Negation => &[":negative-preconditions", ":disjunctive-preconditions", ":adl"],
             Feature::Disjunction => &[":disjunctive-preconditions", ":adl"],
             Feature::Exists => &[":existential-preconditions", ":quantified-preconditions", ":adl"],
@@ -47,6 +56,7 @@ impl Checker<'_> {
     /// One warning for each requirement that is missing, where it is first needed.
     pub(super) fn requirements(&mut self, domain: &Domain, problem: Option<&Problem>) {
         let mut uses = Uses::new();
+        uses.extend(domain.types.first().map(|first| (Feature::Typing, first.name.span)));
         domain.actions.iter().for_each(|action| in_action(action, &mut uses));
         domain.derived.iter().for_each(|rule| in_formula(&rule.body, &mut uses));
         problem.iter().flat_map(|problem| &problem.goal).for_each(|goal| in_formula(goal, &mut uses));

@@ -44,7 +44,7 @@ pub(super) fn unused(task: &Task) -> Vec<Diagnostic> {
 }
 
 /// Numbers that are read and that nothing ever gives a value: a whole function, or a single one that the goal or the metric reads.
-pub(super) fn without_value(task: &Task) -> Vec<Diagnostic> {
+pub(crate) fn without_value(task: &Task) -> Vec<Diagnostic> {
     let mut given: FxHashSet<FunctionId> =
         task.init.numbers.iter().map(|(fluent, _)| fluent.function).collect();
     let mut assigned: FxHashSet<FunctionId> = FxHashSet::default();

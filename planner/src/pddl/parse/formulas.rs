@@ -8,6 +8,8 @@ use crate::pddl::nearest;
 
 /// Words that begin a formula and are no predicates.
 const CONNECTIVES: &[&str] = &["and", "or", "not", "imply", "forall", "exists"];
+/// Signs of other languages for what differs.
+const UNEQUAL: &[&str] = &["!=", "/=", "<>", "~="];
 
 pub(super) fn comparison(word: &str) -> Option<Comparison> {
     Some(match word {
@@ -249,6 +251,12 @@ impl Parser<'_> {
         let head = self.word(first)?;
         if matches!(head, "assign" | "increase" | "decrease" | "scale-up" | "scale-down") {
             self.expected("a condition", node, format!("`{head}` belongs into effects"));
+            return None;
+        }
+        if UNEQUAL.contains(&head) {
+            let sides: Vec<&str> = rest.iter().filter_map(|&part| self.word(part)).collect();
+            let help = format!("that two things differ is written `(not (= {}))`", sides.join(" "));
+            self.expected("a condition", node, help);
             return None;
         }
         // A misspelt connective: its parts are formulas, which no predicate takes.

@@ -438,6 +438,12 @@ impl<'a> Parser<'a> {
                 self.expected("a part of the action", node, format!("parts: {}", ACTION_PARTS.join(" ")));
                 continue;
             };
+            if part == ":precondition" && action.durative {
+                let message = "a durative action has a `:condition`, not a `:precondition`";
+                let span = self.span(node);
+                let finding = Diagnostic::warning("odd-keyword", message, span, "it is read as `:condition`");
+                self.findings.push(finding.with_help("write `:condition`, as other planners ask for it"));
+            }
             // `:condition` is what `:precondition` is called where actions take time.
             let key = if part == ":precondition" { ":condition" } else { part };
             if seen.contains(&key) {

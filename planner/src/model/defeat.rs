@@ -1,0 +1,37 @@
+//! Durative actions that can never be carried out, whatever the state: their own start takes away what they need while they run.
+
+use crate::diagnostic::Span;
+use crate::task::{Action, Atom, Change, Condition};
+
+/// An atom that a durative action needs over all and its own start takes away, and the effect that does so.
+pub fn self_defeating(action: &Action) -> Option<(&Atom, Span)> {
+    let effects = &action.effects.start;
+    let adds = |atom: &Atom| {
+        let same = |change: &Change| matches!(change, Change::Add(own) if is_same(own, atom));
+        effects.iter().any(|effect| same(&effect.change))
+    };
+    let takes = |atom: &Atom| {
+        let sure = effects.iter().filter(|effect| effect.when.start.is_true() && effect.forall.is_empty());
+        let mut deleted = sure.filter(|effect| match &effect.change {
+            Change::Delete(own) => is_same(own, atom),
+            _ => false,
+        });
+        deleted.next().map(|effect| effect.span)
+    };
+    let mut needed = Vec::new();
+    action.is_durative().then(|| certain(&action.condition.over_all, &mut needed));
+    needed.into_iter().filter(|atom| !adds(atom)).find_map(|atom| Some((atom, takes(atom)?)))
+}
+
+fn is_same(one: &Atom, other: &Atom) -> bool {
+    one.predicate == other.predicate && one.arguments == other.arguments
+}
+
+/// Atoms that hold wherever a condition holds.
+fn certain<'c>(condition: &'c Condition, into: &mut Vec<&'c Atom>) {
+    match condition {
+        Condition::And(parts) => parts.iter().for_each(|part| certain(part, into)),
+        Condition::Atom(atom) => into.push(atom),
+        _ => {}
+    }
+}

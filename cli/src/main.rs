@@ -64,7 +64,7 @@ fn hear(stop: &Stop) -> std::io::Result<()> {
             };
             if !stop.is_asked() {
                 stop.ask(by);
-                commands::narrate(&format!("descry: {kind}: stopping the body; Ctrl-C again ends at once"));
+                commands::narrate(&format!("descry: {kind}: stopping; Ctrl-C again ends at once"));
             } else if by == 2 {
                 std::process::exit(i32::from(Exit::Interrupted as u8));
             }

@@ -263,6 +263,52 @@ fn plan_asks_a_program_and_goes_round_the_dear_edge() {
 }
 
 #[test]
+fn a_program_given_by_name_is_sent_what_its_module_writes() {
+    let (domain, problem) = (data("courier.pddl"), data("courier-problem.pddl"));
+    let plan = |more: &[&str], exit: i32, words: &[&str]| {
+        check(&[&["plan", domain.as_str(), problem.as_str()], more].concat(), exit, words)
+    };
+    let drain = format!("drain=sh {}", data("drain.sh"));
+    plan(&["--attach", &drain], 0, &["drive b c"]);
+    plan(&["--attach", &drain, "--attach-reads", "drain=battery"], 0, &["drive b c"]);
+    plan(&["--attach", &drain, "--attach-reads", "drain=batery"], 2, &["did you mean `battery`?"]);
+    plan(&["--attach", &drain, "--attach-reads", "drian=battery"], 2, &["no --attach names `drian`"]);
+    plan(&["--attach", &drain.replace("drain=", "drian=")], 2, &["no module", "did you mean `drain`?"]);
+    plan(&["--attach", "drain=sleep 60", "--attach-time-limit", "0.05"], 2, &["no answer within 0.05 s"]);
+}
+
+#[test]
+fn a_proof_that_rests_on_a_program_says_so() {
+    let (domain, problem) = (data("courier.pddl"), data("courier-problem.pddl"));
+    let empty = format!("drain=sh {}", data("empty.sh"));
+    let (said, _) = check(&["plan", &domain, &problem, "--attach", &empty], 3, &[]);
+    assert!(said.starts_with("unsolvable if the answers of attachments are right (drain)"), "{said}");
+    let said = json(&["plan", &domain, &problem, "--attach", &empty, "--json"], 3);
+    assert_eq!(said["rests_on"], json!(["drain"]), "{said}");
+}
+
+#[test]
+fn the_portfolio_is_printed() {
+    let (said, _) = check(&["plan", "--portfolio"], 0, &["h_FF", "landmark", "satisfiability"]);
+    let printed = json(&["plan", "--portfolio", "--json"], 0);
+    let names = printed["configurations"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|c| c["name"].as_str().expect("a name"));
+    assert!(names.clone().count() > 3 && names.into_iter().all(|name| said.contains(name)), "{said}");
+}
+
+#[test]
+fn the_first_plan_may_be_enough() {
+    let (domain, problem) = (data("courier.pddl"), data("courier-problem.pddl"));
+    let drain = format!("drain=sh {}", data("drain.sh"));
+    let said = json(&["plan", &domain, &problem, "--attach", &drain, "--first", "--json"], 0);
+    assert_eq!((said["status"].as_str(), said["plans"].as_u64()), (Some("solved"), Some(1)), "{said}");
+    check(&["plan", &domain, &problem, "--first", "--anytime"], 2, &["--first"]);
+}
+
+#[test]
 fn a_plan_is_validated() {
     let attach = format!("path-cost=sh {}", data("dear_edge.sh"));
     let (domain, problem) = (data("roads.pddl"), data("roads-problem.pddl"));

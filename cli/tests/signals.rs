@@ -2,7 +2,7 @@
 //! resumes where it was.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::binary::{check, outcome, start};
@@ -68,6 +68,48 @@ fn a_signal_stops_the_body_first_and_the_run_goes_on() {
     ] {
         check_stopped(name, exit, word, times);
     }
+}
+
+/// So many towns that nobody has seen every way round them before a test is over.
+fn towns(count: usize) -> [String; 2] {
+    let domain = "(define (domain round) (:requirements :strips :action-costs) (:predicates (at ?t) (seen ?t) (town ?t))
+      (:functions (far ?a ?b) (total-cost))
+      (:action go :parameters (?a ?b) :precondition (and (at ?a) (town ?b))
+        :effect (and (not (at ?a)) (at ?b) (seen ?b) (increase (total-cost) (far ?a ?b)))))";
+    let names: Vec<String> = (0..count).map(|town| format!("t{town}")).collect();
+    let all = |word: &str| names.iter().map(|name| format!(" ({word} {name})")).collect::<String>();
+    let far = |a: usize, b: usize| format!(" (= (far t{a} t{b}) {})", 1 + (a * 37 + b * 61) % 50);
+    let far: String = (0..count * count).map(|pair| far(pair / count, pair % count)).collect();
+    let problem = format!(
+        "(define (problem p) (:domain round) (:objects {}) (:init (at t0){}{far} (= (total-cost) 0))
+           (:goal (and{})) (:metric minimize (total-cost)))",
+        names.join(" "),
+        all("town"),
+        all("seen")
+    );
+    [domain.to_string(), problem]
+}
+
+#[test]
+fn the_best_plan_so_far_is_printed_when_planning_is_stopped() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let [domain, problem] = towns(30);
+    std::fs::write(folder.path().join("d.pddl"), domain).expect("the folder is writable");
+    std::fs::write(folder.path().join("p.pddl"), problem).expect("the folder is writable");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_descry"))
+        .args(["plan", "d.pddl", "p.pddl", "--anytime"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let first = crate::binary::first_line(&mut child);
+    assert!(first.contains("steps"), "{first}");
+    signal("INT", child.id());
+    let ended = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stdout);
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.matches("(go t").count() >= 29, "{said}");
 }
 
 const BATCH: &str = r#"

@@ -13,7 +13,8 @@ use descry_domains::load::Domain;
 use descry_domains::program::ProgramAttachment;
 use descry_domains::saying::Saying;
 use descry_memory::Fault;
-use descry_planner::{Attachment, Attachments, Findings, Source};
+use descry_planner::task::{Module, Written};
+use descry_planner::{Attachment, Attachments, Findings, Source, Task};
 use descry_robots::input::{read_bytes, read_text};
 use serde::Serialize;
 
@@ -157,6 +158,13 @@ pub struct AttachmentArguments {
     /// A program that answers the calls of one module, such as 'path-cost=python3 cost.py' (may be given several times)
     #[arg(long, value_name = "NAME=COMMAND")]
     attach: Vec<String>,
+    /// Predicates and functions whose values go with every call of a module given by --attach, such as 'drain=battery,at'
+    /// [default: what an effect module writes, nothing for others]
+    #[arg(long, value_name = "NAME=SYMBOL,…")]
+    attach_reads: Vec<String>,
+    /// Seconds that a program given by --attach has for one answer
+    #[arg(long, value_name = "S", default_value_t = 5.0)]
+    attach_time_limit: f64,
 }
 
 /// The part of a TOML file that names programs; other parts are ignored.
@@ -168,7 +176,7 @@ struct Programs {
 
 impl AttachmentArguments {
     /// Binds the attachments of a planning task.
-    pub fn bind(&self, domain: &Path) -> Result<Attachments, CommandError> {
+    pub fn bind(&self, domain: &Path, task: &Task) -> Result<Attachments, CommandError> {
         let started = Instant::now();
         let mut attachments = Attachments::new().with_clock(move || started.elapsed().as_secs_f64());
         let beside = domain.with_file_name("domain.toml");
@@ -183,16 +191,93 @@ impl AttachmentArguments {
                 add(&mut attachments, name, program, folder.clone());
             }
         }
+        if self.attach_time_limit.is_nan() || self.attach_time_limit <= 0.0 {
+            return Err(CommandError::BadInput("--attach-time-limit takes seconds, above 0".into()));
+        }
         for given in &self.attach {
-            let Some((name, command)) = given.split_once('=') else {
-                let expected = "expected NAME=COMMAND, as in --attach 'path-cost=python3 cost.py'";
-                return Err(CommandError::BadInput(format!("--attach '{given}'\n  {expected}")));
-            };
+            let (name, command) =
+                named("--attach", given, "NAME=COMMAND, as in --attach 'path-cost=python3 cost.py'")?;
+            let module = called(task, "--attach", name)?;
             let program = command.split_whitespace().map(str::to_string).collect();
-            add(&mut attachments, name.into(), Program { program, time_limit_s: 5.0, reads: vec![] }, None);
+            let reads = self.reads(task, name, module)?;
+            add(
+                &mut attachments,
+                name.into(),
+                Program { program, time_limit_s: self.attach_time_limit, reads },
+                None,
+            );
+        }
+        for given in &self.attach_reads {
+            let (name, _) = named("--attach-reads", given, READS)?;
+            if !self.attach.iter().any(|own| own.split_once('=').is_some_and(|(own, _)| own == name)) {
+                return Err(CommandError::BadInput(format!(
+                    "--attach-reads '{given}'\n  no --attach names `{name}`"
+                )));
+            }
         }
         Ok(attachments)
     }
+
+    /// What goes with every call of a module: what is asked for, or else what the module writes.
+    fn reads(&self, task: &Task, name: &str, module: &Module) -> Result<Vec<String>, CommandError> {
+        let mut asked: Option<Vec<String>> = None;
+        for given in &self.attach_reads {
+            let (own, symbols) = named("--attach-reads", given, READS)?;
+            if own != name {
+                continue;
+            }
+            let known: Vec<&str> = task
+                .predicates
+                .iter()
+                .map(|p| &*p.name)
+                .chain(task.functions.iter().map(|f| &*f.name))
+                .collect();
+            for symbol in symbols.split(',').map(|symbol| symbol.trim().to_lowercase()) {
+                if !known.contains(&symbol.as_str()) {
+                    let what = format!("--attach-reads '{given}'\n  `{symbol}` is no predicate or function");
+                    return Err(misspelt(&what, &symbol, known));
+                }
+                asked.get_or_insert_default().push(symbol);
+            }
+        }
+        let written = module.writes.iter().map(|written| match written {
+            Written::Number(fluent) | Written::Object(fluent) => &task.function(fluent.function).name,
+            Written::Truth(atom) => &task.predicate(atom.predicate).name,
+        });
+        Ok(asked.unwrap_or_else(|| written.cloned().collect()))
+    }
+}
+
+const READS: &str = "NAME=SYMBOL,…, as in --attach-reads 'drain=battery,at'";
+
+/// The two sides of an option's `=`.
+fn named<'g>(option: &str, given: &'g str, expected: &str) -> Result<(&'g str, &'g str), CommandError> {
+    let message = || CommandError::BadInput(format!("{option} '{given}'\n  expected {expected}"));
+    given.split_once('=').ok_or_else(message)
+}
+
+/// The module that a name binds: its own, or that of its function.
+fn called<'t>(task: &'t Task, option: &str, name: &str) -> Result<&'t Module, CommandError> {
+    let function = |module: &'t Module| module.function.split('@').next().unwrap_or_default();
+    let names = |module: &&Module| {
+        let own = [&*module.function, &*module.name, module.function.split('@').next().unwrap_or_default()];
+        own.iter().any(|own| own.eq_ignore_ascii_case(name))
+    };
+    task.modules.iter().find(names).ok_or_else(|| {
+        let known: Vec<&str> =
+            task.modules.iter().flat_map(|module| [module.name.as_str(), function(module)]).collect();
+        misspelt(&format!("{option} '{name}=…'\n  no module of the domain is called `{name}`"), name, known)
+    })
+}
+
+/// A name that is not known, with the nearest one or all of them.
+fn misspelt(what: &str, name: &str, known: Vec<&str>) -> CommandError {
+    let help = match descry_planner::nearest(name, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None if known.is_empty() => "there is none at all".to_string(),
+        None => format!("known are: {}", known.join(", ")),
+    };
+    CommandError::BadInput(format!("{what}: {help}"))
 }
 
 fn add(attachments: &mut Attachments, name: String, program: Program, folder: Option<PathBuf>) {

@@ -101,7 +101,7 @@ pub enum Command {
 impl Command {
     /// True if the command ends in order when stopped; others may be killed at any time.
     pub fn can_be_stopped(&self) -> bool {
-        matches!(self, Self::Find(_) | Self::Do(_) | Self::Experiment(_))
+        matches!(self, Self::Find(_) | Self::Do(_) | Self::Experiment(_) | Self::Plan(_))
     }
 }
 
@@ -114,7 +114,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Find(arguments) => find::find(arguments, stop),
         Command::Do(arguments) => find::pursue(arguments, stop),
         Command::Goals(arguments) => goals::run(arguments),
-        Command::Plan(arguments) => plan::run(arguments),
+        Command::Plan(arguments) => plan::run(arguments, stop),
         Command::Validate(arguments) => validate::run(arguments),
         Command::New(arguments) => new::run(arguments),
         Command::Check(arguments) => check::run(arguments),

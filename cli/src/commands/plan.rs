@@ -11,15 +11,18 @@ use serde_json::json;
 
 use crate::commands::input::{self, AttachmentArguments};
 use descry_agent::exit::{CommandError, Exit};
+use descry_agent::stop::Stop;
 use descry_agent::why_not;
 
 /// Arguments of `descry plan`.
 #[derive(clap::Args)]
 pub struct Arguments {
     /// PDDL domain
-    domain: PathBuf,
+    #[arg(required_unless_present = "portfolio")]
+    domain: Option<PathBuf>,
     /// PDDL problem
-    problem: PathBuf,
+    #[arg(required_unless_present = "portfolio")]
+    problem: Option<PathBuf>,
     /// Give up after so many seconds
     #[arg(long, value_name = "S")]
     time_limit: Option<f64>,
@@ -29,6 +32,12 @@ pub struct Arguments {
     /// Go on improving the plan until the time limit
     #[arg(long)]
     anytime: bool,
+    /// End with the first plan, as the search has found it
+    #[arg(long, conflicts_with = "anytime")]
+    first: bool,
+    /// Print the searches that are tried where actions take no time: engine, heuristics, shares of work, and what their ends prove
+    #[arg(long)]
+    portfolio: bool,
     /// How many searches may go on side by side, where actions take no time; the plan is the same [default: 1]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -61,18 +70,24 @@ enum Status {
     OutOfMemory,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
+pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandError> {
     let started = Instant::now();
+    let (Some(domain_path), Some(problem_path)) = (&arguments.domain, &arguments.problem) else {
+        return portfolio(arguments.json);
+    };
     if arguments.time_limit.is_some_and(|s| s.is_nan() || s <= 0.0) {
         return Err(CommandError::BadInput("--time-limit takes seconds, above 0".into()));
     }
-    let (domain, problem) = (input::source(&arguments.domain)?, input::source(&arguments.problem)?);
+    let (domain, problem) = (input::source(domain_path)?, input::source(problem_path)?);
     let task = Task::read(&domain, &problem).map_err(|f| CommandError::BadInput(input::drawn(&f)))?;
-    let attachments = arguments.attachments.bind(&arguments.domain)?;
+    let attachments = arguments.attachments.bind(domain_path, &task)?;
     let deadline = arguments.time_limit.map(|s| started + Duration::from_secs_f64(s.min(1e9)));
-    let stop = || deadline.is_some_and(|d| Instant::now() >= d);
+    let told = stop;
+    let is_asked = || told.is_asked();
+    let stop = || is_asked() || deadline.is_some_and(|d| Instant::now() >= d);
     let options = descry_planner::Options {
         anytime: arguments.anytime,
+        first: arguments.first,
         seed: arguments.seed,
         threads: arguments.threads,
         memory_limit_bytes: arguments.memory_limit.map(|mb| mb << 20),
@@ -95,6 +110,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
     unwritten?;
+    let signal = is_asked().then(|| told.signal());
     let (status, exit) = match &outcome {
         Outcome::Solved { .. } => (Status::Solved, Exit::Done),
         Outcome::Unsolvable { .. } => (Status::Unsolvable, Exit::Unsolvable),
@@ -123,12 +139,78 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     if arguments.json {
         print_json((status, endless), &outcome, answer.as_ref(), started)?;
     } else {
-        show(&status, &outcome, arguments.out.is_some(), started, stop())?;
+        let cut = signal.map(|_| "stopped").or_else(|| stop().then_some("out of time"));
+        show(&status, &outcome, arguments.out.is_some(), started, cut)?;
         if let Some(answer) = answer {
             input::narrate_fitted(&answer.said(outcome.plan()));
         }
     }
-    Ok(exit)
+    Ok(signal.map_or(exit, Exit::of_signal))
+}
+
+/// Prints the searches for a first plan and their turns.
+fn portfolio(as_json: bool) -> Result<Exit, CommandError> {
+    use descry_planner::portfolio::{PORTFOLIO, ROUND_FACTOR, ROUNDS, SHORT_SHARE};
+    let names = |round: &[usize]| -> Vec<&str> { round.iter().map(|&place| PORTFOLIO[place].name).collect() };
+    let rounds: Vec<Vec<&str>> = ROUNDS.iter().map(|round| names(round)).collect();
+    if as_json {
+        let said = json!({
+            "configurations": PORTFOLIO,
+            "rounds": rounds,
+            "short_round_divisor": SHORT_SHARE,
+            "round_factor": ROUND_FACTOR,
+        });
+        input::print_json(&said)?;
+        return Ok(Exit::Done);
+    }
+    for configuration in &PORTFOLIO {
+        input::print_text(&told(configuration))?;
+    }
+    for (index, round) in rounds.iter().enumerate() {
+        let share = 100.0 / round.len() as f64;
+        let when = match index {
+            0 => format!("round 1, 1/{SHORT_SHARE} of the work"),
+            _ => format!(
+                "rounds {}, {}, …, each {ROUND_FACTOR} times the work of the one before",
+                index + 1,
+                index + 3
+            ),
+        };
+        input::print_text(&format!("{when}; {share:.0} % each: {}", round.join(" · ")))?;
+    }
+    Ok(Exit::Done)
+}
+
+/// A search of the portfolio in the field's words.
+fn told(configuration: &descry_planner::portfolio::Configuration) -> String {
+    use descry_planner::portfolio::{Engine, Proof};
+    let yes = |holds: bool, said: &'static str| if holds { said } else { "" };
+    let engine = match configuration.engine {
+        Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks } => format!(
+            "lazy greedy best-first; h_FF ({}) and landmark count alternate; preferred operators of h_FF{}; {} tie-breaking{}",
+            if costs { "costs plus one" } else { "unit costs" },
+            yes(prefers_landmarks, " and landmarks"),
+            if newest_first { "LIFO" } else { "FIFO" },
+            yes(lookahead, "; follows relaxed plans (YAHSP lookahead)"),
+        ),
+        Engine::Width { prunes } => {
+            format!(
+                "best-first width search; novelty, goal count{}",
+                yes(prunes, "; prunes what is not novel")
+            )
+        }
+        Engine::Satisfiability => "planning as satisfiability, parallel steps".to_string(),
+    };
+    let proof = match configuration.proof {
+        Proof::Unsolvable => "its end proves unsolvability",
+        Proof::UnsolvableWithoutBound => "its end proves unsolvability where no cost bound is given",
+        Proof::Nothing => "its end proves nothing",
+    };
+    format!(
+        "{:17} {engine}; {proof}{}",
+        configuration.name,
+        yes(configuration.is_capped, "; work capped a turn")
+    )
 }
 
 /// What the process has in use: what lies in main memory, or no more to be had once its address space is nearly used up.
@@ -183,6 +265,8 @@ fn print_json(
         "scored_only": scored_only,
         "endless": endless,
         "attachments": attachments,
+        // A proof takes their answers as they are.
+        "rests_on": why.map(|_| attachments.keys().collect::<Vec<_>>()),
         "why": why.map(|why| why.to_string()),
         // A proof holds for plans in which none of these overlaps itself.
         "overlapping": why.map(|why| &why.overlapping),
@@ -200,7 +284,7 @@ fn show(
     outcome: &Outcome,
     written: bool,
     started: Instant,
-    cut_short: bool,
+    cut: Option<&str>,
 ) -> Result<(), CommandError> {
     let time = format!(
         "{:.3} s, {} states evaluated",
@@ -213,7 +297,12 @@ fn show(
                 true => "",
                 false => " as long as no action overlaps itself",
             };
-            input::print_text(&format!("proven unsolvable{but_for}"))?;
+            let asked: Vec<&str> = outcome.statistics().attachments.keys().map(String::as_str).collect();
+            let said = match asked.is_empty() {
+                true => "proven unsolvable".to_string(),
+                false => format!("unsolvable if the answers of attachments are right ({})", asked.join(", ")),
+            };
+            input::print_text(&format!("{said}{but_for}"))?;
             input::print_findings(&why.findings)?;
             input::narrate(&time);
         }
@@ -232,10 +321,14 @@ fn show(
         _ if matches!(status, Status::OutOfMemory) => {
             input::narrate(&format!("out of memory, no plan yet ({time})"))
         }
-        _ if cut_short => input::narrate(&format!("out of time, no plan yet ({time})")),
-        _ => input::narrate(&format!(
-            "no plan was found, and none is ruled out: the search has left possibilities out ({time})"
-        )),
+        _ => input::narrate(&match cut {
+            Some(cut) => format!("{cut}, no plan yet ({time})"),
+            None => {
+                format!(
+                    "no plan was found, and none is ruled out: the search has left possibilities out ({time})"
+                )
+            }
+        }),
     }
     for (name, calls) in &outcome.statistics().attachments {
         input::narrate(&format!(

@@ -28,7 +28,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     let task = Task::read(&domain, &problem).map_err(|f| CommandError::BadInput(input::drawn(&f)))?;
     let plan =
         Plan::read(&input::source(&arguments.plan)?).map_err(|f| CommandError::BadInput(input::drawn(&f)))?;
-    let attachments = arguments.attachments.bind(&arguments.domain)?;
+    let attachments = arguments.attachments.bind(&arguments.domain, &task)?;
     let verdict = descry_planner::validate(&task, &attachments, &plan);
     if arguments.json {
         input::print_json(&verdict)?;

@@ -1,0 +1,5 @@
+(define (problem one)
+  (:domain courier)
+  (:objects a b c - place)
+  (:init (at a) (road a b) (road b c) (= (battery) 2))
+  (:goal (at c)))

@@ -91,7 +91,7 @@ fn what_is_made_better_by_going_on_is_gone_on_with() {
 }
 
 #[test]
-fn what_only_looks_like_a_plan_without_its_times_is_none() {
+fn what_only_looks_like_a_plan_without_its_times_is_put_off_to_the_right_ones() {
     // The rate is another one on the way; what must stand apart makes an action longer than it may be; a number has no value yet.
     let rated = "(:requirements :continuous-effects) (:predicates (idle) (full)) (:functions (level) (rate))
       (:durative-action fill :parameters () :duration (>= ?duration 1) :condition (at start (idle))
@@ -112,7 +112,8 @@ fn what_only_looks_like_a_plan_without_its_times_is_none() {
         (
             stretched,
             "(:init (dry) (lit) (= (level) 0) (at 2 (lit))) (:goal (= (level) 2))".into(),
-            Expect::Open,
+            // It ends a moment after the literal.
+            Expect::Plan(2.0, false),
         ),
         (unknown, "(:init) (:goal (full))".into(), Expect::Open),
     ] {

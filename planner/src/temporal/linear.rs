@@ -28,6 +28,8 @@ const MOST_EVALUATED: u64 = 1_500;
 const MOST_RANGES: usize = 8;
 /// Cost of a state from which no relaxed plan is known: its numbers may still come out otherwise.
 const FAR: f64 = 1e9;
+/// Bytes that states may take together.
+const MOST_BYTES: u64 = 100 << 20;
 /// States that are evaluated for better plans, besides as many as the first one took.
 const MORE: u64 = 100;
 /// What counts as better.
@@ -52,7 +54,11 @@ pub(super) fn linear_plan(
 ) -> Result<(Option<Vec<Timed>>, u64), Failure> {
     let mut search =
         Search { space, relaxed, bound, nodes: Vec::new(), seen: FxHashSet::default(), evaluated: 0 };
-    let plan = search.run(evaluations.min(MOST_EVALUATED), stop)?;
+    let ground = space.world.ground;
+    let bytes = size_of::<Node>()
+        + ground.variables.len() * 2 * size_of::<u32>()
+        + ground.numerics.len() * (size_of::<Linear>() + size_of::<[i64; 3]>());
+    let plan = search.run(evaluations.min(MOST_EVALUATED).min(MOST_BYTES / bytes as u64), stop)?;
     Ok((plan, search.evaluated))
 }
 

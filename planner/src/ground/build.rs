@@ -331,7 +331,7 @@ fn instantiate(
     let mut axioms = Vec::new();
     for (i, alternative) in rules.alternatives.iter().enumerate() {
         let list = std::mem::take(&mut instances[normal.actions.len() + i]);
-        axioms_of(normal, alternative, &list, make, &mut resolve, &mut axioms);
+        axioms_of(normal, alternative, &list, make, &mut resolve, stop, &mut axioms)?;
     }
     let mut actions = Vec::new();
     for (index, action) in normal.actions.iter().enumerate() {
@@ -371,13 +371,17 @@ fn axioms_of(
     list: &[u32],
     make: &mut Instantiate<'_>,
     resolve: &mut Resolve<'_>,
+    stop: &dyn Fn() -> bool,
     axioms: &mut Vec<RawAxiom>,
-) {
+) -> Result<(), GroundError> {
     let rule = &normal.rules[alternative.rule];
     let width = alternative.slots.len();
     let mut binding = vec![NONE; rule.domains.len()];
     let count = list.len().checked_div(width).unwrap_or(1);
     for i in 0..count {
+        if i % 1024 == 0 && stop() {
+            return Err(GroundError::Stopped);
+        }
         for (&slot, &value) in alternative.slots.iter().zip(&list[i * width..(i + 1) * width]) {
             binding[slot as usize] = value;
         }
@@ -391,6 +395,7 @@ fn axioms_of(
             axioms.push(RawAxiom { head, body, stratum: rule.stratum });
         }
     }
+    Ok(())
 }
 
 fn raw_actions(

@@ -28,6 +28,8 @@ const MOST_EVALUATED: u64 = 1_500;
 const MOST_RANGES: usize = 8;
 /// Cost of a state from which no relaxed plan is known: its numbers may still come out otherwise.
 const FAR: f64 = 1e9;
+/// Squares of the comparisons of all programs, at most: some seconds.
+const MOST_WORK: u64 = 10_000_000;
 /// Bytes that states may take together.
 const MOST_BYTES: u64 = 100 << 20;
 /// States that are evaluated for better plans, besides as many as the first one took.
@@ -52,8 +54,15 @@ pub(super) fn linear_plan(
     evaluations: u64,
     stop: &dyn Fn() -> bool,
 ) -> Result<(Option<Vec<Timed>>, u64), Failure> {
-    let mut search =
-        Search { space, relaxed, bound, nodes: Vec::new(), seen: FxHashSet::default(), evaluated: 0 };
+    let mut search = Search {
+        space,
+        relaxed,
+        bound,
+        nodes: Vec::new(),
+        seen: FxHashSet::default(),
+        evaluated: 0,
+        work: 0,
+    };
     let ground = space.world.ground;
     let bytes = size_of::<Node>()
         + ground.variables.len() * 2 * size_of::<u32>()
@@ -107,6 +116,8 @@ struct Search<'s, 'w, 'a> {
     nodes: Vec<Node>,
     seen: FxHashSet<Seen>,
     evaluated: u64,
+    /// Comparisons of every program, squared.
+    work: u64,
 }
 
 impl<'w, 'a> Search<'_, 'w, 'a> {
@@ -136,7 +147,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
                 best = Some(plan);
             }
             for next in self.successors(&node) {
-                if self.evaluated >= evaluations || stop() {
+                if self.evaluated >= evaluations || self.work >= MOST_WORK || stop() {
                     return Ok(best);
                 }
                 if let Some(made) = self.after(&node, next)? {
@@ -150,6 +161,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
     /// Evaluates a node and puts it in the queue, unless its program has no solution or it is known.
     fn keep(&mut self, node: Node, queue: &mut BinaryHeap<Reverse<(Key, u32)>>) -> Result<(), Failure> {
         self.evaluated += 1;
+        self.work += (node.program.rows() as u64 + 1).pow(2);
         let Some((now_s, states)) = states(&node) else { return Ok(()) };
         if matches!(self.space.measure, Measure::Makespan) && now_s >= self.bound {
             return Ok(());
@@ -288,6 +300,7 @@ impl Node {
         let rates: Vec<(NumericId, f64)> = self.open.iter().flat_map(|open| open.rates.clone()).collect();
         for &(number, rate) in &rates {
             self.numbers[number as usize] = self.numbers[number as usize].plus(rate, &elapsed);
+            self.numbers[number as usize].is_finite().then_some(())?;
         }
         holds &= rates.is_empty() || self.holds_over_all(world);
         holds.then_some(())
@@ -388,6 +401,7 @@ impl Node {
                         Change::ScaleUp => number.times(amount.as_constant()?),
                         Change::ScaleDown => number.times(1.0 / amount.as_constant()?),
                     };
+                    number.is_finite().then_some(())?;
                 }
                 Outcome::Flow { .. } | Outcome::Call(_) => return None,
             }

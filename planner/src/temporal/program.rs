@@ -32,6 +32,11 @@ impl Linear {
         self.terms.is_empty().then_some(self.constant)
     }
 
+    /// False for a number without a value.
+    pub fn is_finite(&self) -> bool {
+        self.constant.is_finite()
+    }
+
     /// The sum with a multiple of another number.
     pub fn plus(&self, factor: f64, other: &Linear) -> Linear {
         let mut terms = self.terms.clone();

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use descry_planner::{Answer, Attachment, CallError, Read, Step};
+use descry_planner::{Answer, Attachment, CallError, Read, Step, Task};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::{Value, json};
 
 use crate::abilities::{self, Meaning, SkillWord};
-use crate::config::ActionConfig;
+use crate::config::{ActionConfig, ActionKind, Config};
 use crate::load::Domain;
 use crate::situation::Situation;
 
@@ -79,20 +79,25 @@ pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grou
     Some(Grounded { word, arguments: tokens.collect() })
 }
 
-/// Whether an action puts things elsewhere: what is asked is not made so by it.
-pub(crate) fn carries(domain: &Domain, action: &str) -> bool {
-    let config = domain.config.action.get(action).cloned().unwrap_or_default();
-    let skill = |text: &str| text.split_whitespace().next().map(str::to_string);
-    let texts = config.does.texts();
-    let skills: Vec<String> = match texts.is_empty() {
-        true if config.program.is_some() => Vec::new(),
-        true => vec![action.to_string()],
-        false => texts.iter().filter_map(|text| skill(text)).collect(),
+/// Effect of an action on the world: that of its program as declared, else the strongest among its skills. What is not
+/// known to leave the world as it is changes it.
+pub fn kind(config: &Config, action: &str) -> ActionKind {
+    let own = config.action.get(action);
+    if let Some(own) = own.filter(|own| own.program.is_some()) {
+        return own.kind.unwrap_or(ActionKind::Changing);
+    }
+    let texts = own.map(|own| own.does.texts()).filter(|texts| !texts.is_empty());
+    let skills = texts.unwrap_or_else(|| vec![action]);
+    let kind = |text: &str| {
+        let skill = text.split_whitespace().next().and_then(|name| abilities::skill(&config.uses, name));
+        skill.map_or(ActionKind::Changing, |skill| skill.kind)
     };
-    let uses = &domain.config.uses;
-    let carrying = &abilities::carrying::ABILITY;
-    let is_of_hand = |name: &String| carrying.skills.iter().any(|word| word.name == name);
-    uses.iter().any(|name| name == carrying.name) && skills.iter().any(is_of_hand)
+    skills.into_iter().map(kind).max().unwrap_or(ActionKind::Changing)
+}
+
+/// The actions that a question may be answered with stay in a task.
+pub(crate) fn only_looking(config: &Config, task: &mut Task) {
+    task.actions.retain(|action| kind(config, &action.name) < ActionKind::Changing);
 }
 
 /// Of the parts of a call the one that its action is called after, else the first.

@@ -1,6 +1,6 @@
 //! What is answered in the end: about what was asked, with where it is and what it rests on.
 
-pub(crate) mod denied;
+mod judged;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,6 +19,7 @@ use crate::config::Answers;
 use crate::goal::Goal;
 use crate::lexicon::{Lexicon, one, plural, symbol};
 use crate::load::Domain;
+use crate::judge::{Judgement, Truth};
 use crate::mind::Mind;
 use crate::no_plan;
 use crate::saying::Saying;
@@ -178,8 +179,17 @@ impl Asker<'_> {
     /// The goal holds: what was asked for, and where.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
-        if let Some(unknown) = self.nowhere().or_else(|| self.undenied()) {
+        if let Some(unknown) = self.nowhere() {
             return (Verdict::CannotTell, unknown);
+        }
+        let Judgement { truth, word } = self.judgement();
+        match truth {
+            Truth::True => {}
+            Truth::Unknown => return (Verdict::CannotTell, self.open(word.as_ref())),
+            Truth::False if self.goal.question => return (Verdict::NotFound, self.denial(word.as_ref())),
+            Truth::False => {
+                return (Verdict::Impossible, self.impossible(&format!(": {}", self.denial(word.as_ref()))));
+            }
         }
         let mut said = self.surely();
         // What was expected before anything was seen tells of no object.
@@ -190,9 +200,8 @@ impl Asker<'_> {
         for (of, kind) in s.kinds.iter().enumerate() {
             let members = self.members(kind);
             let is_known = s.completeness(of) >= s.wanted_of(of);
-            // What is not so of any that stands where was looked is known without all of them.
-            let is_denied = self.goal.asked.denied.iter().any(|d| d.kinds.contains(&kind.symbol));
-            if members.is_empty() && !is_known && is_denied {
+            // What holds of all that stands where was looked is known without all of the kind.
+            if members.is_empty() && !is_known {
                 continue;
             }
             if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
@@ -215,7 +224,7 @@ impl Asker<'_> {
         for &on in &s.asked {
             said.push(self.identified(on));
         }
-        if said.is_empty() || self.goal.asked.more || !self.goal.asked.denied.is_empty() {
+        if said.is_empty() || self.goal.asked.more || self.goal.asked.denies {
             said.insert(0, format!("it holds that {}", self.saying.say(&self.goal.pddl)));
         }
         (Verdict::Achieved, said.join("; "))
@@ -291,8 +300,12 @@ impl Asker<'_> {
         if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
-        if let Some(so) = self.contradicted().filter(|_| self.goal.question) {
-            return (Verdict::NotFound, so);
+        let Judgement { truth, word } = self.judgement();
+        if truth == Truth::True {
+            return self.reached();
+        }
+        if self.goal.question && truth == Truth::False && self.goal.asked.denies {
+            return (Verdict::NotFound, self.denial(word.as_ref()));
         }
         let left = |n: usize| self.nothing_seen(&s.things[n]).or_else(|| reasons::left_about(s, n));
         let open = missing.iter().find_map(|&n| Some((n, left(n)?)));
@@ -301,7 +314,7 @@ impl Asker<'_> {
             let text = format!("it cannot be told whether {} is {asked}, {doubt}", s.things[n].name);
             return (Verdict::CannotTell, format!("{text}; {}", self.looks()));
         }
-        if let Some(&n) = missing.first() {
+        if let Some(&n) = missing.first().filter(|_| !self.goal.question || truth == Truth::False) {
             let thing = &s.things[n];
             let elsewhere = self.elsewhere(thing).map(|w| format!(", it {w}")).unwrap_or_default();
             let asked = self.where_asked(thing);
@@ -327,15 +340,12 @@ impl Asker<'_> {
             };
             return (Verdict::CannotTell, format!("not everything could be identified{left}"));
         }
-        if let Some(no) = self.no_of_kinds().filter(|_| is_proven) {
-            return (Verdict::NotFound, no);
-        }
         if !is_proven {
             let text = format!("no plan was found that brings about {}", self.saying.say(&self.goal.pddl));
             return (Verdict::CannotTell, format!("{text}{says}"));
         }
-        if let Some(no) = self.no_of_things() {
-            return no;
+        if self.goal.question {
+            return self.to_question();
         }
         (Verdict::Impossible, self.impossible(&says))
     }

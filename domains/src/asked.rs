@@ -1,6 +1,13 @@
-//! What a goal asks about: read off its condition, whatever words a phrase used for it.
+//! What a goal asks about: a visitor of its parsed condition.
+
+use descry_planner::Source;
+use descry_planner::task::{Comparison, Condition, Expression, PredicateId, Quantified, Task, Term};
 
 use crate::abilities::searching;
+use crate::declared;
+use crate::lexicon::Lexicon;
+use crate::load::Domain;
+use crate::mentions::mentions;
 use crate::vocabulary::Vocabulary;
 
 /// The objects that a goal's condition speaks of.
@@ -12,24 +19,12 @@ pub struct Asked {
     pub kinds: Vec<(String, Option<Vec<String>>)>,
     /// Surfaces of which it is asked what stands there.
     pub surfaces: Vec<String>,
-    /// What must not be so.
-    pub denied: Vec<Denied>,
+    /// Whether the condition wants something of seen objects to be false, or a certainty about them to be small.
+    pub denies: bool,
     /// Whether it asks for more than looking can tell.
     pub more: bool,
-}
-
-/// Something that must not be so, such as that a thing stands on a surface. As long as nothing was seen, it is not believed; that it is not so
-/// is another thing.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Denied {
-    /// What must not be so.
-    pub things: Vec<String>,
-    /// Or all of these kinds.
-    pub kinds: Vec<String>,
-    /// On which surfaces, or in which rooms, it must not be so; none: nowhere.
-    pub surfaces: Vec<String>,
-    /// Which variables stand for whichever objects there are.
-    pub variables: Vec<String>,
+    /// Words of the condition with their objects, in its order; those behind derived words too. Variables are left as `?`.
+    pub words: Vec<(String, Vec<String>)>,
 }
 
 /// The function that says how sure it is that a thing is on a surface: a question about that surface alone.
@@ -43,52 +38,270 @@ const IN: &str = "in";
 /// What is said of objects that were seen: the less was seen, the less of it holds.
 const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
 
-impl Asked {
-    /// Reads a condition.
-    pub fn of(condition: &str, vocabulary: &Vocabulary) -> Self {
-        let mut asked = Self::default();
-        let mut placed = Vec::new();
-        for Mention { words: mention, is_denied, rooms: within } in signed(condition) {
-            let Some(word) = mention.first().and_then(|name| vocabulary.word(name)) else { continue };
-            let is_denied = is_denied && OF_OBJECTS.contains(&word.name.as_str());
-            let is_seen = searching::ABILITY.facts.iter().any(|fact| fact.name == word.name);
-            asked.more |= !is_seen && word.name != IN;
-            let arguments = || mention[1..].iter().zip(&word.types);
-            let named = |wanted: &'static str| {
-                arguments().filter(move |(_, t)| vocabulary.is_a(t, wanted)).map(|(a, _)| a.clone())
-            };
-            // A variable stands for whichever there are.
-            let of = |wanted: &'static str| named(wanted).filter(|a| !a.starts_with('?'));
-            let mut surfaces: Vec<String> = of("surface").collect();
-            let anywhere = within.is_empty() && named("surface").any(|a| a.starts_with('?'));
-            surfaces.extend(within);
-            if word.name == PLACED {
-                placed.extend(of("thing"));
-                continue;
-            }
-            for thing in of("thing") {
-                let restricted = (word.name == PRESENCE || is_denied) && !anywhere && !surfaces.is_empty();
-                note(&mut asked.things, thing, restricted.then(|| surfaces.clone()));
-            }
-            let rooms: Vec<String> = of("room").collect();
-            for kind in of("kind") {
-                note(&mut asked.kinds, kind, Some(rooms.clone()).filter(|rooms| !rooms.is_empty()));
-            }
-            if is_denied {
-                let variables = mention[1..].iter().filter(|a| a.starts_with('?')).cloned().collect();
-                let (things, kinds) = (of("thing").collect(), of("kind").collect());
-                asked.denied.push(Denied { things, kinds, surfaces: surfaces.clone(), variables });
-            }
-            if word.name == CLARITY {
-                asked.surfaces.extend(surfaces);
+/// Parses a condition over the words of a domain and the names of a lexicon. A name that nobody knows yet, such as a pose of the
+/// body, is an object of the type that its word wants.
+///
+/// # Errors
+/// The findings of the planner, drawn under the condition.
+pub fn parsed(condition: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Task, String> {
+    let vocabulary = &domain.vocabulary;
+    let types = &vocabulary.task.types;
+    let named = types.iter().flat_map(|of| lexicon.of_type(&of.name).iter().map(move |n| (n.symbol.as_str(), of.name.as_str())));
+    let mut objects: Vec<(&str, &str)> = named.collect();
+    let mentioned: Vec<(Vec<String>, Vec<String>)> = mentions(condition)
+        .into_iter()
+        .filter_map(|m| Some((vocabulary.parameters(m.first()?)?.into_iter().map(|(_, of)| of).collect(), m)))
+        .collect();
+    for (types, mention) in &mentioned {
+        for (name, of) in mention[1..].iter().zip(types).filter(|(name, _)| !name.starts_with('?')) {
+            if objects.iter().all(|(known, _)| known != name) {
+                objects.push((name.as_str(), of.as_str()));
             }
         }
+    }
+    let objects = declared::lines(objects, vocabulary).0.join(" ");
+    let name = &vocabulary.task.domain;
+    let problem = format!("(define (problem asked) (:domain {name}) (:objects {objects}) (:init) (:goal {condition}))");
+    Task::read(&domain.pddl, &Source::new("condition", problem)).map_err(|found| found.render(false))
+}
+
+impl Asked {
+    /// Reads the goal of a task.
+    pub fn of(task: &Task, vocabulary: &Vocabulary) -> Self {
+        let mut visit = Visit::new(task, vocabulary);
+        let mut scope = visit.scope(task.goal.slots);
+        visit.condition(&task.goal.body, Wanted::MORE, &mut scope, &[]);
+        let Visit { mut asked, placed, whole, .. } = visit;
         for thing in placed {
             if asked.things.iter().all(|(known, _)| *known != thing) {
                 asked.things.push((thing, None));
             }
         }
+        // What is said of whichever things there are is asked of the surface, where no kind says which they are.
+        if asked.things.is_empty() && asked.kinds.is_empty() {
+            for surface in whole.into_iter().filter(|s| !asked.surfaces.contains(s)).collect::<Vec<_>>() {
+                asked.surfaces.push(surface);
+            }
+        }
         asked
+    }
+
+    /// The objects of a word, each time that the condition has it.
+    pub fn of_word<'a>(&'a self, word: &'a str) -> impl Iterator<Item = &'a [String]> {
+        self.words.iter().filter(move |(name, _)| name == word).map(|(_, objects)| objects.as_slice())
+    }
+}
+
+/// An argument of a word.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Argument {
+    Name(String),
+    /// A variable, numbered across all scopes.
+    Variable(usize),
+}
+
+/// The arguments that stand in the slots of a condition.
+type Scope = Vec<Argument>;
+
+/// A variable, and the room in which it is.
+type Within = (Argument, String);
+
+/// Direction in which a part of a condition counts: more of it is wanted, less of it, or both.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Wanted {
+    more: bool,
+    less: bool,
+}
+
+impl Wanted {
+    const MORE: Wanted = Wanted { more: true, less: false };
+    const BOTH: Wanted = Wanted { more: true, less: true };
+
+    fn turned(self) -> Wanted {
+        Wanted { more: self.less, less: self.more }
+    }
+}
+
+struct Visit<'t> {
+    task: &'t Task,
+    vocabulary: &'t Vocabulary,
+    asked: Asked,
+    /// Things of which it is asked how exactly their places are known.
+    placed: Vec<String>,
+    /// Surfaces of which something is said of whichever things there are.
+    whole: Vec<String>,
+    /// The derived words whose rules are being read.
+    open: Vec<PredicateId>,
+    variables: usize,
+}
+
+impl<'t> Visit<'t> {
+    fn new(task: &'t Task, vocabulary: &'t Vocabulary) -> Self {
+        let (asked, placed, whole, open) = Default::default();
+        Self { task, vocabulary, asked, placed, whole, open, variables: 0 }
+    }
+
+    /// Fresh variables for all slots.
+    fn scope(&mut self, slots: usize) -> Scope {
+        let first = self.variables;
+        self.variables += slots;
+        (first..self.variables).map(Argument::Variable).collect()
+    }
+
+    fn bind(&mut self, variables: &[Quantified], scope: &mut Scope) {
+        for variable in variables {
+            scope[variable.slot.index()] = Argument::Variable(self.variables);
+            self.variables += 1;
+        }
+    }
+
+    fn condition(&mut self, own: &Condition, wanted: Wanted, scope: &mut Scope, within: &[Within]) {
+        match own {
+            Condition::And(parts) | Condition::Or(parts) => {
+                let mut within = within.to_vec();
+                let rooms = parts.iter().filter_map(|part| match (own, part) {
+                    (Condition::And(_), Condition::Atom(_)) => self.room(part, scope),
+                    (Condition::Or(_), Condition::Not(inner)) => self.room(inner, scope),
+                    _ => None,
+                });
+                within.extend(rooms.collect::<Vec<_>>());
+                parts.iter().for_each(|part| self.condition(part, wanted, scope, &within));
+            }
+            Condition::Not(inner) => match &**inner {
+                Condition::Compare(..) => self.condition(inner, Wanted::BOTH, scope, within),
+                _ => self.condition(inner, wanted.turned(), scope, within),
+            },
+            Condition::Forall(variables, inner) | Condition::Exists(variables, inner) => {
+                self.bind(variables, scope);
+                self.condition(inner, wanted, scope, within);
+            }
+            Condition::Atom(atom) => {
+                let arguments = self.arguments(&atom.arguments, scope);
+                if self.task.predicate(atom.predicate).stratum.is_some() {
+                    self.rules(atom.predicate, &arguments, wanted, within);
+                } else {
+                    let name = self.task.predicate(atom.predicate).name.clone();
+                    self.mention(&name, &arguments, wanted, within);
+                }
+            }
+            Condition::Compare(comparison, sides, _) => {
+                let left = match comparison {
+                    Comparison::Equal => Wanted::BOTH,
+                    Comparison::Greater | Comparison::GreaterOrEqual => wanted,
+                    Comparison::Less | Comparison::LessOrEqual => wanted.turned(),
+                };
+                self.expression(&sides[0], left, scope, within);
+                self.expression(&sides[1], left.turned(), scope, within);
+            }
+            Condition::Same(..) | Condition::Call(_) => {}
+        }
+    }
+
+    /// The rules of a derived word, with its arguments.
+    fn rules(&mut self, predicate: PredicateId, arguments: &[Argument], wanted: Wanted, within: &[Within]) {
+        if self.open.contains(&predicate) {
+            return;
+        }
+        self.open.push(predicate);
+        let task = self.task;
+        for rule in task.rules.iter().filter(|rule| rule.predicate == predicate) {
+            let mut scope = self.scope(rule.slots);
+            scope[..arguments.len()].clone_from_slice(arguments);
+            self.condition(&rule.body, wanted, &mut scope, within);
+        }
+        self.open.pop();
+    }
+
+    fn expression(&mut self, own: &Expression, wanted: Wanted, scope: &Scope, within: &[Within]) {
+        match own {
+            Expression::Fluent(fluent) => {
+                let name = self.task.function(fluent.function).name.clone();
+                let arguments = self.arguments(&fluent.arguments, scope);
+                self.mention(&name, &arguments, wanted, within);
+            }
+            Expression::Add(parts) => parts.iter().for_each(|p| self.expression(p, wanted, scope, within)),
+            Expression::Subtract(sides) => {
+                self.expression(&sides[0], wanted, scope, within);
+                self.expression(&sides[1], wanted.turned(), scope, within);
+            }
+            Expression::Negative(inner) => self.expression(inner, wanted.turned(), scope, within),
+            // The sign of a factor is not known.
+            Expression::Multiply(parts) => {
+                parts.iter().for_each(|part| self.expression(part, Wanted::BOTH, scope, within));
+            }
+            Expression::Divide(sides) => {
+                sides.iter().for_each(|side| self.expression(side, Wanted::BOTH, scope, within));
+            }
+            Expression::Number(_)
+            | Expression::Duration
+            | Expression::TotalTime
+            | Expression::Violated(_)
+            | Expression::Call(_) => {}
+        }
+    }
+
+    fn arguments(&self, terms: &[Term], scope: &Scope) -> Vec<Argument> {
+        let argument = |term: &Term| match term {
+            Term::Variable(slot) => scope[slot.index()].clone(),
+            Term::Object(id) => Argument::Name(self.task.object(*id).name.clone()),
+            // Which object it is changes.
+            Term::Function(_) => Argument::Variable(usize::MAX),
+        };
+        terms.iter().map(argument).collect()
+    }
+
+    /// The room that an atom says a variable to be in.
+    fn room(&self, atom: &Condition, scope: &Scope) -> Option<Within> {
+        let Condition::Atom(atom) = atom else { return None };
+        let arguments = self.arguments(&atom.arguments, scope);
+        match (self.task.predicate(atom.predicate).name.as_str(), arguments.as_slice()) {
+            (IN, [variable @ Argument::Variable(_), Argument::Name(room)]) => Some((variable.clone(), room.clone())),
+            _ => None,
+        }
+    }
+
+    fn mention(&mut self, name: &str, arguments: &[Argument], wanted: Wanted, within: &[Within]) {
+        let Some(word) = self.vocabulary.word(name) else { return };
+        let text = |argument: &Argument| match argument {
+            Argument::Name(name) => name.clone(),
+            Argument::Variable(_) => "?".into(),
+        };
+        self.asked.words.push((word.name.clone(), arguments.iter().map(text).collect()));
+        let is_denied = wanted.less && OF_OBJECTS.contains(&word.name.as_str());
+        self.asked.denies |= is_denied;
+        let is_seen = searching::ABILITY.facts.iter().any(|fact| fact.name == word.name);
+        self.asked.more |= !is_seen && word.name != IN;
+        let vocabulary = self.vocabulary;
+        let of_type = |wanted: &'static str| {
+            arguments.iter().zip(&word.types).filter(move |(_, t)| vocabulary.is_a(t, wanted)).map(|(a, _)| a)
+        };
+        let is_variable = |a: &Argument| matches!(a, Argument::Variable(_));
+        let of = |wanted: &'static str| -> Vec<String> {
+            of_type(wanted).filter(|a| !is_variable(a)).map(text).collect()
+        };
+        let rooms: Vec<String> =
+            within.iter().filter(|(v, _)| word.name != IN && arguments.contains(v)).map(|(_, room)| room.clone()).collect();
+        let anywhere = rooms.is_empty() && of_type("surface").any(is_variable);
+        let (things, kinds, named, asked_rooms) = (of("thing"), of("kind"), of("surface"), of("room"));
+        let is_of_all = OF_OBJECTS.contains(&word.name.as_str()) && of_type("thing").any(is_variable);
+        let surfaces: Vec<String> = named.iter().cloned().chain(rooms).collect();
+        if word.name == PLACED {
+            self.placed.extend(things);
+            return;
+        }
+        for thing in things {
+            let restricted = (word.name == PRESENCE || is_denied) && !anywhere && !surfaces.is_empty();
+            note(&mut self.asked.things, thing, restricted.then(|| surfaces.clone()));
+        }
+        for kind in kinds {
+            note(&mut self.asked.kinds, kind, Some(asked_rooms.clone()).filter(|rooms| !rooms.is_empty()));
+        }
+        if is_of_all {
+            self.whole.extend(named);
+        }
+        if word.name == CLARITY {
+            self.asked.surfaces.extend(surfaces);
+        }
     }
 }
 
@@ -102,103 +315,5 @@ fn note(all: &mut Vec<(String, Option<Vec<String>>)>, name: String, places: Opti
                 known
             });
         }
-    }
-}
-
-/// Every list of plain symbols in a condition: `(on cup-a ?s)`, `(confidence cup-a)`.
-pub(crate) fn mentions(condition: &str) -> Vec<Vec<String>> {
-    signed(condition).into_iter().map(|mention| mention.words).collect()
-}
-
-/// A list of plain symbols in a condition.
-pub struct Mention {
-    words: Vec<String>,
-    /// Whether it must not be so for the condition to hold.
-    is_denied: bool,
-    /// The rooms in which its variables are said to be beside it.
-    rooms: Vec<String>,
-}
-
-fn signed(condition: &str) -> Vec<Mention> {
-    let spaced = condition.to_lowercase().replace('(', " ( ").replace(')', " ) ");
-    let mut tokens = spaced.split_whitespace();
-    let mut found = Vec::new();
-    parts(&mut tokens).0.iter().for_each(|part| collect(part, false, &[], &mut found));
-    found
-}
-
-/// A word, or a list of parts in brackets.
-pub enum Part {
-    #[doc(hidden)]
-    Word(String),
-    #[doc(hidden)]
-    List(Vec<Part>),
-}
-
-/// The parts up to the bracket that closes them, and whether it is there: a list that is not closed is none.
-fn parts<'a>(tokens: &mut impl Iterator<Item = &'a str>) -> (Vec<Part>, bool) {
-    let mut all = Vec::new();
-    while let Some(token) = tokens.next() {
-        match token {
-            "(" => match parts(tokens) {
-                (list, true) => all.push(Part::List(list)),
-                (open, false) => all.extend(open.into_iter().filter(|part| matches!(part, Part::List(_)))),
-            },
-            ")" => return (all, true),
-            word => all.push(Part::Word(word.to_string())),
-        }
-    }
-    (all, false)
-}
-
-impl Part {
-    /// The words of a list of words alone.
-    fn plain(&self) -> Option<Vec<&str>> {
-        let Part::List(parts) = self else { return None };
-        parts
-            .iter()
-            .map(|part| if let Part::Word(word) = part { Some(word.as_str()) } else { None })
-            .collect()
-    }
-}
-
-/// A variable, and the room in which it is.
-type Within = (String, String);
-
-/// Collects the lists of words alone; `within` is what is said beside them.
-pub fn collect(part: &Part, is_denied: bool, within: &[Within], found: &mut Vec<Mention>) {
-    let Part::List(parts) = part else { return };
-    if let Some(words) = part.plain() {
-        let is_there = |(variable, _): &&Within| words.contains(&variable.as_str()) && words[0] != IN;
-        let rooms = within.iter().filter(is_there).map(|(_, room)| room.clone()).collect();
-        let words: Vec<String> = words.iter().map(ToString::to_string).collect();
-        found.extend((!words.is_empty()).then_some(Mention { words, is_denied, rooms }));
-        return;
-    }
-    let head = if let Some(Part::Word(head)) = parts.first() { head.as_str() } else { "" };
-    let mut within = within.to_vec();
-    match head {
-        "and" => within.extend(parts.iter().filter_map(|part| match part.plain()?.as_slice() {
-            [IN, variable, room] if variable.starts_with('?') && !room.starts_with('?') => {
-                Some((variable.to_string(), room.to_string()))
-            }
-            _ => None,
-        })),
-        // A variable that is bound anew is another.
-        "forall" | "exists" => {
-            let bound = parts.get(1).and_then(Part::plain).unwrap_or_default();
-            within.retain(|(variable, _)| !bound.contains(&variable.as_str()));
-        }
-        _ => {}
-    }
-    for (n, part) in parts.iter().enumerate() {
-        // More of a number is less of what it must not exceed.
-        let turns = match head {
-            "not" => true,
-            "imply" | "<" | "<=" => n == 1,
-            ">" | ">=" => n == 2,
-            _ => false,
-        };
-        collect(part, is_denied != turns, &within, found);
     }
 }

@@ -85,7 +85,7 @@ pub struct GoalPhrase {
     pub also: Vec<String>,
     /// The goal condition in PDDL, with the same slots.
     pub means: String,
-    /// Whether the answer is yes or no. Nothing is carried to make it yes.
+    /// Whether the answer is yes or no. The robot moves and looks to find out; no action changes anything for it.
     #[serde(default)]
     pub question: bool,
     /// The confidence that is asked for where the goal says none; none: that of the thresholds.
@@ -141,6 +141,8 @@ pub struct ActionConfig {
     pub does: Steps,
     /// A program that carries it out, instead of a skill.
     pub program: Option<Vec<String>>,
+    /// Effect of that program on the world: `sensing`, `moving` or `changing`; none: changing. A question is answered without changing.
+    pub kind: Option<ActionKind>,
     /// Time for each of its skills on the body's clock, or for the program, seconds.
     pub limit_s: Option<f64>,
     /// Failures that may pass are tried again so often.
@@ -155,6 +157,18 @@ pub struct ActionConfig {
     pub check: Option<String>,
     /// Why it is done, for people, over its variables.
     pub because: Option<String>,
+}
+
+/// Effect of an action on the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ActionKind {
+    /// It looks, reads or reckons: the world stays as it is.
+    Sensing,
+    /// The body moves and leaves everything else in its place.
+    Moving,
+    /// Something else moves, opens or becomes otherwise.
+    Changing,
 }
 
 /// One step or several.

@@ -5,7 +5,7 @@ mod english;
 mod nearest;
 mod sentence;
 
-use crate::asked::Asked;
+use crate::asked::{Asked, parsed};
 use crate::config::Answers;
 use crate::lexicon::Lexicon;
 use crate::load::Domain;
@@ -148,7 +148,7 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     reader.misses.clear();
     let read = literal.or_else(|| reader.sentence(&english::unlisted(&plain)));
     match read.or_else(|| reader.sentence(&plain)) {
-        Some(sentence) => goal_of(said, &sentence, wanted, domain),
+        Some(sentence) => goal_of(said, &sentence, wanted, domain, lexicon),
         None if reader.is_mixed => Err(GoalError::Several { said: said.into() }),
         None => Err(not_understood(said, &plain, reader)),
     }
@@ -241,7 +241,13 @@ pub fn put_in(text: &str, slots: &[Filled], with: impl Fn(&Filled) -> String) ->
     Ok(out)
 }
 
-fn goal_of(said: &str, sentence: &Sentence<'_>, wanted: Wanted, domain: &Domain) -> Result<Goal, GoalError> {
+fn goal_of(
+    said: &str,
+    sentence: &Sentence<'_>,
+    wanted: Wanted,
+    domain: &Domain,
+    lexicon: &Lexicon,
+) -> Result<Goal, GoalError> {
     let question = sentence.is_question(said)?;
     let usual = |c: &Clause<'_>| c.phrase.confidence.unwrap_or(domain.config.thresholds.confidence);
     let threshold =
@@ -250,12 +256,18 @@ fn goal_of(said: &str, sentence: &Sentence<'_>, wanted: Wanted, domain: &Domain)
         sentence.clauses.iter().map(|c| condition(c, threshold, domain)).collect::<Result<_, _>>()?;
     let joint = if sentence.joint == Joint::And { "and" } else { "or" };
     // "which cups are in the kitchen or the study": either would do, or both?
-    let is_whole = |part: &String| {
-        let asked = Asked::of(part, &domain.vocabulary);
-        !asked.kinds.is_empty() || !asked.surfaces.is_empty()
+    let asked = |condition: &String| -> Result<Asked, GoalError> {
+        let task = parsed(condition, domain, lexicon).map_err(|because| GoalError::BadPhrase {
+            phrase: sentence.clauses[0].phrase.say.clone(),
+            because,
+        })?;
+        Ok(Asked::of(&task, &domain.vocabulary))
     };
-    if sentence.joint == Joint::Or && parts.len() > 1 && parts.iter().any(is_whole) {
-        return Err(GoalError::Several { said: said.into() });
+    if sentence.joint == Joint::Or && parts.len() > 1 {
+        let parts: Vec<Asked> = parts.iter().map(asked).collect::<Result<_, _>>()?;
+        if parts.iter().any(|part| !part.kinds.is_empty() || !part.surfaces.is_empty()) {
+            return Err(GoalError::Several { said: said.into() });
+        }
     }
     let pddl = match parts.as_slice() {
         [only] => only.clone(),
@@ -265,7 +277,7 @@ fn goal_of(said: &str, sentence: &Sentence<'_>, wanted: Wanted, domain: &Domain)
     Ok(Goal {
         said: said.into(),
         phrase: says.join(&format!(" {joint} ")),
-        asked: Asked::of(&pddl, &domain.vocabulary),
+        asked: asked(&pddl)?,
         pddl,
         slots: sentence.clauses.iter().flat_map(|c| c.slots.clone()).collect(),
         question,

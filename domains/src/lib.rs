@@ -10,14 +10,19 @@ pub mod config;
 pub mod declared;
 pub mod function;
 pub mod goal;
+#[doc(hidden)]
+pub mod judge;
 pub mod lesson;
 pub mod lexicon;
 pub mod load;
+mod mentions;
 pub mod mind;
 pub mod no_plan;
 pub mod note;
 pub mod program;
 mod programs;
+#[doc(hidden)]
+pub mod range;
 pub mod saying;
 pub mod situation;
 pub mod template;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use descry_planner::task::{Assignment, Change, Task, TypeId, Written};
+use descry_planner::task::{Action, Assignment, Change, Task, TypeId, Written};
 use descry_planner::{Findings, Source, Span};
 
 use crate::abilities::{self, Fact};
@@ -154,6 +154,16 @@ impl Vocabulary {
         self.changed.contains(word)
     }
 
+    /// The actions whose effects change a word, by name.
+    pub fn changers(&self, word: &str) -> Vec<&str> {
+        let changes = |action: &Action| {
+            let rates = action.continuous.iter().any(|rate| self.task.function(rate.fluent.function).name == *word);
+            let effects = action.effects.start.iter().chain(&action.effects.end);
+            rates || effects.flat_map(|effect| changed_by(&self.task, &effect.change)).any(|name| name == word)
+        };
+        self.task.actions.iter().filter(|action| changes(action)).map(|action| action.name.as_str()).collect()
+    }
+
     /// Whether an action's effects give a word a value whatever it had before.
     pub fn is_given(&self, word: &str) -> bool {
         self.given.contains(word)
@@ -176,21 +186,23 @@ fn domain_name(text: &str) -> String {
 
 /// The words that such effects of actions change.
 fn changed(task: &Task, is_such: impl Fn(&Change) -> bool) -> BTreeSet<String> {
+    let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
+    effects.filter(|effect| is_such(&effect.change)).flat_map(|e| changed_by(task, &e.change)).collect()
+}
+
+/// The words that a change is of.
+fn changed_by(task: &Task, change: &Change) -> Vec<String> {
     let predicate = |id: descry_planner::task::PredicateId| task.predicate(id).name.clone();
     let function = |id: descry_planner::task::FunctionId| task.function(id).name.clone();
-    let of = |change: &Change| -> Vec<String> {
-        match change {
-            Change::Add(atom) | Change::Delete(atom) => vec![predicate(atom.predicate)],
-            Change::Number(_, fluent, _) | Change::Object(fluent, _) => vec![function(fluent.function)],
-            Change::Call(call) => {
-                let written = |w: &Written| match w {
-                    Written::Number(f) | Written::Object(f) => function(f.function),
-                    Written::Truth(atom) => predicate(atom.predicate),
-                };
-                task.module(call.module).writes.iter().map(written).collect()
-            }
+    match change {
+        Change::Add(atom) | Change::Delete(atom) => vec![predicate(atom.predicate)],
+        Change::Number(_, fluent, _) | Change::Object(fluent, _) => vec![function(fluent.function)],
+        Change::Call(call) => {
+            let written = |w: &Written| match w {
+                Written::Number(f) | Written::Object(f) => function(f.function),
+                Written::Truth(atom) => predicate(atom.predicate),
+            };
+            task.module(call.module).writes.iter().map(written).collect()
         }
-    };
-    let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
-    effects.filter(|effect| is_such(&effect.change)).flat_map(|e| of(&e.change)).collect()
+    }
 }

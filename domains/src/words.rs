@@ -13,6 +13,10 @@ use crate::vocabulary::{Ground, Vocabulary};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Words {
     held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
+    /// Words of which `init` says something.
+    begun: BTreeSet<String>,
+    /// Instances that were given a value, or that it does not hold.
+    told: BTreeSet<(String, Vec<String>)>,
 }
 
 /// What an atom has for a value that holds.
@@ -39,7 +43,10 @@ impl Words {
                             "init: \"{line}\": {name} is sensed; only what is remembered or fixed can be said to begin so"
                         ));
                     }
-                    Some(_) => words.set(&name, arguments, value),
+                    Some(_) => {
+                        words.begun.insert(name.clone());
+                        words.set(&name, arguments, value);
+                    }
                 }
             }
         }
@@ -48,6 +55,7 @@ impl Words {
 
     /// Gives a word a value on some arguments: of a predicate 1 for true, 0 for false.
     pub fn set(&mut self, name: &str, arguments: Vec<String>, value: Option<f64>) {
+        self.told.insert((name.into(), arguments.clone()));
         let instances = self.held.entry(name.into()).or_default();
         match value {
             Some(value) => instances.insert(arguments, value),
@@ -69,6 +77,16 @@ impl Words {
     /// Forgets everything about a word.
     pub fn forget(&mut self, name: &str) {
         self.held.remove(name);
+    }
+
+    /// Whether `init` says something of a word: what it leaves out does not hold in the beginning.
+    pub fn is_spoken_of(&self, name: &str) -> bool {
+        self.begun.contains(name)
+    }
+
+    /// Whether `init`, an action or a failure of this run has said whether an atom holds.
+    pub fn is_told(&self, name: &str, arguments: &[String]) -> bool {
+        self.told.contains(&(name.to_string(), arguments.to_vec()))
     }
 
     /// The arguments of which a word holds or has a value.

@@ -209,7 +209,7 @@ impl<'a> World<'a> {
         let problem = self.problem(&situation)?;
         let mut task = Task::read(&domain.pddl, &problem).map_err(|f| WorldError::Domain(f.render(false)))?;
         if self.setting.goal.question {
-            task.actions.retain(|action| !actions::carries(domain, &action.name));
+            actions::only_looking(&domain.config, &mut task);
         }
         let attachments = self.bind(&situation);
         let said = json!({ "name": problem.name, "pddl": problem.text });
@@ -340,8 +340,11 @@ impl<'a> World<'a> {
             return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
         }
         let there = format!("(at {})", s.candidates[look.from].symbol);
-        let task = words::with_goal(self.setting.domain, &round.problem, &self.goal_now(s), &there)
+        let mut task = words::with_goal(self.setting.domain, &round.problem, &self.goal_now(s), &there)
             .map_err(WorldError::Domain)?;
+        if self.setting.goal.question {
+            actions::only_looking(&self.setting.domain.config, &mut task);
+        }
         Ok(Choice::Towards { task: Box::new(task), then: reasons::look_there(s, look.from, look.on) })
     }
 

@@ -14,10 +14,12 @@ use descry_skills::{Outcome, Skill, SkillFailure};
 
 use crate::abilities::searching::perceive::Eyes;
 use crate::answer::{Conclusion, Ended};
+pub use crate::config::ActionKind;
 use crate::goal::Goal;
 use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
+use crate::range::Bounds;
 use crate::situation::Situation;
 use crate::vocabulary::Vocabulary;
 use crate::world::WorldError;
@@ -56,6 +58,8 @@ pub struct Fact {
     pub about: &'static str,
     /// The instances that hold now, a line of PDDL each.
     pub states: fn(&Situation) -> Vec<String>,
+    /// What it may turn out to be, where looks tell; none: what it states is known.
+    pub bounds: Option<Bounds>,
 }
 
 /// Facts on which the answer of a call depends besides its arguments.
@@ -109,6 +113,8 @@ pub struct Meaning {
 pub struct SkillWord {
     /// By which actions take it.
     pub name: &'static str,
+    /// Effect on the world.
+    pub kind: ActionKind,
     /// The types of its arguments.
     pub types: &'static [&'static str],
     /// What it does, in a line.

@@ -3,7 +3,7 @@
 use descry_skills::{Outcome, Read};
 use serde_json::json;
 
-use super::{Ability, NOTHING_MORE, SkillWord};
+use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
 use crate::lexicon::{SENSE, symbol};
 use crate::situation::Situation;
 use crate::world::WorldError;
@@ -19,6 +19,7 @@ pub const ABILITY: Ability = Ability {
     calls: &[],
     skills: &[SkillWord {
         name: "read",
+        kind: ActionKind::Sensing,
         types: &[SENSE],
         about: "reads a sense of the body: what it says stands in the record and in the questions to facts by programs",
         ground: |s, arguments| {

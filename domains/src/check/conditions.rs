@@ -3,7 +3,7 @@
 use descry_planner::{Diagnostic, Severity, Source};
 
 use super::Check;
-use crate::asked::mentions;
+use crate::mentions::mentions;
 use crate::declared;
 
 impl Check<'_> {

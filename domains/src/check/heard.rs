@@ -3,7 +3,7 @@
 use descry_planner::{Diagnostic, Span};
 
 use super::Check;
-use crate::asked::mentions;
+use crate::mentions::mentions;
 use crate::config::GoalPhrase;
 use crate::goal::{CONFIDENCE, DEADLINE, pattern, slots_of, type_of_slot};
 

@@ -5,7 +5,7 @@ use descry_planner::Diagnostic;
 use super::Check;
 use crate::abilities::{self, learning};
 use crate::answer::CHANGES;
-use crate::asked::mentions;
+use crate::mentions::mentions;
 use crate::config::GoalPhrase;
 use crate::goal::{Filled, put_in, slots_of, type_of_slot};
 use crate::lexicon::SENSE;

@@ -3,7 +3,7 @@
 use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
 use crate::abilities;
 use crate::abilities::searching::{policies, reasons};
-use crate::answer::denied;
+use crate::judge::Judge;
 
 impl World<'_> {
     /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
@@ -27,6 +27,13 @@ impl World<'_> {
         look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
     }
 
+    /// Whether looks may decide whether the goal holds.
+    fn is_open_to_looks(&self, round: &Round) -> bool {
+        let (domain, words) = (self.setting.domain, &self.mind.words);
+        let judge = Judge::new(domain, words, &round.situation, &round.task, &round.attachments);
+        judge.is_some_and(|judge| judge.goal().is_open_to_looks())
+    }
+
     /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, or else one behind what is shut,
     /// if it is not known.
     ///
@@ -35,7 +42,7 @@ impl World<'_> {
     pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         self.heading_for = None;
-        if s.held.is_some() || !denied::is_open(s, &self.setting.goal.asked.denied) {
+        if s.held.is_some() || !self.is_open_to_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
         match reasons::one_look(s) {
@@ -53,8 +60,8 @@ impl World<'_> {
         let s = &round.situation;
         self.heading_for = None;
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
-        let is_short = s.time_left_s.is_some() || self.setting.goal.question;
-        let may_look = is_short && s.held.is_none() && is_searching;
+        let is_asked = self.setting.goal.question && self.is_open_to_looks(round);
+        let may_look = (s.time_left_s.is_some() || is_asked) && s.held.is_none() && is_searching;
         let look = reasons::one_look(s).filter(|_| may_look);
         Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
     }

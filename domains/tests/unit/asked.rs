@@ -1,7 +1,16 @@
 //! Tests of `asked`.
 
-use descry_domains::asked::*;
+use descry_domains::asked::{Asked, parsed};
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
+use descry_domains::vocabulary::Vocabulary;
+
+/// What a condition over the words of a domain, and a few derived ones, asks about.
+fn asked(domain: &Domain, condition: &str) -> Asked {
+    let lexicon = Lexicon::new(domain, &Places::of_scene(domain));
+    let task = parsed(condition, domain, &lexicon).unwrap_or_else(|e| panic!("{condition}: {e}"));
+    Asked::of(&task, &domain.vocabulary)
+}
 
 #[test]
 fn what_is_asked_is_read_off_the_condition() {
@@ -12,10 +21,12 @@ fn what_is_asked_is_read_off_the_condition() {
             things: things.iter().map(|(t, on)| (t.to_string(), on.map(own))).collect(),
             kinds: own(kinds).into_iter().map(|kind| (kind, None)).collect(),
             surfaces: own(surfaces),
-            denied: Vec::new(),
+            denies: false,
             more: condition.contains("observed"),
+            words: Vec::new(),
         };
-        assert_eq!(Asked::of(condition, &domain.vocabulary), expected, "{condition}");
+        let found = Asked { words: Vec::new(), ..asked(&domain, condition) };
+        assert_eq!(found, expected, "{condition}");
     };
     check("(>= (confidence cup-a) 0.8)", &[("cup-a", None)], &[], &[]);
     check("(>= (presence cup-a table) 0.8)", &[("cup-a", Some(&["table"]))], &[], &[]);
@@ -35,36 +46,44 @@ fn what_is_asked_is_read_off_the_condition() {
 
 #[test]
 fn what_must_not_be_so_is_told_from_what_must() {
-    let domain = Domain::load("home").unwrap();
-    let check = |condition: &str, expected: &[(&[&str], &[&str], &[&str])]| {
-        let own = |list: &[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
-        let denied = Asked::of(condition, &domain.vocabulary).denied;
-        let denied: Vec<_> = denied.into_iter().map(|d| (d.things, d.kinds, d.surfaces)).collect();
-        let expected: Vec<_> = expected.iter().map(|(t, k, s)| (own(t), own(k), own(s))).collect();
-        assert_eq!(denied, expected, "{condition}");
+    let mut domain = Domain::load("home").unwrap();
+    let text = domain.pddl.text.replace("(:durative-action move", "(:derived (absent ?w - thing ?o - surface) (not (on ?w ?o)))\n(:durative-action move");
+    let text = text.replace("(:predicates", "(:predicates (absent ?w - thing ?o - surface)").replace(":modules)", ":modules :derived-predicates)");
+    domain.pddl = descry_planner::Source::new("domain.pddl", text);
+    domain.vocabulary = Vocabulary::read(&domain.pddl).unwrap_or_else(|e| panic!("{e}"));
+    let check = |condition: &str, denies: bool, things: &[(&str, &[&str])], surfaces: &[&str]| {
+        let found = asked(&domain, condition);
+        assert_eq!(found.denies, denies, "{condition}");
+        let own = |(thing, places): &(&str, &[&str])| {
+            let places: Vec<String> = places.iter().map(|s| s.to_string()).collect();
+            (thing.to_string(), Some(places).filter(|places| !places.is_empty()))
+        };
+        assert_eq!(found.things, things.iter().map(own).collect::<Vec<_>>(), "{condition}");
+        assert_eq!(found.surfaces, surfaces, "{condition}");
     };
-    check("(on cup-a desk)", &[]);
-    check("(not (on cup-a desk))", &[(&["cup-a"], &[], &["desk"])]);
-    check("(not (not (on cup-a desk)))", &[]);
-    check("(>= (presence cup-a desk) 0.8)", &[]);
-    check("(<= (presence cup-a desk) 0.1)", &[(&["cup-a"], &[], &["desk"])]);
-    check("(> 0.1 (presence cup-a desk))", &[(&["cup-a"], &[], &["desk"])]);
-    check("(not (>= (confidence cup-a) 0.8))", &[(&["cup-a"], &[], &[])]);
-    check(
-        "(and (>= (completeness cup) 0.9) (forall (?t - thing) (imply (is ?t cup) (on ?t desk))))",
-        &[(&[], &["cup"], &[])],
-    );
-    check(
-        "(not (exists (?t - thing) (and (is ?t mug) (on ?t desk))))",
-        &[(&[], &["mug"], &[]), (&[], &[], &["desk"])],
-    );
-    check(
-        "(not (exists (?s - surface) (and (in ?s study) (on cup-a ?s))))",
-        &[(&["cup-a"], &[], &["study"])],
-    );
+    let desk: &[(&str, &[&str])] = &[("cup-a", &["desk"])];
+    let anywhere: &[(&str, &[&str])] = &[("cup-a", &[])];
+    check("(on cup-a desk)", false, anywhere, &[]);
+    check("(not (on cup-a desk))", true, desk, &[]);
+    check("(not (not (on cup-a desk)))", false, anywhere, &[]);
+    check("(absent cup-a desk)", true, desk, &[]);
+    check("(not (absent cup-a desk))", false, anywhere, &[]);
+    check("(>= (presence cup-a desk) 0.8)", false, desk, &[]);
+    check("(<= (presence cup-a desk) 0.1)", true, desk, &[]);
+    check("(> 0.1 (presence cup-a desk))", true, desk, &[]);
+    check("(= (presence cup-a desk) 0)", true, desk, &[]);
+    check("(>= (- 1 (presence cup-a desk)) 0.9)", true, desk, &[]);
+    check("(>= (- (presence cup-a desk) 1) 0.9)", false, desk, &[]);
+    check("(>= (* (presence cup-a desk) -1) 0.9)", true, desk, &[]);
+    check("(not (>= (confidence cup-a) 0.8))", true, anywhere, &[]);
+    check("(not (exists (?s - surface) (and (in ?s study) (on cup-a ?s))))", true, &[("cup-a", &["study"])], &[]);
+    check("(and (>= (completeness cup) 0.9) (forall (?t - thing) (imply (is ?t cup) (on ?t desk))))", true, &[], &[]);
+    // Of whichever things there are it is asked on the surface, unless a kind says which.
+    check("(not (exists (?t - thing) (and (is ?t mug) (on ?t desk))))", true, &[], &[]);
+    check("(not (exists (?t - thing) (on ?t desk)))", true, &[], &["desk"]);
     // What is remembered of what was done is known.
-    check("(not (slippery cup-a))", &[]);
-    check("(not (observed desk-1 desk))", &[]);
+    check("(not (slippery cup-a))", false, anywhere, &[]);
+    check("(not (observed desk-1 desk))", false, &[], &[]);
 }
 
 #[test]
@@ -73,7 +92,7 @@ fn a_thing_is_asked_about_in_the_room_that_is_said_beside_it() {
     let check = |condition: &str, places: &[Option<&[&str]>]| {
         let own = |list: &&[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
         let found: Vec<_> =
-            Asked::of(condition, &domain.vocabulary).things.into_iter().map(|(_, places)| places).collect();
+            asked(&domain, condition).things.into_iter().map(|(_, places)| places).collect();
         let expected: Vec<_> = places.iter().map(|places| places.as_ref().map(own)).collect();
         assert_eq!(found, expected, "{condition}");
     };
@@ -92,7 +111,7 @@ fn a_kind_is_asked_about_in_the_rooms_that_are_named() {
     let domain = Domain::load("home").unwrap();
     let check = |condition: &str, rooms: Option<&[&str]>| {
         let rooms = rooms.map(|rooms| rooms.iter().map(|r| r.to_string()).collect());
-        assert_eq!(Asked::of(condition, &domain.vocabulary).kinds, [("cup".to_string(), rooms)]);
+        assert_eq!(asked(&domain, condition).kinds, [("cup".to_string(), rooms)]);
     };
     let kitchen = "(>= (completeness-in cup kitchen) 0.9)";
     check(kitchen, Some(&["kitchen"]));

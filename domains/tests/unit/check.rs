@@ -120,6 +120,7 @@ fn faults_of_actions_and_calls_are_found_at_their_place() {
     toml(("retries = 2\n", "check = \"(att ?to)\"\n"), "undeclared-predicate", "att", &["`at`"]);
     toml(("retries = 2\n", "because = \"on to ?too\"\n"), "no-parameter", "?too", &["did you mean `?to`?"]);
     toml(("limit_s = 120.0", "limit_s = -1.0"), "value", "-1.0", &["seconds, above 0"]);
+    toml(("retries = 2\n", "kind = \"sensing\"\n"), "kind-of-skill", "\"sensing\"", &["programs alone"]);
 }
 
 #[test]

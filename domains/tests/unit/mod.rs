@@ -11,6 +11,7 @@ mod abilities_searching_unnoticed;
 mod abilities_searching_vanished;
 mod abilities_shapes_unseen;
 mod abilities_surveying_ground;
+mod actions;
 mod answer;
 mod asked;
 mod check;

@@ -10,7 +10,7 @@ use descry_planner::{Answer, Call, CallError, Plan, Step};
 use descry_robots::{Description, Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
-use super::{Ability, Fact, Meaning, SkillWord, argument};
+use super::{Ability, ActionKind, Fact, Meaning, SkillWord, argument};
 use crate::abilities::searching::change::Change;
 use crate::abilities::searching::perceive::{self, Eyes};
 use crate::abilities::searching::reasons;
@@ -35,8 +35,8 @@ pub const ABILITY: Ability = Ability {
     name: "carrying",
     about: "takes one thing into the hand and puts it down elsewhere",
     facts: &[
-        Fact { name: "holding", types: &["thing"], about: "the thing is in the hand", states: holding },
-        Fact { name: "hand-free", types: &[], about: "nothing is in the hand", states: hand_free },
+        Fact { name: "holding", types: &["thing"], about: "the thing is in the hand", states: holding, bounds: None },
+        Fact { name: "hand-free", types: &[], about: "nothing is in the hand", states: hand_free, bounds: None },
     ],
     calls: &[
         Meaning {
@@ -55,6 +55,7 @@ pub const ABILITY: Ability = Ability {
     skills: &[
         SkillWord {
             name: "pick-up",
+            kind: ActionKind::Changing,
             types: &["pose", "thing", "surface"],
             about: "takes the thing into the hand and lifts it",
             ground: |s, arguments| {
@@ -70,6 +71,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "put-down",
+            kind: ActionKind::Changing,
             types: &["pose", "thing", "surface"],
             about: "puts what is in the hand down where there is room on the surface",
             ground: |s, arguments| {

@@ -7,42 +7,48 @@ use crate::situation::Situation;
 
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[
-    Fact { name: "waypoint", types: &["pose"], about: "a place is visited from there", states: waypoint },
+    Fact { name: "waypoint", types: &["pose"], about: "a place is visited from there", states: waypoint, bounds: None },
     Fact {
         name: "stand",
         types: &["pose", "novelty"],
         about: "one can look at it from there",
         states: stand,
+        bounds: None,
     },
     Fact {
         name: "way-in",
         types: &["pose"],
         about: "one may drive there from anywhere: it stands around nothing, or begins a way around something",
         states: way_in,
+        bounds: None,
     },
     Fact {
         name: "next-to",
         types: &["pose", "pose"],
         about: "neighbours on the way around something; to drive from one to the other is no detour",
         states: next_to,
+        bounds: None,
     },
     Fact {
         name: "before",
         types: &["novelty", "novelty"],
         about: "one is learned after the other, in the order in which they were noticed",
         states: before,
+        bounds: None,
     },
     Fact {
         name: "unfaced",
         types: &["novelty"],
         about: "share of the directions around it that were not seen and can be seen",
         states: unfaced,
+        bounds: None,
     },
     Fact {
         name: "settled",
         types: &["novelty"],
         about: "it was learned, is known, or cannot be learned",
         states: settled,
+        bounds: None,
     },
 ];
 

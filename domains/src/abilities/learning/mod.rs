@@ -18,9 +18,8 @@ use descry_perception::nalgebra::Unit;
 use descry_robots::{Part, Place as Where};
 use descry_skills::{Model, Observe, Outcome};
 
-use super::{Ability, NOTHING_MORE, SkillWord};
+use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
-use crate::asked::mentions;
 use crate::goal::Goal;
 use crate::load::Domain;
 use crate::mind::Mind;
@@ -41,6 +40,7 @@ pub const ABILITY: Ability = Ability {
     skills: &[
         SkillWord {
             name: "patrol",
+            kind: ActionKind::Sensing,
             types: &["pose"],
             about: "looks at a place from its waypoint, and compares with how it was before",
             ground: |s, arguments| {
@@ -58,6 +58,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "face",
+            kind: ActionKind::Sensing,
             types: &["pose", "novelty"],
             about: "looks at something new from a pose around it",
             ground: |s, arguments| {
@@ -70,6 +71,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "model",
+            kind: ActionKind::Sensing,
             types: &["novelty"],
             about: "brings all looks at something new together, and learns it",
             ground: |s, arguments| Ok(Box::new(modelling(s, arguments[0])?)),
@@ -108,7 +110,7 @@ fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candi
 
 /// A run begins: which places are visited, and how they looked before.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
-    if mentions(&goal.pddl).iter().all(|m| m[0] != PATROLLED) {
+    if goal.asked.of_word(PATROLLED).next().is_none() {
         return;
     }
     let known = &mind.known;

@@ -4,7 +4,6 @@ use super::news::{Change, Fate, Novelty, Place};
 use super::taken::size;
 use super::{PATROLLED, news::DIRECTIONS};
 use crate::answer::{Believed, Conclusion, Ended, Verdict};
-use crate::asked::mentions;
 use crate::goal::Goal;
 use crate::mind::Mind;
 use crate::situation::Situation;
@@ -14,11 +13,10 @@ const ALL_ROUND: f64 = 0.9;
 
 /// See the module; none where something else was asked.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
-    let asked = mentions(&goal.pddl);
-    if asked.iter().all(|m| m[0] != PATROLLED) {
+    if goal.asked.of_word(PATROLLED).next().is_none() {
         return None;
     }
-    let is_to_learn = asked.iter().any(|m| m[0] == "settled");
+    let is_to_learn = goal.asked.of_word("settled").next().is_some();
     let (verdict, why) = told(mind, s, ended, is_to_learn);
     let objects: Vec<Believed> = mind.known.news.novelties.iter().map(|n| believed(mind, n)).collect();
     Some(Conclusion {

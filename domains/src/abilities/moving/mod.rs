@@ -6,7 +6,7 @@ mod time_left;
 
 use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
-use super::{Ability, Fact, Meaning, NOTHING_MORE, Reads, SkillWord};
+use super::{Ability, ActionKind, Fact, Meaning, NOTHING_MORE, Reads, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
 use crate::abilities::surveying::ground;
 use crate::mind::Mind;
@@ -19,24 +19,27 @@ pub const ABILITY: Ability = Ability {
     name: "moving",
     about: "drives on the map, opens doors",
     facts: &[
-        Fact { name: "at", types: &["pose"], about: "where the body stands", states: at::state },
+        Fact { name: "at", types: &["pose"], about: "where the body stands", states: at::state, bounds: None },
         Fact {
             name: "time-left",
             types: &[],
             about: "the deadline, if there is one, has not passed",
             states: time_left::state,
+            bounds: None,
         },
         Fact {
             name: "beside",
             types: &["pose", "door"],
             about: "the door can be opened from there, by the map",
             states: beside,
+            bounds: None,
         },
         Fact {
             name: "in",
             types: &["surface", "room"],
             about: "the surface is in the room, by the map",
             states: in_room,
+            bounds: None,
         },
     ],
     calls: &[Meaning {
@@ -48,6 +51,7 @@ pub const ABILITY: Ability = Ability {
     skills: &[
         SkillWord {
             name: "move",
+            kind: ActionKind::Moving,
             types: &["pose", "pose"],
             about: "drives from one pose to the other",
             ground: |s, arguments| {
@@ -71,6 +75,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "open-door",
+            kind: ActionKind::Changing,
             types: &["pose", "door"],
             about: "opens a door from beside it",
             ground: |s, arguments| {

@@ -23,7 +23,7 @@ pub use calls::FirstLook;
 use descry_robots::Part;
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 
-use super::{Ability, SkillWord};
+use super::{Ability, ActionKind, SkillWord};
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
@@ -39,6 +39,7 @@ pub const ABILITY: Ability = Ability {
     skills: &[
         SkillWord {
             name: "observe",
+            kind: ActionKind::Sensing,
             types: &["pose", "surface"],
             about: "turns to the surface, takes a view, believes what all its views show",
             ground: |s, arguments| {
@@ -54,6 +55,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "push-aside",
+            kind: ActionKind::Changing,
             types: &["pose", "obstacle"],
             about: "pushes an object aside, so that what is behind it can be seen",
             ground: |s, arguments| {

@@ -12,34 +12,39 @@ pub(super) const ALL: &[Fact] = &[
         types: &["pose", "spot"],
         about: "the pose is one of those around it",
         states: around,
+        bounds: None,
     },
-    Fact { name: "on-floor", types: &["pose"], about: "the pose is around nothing", states: on_floor },
+    Fact { name: "on-floor", types: &["pose"], about: "the pose is around nothing", states: on_floor, bounds: None },
     Fact {
         name: "looseness",
         types: &["spot"],
         about: "how far on average it may reach beyond what was met of it, metres",
         states: looseness,
+        bounds: None,
     },
     Fact {
         name: "aligned",
         types: &["spot"],
         about: "all scans of it are brought together",
         states: aligned,
+        bounds: None,
     },
     Fact {
         name: "sureness",
         types: &["spot"],
         about: "how sure it is what it is, or that it is none of the known",
         states: sureness,
+        bounds: None,
     },
-    Fact { name: "may-be", types: &["spot", "shape"], about: "its scans fit that shape", states: may_be },
+    Fact { name: "may-be", types: &["spot", "shape"], about: "its scans fit that shape", states: may_be, bounds: None },
     Fact {
         name: "found",
         types: &["shape"],
         about: "how sure it is that something on the floor has that shape",
         states: found,
+        bounds: None,
     },
-    Fact { name: "learned", types: &["shape"], about: "its shape was learned in this run", states: learned },
+    Fact { name: "learned", types: &["shape"], about: "its shape was learned in this run", states: learned, bounds: None },
 ];
 
 fn around(s: &Situation) -> Vec<String> {

@@ -16,7 +16,7 @@ use descry_perception::laser::{KnownShape, Verdict};
 use descry_robots::Part;
 use descry_skills::{Align, Circle, Outcome, Scan};
 
-use super::{Ability, NOTHING_MORE, SkillWord, moving};
+use super::{Ability, ActionKind, NOTHING_MORE, SkillWord, moving};
 use crate::abilities::searching::perceive::Eyes;
 use crate::goal::{Goal, type_of_slot};
 use crate::lexicon::symbol;
@@ -37,6 +37,7 @@ pub const ABILITY: Ability = Ability {
     skills: &[
         SkillWord {
             name: "scan",
+            kind: ActionKind::Sensing,
             types: &["pose", "spot"],
             about: "sweeps the laser from a pose around it",
             ground: |_, _| Ok(Box::new(Scan)),
@@ -46,6 +47,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "survey",
+            kind: ActionKind::Sensing,
             types: &["pose"],
             about: "sweeps the laser over floor that was not seen yet",
             ground: |_, _| Ok(Box::new(Scan)),
@@ -55,6 +57,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "circle",
+            kind: ActionKind::Moving,
             types: &["pose", "pose", "spot"],
             about: "drives around it from one pose to another",
             ground: |s, arguments| Ok(Box::new(Circle { way: way(s, arguments)? })),
@@ -67,6 +70,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "align",
+            kind: ActionKind::Sensing,
             types: &["spot"],
             about: "brings all scans of it together, and takes the shape for one of those known, or for none",
             ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
@@ -76,6 +80,7 @@ pub const ABILITY: Ability = Ability {
         },
         SkillWord {
             name: "learn",
+            kind: ActionKind::Sensing,
             types: &["spot", "shape"],
             about: "brings all scans of it together, and keeps the shape under that name",
             ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
@@ -106,9 +111,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
             names.push((symbol(name), name.clone()));
         }
     }
-    let sought = crate::asked::mentions(&goal.pddl)
-        .into_iter()
-        .find_map(|m| m.strip_prefix(&["found".to_string()]).and_then(|rest| rest.first().cloned()));
+    let sought = goal.asked.of_word("found").find_map(|objects| objects.first().cloned());
     if sought.is_some() {
         poses::survey(mind, &*robot);
     }

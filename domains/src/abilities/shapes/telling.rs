@@ -5,7 +5,6 @@ use descry_perception::laser::Verdict as Taken;
 use super::floor::{THIS, Thing, place};
 use super::taken::contradict;
 use crate::answer::{Believed, Conclusion, Ended, Verdict};
-use crate::asked::mentions;
 use crate::goal::Goal;
 use crate::lexicon::symbol;
 use crate::mind::Mind;
@@ -17,7 +16,7 @@ const OPEN_M: f64 = 0.02;
 /// See the module. `s` is the last round's.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     let teller = Teller { mind, s };
-    let is_to_learn = mentions(&goal.pddl).iter().any(|m| m[0] == "learned");
+    let is_to_learn = goal.asked.of_word("learned").next().is_some();
     let (verdict, why, thing) = match &s.floor.sought {
         Some(shape) => teller.where_is(shape, ended),
         None if is_to_learn => teller.learned(ended),

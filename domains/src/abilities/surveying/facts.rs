@@ -10,12 +10,14 @@ pub(super) const ALL: &[Fact] = &[
         types: &["pose"],
         about: "a look from there would show floor that is not known yet",
         states: outlook,
+        bounds: None,
     },
     Fact {
         name: "unseen",
         types: &[],
         about: "floor that is unknown and expected to be seen from somewhere, square metres",
         states: unseen,
+        bounds: None,
     },
 ];
 

@@ -16,7 +16,7 @@ use descry_robots::nalgebra::Point3;
 use descry_robots::{Part, Place};
 use descry_skills::{Observe, Outcome};
 
-use super::{Ability, NOTHING_MORE, SkillWord};
+use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
 use crate::abilities::searching::perceive::Eyes;
 use crate::goal::Goal;
 use crate::load::Domain;
@@ -36,6 +36,7 @@ pub const ABILITY: Ability = Ability {
     calls: calls::ALL,
     skills: &[SkillWord {
         name: "chart",
+        kind: ActionKind::Sensing,
         types: &["pose"],
         about: "looks straight ahead, and takes what it sees into the map",
         ground: |s, _| Ok(Box::new(Observe { at: ahead(s) })),

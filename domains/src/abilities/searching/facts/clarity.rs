@@ -1,9 +1,21 @@
 //! `(clarity ?on)`: how sure it is what each object on a surface is, and that none is hidden.
 
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
     let fluent =
         |on: usize| format!("(= (clarity {}) {:.6})", situation.surfaces[on].symbol, situation.clarity(on));
     (0..situation.surfaces.len()).map(fluent).collect()
+}
+
+/// How sure it may become: nothing is sure of what nobody has looked at.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    match of {
+        [Referent::Named(on)] => match s.surface(on) {
+            Ok(on) if s.is_looked_at(on) => Range::certainty(s.clarity(on), s.threshold),
+            _ => Range::UNKNOWN,
+        },
+        _ => Range::UNKNOWN,
+    }
 }

@@ -1,5 +1,6 @@
 //! `(completeness ?of)`: how sure it is which objects are of a kind, and that no more are hidden.
 
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -7,4 +8,20 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
         format!("(= (completeness {}) {:.6})", situation.kinds[of].symbol, situation.completeness(of))
     };
     (0..situation.kinds.len()).map(fluent).collect()
+}
+
+/// How sure it may become: nothing is sure of what nobody has looked at.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    match of.first() {
+        Some(Referent::Named(kind)) => match s.kind(kind) {
+            Ok(of) if is_looked_for(s, of) => Range::certainty(s.completeness(of), s.wanted_of(of)),
+            _ => Range::UNKNOWN,
+        },
+        _ => Range::UNKNOWN,
+    }
+}
+
+/// Whether a view of a surface was taken on which it could stand.
+fn is_looked_for(s: &Situation, of: usize) -> bool {
+    (0..s.surfaces.len()).any(|on| s.kinds[of].may_be_on(on) && s.is_looked_at(on))
 }

@@ -1,7 +1,9 @@
 //! `(completeness-in ?of ?where)`: how sure it is that all of a kind are found that are in a room. Known of the rooms that
 //! are asked about: of each it is at least as sure as of all of them together. Of any other no more is known than nothing.
 
+use super::completeness;
 use crate::lexicon::symbol;
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -17,4 +19,17 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
         }
     }
     lines
+}
+
+/// How sure it may become: of a room that is asked about as of all of the kind.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [Referent::Named(kind), Referent::Named(room)] = of else { return Range::UNKNOWN };
+    let is_there = |n: &usize| s.surfaces[*n].is_in(&[(*room).to_string()]);
+    let is_asked = |kind: &crate::situation::Thing| {
+        kind.on.as_ref().is_none_or(|on| (0..s.surfaces.len()).filter(is_there).all(|n| on.contains(&n)))
+    };
+    match s.kind(kind) {
+        Ok(n) if is_asked(&s.kinds[n]) => completeness::bounds(s, of),
+        _ => Range::UNKNOWN,
+    }
 }

@@ -1,5 +1,6 @@
 //! `(confidence ?what)`: how sure it is where a sought object stands.
 
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -7,4 +8,13 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
         format!("(= (confidence {}) {:.6})", situation.things[what].symbol, situation.confidence(what))
     };
     (0..situation.things.len()).map(fluent).collect()
+}
+
+/// How sure it may become. What is called *not there* counts as not at all.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [Referent::Named(what)] = of else { return Range::UNKNOWN };
+    let Ok(what) = s.thing(what) else { return Range::UNKNOWN };
+    let sure = Range::certainty(s.confidence(what), s.threshold);
+    let is_absent = sure.believed < s.threshold && s.chance_there(what) <= s.thresholds.not_there;
+    if is_absent { Range::exactly(0.0) } else { sure }
 }

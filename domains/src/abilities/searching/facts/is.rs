@@ -1,5 +1,9 @@
 //! `(is ?what ?kind)`: an object that was seen is surely of a kind.
 
+use descry_memory::belief::Track;
+use descry_perception::recognise::ObjectModel;
+
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -12,4 +16,29 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
         }
     }
     atoms
+}
+
+/// Whether it is, for all that was looked at.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [what, Referent::Named(kind)] = of else { return Range::UNKNOWN };
+    let Ok(of) = s.kind(kind) else { return Range::UNKNOWN };
+    let of_track = |track: &Track| Range::settled(track.probability_of(&s.kinds[of].name), s.threshold);
+    match what {
+        Referent::Seen(track) => of_track(track),
+        Referent::Unseen if s.completeness(of) >= s.wanted_of(of) => Range::exactly(0.0),
+        Referent::Unseen => Range::UNKNOWN,
+        Referent::Named(what) => {
+            let Ok(what) = s.thing(what) else { return Range::UNKNOWN };
+            let thing = &s.things[what];
+            let is = |m: &ObjectModel| s.kinds[of].models.iter().any(|other| other.name == m.name);
+            let count = thing.models.iter().filter(|model| is(model)).count();
+            match thing.track {
+                Some(id) => s.belief.tracks.iter().find(|t| t.id == id).map_or(Range::UNKNOWN, of_track),
+                // What a known object is, its name says.
+                None if count == 0 => Range::exactly(0.0),
+                None if count == thing.models.len() => Range::exactly(1.0),
+                None => Range::UNKNOWN,
+            }
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! `(on ?what ?on)`: a sought object stands on a surface, as surely as was asked for.
 
+use super::presence;
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -13,4 +15,17 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
         }
     }
     atoms
+}
+
+/// Whether it stands there, for all that was looked at.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let there = match of {
+        [Referent::Seen(track), Referent::Named(on)] => Range::exactly(f64::from(u8::from(track.on == **on))),
+        of => presence::bounds(s, of),
+    };
+    match there {
+        sure if sure.believed >= s.threshold => Range::exactly(1.0),
+        none if none.greatest <= 0.0 => Range::exactly(0.0),
+        _ => Range::UNKNOWN,
+    }
 }

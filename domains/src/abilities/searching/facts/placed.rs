@@ -1,9 +1,18 @@
 //! `(placed ?what)`: how sure it is that a sought object, where one is believed in, stands where on its surface it is believed to.
 
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
     let fluent =
         |what: usize| format!("(= (placed {}) {:.6})", situation.things[what].symbol, situation.placed(what));
     (0..situation.things.len()).map(fluent).collect()
+}
+
+/// How sure it may become: nothing is known of the place of what was not seen.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [Referent::Named(what)] = of else { return Range::UNKNOWN };
+    let Ok(what) = s.thing(what) else { return Range::UNKNOWN };
+    let is_known = s.best(what).is_some() || s.chance_there(what) <= s.thresholds.not_there;
+    if is_known { Range::certainty(s.placed(what), s.threshold) } else { Range::UNKNOWN }
 }

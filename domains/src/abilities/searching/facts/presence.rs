@@ -1,5 +1,6 @@
 //! `(presence ?what ?on)`: how sure it is that a sought object stands on a surface.
 
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
@@ -9,4 +10,39 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     };
     let surfaces = 0..situation.surfaces.len();
     (0..situation.things.len()).flat_map(|what| surfaces.clone().map(move |on| fluent(what, on))).collect()
+}
+
+/// How sure it may become, for all that was looked at. What is called *not there* counts as not at all.
+pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [what, on] = of else { return Range::UNKNOWN };
+    let on = match on {
+        Referent::Named(on) => s.surface(on).ok(),
+        _ => None,
+    };
+    match (what, on) {
+        (Referent::Named(what), Some(on)) => match s.thing(what) {
+            Ok(what) => of_thing(s, what, on),
+            Err(_) => Range::UNKNOWN,
+        },
+        // On a surface that nobody has found, it stands where it may be at all.
+        (Referent::Named(what), None) => match s.thing(what) {
+            Ok(what) if s.chance_there(what) <= s.thresholds.not_there => Range::exactly(0.0),
+            _ => Range::UNKNOWN,
+        },
+        (Referent::Seen(track), Some(on)) => {
+            Range::exactly(f64::from(u8::from(track.on == s.surfaces[on].symbol)))
+        }
+        (Referent::Unseen, Some(on)) if s.is_clear(on) => Range::exactly(0.0),
+        _ => Range::UNKNOWN,
+    }
+}
+
+fn of_thing(s: &Situation, what: usize, on: usize) -> Range {
+    let sure = Range::certainty(s.presence(what, on), s.threshold);
+    let thing = &s.things[what];
+    let is_elsewhere = match thing.track {
+        Some(id) => s.on_surface(on).all(|track| track.id != id),
+        None => sure.believed < s.threshold && s.chance_on(what, on) <= s.thresholds.not_there,
+    };
+    if is_elsewhere { Range::exactly(0.0) } else { sure }
 }

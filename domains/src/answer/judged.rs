@@ -1,0 +1,183 @@
+//! Answers that follow from the three-valued truth of the goal: what is open and why, and what speaks against it.
+
+use descry_memory::belief::Track;
+
+use super::{Asker, Verdict};
+use crate::abilities::searching::reasons;
+use crate::judge::{Decisive, Judge, Judgement, Truth};
+use crate::lexicon::plural;
+use crate::situation::Thing;
+use crate::vocabulary::Ground;
+
+impl Asker<'_> {
+    /// Truth of the goal in the last round; unknown where an attachment fails.
+    pub(super) fn judgement(&self) -> Judgement {
+        let round = self.round;
+        let judge = Judge::new(self.domain, &self.mind.words, self.s, &round.task, &round.attachments);
+        judge.map_or(Judgement { truth: Truth::Unknown, word: None }, |judge| judge.goal())
+    }
+
+    /// Why it cannot be told whether the goal holds.
+    pub(super) fn open(&self, word: Option<&Decisive>) -> String {
+        let Some(word) = word else {
+            return format!("it cannot be told whether {}", self.saying.say(&self.goal.pddl));
+        };
+        if !word.is_seen {
+            return self.untold(word);
+        }
+        let s = self.s;
+        let thing = self.thing_of(word);
+        let surface = self.surface_of(word);
+        if let Some(what) = thing {
+            let may_be = |on: &usize| s.chance_on(what, *on) > s.thresholds.not_there;
+            let asked = (0..s.surfaces.len()).filter(|&on| s.things[what].may_be_on(on));
+            if let Some(on) = surface.or_else(|| asked.into_iter().find(may_be)) {
+                return self.open_on(what, on);
+            }
+            let name = &s.things[what].name;
+            return format!("it cannot be told where {name} is: no surface is known");
+        }
+        if let Some(of) = self.kind_of(word) {
+            let kind = &s.kinds[of];
+            let (name, place) = (plural(&kind.name), reasons::in_room(s, kind));
+            return format!("it cannot be told, for not all {name}{place} are known");
+        }
+        let unclear = (0..s.surfaces.len()).find(|&on| !s.is_clear(on));
+        match surface.or(unclear) {
+            Some(on) => {
+                let name = &s.surfaces[on].name;
+                let why = self.why_open(on).unwrap_or_else(|| "not all on it is identified".into());
+                format!("it cannot be told what stands on the {name}: {why}")
+            }
+            None => format!("it cannot be told whether {}", self.saying.say(&self.goal.pddl)),
+        }
+    }
+
+    fn open_on(&self, what: usize, on: usize) -> String {
+        let s = self.s;
+        let (thing, surface) = (&s.things[what].name, &s.surfaces[on].name);
+        let chance = s.chance_on(what, on);
+        let left = || format!("a chance of {chance:.2} is left that it is");
+        let why = self.why_open(on).unwrap_or_else(left);
+        format!("it cannot be told that {thing} is not on the {surface}: {why}")
+    }
+
+    /// Why looks at a surface tell too little.
+    fn why_open(&self, on: usize) -> Option<String> {
+        let there = Thing { on: Some(vec![on]), ..Thing::default() };
+        let looks = self.mind.regions[on].taken;
+        let unseen = (looks == 0).then(|| format!("the {} was not looked at", self.s.surfaces[on].name));
+        unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(self.s, &there))
+    }
+
+    /// That no look tells of a word, and nothing else has.
+    fn untold(&self, word: &Decisive) -> String {
+        let said = word.pddl().map_or_else(|| word.word.clone(), |pddl| self.saying.say(&pddl));
+        match word.is_number {
+            true => format!("it cannot be told how much {said} is: nothing gives it a value"),
+            false => format!("it cannot be told whether {said}: no look shows that, and nothing has said so"),
+        }
+    }
+
+    fn thing_of(&self, word: &Decisive) -> Option<usize> {
+        word.objects.iter().flatten().find_map(|name| self.s.thing(name).ok())
+    }
+
+    fn surface_of(&self, word: &Decisive) -> Option<usize> {
+        word.objects.iter().flatten().find_map(|name| self.s.surface(name).ok())
+    }
+
+    fn kind_of(&self, word: &Decisive) -> Option<usize> {
+        // A thing and a kind may have one name: the word says which is meant.
+        let types = self.domain.vocabulary.word(&word.word)?.types;
+        let mut named = word.objects.iter().zip(&types).filter(|(_, of)| self.domain.vocabulary.is_a(of, "kind"));
+        named.find_map(|(name, _)| self.s.kind(name.as_ref()?).ok())
+    }
+
+    /// That the goal does not hold, and what says so.
+    pub(super) fn denial(&self, word: Option<&Decisive>) -> String {
+        let denied = format!("it does not hold that {}", self.saying.say(&self.goal.pddl));
+        let Some(word) = word else { return denied };
+        if let Some(standing) = self.stands_against(word) {
+            return standing;
+        }
+        if word.is_seen {
+            let said = self.surely().join("; ");
+            return if said.is_empty() { denied } else { format!("{said}; so {denied}") };
+        }
+        let Some(pddl) = word.pddl() else { return denied };
+        let fact = match (word.is_number, word.holds) {
+            (true, _) => return denied + &self.value_of(word),
+            (false, true) => self.saying.say(&pddl),
+            (false, false) => self.saying.deny(&pddl),
+        };
+        format!("{denied}: {fact}{}", self.source(&word.word))
+    }
+
+    /// What a number is.
+    fn value_of(&self, word: &Decisive) -> String {
+        let objects: Vec<&str> = word.objects.iter().flatten().map(String::as_str).collect();
+        let atom = [&[word.word.as_str()], objects.as_slice()].concat().join(" ");
+        let pddl = format!("({atom})");
+        format!(": {} is {}{}", self.saying.say(&pddl), self.value(&atom), self.source(&word.word))
+    }
+
+    /// Who says what a word is where no look does; empty where that is the body, or a program.
+    fn source(&self, name: &str) -> &'static str {
+        let Some(word) = self.domain.vocabulary.word(name) else { return "" };
+        match self.domain.vocabulary.ground(&word, &self.domain.config) {
+            Ground::Fixed => ", as the domain says",
+            Ground::Remembered if self.mind.words.is_spoken_of(name) => ", as the domain says in the beginning",
+            _ => "",
+        }
+    }
+
+    /// Where something stands that the goal wants not to stand there.
+    fn stands_against(&self, word: &Decisive) -> Option<String> {
+        let s = self.s;
+        if !self.goal.asked.denies {
+            return None;
+        }
+        let is_there = |t: &&Track| self.surface_of(word).is_none_or(|on| s.surface_of(t) == Some(on));
+        match word.objects.first()? {
+            Some(name) => {
+                let thing = &s.things[s.thing(name).ok()?];
+                let is_it = |t: &&Track| match thing.track {
+                    Some(id) => t.id == id,
+                    None => t.probability_of(&thing.name) >= s.threshold,
+                };
+                let track = s.belief.tracks.iter().filter(is_there).find(is_it)?;
+                Some(format!("{} {}", thing.name, self.standing(track)))
+            }
+            None => {
+                let track = s.strangers().find(is_there)?;
+                let name = track.label().or_else(|| track.kind()).unwrap_or("something unknown");
+                Some(format!("{name} {}", self.standing(track)))
+            }
+        }
+    }
+
+    /// Answer to a question of which nothing that can be done tells more.
+    pub(super) fn to_question(&self) -> (Verdict, String) {
+        let Judgement { truth, word } = self.judgement();
+        match truth {
+            Truth::True => self.reached(),
+            Truth::False => (Verdict::NotFound, self.no_of_kinds().unwrap_or_else(|| self.denial(word.as_ref()))),
+            Truth::Unknown => (Verdict::CannotTell, self.another().unwrap_or_else(|| self.open(word.as_ref()))),
+        }
+    }
+
+    /// That another thing of the same may stand where it is asked about, though it is known where one stands.
+    fn another(&self) -> Option<String> {
+        let s = self.s;
+        let is_known = |what: usize, on: usize| s.presence(what, on) >= s.threshold;
+        let said = self.surely();
+        let mut places = self.own().flat_map(|(what, _)| (0..s.surfaces.len()).map(move |on| (what, on)));
+        let (what, on) = places
+            .find(|&(what, on)| !is_known(what, on) && s.chance_on(what, on) > s.thresholds.not_there)
+            .filter(|_| !said.is_empty() && !self.goal.asked.more)?;
+        let (thing, surface, chance) = (&s.things[what].name, &s.surfaces[on].name, s.chance_on(what, on));
+        let left = format!("a chance of {chance:.2} is left that there is another {thing} on the {surface}");
+        Some(format!("{}; it cannot be told more, {left}; {}", said.join("; "), self.looks()))
+    }
+}

@@ -1,0 +1,472 @@
+//! Three-valued truth of a goal against what is believed: what nobody has looked at is neither true nor false.
+//!
+//! A word is known or lies in a [`Range`]: facts about seen objects are bounded by what looks have left open; what a program or the
+//! body states is known; a remembered word is known where only looking and moving set it, where `init` speaks of it, and where an
+//! action or a failure of this run has said so. Quantified things include one that nobody has seen.
+
+use std::cmp::Ordering;
+
+use descry_planner::semantics::Binding;
+use descry_planner::state::State;
+use descry_planner::task::{
+    Comparison, Condition, Expression, Fluent, ObjectId, PredicateId, Quantified, Task, Term,
+};
+use descry_planner::{Attachments, Semantics};
+
+use crate::actions;
+use crate::config::ActionKind;
+use crate::load::Domain;
+use crate::range::{Bounds, Range, Referent};
+use crate::situation::Situation;
+use crate::vocabulary::{Ground, Word};
+use crate::words::Words;
+
+/// Truth of a condition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Truth {
+    /// It does not hold.
+    False,
+    /// It may hold or not.
+    Unknown,
+    /// It holds.
+    True,
+}
+
+impl Truth {
+    fn of(is_so: bool) -> Truth {
+        if is_so { Truth::True } else { Truth::False }
+    }
+
+    fn not(self) -> Truth {
+        match self {
+            Truth::False => Truth::True,
+            Truth::Unknown => Truth::Unknown,
+            Truth::True => Truth::False,
+        }
+    }
+}
+
+/// Truth of a condition, with the word that decides it or leaves it open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// Whether it holds.
+    pub truth: Truth,
+    /// The word; none where a condition of no words decides.
+    pub word: Option<Decisive>,
+}
+
+/// A word with its objects that decides a condition, or leaves it open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decisive {
+    /// Name of the word.
+    pub word: String,
+    /// Its objects: symbols of the problem; none where nobody has seen such an object, or it is none of the problem.
+    pub objects: Vec<Option<String>>,
+    /// Whether it is a number.
+    pub is_number: bool,
+    /// Whether looks tell what it is.
+    pub is_seen: bool,
+    /// Whether it holds, as believed now; of a number whether it has a value.
+    pub holds: bool,
+}
+
+impl Decisive {
+    /// The word as it is written in PDDL, where all its objects are of the problem.
+    pub fn pddl(&self) -> Option<String> {
+        let objects: Option<Vec<&str>> = self.objects.iter().map(Option::as_deref).collect();
+        Some(format!("({})", [&[self.word.as_str()], objects?.as_slice()].concat().join(" ")))
+    }
+}
+
+impl Judgement {
+    fn of(truth: Truth) -> Judgement {
+        Judgement { truth, word: None }
+    }
+
+    /// Whether looks may decide it.
+    pub fn is_open_to_looks(&self) -> bool {
+        self.truth == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
+    }
+}
+
+/// What a slot holds.
+type Bound<'a> = Option<Held<'a>>;
+
+#[derive(Clone, Copy)]
+enum Held<'a> {
+    Object(ObjectId),
+    Other(Referent<'a>),
+}
+
+/// Judges conditions in one situation.
+pub struct Judge<'a> {
+    domain: &'a Domain,
+    words: &'a Words,
+    s: &'a Situation,
+    semantics: Semantics<'a>,
+    state: State,
+    vocabulary: Vec<Word>,
+}
+
+impl<'a> Judge<'a> {
+    /// A judge of the conditions of a round's task; none where an attachment fails.
+    pub fn new(
+        domain: &'a Domain,
+        words: &'a Words,
+        s: &'a Situation,
+        task: &'a Task,
+        attachments: &'a Attachments,
+    ) -> Option<Self> {
+        let semantics = Semantics::new(task, attachments);
+        let state = semantics.initial().ok()?;
+        Some(Self { domain, words, s, semantics, state, vocabulary: domain.vocabulary.words() })
+    }
+
+    /// Truth of the task's goal.
+    pub fn goal(&self) -> Judgement {
+        let goal = &self.semantics.task.goal;
+        self.condition(&goal.body, &mut vec![None; goal.slots], &mut Vec::new())
+    }
+
+    fn condition(
+        &self,
+        own: &Condition,
+        scope: &mut Vec<Bound<'a>>,
+        open: &mut Vec<(PredicateId, Vec<String>)>,
+    ) -> Judgement {
+        match own {
+            Condition::And(parts) => {
+                all(Truth::False, parts.iter().map(|part| self.condition(part, scope, open)))
+            }
+            Condition::Or(parts) => {
+                all(Truth::True, parts.iter().map(|part| self.condition(part, scope, open)))
+            }
+            Condition::Not(inner) => {
+                let Judgement { truth, word } = self.condition(inner, scope, open);
+                Judgement { truth: truth.not(), word }
+            }
+            Condition::Forall(variables, inner) => self.each(Truth::False, variables, inner, scope, open),
+            Condition::Exists(variables, inner) => self.each(Truth::True, variables, inner, scope, open),
+            Condition::Atom(atom) => {
+                let arguments = self.referents(&atom.arguments, scope);
+                match arguments {
+                    Some(arguments) => self.atom(atom.predicate, &arguments, open),
+                    None => Judgement::of(Truth::False),
+                }
+            }
+            Condition::Compare(comparison, sides, _) => self.compare(*comparison, sides, scope),
+            Condition::Same(terms, _) => {
+                let of = |term: &Term| self.referent(term, scope);
+                Judgement::of(match (of(&terms[0]), of(&terms[1])) {
+                    (Some(Held::Object(one)), Some(Held::Object(other))) => Truth::of(one == other),
+                    (Some(Held::Other(Referent::Unseen)), Some(Held::Other(Referent::Unseen))) => {
+                        Truth::Unknown
+                    }
+                    (Some(Held::Other(Referent::Seen(one))), Some(Held::Other(Referent::Seen(other)))) => {
+                        Truth::of(one.id == other.id)
+                    }
+                    _ => Truth::False,
+                })
+            }
+            Condition::Call(_) => match self.binding(scope) {
+                Some(mut binding) => match self.semantics.holds(&self.state, own, &mut binding) {
+                    Ok(holds) => Judgement::of(Truth::of(holds)),
+                    Err(_) => Judgement::of(Truth::Unknown),
+                },
+                None => Judgement::of(Truth::Unknown),
+            },
+        }
+    }
+
+    /// Judges a condition for each object of some variables; `decides` is the truth that one of them suffices for.
+    fn each(
+        &self,
+        decides: Truth,
+        variables: &[Quantified],
+        inner: &Condition,
+        scope: &mut Vec<Bound<'a>>,
+        open: &mut Vec<(PredicateId, Vec<String>)>,
+    ) -> Judgement {
+        let Some((first, rest)) = variables.split_first() else {
+            return self.condition(inner, scope, open);
+        };
+        let objects = first.parameter.objects.iter().map(|&object| Held::Object(object));
+        let others: Vec<Held<'a>> = self.others(first).into_iter().map(Held::Other).collect();
+        let values: Vec<Held<'a>> = objects.chain(others).collect();
+        all(
+            decides,
+            values.into_iter().map(|value| {
+                scope[first.slot.index()] = Some(value);
+                self.each(decides, rest, inner, scope, open)
+            }),
+        )
+    }
+
+    /// What a variable may stand for besides the objects of the problem.
+    fn others(&self, variable: &Quantified) -> Vec<Referent<'a>> {
+        let task = self.semantics.task;
+        let takes = |wanted: &str| {
+            let is = |id: &descry_planner::task::TypeId| {
+                let name = &task.type_of(*id).name;
+                name == wanted || self.domain.vocabulary.is_a(wanted, name)
+            };
+            variable.parameter.types.iter().any(is)
+        };
+        let mut others = Vec::new();
+        if takes("thing") {
+            others.extend(self.s.strangers().map(Referent::Seen));
+            others.push(Referent::Unseen);
+        } else if takes("surface") && self.s.robot.surfaces().is_empty() {
+            others.push(Referent::Unseen);
+        }
+        others
+    }
+
+    fn atom(
+        &self,
+        predicate: PredicateId,
+        arguments: &[Held<'a>],
+        open: &mut Vec<(PredicateId, Vec<String>)>,
+    ) -> Judgement {
+        let declared = self.semantics.task.predicate(predicate);
+        if declared.stratum.is_some() {
+            return self.derived(predicate, arguments, open);
+        }
+        let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
+        let holds = objects.is_some_and(|objects| self.state.holds(predicate, &objects));
+        let (truth, is_seen) = match self.bounds(&declared.name) {
+            Some(bounds) => {
+                let range = self.range(bounds, arguments);
+                let truth = match range {
+                    Range { least, .. } if least >= 1.0 => Truth::True,
+                    Range { greatest, .. } if greatest <= 0.0 => Truth::False,
+                    _ => Truth::Unknown,
+                };
+                (truth, true)
+            }
+            None if holds => (Truth::True, false),
+            None if self.is_known(&declared.name, arguments) => (Truth::False, false),
+            None => (Truth::Unknown, false),
+        };
+        let word = self.decisive(&declared.name, arguments, (false, is_seen, holds));
+        Judgement { truth, word: Some(word) }
+    }
+
+    /// A derived word holds where one of its rules does.
+    fn derived(
+        &self,
+        predicate: PredicateId,
+        arguments: &[Held<'a>],
+        open: &mut Vec<(PredicateId, Vec<String>)>,
+    ) -> Judgement {
+        let key = (predicate, arguments.iter().map(|held| format!("{:?}", self.shown(held))).collect::<Vec<_>>());
+        // What rests on itself alone does not hold.
+        if open.contains(&key) {
+            return Judgement::of(Truth::False);
+        }
+        open.push(key);
+        let task = self.semantics.task;
+        let fits = |rule: &&descry_planner::task::Rule| {
+            let fits = |(held, parameter): (&Held<'a>, &descry_planner::task::Parameter)| match held {
+                Held::Object(id) => parameter.objects.contains(id),
+                Held::Other(_) => true,
+            };
+            rule.predicate == predicate && arguments.iter().zip(&rule.parameters).all(fits)
+        };
+        let rules: Vec<_> = task.rules.iter().filter(fits).collect();
+        let judged = all(
+            Truth::True,
+            rules.into_iter().map(|rule| {
+                let mut scope: Vec<Bound<'a>> = vec![None; rule.slots];
+                scope.iter_mut().zip(arguments).for_each(|(slot, held)| *slot = Some(*held));
+                self.condition(&rule.body, &mut scope, open)
+            }),
+        );
+        open.pop();
+        judged
+    }
+
+    fn compare(&self, comparison: Comparison, sides: &[Expression; 2], scope: &[Bound<'a>]) -> Judgement {
+        let mut words = Vec::new();
+        let [left, right] = sides.each_ref().map(|side| self.expression(side, scope, &mut words));
+        // A certainty by itself is as great as it is believed to be; in a sum it counts as what further looks leave.
+        let plain = |side: &Expression, range: Range| match side {
+            Expression::Fluent(_) => range.believed,
+            _ => range.least,
+        };
+        let (believed_left, believed_right) = (plain(&sides[0], left), plain(&sides[1], right));
+        let truth = match comparison {
+            Comparison::GreaterOrEqual if believed_left >= right.greatest => Truth::True,
+            Comparison::GreaterOrEqual if left.greatest < right.least => Truth::False,
+            Comparison::Greater if believed_left > right.greatest => Truth::True,
+            Comparison::Greater if left.greatest <= right.least => Truth::False,
+            Comparison::LessOrEqual if left.greatest <= believed_right => Truth::True,
+            Comparison::LessOrEqual if left.least > right.greatest => Truth::False,
+            Comparison::Less if left.greatest < believed_right => Truth::True,
+            Comparison::Less if left.least >= right.greatest => Truth::False,
+            Comparison::Equal if left.is_exact() && right.is_exact() && left.least == right.least => Truth::True,
+            Comparison::Equal if left.greatest < right.least || left.least > right.greatest => Truth::False,
+            _ => Truth::Unknown,
+        };
+        // A number that has no value is the reason before what looks tell.
+        words.sort_by(|a: &Decisive, b: &Decisive| match (a.is_seen, b.is_seen) {
+            (false, true) if !a.holds => Ordering::Less,
+            (true, false) if !b.holds => Ordering::Greater,
+            (true, false) => Ordering::Less,
+            (false, true) => Ordering::Greater,
+            _ => Ordering::Equal,
+        });
+        Judgement { truth, word: words.into_iter().next() }
+    }
+
+    fn expression(&self, own: &Expression, scope: &[Bound<'a>], words: &mut Vec<Decisive>) -> Range {
+        let mut side = |part: &Expression| self.expression(part, scope, words);
+        match own {
+            Expression::Number(number) => Range::exactly(*number),
+            Expression::Fluent(fluent) => self.fluent(fluent, scope, words),
+            Expression::Add(parts) => {
+                parts.iter().map(side).fold(Range::exactly(0.0), |sum, part| sum.combined(part, |a, b| a + b))
+            }
+            Expression::Multiply(parts) => {
+                parts.iter().map(side).fold(Range::exactly(1.0), |sum, part| sum.combined(part, |a, b| a * b))
+            }
+            Expression::Subtract(sides) => side(&sides[0]).combined(side(&sides[1]), |a, b| a - b),
+            Expression::Negative(inner) => Range::exactly(0.0).combined(side(inner), |a, b| a - b),
+            Expression::Divide(sides) => {
+                let (above, below) = (side(&sides[0]), side(&sides[1]));
+                match below.least > 0.0 || below.greatest < 0.0 {
+                    true => above.combined(below, |a, b| a / b),
+                    false => Range::UNDEFINED,
+                }
+            }
+            Expression::Call(_) => {
+                let value = self.binding(scope).and_then(|binding| {
+                    self.semantics.number(&self.state, own, &binding).ok().flatten()
+                });
+                value.map_or(Range::UNDEFINED, Range::exactly)
+            }
+            Expression::Duration | Expression::TotalTime | Expression::Violated(_) => Range::UNDEFINED,
+        }
+    }
+
+    fn fluent(&self, fluent: &Fluent, scope: &[Bound<'a>], words: &mut Vec<Decisive>) -> Range {
+        let name = &self.semantics.task.function(fluent.function).name;
+        let Some(arguments) = self.referents(&fluent.arguments, scope) else { return Range::UNDEFINED };
+        let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
+        let value = objects.and_then(|objects| self.state.number(fluent.function, &objects));
+        let bounds = self.bounds(name);
+        words.push(self.decisive(name, &arguments, (true, bounds.is_some(), value.is_some())));
+        match (bounds, value) {
+            (Some(bounds), _) => self.range(bounds, &arguments),
+            (None, Some(value)) => Range::exactly(value),
+            (None, None) => Range::UNDEFINED,
+        }
+    }
+
+    /// What looks tell of a word; none where something else does.
+    fn bounds(&self, name: &str) -> Option<Bounds> {
+        let word = self.vocabulary.iter().find(|word| word.name == name)?;
+        match self.domain.vocabulary.ground(word, &self.domain.config) {
+            Ground::Sensed(fact) => fact.bounds,
+            _ => None,
+        }
+    }
+
+    /// Whether a word that is not said to hold is known not to.
+    fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
+        let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
+        if !matches!(self.domain.vocabulary.ground(word, &self.domain.config), Ground::Remembered) {
+            return true;
+        }
+        let objects: Option<Vec<String>> = arguments.iter().map(|held| self.shown(held)).collect();
+        is_own(self.domain, name)
+            || self.words.is_spoken_of(name)
+            || objects.is_some_and(|objects| self.words.is_told(name, &objects))
+    }
+
+    fn range(&self, bounds: Bounds, arguments: &[Held<'a>]) -> Range {
+        let referents: Vec<Referent<'_>> = arguments
+            .iter()
+            .map(|held| match held {
+                Held::Object(id) => Referent::Named(&self.semantics.task.object(*id).name),
+                Held::Other(other) => *other,
+            })
+            .collect();
+        bounds(self.s, &referents)
+    }
+
+    fn decisive(
+        &self,
+        word: &str,
+        arguments: &[Held<'a>],
+        (is_number, is_seen, holds): (bool, bool, bool),
+    ) -> Decisive {
+        let objects = arguments.iter().map(|held| self.shown(held)).collect();
+        Decisive { word: word.into(), objects, is_number, is_seen, holds }
+    }
+
+    fn shown(&self, held: &Held<'a>) -> Option<String> {
+        held.object().map(|id| self.semantics.task.object(id).name.clone())
+    }
+
+    /// What terms stand for; none where one of them is undefined.
+    fn referents(&self, terms: &[Term], scope: &[Bound<'a>]) -> Option<Vec<Held<'a>>> {
+        terms.iter().map(|term| self.referent(term, scope)).collect()
+    }
+
+    fn referent(&self, term: &Term, scope: &[Bound<'a>]) -> Bound<'a> {
+        match term {
+            Term::Variable(slot) => scope.get(slot.index()).copied().flatten(),
+            Term::Object(id) => Some(Held::Object(*id)),
+            Term::Function(_) => {
+                let binding = self.binding(scope)?;
+                self.semantics.object(&self.state, term, &binding).map(Held::Object)
+            }
+        }
+    }
+
+    /// The objects in the slots; none where one of them is no object of the problem.
+    fn binding(&self, scope: &[Bound<'a>]) -> Option<Binding> {
+        let mut binding = Binding::new(scope.len());
+        for (slot, held) in binding.objects.iter_mut().zip(scope) {
+            match held {
+                Some(Held::Object(id)) => *slot = *id,
+                Some(Held::Other(_)) => return None,
+                None => {}
+            }
+        }
+        Some(binding)
+    }
+}
+
+impl Held<'_> {
+    fn object(&self) -> Option<ObjectId> {
+        match self {
+            Held::Object(id) => Some(*id),
+            Held::Other(_) => None,
+        }
+    }
+}
+
+/// Whether a remembered word tells of what the robot has done alone: no action that changes the world sets it.
+pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
+    let changers = domain.vocabulary.changers(word);
+    changers.into_iter().all(|action| actions::kind(&domain.config, action) < ActionKind::Changing)
+}
+
+/// Judges several parts of which one that is as `decides` says decides; among those that leave it open, what looks tell comes first.
+fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
+    let mut left: Option<Judgement> = None;
+    for part in parts {
+        if part.truth == decides {
+            return part;
+        }
+        let is_better = match &left {
+            None => true,
+            Some(left) if left.truth == Truth::Unknown => part.is_open_to_looks() && !left.is_open_to_looks(),
+            Some(_) => part.truth == Truth::Unknown,
+        };
+        left = if is_better { Some(part) } else { left };
+    }
+    left.unwrap_or(Judgement::of(decides.not()))
+}

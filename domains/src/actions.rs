@@ -6,7 +6,7 @@ use descry_planner::{Answer, Attachment, CallError, Read, Step, Task};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::{Value, json};
 
-use crate::abilities::{self, Meaning, SkillWord};
+use crate::abilities::{self, Deed, Meaning, SkillWord};
 use crate::config::{ActionConfig, ActionKind, Config};
 use crate::load::Domain;
 use crate::situation::Situation;
@@ -93,6 +93,65 @@ pub fn kind(config: &Config, action: &str) -> ActionKind {
         skill.map_or(ActionKind::Changing, |skill| skill.kind)
     };
     skills.into_iter().map(kind).max().unwrap_or(ActionKind::Changing)
+}
+
+/// An action of the domain that does a deed, with its arguments as far as the deed names them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Performer {
+    /// Name of the action.
+    pub action: String,
+    /// Its arguments.
+    pub arguments: Vec<Option<String>>,
+}
+
+/// The actions that do a deed, those first that do nothing else. What changes the world does no deed that leaves it as it is.
+pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
+    let own = abilities::skill(&domain.config.uses, deed.skill).map_or(ActionKind::Changing, |skill| skill.kind);
+    let mut found: Vec<(usize, Performer)> = Vec::new();
+    for action in &domain.vocabulary.task.actions {
+        if kind(&domain.config, &action.name) > own.max(ActionKind::Moving) {
+            continue;
+        }
+        let parameters: Vec<String> = action.parameters.iter().map(|p| p.name.clone()).collect();
+        let texts = texts(&domain.config, &action.name, &parameters);
+        let performer = texts.iter().find_map(|text| unified(text, deed, &parameters));
+        found.extend(performer.map(|arguments| (texts.len(), Performer { action: action.name.clone(), arguments })));
+    }
+    found.sort_by_key(|(steps, _)| *steps > 1);
+    found.into_iter().map(|(_, performer)| performer).collect()
+}
+
+/// The skills of an action as texts; none where a program carries it out.
+fn texts(config: &Config, action: &str, parameters: &[String]) -> Vec<String> {
+    let own = config.action.get(action);
+    if own.is_some_and(|own| own.program.is_some()) {
+        return Vec::new();
+    }
+    let texts = own.map(|own| own.does.texts()).unwrap_or_default();
+    match texts.is_empty() {
+        true => vec![format!("{action} {}", parameters.join(" "))],
+        false => texts.into_iter().map(str::to_string).collect(),
+    }
+}
+
+/// What a deed says of an action's parameters, where a skill of the action is that deed.
+fn unified(text: &str, deed: &Deed, parameters: &[String]) -> Option<Vec<Option<String>>> {
+    let mut tokens = text.split_whitespace();
+    if tokens.next() != Some(deed.skill) {
+        return None;
+    }
+    let tokens: Vec<String> = tokens.map(str::to_lowercase).collect();
+    let mut arguments = vec![None; parameters.len()];
+    for (token, value) in tokens.iter().zip(&deed.arguments) {
+        match parameters.iter().position(|name| name == token) {
+            Some(at) if arguments[at].as_ref().is_none_or(|known| known == value) => {
+                arguments[at] = Some(value.clone());
+            }
+            None if token == value => {}
+            _ => return None,
+        }
+    }
+    (tokens.len() == deed.arguments.len()).then_some(arguments)
 }
 
 /// The actions that a question may be answered with stay in a task.

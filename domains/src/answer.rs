@@ -311,7 +311,8 @@ impl Asker<'_> {
         let open = missing.iter().find_map(|&n| Some((n, left(n)?)));
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
-            let text = format!("it cannot be told whether {} is {asked}, {doubt}", s.things[n].name);
+            let closed = self.closed().map(|closed| format!(", {closed}")).unwrap_or_default();
+            let text = format!("it cannot be told whether {} is {asked}, {doubt}{closed}", s.things[n].name);
             return (Verdict::CannotTell, format!("{text}; {}", self.looks()));
         }
         if let Some(&n) = missing.first().filter(|_| !self.goal.question || truth == Truth::False) {
@@ -340,12 +341,12 @@ impl Asker<'_> {
             };
             return (Verdict::CannotTell, format!("not everything could be identified{left}"));
         }
+        if self.goal.question {
+            return self.to_question();
+        }
         if !is_proven {
             let text = format!("no plan was found that brings about {}", self.saying.say(&self.goal.pddl));
             return (Verdict::CannotTell, format!("{text}{says}"));
-        }
-        if self.goal.question {
-            return self.to_question();
         }
         (Verdict::Impossible, self.impossible(&says))
     }

@@ -5,6 +5,7 @@ mod end;
 mod error;
 mod fallback;
 mod grounds;
+mod steps;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,7 +18,7 @@ use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
 
-use crate::abilities;
+use crate::abilities::{self, Deed};
 use crate::abilities::learning::news::News;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
@@ -72,10 +73,12 @@ pub struct World<'a> {
     tries: BTreeMap<Call, usize>,
     seen_before: BTreeMap<String, usize>,
     given_up: Option<String>,
-    /// The look that a policy has chosen, candidate and surface.
-    heading_for: Option<(usize, usize)>,
-    /// Looks that no plan leads to.
-    barred: BTreeSet<(usize, usize)>,
+    /// The deed that is planned towards.
+    heading_for: Option<Deed>,
+    /// Whether the steps are a policy's, which does not say that they will be enough.
+    is_unasked: bool,
+    /// Deeds that nothing leads to, and that cannot be done.
+    barred: BTreeSet<Deed>,
 }
 
 /// The planning problem of one round, and what its calls are bound to.
@@ -183,6 +186,7 @@ impl<'a> World<'a> {
             seen_before: BTreeMap::new(),
             given_up: None,
             heading_for: None,
+            is_unasked: false,
             barred: BTreeSet::new(),
             setting,
         })
@@ -315,48 +319,45 @@ impl<'a> World<'a> {
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
     pub fn choice(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
-        self.heading_for = None;
+        (self.heading_for, self.is_unasked) = (None, false);
+        if self.is_beyond_looks(round) {
+            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+        }
         if self.chooser.first_look_here
             && self.mind.views == 0
             && let Some(look) = policies::here(s)
+            && let Some(plan) = self.directly(round, &[reasons::look(s, look.from, look.on)], true)
         {
-            return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
+            return Ok(Choice::Steps(plan));
         }
-        let policy = match &mut self.chooser.by {
-            By::Policy(policy) if policies::is_asked(s) => policy,
-            _ => return Ok(Choice::Planner),
-        };
-        let Some(look) = policies::next(&mut **policy, s, &self.barred) else {
-            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
-        };
-        self.head_for(round, look)
-    }
-
-    /// A look that was chosen: at once, or by a plan that opens what is shut on the way.
-    fn head_for(&mut self, round: &Round, look: Look) -> Result<Choice, WorldError> {
-        let s = &round.situation;
-        self.heading_for = Some((look.from, look.on));
-        if s.can_drive_to(look.from) {
-            return Ok(Choice::Steps(reasons::look(s, look.from, look.on)));
+        let is_asked = policies::is_asked(s);
+        loop {
+            let barred = &self.barred;
+            let is_barred = |look: &Look| barred.contains(&reasons::look(s, look.from, look.on));
+            let policy = match &mut self.chooser.by {
+                By::Policy(policy) if is_asked => policy,
+                _ => return Ok(Choice::Planner),
+            };
+            let Some(look) = policies::next(&mut **policy, s, &is_barred) else {
+                return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+            };
+            let (deed, looks_at_all) = (reasons::look(s, look.from, look.on), policy.looks_at_all());
+            if let Some(choice) = self.head_for(round, deed, look.from, looks_at_all) {
+                return Ok(choice);
+            }
         }
-        let there = format!("(at {})", s.candidates[look.from].symbol);
-        let mut task = words::with_goal(self.setting.domain, &round.problem, &self.goal_now(s), &there)
-            .map_err(WorldError::Domain)?;
-        if self.setting.goal.question {
-            actions::only_looking(&self.setting.domain.config, &mut task);
-        }
-        Ok(Choice::Towards { task: Box::new(task), then: reasons::look_there(s, look.from, look.on) })
     }
 
     /// No plan leads to what was chosen: it is not chosen again.
     pub fn bar(&mut self) {
         self.barred.extend(self.heading_for.take());
+        self.is_unasked = false;
     }
 
     /// Whether the steps are taken whatever they promise: a policy chooses one look at a time and does not say that it will be
     /// enough.
     pub fn takes_steps_unasked(&self) -> bool {
-        self.heading_for.is_some()
+        self.is_unasked
     }
 
     /// A plan was made.

@@ -8,7 +8,7 @@ pub mod searching;
 pub mod shapes;
 pub mod surveying;
 
-use descry_planner::{Answer, Call, CallError, Plan, Read, Step};
+use descry_planner::{Answer, Call, CallError, Read};
 use descry_robots::Part;
 use descry_skills::{Outcome, Skill, SkillFailure};
 
@@ -41,7 +41,7 @@ pub struct Ability {
     pub needs: &'static [Part],
     /// What it prepares when a run begins, if anything.
     pub begins: Option<Begins>,
-    /// Steps that are surely no waste when no plan is found, where it has some of its own.
+    /// What is surely no waste when no plan is found, where it has something of its own.
     pub fallback: Option<Fallback>,
     /// What it answers in the end, where it has an answer of its own.
     pub answers: Option<Answers>,
@@ -102,6 +102,8 @@ pub struct Meaning {
     pub name: &'static str,
     /// The facts that its answer depends on besides its arguments.
     pub reads: &'static [Reads],
+    /// Whether it says what is worth doing, not what can be done.
+    pub is_advice: bool,
     /// What it says, in a line.
     pub about: &'static str,
     /// The answer.
@@ -146,8 +148,44 @@ pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
-/// Steps that are surely no waste; none if nothing that can be done promises anything.
-pub type Fallback = fn(&Situation) -> Option<Plan>;
+/// What is surely no waste: alternatives, the best first. Each is a deed, with the drive to it where one is needed.
+pub type Fallback = fn(&Situation) -> Vec<Vec<Deed>>;
+
+/// A skill with its arguments, for an action of the domain to do.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Deed {
+    /// Name of the skill.
+    pub skill: &'static str,
+    /// Its arguments, in its own order.
+    pub arguments: Vec<String>,
+}
+
+impl Deed {
+    /// A skill on some objects.
+    pub(crate) fn new(skill: &'static str, arguments: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        Self { skill, arguments: arguments.into_iter().map(Into::into).collect() }
+    }
+
+    /// The drive to a candidate, and a deed there.
+    pub(crate) fn after_drive(self, s: &Situation, to: usize) -> Vec<Deed> {
+        let symbol = |n: usize| s.candidates[n].symbol.as_str();
+        let drive = (to != s.at).then(|| Deed::new(moving::MOVE, [symbol(s.at), symbol(to)]));
+        drive.into_iter().chain([self]).collect()
+    }
+}
+
+/// Values in the order of a rating, the greatest first; of equals the later first.
+pub(crate) fn best_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
+    all.reverse();
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.into_iter().map(|(_, value)| value).collect()
+}
+
+/// Values in the order of what they take, the least first; of equals the earlier first.
+pub(crate) fn quickest_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    all.into_iter().map(|(_, value)| value).collect()
+}
 
 /// Answers in the end, by the situation of the last round; none where searching answers.
 pub type Answers = fn(&Goal, &Mind, &Situation, &Ended) -> Option<Conclusion>;
@@ -187,25 +225,6 @@ pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
 /// The skill of a name.
 pub fn skill(uses: &[String], name: &str) -> Option<&'static SkillWord> {
     used(uses).flat_map(|a| a.skills).find(|s| s.name == name)
-}
-
-/// Between the end of a step and the begin of the next, seconds.
-const GAP_S: f64 = 0.001;
-
-/// A plan of steps: action, arguments, and how long it takes, seconds.
-pub(crate) fn one_after_another(all: &[(&str, Vec<String>, f64)]) -> Plan {
-    let mut start_s = 0.0;
-    let step = |(action, arguments, duration_s): &(&str, Vec<String>, f64)| {
-        let begins_s = start_s;
-        start_s += duration_s + GAP_S;
-        Step {
-            start_s: Some(begins_s),
-            action: (*action).into(),
-            arguments: arguments.clone(),
-            duration_s: *duration_s,
-        }
-    };
-    Plan { steps: all.iter().map(step).collect(), ..Plan::default() }
 }
 
 /// The `n`-th argument of a call, by name.

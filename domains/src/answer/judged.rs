@@ -66,8 +66,19 @@ impl Asker<'_> {
     fn why_open(&self, on: usize) -> Option<String> {
         let there = Thing { on: Some(vec![on]), ..Thing::default() };
         let looks = self.mind.regions[on].taken;
-        let unseen = (looks == 0).then(|| format!("the {} was not looked at", self.s.surfaces[on].name));
+        let closed = self.closed().map(|closed| format!(", {closed}")).unwrap_or_default();
+        let unseen = (looks == 0).then(|| format!("the {} was not looked at{closed}", self.s.surfaces[on].name));
         unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(self.s, &there))
+    }
+
+    /// That a door is shut, which stays so where it is only asked; none if none is in the way.
+    pub(super) fn closed(&self) -> Option<String> {
+        let s = self.s;
+        let shut: Vec<&str> = s.shut.iter().map(|&door| s.doors[door].door.name.as_str()).collect();
+        let is_behind = |&n: &usize| !s.can_drive_to(n) && s.can_reach(n);
+        let is_closed = self.goal.question && (0..s.candidates.len()).any(|n| is_behind(&n));
+        let are = if shut.len() == 1 { "is" } else { "are" };
+        is_closed.then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
     }
 
     /// That no look tells of a word, and nothing else has.

@@ -2,8 +2,9 @@
 
 use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
 use crate::abilities;
-use crate::abilities::searching::{policies, reasons};
-use crate::judge::Judge;
+use crate::abilities::searching::policies::{self, Look};
+use crate::abilities::searching::reasons;
+use crate::judge::{Judge, Judgement};
 
 impl World<'_> {
     /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
@@ -12,10 +13,14 @@ impl World<'_> {
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
     pub fn fallback(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
-        self.heading_for = None;
+        (self.heading_for, self.is_unasked) = (None, false);
+        if self.is_beyond_looks(round) {
+            return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+        }
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
-        match own.map_or_else(|| reasons::one_look(s), |fallback| fallback(s)) {
-            Some(plan) => Ok(Choice::Steps(plan)),
+        let all = own.map_or_else(|| reasons::look_deeds(s), |fallback| fallback(s));
+        match self.first_of(round, &all) {
+            Some(choice) => Ok(choice),
             None => self.behind(round),
         }
     }
@@ -23,15 +28,34 @@ impl World<'_> {
     /// A look behind what is shut.
     fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
-        let look = policies::behind(s, &self.barred).filter(|_| s.held.is_none());
-        look.map_or_else(|| Ok(Choice::Nothing(NOTHING_LEFT.into())), |look| self.head_for(round, look))
+        loop {
+            let barred = &self.barred;
+            let is_barred = |look: &Look| barred.contains(&reasons::look(s, look.from, look.on));
+            let Some(look) = policies::behind(s, &is_barred).filter(|_| s.held.is_none()) else {
+                return Ok(Choice::Nothing(NOTHING_LEFT.into()));
+            };
+            let deed = reasons::look(s, look.from, look.on);
+            if let Some(choice) = self.head_for(round, deed, look.from, false) {
+                return Ok(choice);
+            }
+        }
+    }
+
+    fn judgement(&self, round: &Round) -> Option<Judgement> {
+        let (domain, words) = (self.setting.domain, &self.mind.words);
+        let judge = Judge::new(domain, words, &round.situation, &round.task, &round.attachments);
+        judge.map(|judge| judge.goal())
     }
 
     /// Whether looks may decide whether the goal holds.
     fn is_open_to_looks(&self, round: &Round) -> bool {
-        let (domain, words) = (self.setting.domain, &self.mind.words);
-        let judge = Judge::new(domain, words, &round.situation, &round.task, &round.attachments);
-        judge.is_some_and(|judge| judge.goal().is_open_to_looks())
+        self.judgement(round).is_some_and(|judged| judged.is_open_to_looks())
+    }
+
+    /// Whether the goal is a question that a word decides, or leaves open, of which no look tells.
+    pub(super) fn is_beyond_looks(&self, round: &Round) -> bool {
+        let of_no_look = |judged: Judgement| judged.word.is_some_and(|word| !word.is_seen);
+        self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
     }
 
     /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, or else one behind what is shut,
@@ -41,12 +65,12 @@ impl World<'_> {
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
     pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
-        self.heading_for = None;
+        (self.heading_for, self.is_unasked) = (None, false);
         if s.held.is_some() || !self.is_open_to_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
-        match reasons::one_look(s) {
-            Some(plan) => Ok(Choice::Steps(plan)),
+        match self.first_of(round, &reasons::look_deeds(s)) {
+            Some(choice) => Ok(choice),
             None => self.behind(round),
         }
     }
@@ -58,11 +82,11 @@ impl World<'_> {
     /// Never: it is chosen as [`World::fallback`] is.
     pub fn in_time(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
-        self.heading_for = None;
+        (self.heading_for, self.is_unasked) = (None, false);
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
         let is_asked = self.setting.goal.question && self.is_open_to_looks(round);
         let may_look = (s.time_left_s.is_some() || is_asked) && s.held.is_none() && is_searching;
-        let look = reasons::one_look(s).filter(|_| may_look);
-        Ok(look.map_or_else(|| Choice::Nothing(NOTHING_LEFT.into()), Choice::Steps))
+        let looks = if may_look { reasons::look_deeds(s) } else { Vec::new() };
+        Ok(self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into())))
     }
 }

@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
-use descry_planner::{Answer, Call, CallError, Plan, Step};
+use descry_planner::{Answer, Call, CallError};
 use descry_robots::{Description, Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
-use super::{Ability, ActionKind, Fact, Meaning, SkillWord, argument};
+use super::{Ability, ActionKind, Deed, Fact, Meaning, SkillWord, argument, quickest_first};
 use crate::abilities::searching::change::Change;
 use crate::abilities::searching::perceive::{self, Eyes};
 use crate::abilities::searching::reasons;
@@ -27,8 +27,8 @@ const SLIPPED_M: f64 = 0.15;
 const ASTRAY: f64 = 2.0;
 const FROM_M: f64 = 1.2;
 
-/// What putting down takes, as in the domain, seconds.
-const PUT_DOWN_S: f64 = 10.0;
+/// The skill that puts down what is in the hand.
+const PUT_DOWN: &str = "put-down";
 
 /// See the module.
 pub const ABILITY: Ability = Ability {
@@ -42,12 +42,14 @@ pub const ABILITY: Ability = Ability {
         Meaning {
             name: "can-grasp",
             reads: &[],
+            is_advice: false,
             about: "whether the hand reaches the thing from there and is wide enough for it",
             answers: can_grasp,
         },
         Meaning {
             name: "can-put",
             reads: &[],
+            is_advice: false,
             about: "whether the hand reaches a place on the surface from there that is free as far as is known",
             answers: can_put,
         },
@@ -70,7 +72,7 @@ pub const ABILITY: Ability = Ability {
             failed: pick_up_failed,
         },
         SkillWord {
-            name: "put-down",
+            name: PUT_DOWN,
             kind: ActionKind::Changing,
             types: &["pose", "thing", "surface"],
             about: "puts what is in the hand down where there is room on the surface",
@@ -93,19 +95,17 @@ pub const ABILITY: Ability = Ability {
 };
 
 /// The look that tells most a second; with something in the hand, it is put down first, where that takes least.
-fn fallback(s: &Situation) -> Option<Plan> {
-    let Some(track) = held(s) else { return reasons::one_look(s) };
-    let thing = s.things.iter().find(|thing| is_held(s, thing, track))?;
+fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
+    let Some(track) = held(s) else { return reasons::look_deeds(s) };
+    let Some(thing) = s.things.iter().find(|thing| is_held(s, thing, track)) else { return Vec::new() };
     let poses = (0..s.candidates.len()).filter(|&from| s.can_drive_to(from));
     let spots = poses.flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
     let free = spots.filter(|&(from, on)| spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some());
-    let nearest =
-        |a: &(usize, usize), b: &(usize, usize)| s.travel_s(s.at, a.0).total_cmp(&s.travel_s(s.at, b.0));
-    let (from, on) = free.min_by(nearest)?;
-    let arguments =
-        vec![s.candidates[from].symbol.clone(), thing.symbol.clone(), s.surfaces[on].symbol.clone()];
-    let step = Step { start_s: Some(0.0), action: "put-down".into(), arguments, duration_s: PUT_DOWN_S };
-    Some(reasons::from_there(s, from, Plan { steps: vec![step], ..Plan::default() }))
+    let deed = |(from, on): (usize, usize)| {
+        let (from_symbol, on) = (&s.candidates[from].symbol, &s.surfaces[on].symbol);
+        Deed::new(PUT_DOWN, [from_symbol, &thing.symbol, on]).after_drive(s, from)
+    };
+    quickest_first(free.map(|spot| (s.travel_s(s.at, spot.0), deed(spot))).collect())
 }
 
 /// `(holding ?thing)`.

@@ -2,25 +2,21 @@
 
 use std::collections::BTreeSet;
 
-use descry_planner::{Answer, Call, CallError, Plan};
+use descry_planner::{Answer, Call, CallError};
 
 use super::news::{DIRECTIONS, Fate, Novelty};
 use crate::abilities::searching::reasons;
-use crate::abilities::{Meaning, Reads, argument, one_after_another};
+use crate::abilities::{Deed, Meaning, Reads, argument, quickest_first};
 use crate::situation::{Situation, holding};
 
 /// Every call.
 pub(super) const ALL: &[Meaning] = &[Meaning {
     name: "expected-sides",
     reads: &[Reads::all("faced")],
+    is_advice: false,
     about: "share of the directions around it that a look from there would show beyond those before it",
     answers: expected_sides,
 }];
-
-/// What a visit, a look and a model take, as in the domain, seconds.
-const PATROL_S: f64 = 2.0;
-const FACE_S: f64 = 1.5;
-const MODEL_S: f64 = 1.0;
 
 fn expected_sides(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, what) = (argument(call, 0)?, argument(call, 1)?);
@@ -52,29 +48,26 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
 }
 
 /// The quickest of the visits and looks that promise anything; a look that searches where none is asked for.
-pub(super) fn fallback(s: &Situation) -> Option<Plan> {
-    let symbol = |n: usize| s.candidates[n].symbol.clone();
-    let visits = s.news.places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), "patrol", None));
+pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
+    let visits = s.news.places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), None));
     let open = s.news.novelties.iter().filter(|n| n.fate == Fate::Open);
-    let looks = open.flat_map(|n| n.open_stands(s).map(move |pose| (pose.clone(), "face", Some(n))));
-    let promising = looks.filter(|(pose, _, n)| n.is_some_and(|n| gain(s, n, pose, &[]) > 0.0));
-    let reached = visits.chain(promising).filter_map(|(pose, what, of)| {
+    let looks = open.flat_map(|n| n.open_stands(s).map(move |pose| (pose.clone(), Some(n))));
+    let promising = looks.filter(|(pose, n)| n.is_some_and(|n| gain(s, n, pose, &[]) > 0.0));
+    let reached = visits.chain(promising).filter_map(|(pose, of)| {
         let to = s.candidate(&pose).ok().filter(|to| s.can_drive_to(*to))?;
         let way_s = if to == s.at { 0.0 } else { s.travel_s(s.at, to) };
-        Some((way_s, to, what, of.map(|n| n.symbol.clone())))
-    });
-    let nearest = reached.min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((way_s, to, what, of)) = nearest else {
-        let ready = s.news.novelties.iter().find(|n| n.fate == Fate::Open);
-        return match ready {
-            Some(n) => Some(one_after_another(&[("model", vec![n.symbol.clone()], MODEL_S)])),
-            None => reasons::one_look(s),
+        let deed = match of {
+            Some(novelty) => Deed::new("face", [&pose, &novelty.symbol]),
+            None => Deed::new("patrol", [&pose]),
         };
-    };
-    let takes_s = if of.is_some() { FACE_S } else { PATROL_S };
-    let both = [
-        ("move", vec![symbol(s.at), symbol(to)], way_s),
-        (what, std::iter::once(symbol(to)).chain(of).collect(), takes_s),
-    ];
-    Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
+        Some((way_s, deed.after_drive(s, to)))
+    });
+    let nearest = quickest_first(reached.collect());
+    if !nearest.is_empty() {
+        return nearest;
+    }
+    match s.news.novelties.iter().find(|n| n.fate == Fate::Open) {
+        Some(ready) => vec![vec![Deed::new("model", [&ready.symbol])]],
+        None => reasons::look_deeds(s),
+    }
 }

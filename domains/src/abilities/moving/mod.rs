@@ -14,6 +14,9 @@ use crate::note::Note;
 use crate::situation::Situation;
 use crate::world::WorldError;
 
+/// The skill that drives from one pose to another.
+pub(crate) const MOVE: &str = "move";
+
 /// See the module.
 pub const ABILITY: Ability = Ability {
     name: "moving",
@@ -45,12 +48,13 @@ pub const ABILITY: Ability = Ability {
     calls: &[Meaning {
         name: "path-cost",
         reads: &[Reads::all("shut")],
+        is_advice: false,
         about: "seconds that the drive takes past shut doors; infinite where no route leads",
         answers: path_cost::answer,
     }],
     skills: &[
         SkillWord {
-            name: "move",
+            name: MOVE,
             kind: ActionKind::Moving,
             types: &["pose", "pose"],
             about: "drives from one pose to the other",

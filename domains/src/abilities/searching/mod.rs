@@ -30,6 +30,9 @@ use crate::situation::Situation;
 use crate::world::WorldError;
 use perceive::Eyes;
 
+/// The skill that looks at a surface.
+pub(crate) const OBSERVE: &str = "observe";
+
 /// See the module.
 pub const ABILITY: Ability = Ability {
     name: "searching",
@@ -38,7 +41,7 @@ pub const ABILITY: Ability = Ability {
     calls: calls::ALL,
     skills: &[
         SkillWord {
-            name: "observe",
+            name: OBSERVE,
             kind: ActionKind::Sensing,
             types: &["pose", "surface"],
             about: "turns to the surface, takes a view, believes what all its views show",

@@ -4,7 +4,9 @@ use descry_memory::belief::Track;
 use descry_perception::nalgebra::{self, Point3, Vector3};
 use descry_planner::{Plan, Step};
 
+use super::OBSERVE;
 use super::doubt::{Doubt, Taken};
+use crate::abilities::{Deed, best_first};
 use crate::lexicon::plural;
 use crate::situation::{KnownSurface, Situation, Thing};
 
@@ -13,8 +15,8 @@ pub const WORTH_SAYING: f64 = 0.01;
 /// What a look takes, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// The single look that settles most a second; none if no look settles what matters in the time that is left.
-pub fn one_look(s: &Situation) -> Option<Plan> {
+/// Looks that settle what matters in the time that is left, by how much they settle a second, the most first.
+pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
     let is_open = |&of: &usize| s.completeness(of) < s.wanted_of(of);
     let kinds: Vec<&Doubt> = (0..s.kinds.len()).filter(is_open).map(|of| s.doubt_of(of)).collect();
@@ -30,25 +32,17 @@ pub fn one_look(s: &Situation) -> Option<Plan> {
     };
     let rated = open.map(|look| (look, settles(look)));
     let worth = rated.filter(|(_, settles)| *settles >= s.thresholds.remaining);
-    let rate = |(look, settles): &((usize, usize), f64)| settles / takes_s(look.0);
-    let ((from, on), _) = worth.max_by(|a, b| rate(a).total_cmp(&rate(b)))?;
-    Some(look(s, from, on))
+    best_first(worth.map(|(look, settles)| (settles / takes_s(look.0), look)).collect())
 }
 
-/// A look as a plan in the words of *searching*: a drive if one is needed, then the look.
-pub fn look(s: &Situation, from: usize, on: usize) -> Plan {
-    from_there(s, from, look_there(s, from, on))
+/// The same as deeds.
+pub(crate) fn look_deeds(s: &Situation) -> Vec<Vec<Deed>> {
+    looks(s).into_iter().map(|(from, on)| look(s, from, on).after_drive(s, from)).collect()
 }
 
-/// A plan of the body that stands at a candidate, after the drive there if one is needed.
-pub fn from_there(s: &Situation, from: usize, then: Plan) -> Plan {
-    if from == s.at {
-        return then;
-    }
-    let arguments = [s.at, from].map(|n| s.candidates[n].symbol.clone()).to_vec();
-    let drive =
-        Step { start_s: Some(0.0), action: "move".into(), arguments, duration_s: s.travel_s(s.at, from) };
-    one_then(Plan { steps: vec![drive], ..Plan::default() }, then)
+/// A look from a candidate at a surface.
+pub(crate) fn look(s: &Situation, from: usize, on: usize) -> Deed {
+    Deed::new(OBSERVE, [s.candidates[from].symbol.as_str(), s.surfaces[on].symbol.as_str()])
 }
 
 /// A plan and then another, whose steps begin when those of the first have ended.
@@ -57,13 +51,6 @@ pub fn one_then(mut first: Plan, second: Plan) -> Plan {
     let later = |step: Step| Step { start_s: step.start_s.map(|start_s| start_s + ends_s), ..step };
     first.steps.extend(second.steps.into_iter().map(later));
     Plan { cost: None, ..first }
-}
-
-/// A look as a plan of the body that stands where it is taken from.
-pub fn look_there(s: &Situation, from: usize, on: usize) -> Plan {
-    let arguments = vec![s.candidates[from].symbol.clone(), s.surfaces[on].symbol.clone()];
-    let look = Step { start_s: Some(0.0), action: "observe".into(), arguments, duration_s: LOOK_S };
-    Plan { steps: vec![look], ..Plan::default() }
 }
 
 /// What a look is expected to settle.

@@ -1,10 +1,11 @@
 //! The calls that *shapes* answers: what a scan from a pose is expected to bring, and what it costs to get there.
 
-use descry_planner::{Answer, Call, CallError, Plan};
+use descry_planner::{Answer, Call, CallError};
 
 use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
 use super::poses;
-use crate::abilities::{Meaning, Reads, argument, one_after_another};
+use crate::abilities::moving::MOVE;
+use crate::abilities::{Deed, Meaning, Reads, argument, quickest_first};
 use crate::situation::{Situation, holding};
 
 const SCANS: &[Reads] = &[Reads::all("scanned")];
@@ -14,31 +15,42 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "circle-cost",
         reads: &[],
+        is_advice: false,
         about: "seconds that the drive around it takes; infinite where no way leads",
         answers: circle_cost,
     },
-    Meaning { name: "can-scan", reads: &[], about: "whether a scan from there shows it", answers: can_scan },
+    Meaning {
+        name: "can-scan",
+        reads: &[],
+        is_advice: false,
+        about: "whether a scan from there shows it",
+        answers: can_scan,
+    },
     Meaning {
         name: "expected-tightening",
         reads: SCANS,
+        is_advice: false,
         about: "by how much a scan would lessen how far it may reach beyond what was met",
         answers: expected_tightening,
     },
     Meaning {
         name: "expected-sureness",
         reads: SCANS,
+        is_advice: false,
         about: "by how much surer one may be what it is once its scans are aligned",
         answers: expected_sureness,
     },
     Meaning {
         name: "expected-found",
         reads: SCANS,
+        is_advice: false,
         about: "by how much surer one may be that it has that shape once its scans are aligned",
         answers: expected_found,
     },
     Meaning {
         name: "expected-discovery",
         reads: &[],
+        is_advice: false,
         about: "whether a sweep from there passes over floor on which something of that shape may stand",
         answers: expected_discovery,
     },
@@ -126,10 +138,10 @@ fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 const WORTH_M: f64 = 0.001;
 
 /// The quickest of the single scans and alignments that promise anything for what is asked.
-pub(super) fn fallback(s: &Situation) -> Option<Plan> {
+pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     // What nobody has learned is known by no scan.
     if s.floor.sought.as_ref().is_some_and(|shape| !s.floor.knows(shape)) {
-        return None;
+        return Vec::new();
     }
     let is_open = |t: &&Thing| match &s.floor.sought {
         Some(shape) => t.may_have(shape, s.floor.known.len(), s.threshold),
@@ -137,7 +149,7 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
     };
     let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();
     if let Some(thing) = open.iter().find(|t| t.outline.is_some() && t.taken_for.is_none()) {
-        return Some(one_after_another(&[("align", vec![thing.symbol.clone()], ALIGN_S)]));
+        return vec![vec![Deed::new("align", [&thing.symbol])]];
     }
     let pose = |n: usize| s.candidates[n].symbol.clone();
     let here = pose(s.at);
@@ -153,22 +165,16 @@ pub(super) fn fallback(s: &Situation) -> Option<Plan> {
         let is_around = s.floor.things.iter().any(|t| t.ring.contains(p));
         (!is_around && untried(p) && s.can_drive_to(to)).then(|| (s.travel_s(s.at, to), to, None))
     });
-    let (way_s, to, thing) = scans.chain(surveys).min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let drive = match thing {
-        Some(t) => ("circle", vec![here, pose(to), t.symbol.clone()], way_s),
-        None => ("move", vec![here, pose(to)], way_s),
+    let deeds = |(way_s, to, thing): (f64, usize, Option<&Thing>)| {
+        let there = pose(to);
+        let all = match thing {
+            Some(t) => [Deed::new("circle", [&here, &there, &t.symbol]), Deed::new("scan", [&there, &t.symbol])],
+            None => [Deed::new(MOVE, [&here, &there]), Deed::new("survey", [&there])],
+        };
+        (way_s, all.into_iter().skip(usize::from(to == s.at)).collect())
     };
-    let sweep = match thing {
-        Some(t) => ("scan", vec![pose(to), t.symbol.clone()], SWEEP_S),
-        None => ("survey", vec![pose(to)], SWEEP_S),
-    };
-    let both = [drive, sweep];
-    Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
+    quickest_first(scans.chain(surveys).map(deeds).collect())
 }
-
-/// What a sweep and an alignment take, as in the domain.
-const SWEEP_S: f64 = 0.5;
-const ALIGN_S: f64 = 0.1;
 
 /// Why a scan is taken from there.
 pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {

@@ -1,11 +1,12 @@
 //! The calls that *surveying* answers, and what is done where the planner finds no plan.
 
 use descry_perception::mapping::Unseen;
-use descry_planner::{Answer, Call, CallError, Plan};
+use descry_planner::{Answer, Call, CallError};
 
+use super::CHART;
 use super::chart::{LOOK_S, NOTHING_SEEN_M2};
 use crate::abilities::searching::reasons;
-use crate::abilities::{Meaning, Reads, argument, one_after_another};
+use crate::abilities::{Deed, Meaning, Reads, argument, best_first};
 use crate::situation::{Situation, holding};
 
 /// Every call.
@@ -13,18 +14,21 @@ pub(super) const ALL: &[Meaning] = &[
     Meaning {
         name: "expected-view",
         reads: &[Reads::all("charted")],
+        is_advice: false,
         about: "unknown floor that a look from there is expected to show beyond those before it, square metres",
         answers: expected_view,
     },
     Meaning {
         name: "expected-discovery",
         reads: &[Reads::all("charted")],
+        is_advice: false,
         about: "by how much it would raise the confidence in a thing if that stood on what is not known yet",
         answers: expected_discovery,
     },
     Meaning {
         name: "expected-discoveries",
         reads: &[Reads::all("charted")],
+        is_advice: false,
         about: "by how much it would raise the certainty of having found all of a kind if more stood on what is not known yet",
         answers: expected_discoveries,
     },
@@ -77,15 +81,12 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
 }
 
 /// The look that shows most of the unknown floor for its time, if any does; else one at a surface.
-pub(super) fn fallback(s: &Situation) -> Option<Plan> {
+pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let rate = |(symbol, look): &(String, descry_perception::mapping::Outlook)| {
         let to = s.candidate(symbol).ok().filter(|to| s.can_drive_to(*to))?;
         let way_s = if to == s.at { 0.0 } else { s.travel_s(s.at, to) };
-        Some((Unseen::default().gain_m2(look) / (way_s + LOOK_S), to, way_s))
+        Some((Unseen::default().gain_m2(look) / (way_s + LOOK_S), Deed::new(CHART, [symbol]).after_drive(s, to)))
     };
-    let best = s.chart.open.iter().filter_map(rate).max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, to, way_s)) = best else { return reasons::one_look(s) };
-    let symbol = |n: usize| s.candidates[n].symbol.clone();
-    let both = [("move", vec![symbol(s.at), symbol(to)], way_s), ("chart", vec![symbol(to)], LOOK_S)];
-    Some(one_after_another(if to == s.at { &both[1..] } else { &both }))
+    let all = best_first(s.chart.open.iter().filter_map(rate).collect());
+    if all.is_empty() { reasons::look_deeds(s) } else { all }
 }

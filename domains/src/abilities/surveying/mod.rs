@@ -28,6 +28,9 @@ use crate::world::WorldError;
 /// A look that maps goes to a place so far ahead and so high, metres: the floor begins near the body, and walls are seen up to the height of a man.
 const AHEAD_M: (f64, f64) = (3.0, 0.35);
 
+/// The skill that takes a look into the map.
+const CHART: &str = "chart";
+
 /// See the module.
 pub const ABILITY: Ability = Ability {
     name: "surveying",
@@ -35,7 +38,7 @@ pub const ABILITY: Ability = Ability {
     facts: facts::ALL,
     calls: calls::ALL,
     skills: &[SkillWord {
-        name: "chart",
+        name: CHART,
         kind: ActionKind::Sensing,
         types: &["pose"],
         about: "looks straight ahead, and takes what it sees into the map",

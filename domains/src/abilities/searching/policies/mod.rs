@@ -163,23 +163,22 @@ pub fn is_asked(s: &Situation) -> bool {
     s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
 }
 
-/// The next look of a policy, but for those that cannot be got to, candidate and surface; none if it gives up.
+/// The next look of a policy, but for those that cannot be taken; none if it gives up.
 pub fn next(
     policy: &mut dyn Policy,
     situation: &Situation,
-    barred: &BTreeSet<(usize, usize)>,
+    is_barred: &dyn Fn(&Look) -> bool,
 ) -> Option<Look> {
     let all = policy.looks_at_all();
-    let is_offered = |look: &Look| (all || look.gain > 0.0) && !barred.contains(&(look.from, look.on));
+    let is_offered = |look: &Look| (all || look.gain > 0.0) && !is_barred(look);
     let looks: Vec<Look> = open(situation).into_iter().filter(is_offered).collect();
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
 }
 
 /// The look that is expected to settle most a second of those to which the body cannot drive before it has opened something; none if
 /// there is none that is not barred.
-pub fn behind(situation: &Situation, barred: &BTreeSet<(usize, usize)>) -> Option<Look> {
-    let is_behind =
-        |look: &Look| !situation.can_drive_to(look.from) && !barred.contains(&(look.from, look.on));
+pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Option<Look> {
+    let is_behind = |look: &Look| !situation.can_drive_to(look.from) && !is_barred(look);
     let looks: Vec<Look> =
         open(situation).into_iter().filter(|look| look.gain > 0.0 && is_behind(look)).collect();
     gain_per_second::GainPerSecond.choose(situation, &looks)

@@ -1,0 +1,167 @@
+//! Steps that do not come from the planner: the domain's own actions that do what is wanted, where the domain lets them.
+
+use descry_planner::semantics::Binding;
+use descry_planner::task::{Action, Comparison, Condition, Quantified, Scoped, Slot, When};
+use descry_planner::{Plan, Semantics, Step, Task, after};
+
+use super::{Choice, Round, World};
+use crate::abilities::{self, Deed};
+use crate::actions::{self, Performer};
+
+/// Between the end of a step and the begin of the next, seconds.
+const GAP_S: f64 = 0.001;
+/// Bindings of parameters that no deed names which are tried at most.
+const BINDINGS: usize = 64;
+
+impl World<'_> {
+    /// A look that a policy has chosen: at once, or by a plan that opens, unlocks or charges what it must on the way. None where no
+    /// action can take it: it is not chosen again.
+    pub(super) fn head_for(
+        &mut self,
+        round: &Round,
+        deed: Deed,
+        from: usize,
+        is_unadvised: bool,
+    ) -> Option<Choice> {
+        let s = &round.situation;
+        let direct = s.can_drive_to(from).then(|| deed.clone().after_drive(s, from));
+        let plan = direct.and_then(|deeds| self.directly(round, &deeds, is_unadvised));
+        let choice =
+            plan.map(Choice::Steps).or_else(|| self.towards(round, std::slice::from_ref(&deed), is_unadvised));
+        match choice {
+            Some(_) => (self.heading_for, self.is_unasked) = (Some(deed), true),
+            None => self.barred.extend([deed]),
+        }
+        choice
+    }
+
+    /// The first of several alternatives that can be done at once.
+    pub(super) fn first_of(&self, round: &Round, all: &[Vec<Deed>]) -> Option<Choice> {
+        all.iter().find_map(|deeds| self.directly(round, deeds, false)).map(Choice::Steps)
+    }
+
+    /// The deeds as steps of the domain's own actions whose conditions hold, one after the other; none where there are no such actions.
+    /// `is_unadvised` where what a call says to be worth it does not matter.
+    pub(super) fn directly(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Plan> {
+        let freed = is_unadvised.then(|| self.without_advice(&round.task));
+        let task = freed.as_ref().unwrap_or(&round.task);
+        let semantics = Semantics::new(task, &round.attachments);
+        let state = semantics.initial().ok()?;
+        let duration_s = |action: &str, arguments: &[String]| -> Option<f64> {
+            let step = Step { start_s: None, action: action.into(), arguments: arguments.to_vec(), duration_s: 0.0 };
+            let (id, binding) = semantics.bind(&step).ok()?;
+            let Some(bounds) = &task.action(id).duration else { return Some(0.0) };
+            let exact = bounds.iter().find(|b| b.comparison == Comparison::Equal && b.when == When::Start);
+            let least = bounds.iter().find(|b| b.comparison == Comparison::GreaterOrEqual && b.when == When::Start);
+            let seconds = semantics.number(&state, &exact.or(least)?.value, &binding).ok()??;
+            Some(seconds).filter(|s| s.is_finite())
+        };
+        let ways = deeds.iter().map(|deed| self.calls(task, deed)).collect::<Vec<_>>();
+        let mut plans = vec![Plan::default()];
+        for calls in &ways {
+            let mut longer = Vec::new();
+            for plan in &plans {
+                for (action, arguments) in calls {
+                    let Some(takes_s) = duration_s(action, arguments) else { continue };
+                    let start_s = plan.makespan_s().map_or(0.0, |ends_s| ends_s + GAP_S);
+                    let mut plan = plan.clone();
+                    plan.steps.push(Step {
+                        start_s: Some(start_s),
+                        action: action.clone(),
+                        arguments: arguments.clone(),
+                        duration_s: takes_s,
+                    });
+                    if longer.len() < BINDINGS && after(task, &round.attachments, &plan, &[]).is_ok() {
+                        longer.push(plan);
+                    }
+                }
+            }
+            plans = longer;
+        }
+        plans.into_iter().next()
+    }
+
+    /// A plan towards where the first action that does the last deed may be taken, and that action.
+    pub(super) fn towards(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Choice> {
+        let freed = is_unadvised.then(|| self.without_advice(&round.task));
+        let mut task = freed.unwrap_or_else(|| round.task.clone());
+        let (name, arguments) = self.calls(&task, deeds.last()?).into_iter().next()?;
+        let semantics = Semantics::new(&task, &round.attachments);
+        let step = Step { start_s: Some(0.0), action: name, arguments, duration_s: 0.0 };
+        let (id, binding) = semantics.bind(&step).ok()?;
+        let state = semantics.initial().ok()?;
+        let action = task.action(id);
+        let bound = action.duration.iter().flatten().find(|b| b.when == When::Start);
+        let duration_s = bound.and_then(|b| semantics.number(&state, &b.value, &binding).ok().flatten());
+        let goal = startable(action, &binding);
+        task.goal = goal;
+        let step = Step { duration_s: duration_s.unwrap_or(0.0), ..step };
+        Some(Choice::Towards {
+            task: Box::new(task),
+            then: Plan { steps: vec![step], ..Plan::default() },
+        })
+    }
+
+    /// The domain's own actions that do a deed, with all their arguments, those first that do nothing else.
+    fn calls(&self, task: &Task, deed: &Deed) -> Vec<(String, Vec<String>)> {
+        let known = |action: &Performer| task.actions.iter().find(|a| a.name == action.action);
+        let performers = actions::performers(self.setting.domain, deed);
+        let of = |performer: Performer| {
+            let action = known(&performer);
+            action.map(|action| bindings(task, action, &performer)).unwrap_or_default()
+        };
+        performers.into_iter().flat_map(of).collect()
+    }
+
+    /// A task in whose actions no call advises what is worth it.
+    fn without_advice(&self, task: &Task) -> Task {
+        let config = &self.setting.domain.config;
+        let advises = |name: &str| {
+            let mut calls = abilities::used(&config.uses).flat_map(|ability| ability.calls);
+            calls.any(|call| call.name == name && call.is_advice && !config.attachments.contains_key(name))
+        };
+        let mut freed = task.clone();
+        for action in &mut freed.actions {
+            let condition = std::mem::take(&mut action.condition.start);
+            action.condition.start = without(condition, &|module| advises(&task.module(module).name));
+        }
+        freed
+    }
+}
+
+/// A condition without the calls of some modules.
+fn without(own: Condition, is_gone: &dyn Fn(descry_planner::task::ModuleId) -> bool) -> Condition {
+    match own {
+        Condition::And(parts) => {
+            Condition::And(parts.into_iter().map(|part| without(part, is_gone)).collect())
+        }
+        Condition::Call(call) if is_gone(call.module) => Condition::TRUE,
+        other => other,
+    }
+}
+
+/// That an action may be taken with some arguments.
+fn startable(action: &Action, binding: &Binding) -> Scoped<Condition> {
+    let bound = (0..).zip(&action.parameters).zip(&binding.objects).map(|((slot, parameter), object)| {
+        let parameter = descry_planner::task::Parameter { objects: [*object].into(), ..parameter.clone() };
+        Quantified { slot: Slot(slot), parameter }
+    });
+    let body = Condition::Exists(bound.collect(), Box::new(action.condition.start.clone()));
+    Scoped { slots: action.slots, body }
+}
+
+/// The ways to call an action: what a deed leaves open is any object that fits.
+fn bindings(task: &Task, action: &Action, performer: &Performer) -> Vec<(String, Vec<String>)> {
+    let mut all: Vec<Vec<String>> = vec![Vec::new()];
+    for (parameter, given) in action.parameters.iter().zip(&performer.arguments) {
+        let values: Vec<String> = match given {
+            Some(value) => vec![value.clone()],
+            None => parameter.objects.iter().map(|id| task.object(*id).name.clone()).collect(),
+        };
+        let extended = all.iter().flat_map(|before| {
+            values.iter().map(move |value| before.iter().chain([value]).cloned().collect::<Vec<_>>())
+        });
+        all = extended.take(BINDINGS).collect();
+    }
+    all.into_iter().map(|arguments| (action.name.clone(), arguments)).collect()
+}

@@ -172,7 +172,7 @@ impl<'a> Agent<'a> {
                 let reason = Reason { is_late: round.situation.time_left_s.is_some(), ..reason };
                 match self.take_up(world, round, &reason, asked_of(&statistics), World::in_time)? {
                     Taken::Up => {}
-                    _ => return Ok(Some(Ended::NoPlan(why.reasons()))),
+                    _ => return Ok(Some(Ended::NoPlan(world.reasons(round, why.reasons())))),
                 }
             }
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, &reason)?,

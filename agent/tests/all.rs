@@ -4,4 +4,5 @@
 mod own_body;
 
 mod example;
+mod goals;
 mod unit;

@@ -21,6 +21,7 @@ mod page;
 mod programs;
 mod readme;
 mod record;
+mod renamed;
 mod serve;
 mod shapes;
 mod signals;

@@ -399,3 +399,30 @@ fn a_run_with_programs_is_lived_through_again_without_them() {
     let rung = std::fs::read_to_string(folder.path().join("own/rung.txt")).expect("it rang");
     assert_eq!(rung.lines().count(), 1, "the program is not run again");
 }
+
+#[test]
+fn a_number_that_forbids_every_drive_is_the_reason() {
+    let charge = |init: &'static str| {
+        vec![
+            replace("domain.pddl", "(:functions", "(:functions (charge)"),
+            replace(
+                "domain.pddl",
+                "(at start (not (= ?from ?to)))",
+                "(at start (not (= ?from ?to))) (at start (>= (charge) [path-cost ?from ?to]))",
+            ),
+            replace("domain.pddl", "(at end (at ?to))", "(at end (at ?to)) (at end (assign (charge) 100))"),
+            replace("domain.toml", "scene = \"default\"", init),
+            append(
+                "domain.toml",
+                "[[goal]]\nsay = \"look from there\"\nmeans = \"(observed table-3 table)\"",
+            ),
+        ]
+    };
+    let never = ["it was asked for"];
+    let low = charge("init = [\"(= (charge) 0.1)\"]\nscene = \"default\"");
+    let words = ["no drive can be taken: (charge) is 0.10, and at least"];
+    check(&low, "look from there", 1, &words, &never);
+    // So where it has no value at all, which the check of the domain finds, too.
+    let unset = charge("scene = \"default\"");
+    check(&unset, "look from there", 1, &["no drive can be taken: (charge) has no value"], &never);
+}

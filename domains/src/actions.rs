@@ -106,7 +106,8 @@ pub struct Performer {
 
 /// The actions that do a deed, those first that do nothing else. What changes the world does no deed that leaves it as it is.
 pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
-    let own = abilities::skill(&domain.config.uses, deed.skill).map_or(ActionKind::Changing, |skill| skill.kind);
+    let own =
+        abilities::skill(&domain.config.uses, deed.skill).map_or(ActionKind::Changing, |skill| skill.kind);
     let mut found: Vec<(usize, Performer)> = Vec::new();
     for action in &domain.vocabulary.task.actions {
         if kind(&domain.config, &action.name) > own.max(ActionKind::Moving) {
@@ -115,10 +116,23 @@ pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
         let parameters: Vec<String> = action.parameters.iter().map(|p| p.name.clone()).collect();
         let texts = texts(&domain.config, &action.name, &parameters);
         let performer = texts.iter().find_map(|text| unified(text, deed, &parameters));
-        found.extend(performer.map(|arguments| (texts.len(), Performer { action: action.name.clone(), arguments })));
+        found.extend(
+            performer.map(|arguments| (texts.len(), Performer { action: action.name.clone(), arguments })),
+        );
     }
     found.sort_by_key(|(steps, _)| *steps > 1);
     found.into_iter().map(|(_, performer)| performer).collect()
+}
+
+/// Whether an action of the domain does a skill.
+pub(crate) fn does(domain: &Domain, skill: &str) -> bool {
+    let is_it = |text: &String| text.split_whitespace().next() == Some(skill);
+    domain
+        .vocabulary
+        .task
+        .actions
+        .iter()
+        .any(|action| texts(&domain.config, &action.name, &[]).iter().any(is_it))
 }
 
 /// The skills of an action as texts; none where a program carries it out.

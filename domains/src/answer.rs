@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use descry_memory::belief::Track;
 use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
+use descry_perception::recognise::ObjectModel;
 use descry_planner::{Attachments, FactValue, NoPlan, Plan, Task, after};
 use descry_robots::Part;
 use serde::{Deserialize, Serialize};
@@ -16,14 +17,15 @@ use crate::abilities::searching::adrift;
 use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::config::Answers;
+use crate::culprit;
 use crate::goal::Goal;
+use crate::judge::{Judgement, Truth};
 use crate::lexicon::{Lexicon, one, plural, symbol};
 use crate::load::Domain;
-use crate::judge::{Judgement, Truth};
 use crate::mind::Mind;
 use crate::no_plan;
 use crate::saying::Saying;
-use crate::situation::{Situation, Thing};
+use crate::situation::{Situation, Thing, is_alike};
 use crate::world::Round;
 
 /// Why a run ended.
@@ -182,8 +184,8 @@ impl Asker<'_> {
         if let Some(unknown) = self.nowhere() {
             return (Verdict::CannotTell, unknown);
         }
-        let Judgement { truth, word } = self.judgement();
-        match truth {
+        let Judgement { value, word } = self.judgement();
+        match value {
             Truth::True => {}
             Truth::Unknown => return (Verdict::CannotTell, self.open(word.as_ref())),
             Truth::False if self.goal.question => return (Verdict::NotFound, self.denial(word.as_ref())),
@@ -204,7 +206,7 @@ impl Asker<'_> {
             if members.is_empty() && !is_known {
                 continue;
             }
-            if members.is_empty() && said.is_empty() && s.kinds.len() == 1 {
+            if members.is_empty() && said.is_empty() && s.kinds.len() == 1 && !self.goal.question {
                 return self.none_of(kind);
             }
             said.push(match members.len() {
@@ -225,7 +227,8 @@ impl Asker<'_> {
             said.push(self.identified(on));
         }
         if said.is_empty() || self.goal.asked.more || self.goal.asked.denies {
-            said.insert(0, format!("it holds that {}", self.saying.say(&self.goal.pddl)));
+            let source = word.filter(|word| !word.is_seen).map_or("", |word| self.source(&word));
+            said.insert(0, format!("it holds that {}{source}", self.saying.say(&self.goal.pddl)));
         }
         (Verdict::Achieved, said.join("; "))
     }
@@ -285,7 +288,13 @@ impl Asker<'_> {
     /// No plan is left: what is known of what was asked for, and what keeps one from saying more.
     fn gave_up(&self, planner_says: &str, is_proven: bool) -> (Verdict, String) {
         let s = self.s;
-        let says = if planner_says.is_empty() { String::new() } else { format!(": {planner_says}") };
+        let culprit = culprit::of_drives(self.domain, self.round);
+        let culprit =
+            culprit.map(|c| format!("no drive can be taken: {}", culprit::told(&c, &|t| self.saying.say(t))));
+        let says = match culprit.as_deref().unwrap_or(planner_says) {
+            "" => String::new(),
+            says => format!(": {says}"),
+        };
         let missing: Vec<usize> =
             self.own().map(|(n, _)| n).filter(|&n| s.confidence(n) < s.threshold).collect();
         // Where looks could still settle what they can, it is something else that cannot be brought about.
@@ -300,22 +309,28 @@ impl Asker<'_> {
         if (is_beyond_looks || is_beyond_the_body) && is_proven {
             return (Verdict::Impossible, self.impossible(&says));
         }
-        let Judgement { truth, word } = self.judgement();
-        if truth == Truth::True {
+        let Judgement { value, word } = self.judgement();
+        if value == Truth::True {
             return self.reached();
-        }
-        if self.goal.question && truth == Truth::False && self.goal.asked.denies {
-            return (Verdict::NotFound, self.denial(word.as_ref()));
         }
         let left = |n: usize| self.nothing_seen(&s.things[n]).or_else(|| reasons::left_about(s, n));
         let open = missing.iter().find_map(|&n| Some((n, left(n)?)));
+        // Where a thing is may be open, and the answer known all the same: where it is asked about it is not.
+        let is_sound = |n: usize| {
+            let thing = &s.things[n];
+            self.nothing_seen(thing).or_else(|| reasons::may_be_none(s, thing)).is_none()
+        };
+        let is_settled = self.goal.asked.denies || open.as_ref().is_some_and(|(n, _)| is_sound(*n));
+        if self.goal.question && value == Truth::False && is_settled {
+            return (Verdict::NotFound, self.denial(word.as_ref()));
+        }
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
-            let closed = self.closed().map(|closed| format!(", {closed}")).unwrap_or_default();
+            let closed = self.closed().or(culprit).map(|closed| format!(", {closed}")).unwrap_or_default();
             let text = format!("it cannot be told whether {} is {asked}, {doubt}{closed}", s.things[n].name);
             return (Verdict::CannotTell, format!("{text}; {}", self.looks()));
         }
-        if let Some(&n) = missing.first().filter(|_| !self.goal.question || truth == Truth::False) {
+        if let Some(&n) = missing.first().filter(|_| !self.goal.question || value == Truth::False) {
             let thing = &s.things[n];
             let elsewhere = self.elsewhere(thing).map(|w| format!(", it {w}")).unwrap_or_default();
             let asked = self.where_asked(thing);
@@ -416,9 +431,17 @@ impl Asker<'_> {
 
     fn stands(&self, thing: &Thing) -> String {
         match self.best(thing) {
-            Some(track) => self.standing(track),
+            Some(track) => format!("{}{}", self.standing(track), self.or_other(thing)),
             None => "has not been seen".into(),
         }
+    }
+
+    /// That it may be another known object, where no look tells the two apart; empty where looks do.
+    fn or_other(&self, thing: &Thing) -> String {
+        let [model] = thing.models.as_slice() else { return String::new() };
+        let mut others = self.domain.objects.iter().filter(|o| o.name != model.name && is_alike(o, model));
+        let told = |other: &ObjectModel| format!(", or it is {}: no look tells the two apart", other.name);
+        others.next().map(told).unwrap_or_default()
     }
 
     fn standing(&self, track: &Track) -> String {

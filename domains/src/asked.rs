@@ -46,7 +46,9 @@ const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
 pub fn parsed(condition: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Task, String> {
     let vocabulary = &domain.vocabulary;
     let types = &vocabulary.task.types;
-    let named = types.iter().flat_map(|of| lexicon.of_type(&of.name).iter().map(move |n| (n.symbol.as_str(), of.name.as_str())));
+    let named = types
+        .iter()
+        .flat_map(|of| lexicon.of_type(&of.name).iter().map(move |n| (n.symbol.as_str(), of.name.as_str())));
     let mut objects: Vec<(&str, &str)> = named.collect();
     let mentioned: Vec<(Vec<String>, Vec<String>)> = mentions(condition)
         .into_iter()
@@ -61,7 +63,8 @@ pub fn parsed(condition: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Tas
     }
     let objects = declared::lines(objects, vocabulary).0.join(" ");
     let name = &vocabulary.task.domain;
-    let problem = format!("(define (problem asked) (:domain {name}) (:objects {objects}) (:init) (:goal {condition}))");
+    let problem =
+        format!("(define (problem asked) (:domain {name}) (:objects {objects}) (:init) (:goal {condition}))");
     Task::read(&domain.pddl, &Source::new("condition", problem)).map_err(|found| found.render(false))
 }
 
@@ -255,7 +258,9 @@ impl<'t> Visit<'t> {
         let Condition::Atom(atom) = atom else { return None };
         let arguments = self.arguments(&atom.arguments, scope);
         match (self.task.predicate(atom.predicate).name.as_str(), arguments.as_slice()) {
-            (IN, [variable @ Argument::Variable(_), Argument::Name(room)]) => Some((variable.clone(), room.clone())),
+            (IN, [variable @ Argument::Variable(_), Argument::Name(room)]) => {
+                Some((variable.clone(), room.clone()))
+            }
             _ => None,
         }
     }
@@ -279,8 +284,11 @@ impl<'t> Visit<'t> {
         let of = |wanted: &'static str| -> Vec<String> {
             of_type(wanted).filter(|a| !is_variable(a)).map(text).collect()
         };
-        let rooms: Vec<String> =
-            within.iter().filter(|(v, _)| word.name != IN && arguments.contains(v)).map(|(_, room)| room.clone()).collect();
+        let rooms: Vec<String> = within
+            .iter()
+            .filter(|(v, _)| word.name != IN && arguments.contains(v))
+            .map(|(_, room)| room.clone())
+            .collect();
         let anywhere = rooms.is_empty() && of_type("surface").any(is_variable);
         let (things, kinds, named, asked_rooms) = (of("thing"), of("kind"), of("surface"), of("room"));
         let is_of_all = OF_OBJECTS.contains(&word.name.as_str()) && of_type("thing").any(is_variable);

@@ -50,7 +50,7 @@ impl Truth {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
     /// Whether it holds.
-    pub truth: Truth,
+    pub value: Truth,
     /// The word; none where a condition of no words decides.
     pub word: Option<Decisive>,
 }
@@ -79,13 +79,13 @@ impl Decisive {
 }
 
 impl Judgement {
-    fn of(truth: Truth) -> Judgement {
-        Judgement { truth, word: None }
+    fn of(value: Truth) -> Judgement {
+        Judgement { value, word: None }
     }
 
     /// Whether looks may decide it.
     pub fn is_open_to_looks(&self) -> bool {
-        self.truth == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
+        self.value == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
     }
 }
 
@@ -142,8 +142,8 @@ impl<'a> Judge<'a> {
                 all(Truth::True, parts.iter().map(|part| self.condition(part, scope, open)))
             }
             Condition::Not(inner) => {
-                let Judgement { truth, word } = self.condition(inner, scope, open);
-                Judgement { truth: truth.not(), word }
+                let Judgement { value, word } = self.condition(inner, scope, open);
+                Judgement { value: value.not(), word }
             }
             Condition::Forall(variables, inner) => self.each(Truth::False, variables, inner, scope, open),
             Condition::Exists(variables, inner) => self.each(Truth::True, variables, inner, scope, open),
@@ -178,7 +178,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Judges a condition for each object of some variables; `decides` is the truth that one of them suffices for.
+    /// Judges a condition for each object of some variables; `decides` is the value for which one of them suffices.
     fn each(
         &self,
         decides: Truth,
@@ -234,22 +234,22 @@ impl<'a> Judge<'a> {
         }
         let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
         let holds = objects.is_some_and(|objects| self.state.holds(predicate, &objects));
-        let (truth, is_seen) = match self.bounds(&declared.name) {
+        let (value, is_seen) = match self.bounds(&declared.name) {
             Some(bounds) => {
                 let range = self.range(bounds, arguments);
-                let truth = match range {
+                let value = match range {
                     Range { least, .. } if least >= 1.0 => Truth::True,
                     Range { greatest, .. } if greatest <= 0.0 => Truth::False,
                     _ => Truth::Unknown,
                 };
-                (truth, true)
+                (value, true)
             }
             None if holds => (Truth::True, false),
             None if self.is_known(&declared.name, arguments) => (Truth::False, false),
             None => (Truth::Unknown, false),
         };
         let word = self.decisive(&declared.name, arguments, (false, is_seen, holds));
-        Judgement { truth, word: Some(word) }
+        Judgement { value, word: Some(word) }
     }
 
     /// A derived word holds where one of its rules does.
@@ -259,7 +259,8 @@ impl<'a> Judge<'a> {
         arguments: &[Held<'a>],
         open: &mut Vec<(PredicateId, Vec<String>)>,
     ) -> Judgement {
-        let key = (predicate, arguments.iter().map(|held| format!("{:?}", self.shown(held))).collect::<Vec<_>>());
+        let key =
+            (predicate, arguments.iter().map(|held| format!("{:?}", self.shown(held))).collect::<Vec<_>>());
         // What rests on itself alone does not hold.
         if open.contains(&key) {
             return Judgement::of(Truth::False);
@@ -295,7 +296,7 @@ impl<'a> Judge<'a> {
             _ => range.least,
         };
         let (believed_left, believed_right) = (plain(&sides[0], left), plain(&sides[1], right));
-        let truth = match comparison {
+        let value = match comparison {
             Comparison::GreaterOrEqual if believed_left >= right.greatest => Truth::True,
             Comparison::GreaterOrEqual if left.greatest < right.least => Truth::False,
             Comparison::Greater if believed_left > right.greatest => Truth::True,
@@ -304,7 +305,9 @@ impl<'a> Judge<'a> {
             Comparison::LessOrEqual if left.least > right.greatest => Truth::False,
             Comparison::Less if left.greatest < believed_right => Truth::True,
             Comparison::Less if left.least >= right.greatest => Truth::False,
-            Comparison::Equal if left.is_exact() && right.is_exact() && left.least == right.least => Truth::True,
+            Comparison::Equal if left.is_exact() && right.is_exact() && left.least == right.least => {
+                Truth::True
+            }
             Comparison::Equal if left.greatest < right.least || left.least > right.greatest => Truth::False,
             _ => Truth::Unknown,
         };
@@ -316,7 +319,7 @@ impl<'a> Judge<'a> {
             (false, true) => Ordering::Greater,
             _ => Ordering::Equal,
         });
-        Judgement { truth, word: words.into_iter().next() }
+        Judgement { value, word: words.into_iter().next() }
     }
 
     fn expression(&self, own: &Expression, scope: &[Bound<'a>], words: &mut Vec<Decisive>) -> Range {
@@ -340,9 +343,9 @@ impl<'a> Judge<'a> {
                 }
             }
             Expression::Call(_) => {
-                let value = self.binding(scope).and_then(|binding| {
-                    self.semantics.number(&self.state, own, &binding).ok().flatten()
-                });
+                let value = self
+                    .binding(scope)
+                    .and_then(|binding| self.semantics.number(&self.state, own, &binding).ok().flatten());
                 value.map_or(Range::UNDEFINED, Range::exactly)
             }
             Expression::Duration | Expression::TotalTime | Expression::Violated(_) => Range::UNDEFINED,
@@ -458,13 +461,13 @@ pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
 fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
     let mut left: Option<Judgement> = None;
     for part in parts {
-        if part.truth == decides {
+        if part.value == decides {
             return part;
         }
         let is_better = match &left {
             None => true,
-            Some(left) if left.truth == Truth::Unknown => part.is_open_to_looks() && !left.is_open_to_looks(),
-            Some(_) => part.truth == Truth::Unknown,
+            Some(left) if left.value == Truth::Unknown => part.is_open_to_looks() && !left.is_open_to_looks(),
+            Some(_) => part.value == Truth::Unknown,
         };
         left = if is_better { Some(part) } else { left };
     }

@@ -7,6 +7,8 @@ pub mod asked;
 pub mod check;
 pub mod config;
 #[doc(hidden)]
+#[doc(hidden)]
+pub mod culprit;
 pub mod declared;
 pub mod function;
 pub mod goal;

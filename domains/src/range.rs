@@ -64,7 +64,12 @@ impl Range {
 
     /// A function of two values that is monotonic in each: the extremes of its corners.
     pub fn combined(self, other: Range, function: impl Fn(f64, f64) -> f64) -> Range {
-        let corners = [(self.least, other.least), (self.least, other.greatest), (self.greatest, other.least), (self.greatest, other.greatest)];
+        let corners = [
+            (self.least, other.least),
+            (self.least, other.greatest),
+            (self.greatest, other.least),
+            (self.greatest, other.greatest),
+        ];
         let values = corners.map(|(a, b)| function(a, b));
         if values.iter().any(|value| value.is_nan()) {
             return Range::UNDEFINED;

@@ -595,6 +595,17 @@ fn find<'a>(
     symbols.position(|s| s == name).ok_or_else(|| CallError::Failed(format!("`{name}` is not {expected}")))
 }
 
+/// Whether two known objects have one shape and size: only their names tell them apart.
+pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
+    let named = ObjectModel {
+        name: one.name.clone(),
+        kind: one.kind.clone(),
+        phrases: one.phrases.clone(),
+        ..other.clone()
+    };
+    named == *one
+}
+
 /// A thing that a goal asks for, from the models of the domain: one of the known objects, or a kind of them.
 pub fn thing(domain: &Domain, wanted: &str) -> Thing {
     let single = domain.objects.iter().find(|o| symbol(&o.name) == wanted);

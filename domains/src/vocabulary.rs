@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use descry_planner::task::{Action, Assignment, Change, Task, TypeId, Written};
+use descry_planner::task::{
+    Action, Assignment, Change, Condition, Expression, Fluent, Task, TypeId, Written,
+};
 use descry_planner::{Findings, Source, Span};
 
 use crate::abilities::{self, Fact};
@@ -157,11 +159,19 @@ impl Vocabulary {
     /// The actions whose effects change a word, by name.
     pub fn changers(&self, word: &str) -> Vec<&str> {
         let changes = |action: &Action| {
-            let rates = action.continuous.iter().any(|rate| self.task.function(rate.fluent.function).name == *word);
+            let rates =
+                action.continuous.iter().any(|rate| self.task.function(rate.fluent.function).name == *word);
             let effects = action.effects.start.iter().chain(&action.effects.end);
-            rates || effects.flat_map(|effect| changed_by(&self.task, &effect.change)).any(|name| name == word)
+            rates
+                || effects.flat_map(|effect| changed_by(&self.task, &effect.change)).any(|name| name == word)
         };
         self.task.actions.iter().filter(|action| changes(action)).map(|action| action.name.as_str()).collect()
+    }
+
+    /// Whether an action can be taken only where a number compares as it should.
+    pub fn is_compared(&self, word: &str) -> bool {
+        let is_it = |fluent: &Fluent| self.task.function(fluent.function).name == *word;
+        self.task.actions.iter().any(|action| compares(&action.condition.start, &is_it))
     }
 
     /// Whether an action's effects give a word a value whatever it had before.
@@ -182,6 +192,30 @@ fn domain_name(text: &str) -> String {
         lower.split(|c: char| c.is_whitespace() || c == '(' || c == ')').filter(|t| !t.is_empty());
     let found = tokens.by_ref().find(|t| t.eq_ignore_ascii_case("domain")).and_then(|_| tokens.next());
     found.unwrap_or("domain").to_string()
+}
+
+/// Whether a condition compares a number.
+fn compares(condition: &Condition, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| compares(part, is_it)),
+        Condition::Not(inner) | Condition::Forall(_, inner) | Condition::Exists(_, inner) => {
+            compares(inner, is_it)
+        }
+        Condition::Compare(_, sides, _) => sides.iter().any(|side| reads(side, is_it)),
+        Condition::Atom(_) | Condition::Same(..) | Condition::Call(_) => false,
+    }
+}
+
+fn reads(expression: &Expression, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
+    match expression {
+        Expression::Fluent(fluent) => is_it(fluent),
+        Expression::Add(parts) | Expression::Multiply(parts) => parts.iter().any(|part| reads(part, is_it)),
+        Expression::Subtract(sides) | Expression::Divide(sides) => {
+            sides.iter().any(|side| reads(side, is_it))
+        }
+        Expression::Negative(inner) => reads(inner, is_it),
+        _ => false,
+    }
 }
 
 /// The words that such effects of actions change.

@@ -15,7 +15,7 @@ pub struct Words {
     held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
     /// Words of which `init` says something.
     begun: BTreeSet<String>,
-    /// Instances that were given a value, or that it does not hold.
+    /// Instances that this run has given a value, or said not to hold.
     told: BTreeSet<(String, Vec<String>)>,
 }
 
@@ -50,6 +50,7 @@ impl Words {
                 }
             }
         }
+        words.told.clear();
         Ok(words)
     }
 
@@ -84,7 +85,7 @@ impl Words {
         self.begun.contains(name)
     }
 
-    /// Whether `init`, an action or a failure of this run has said whether an atom holds.
+    /// Whether an action, a look or a failure of this run has said whether an atom holds.
     pub fn is_told(&self, name: &str, arguments: &[String]) -> bool {
         self.told.contains(&(name.to_string(), arguments.to_vec()))
     }

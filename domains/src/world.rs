@@ -18,7 +18,6 @@ use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::json;
 
-use crate::abilities::{self, Deed};
 use crate::abilities::learning::news::News;
 use crate::abilities::searching::candidates;
 use crate::abilities::searching::perceive::{self, Eyes};
@@ -26,6 +25,7 @@ pub use crate::abilities::searching::policies::Chooser;
 use crate::abilities::searching::policies::{self, By, Look};
 use crate::abilities::searching::reasons;
 use crate::abilities::surveying::chart::Chart;
+use crate::abilities::{self, Deed};
 use crate::actions::{self, Carried, Grounded};
 use crate::declared;
 use crate::goal::Goal;

@@ -1,4 +1,4 @@
-//! Answers that follow from the three-valued truth of the goal: what is open and why, and what speaks against it.
+//! Answers that follow from the three-valued judgement of the goal: what is open and why, and what speaks against it.
 
 use descry_memory::belief::Track;
 
@@ -14,7 +14,7 @@ impl Asker<'_> {
     pub(super) fn judgement(&self) -> Judgement {
         let round = self.round;
         let judge = Judge::new(self.domain, &self.mind.words, self.s, &round.task, &round.attachments);
-        judge.map_or(Judgement { truth: Truth::Unknown, word: None }, |judge| judge.goal())
+        judge.map_or(Judgement { value: Truth::Unknown, word: None }, |judge| judge.goal())
     }
 
     /// Why it cannot be told whether the goal holds.
@@ -67,7 +67,8 @@ impl Asker<'_> {
         let there = Thing { on: Some(vec![on]), ..Thing::default() };
         let looks = self.mind.regions[on].taken;
         let closed = self.closed().map(|closed| format!(", {closed}")).unwrap_or_default();
-        let unseen = (looks == 0).then(|| format!("the {} was not looked at{closed}", self.s.surfaces[on].name));
+        let unseen =
+            (looks == 0).then(|| format!("the {} was not looked at{closed}", self.s.surfaces[on].name));
         unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(self.s, &there))
     }
 
@@ -78,7 +79,8 @@ impl Asker<'_> {
         let is_behind = |&n: &usize| !s.can_drive_to(n) && s.can_reach(n);
         let is_closed = self.goal.question && (0..s.candidates.len()).any(|n| is_behind(&n));
         let are = if shut.len() == 1 { "is" } else { "are" };
-        is_closed.then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
+        is_closed
+            .then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
     }
 
     /// That no look tells of a word, and nothing else has.
@@ -101,7 +103,8 @@ impl Asker<'_> {
     fn kind_of(&self, word: &Decisive) -> Option<usize> {
         // A thing and a kind may have one name: the word says which is meant.
         let types = self.domain.vocabulary.word(&word.word)?.types;
-        let mut named = word.objects.iter().zip(&types).filter(|(_, of)| self.domain.vocabulary.is_a(of, "kind"));
+        let mut named =
+            word.objects.iter().zip(&types).filter(|(_, of)| self.domain.vocabulary.is_a(of, "kind"));
         named.find_map(|(name, _)| self.s.kind(name.as_ref()?).ok())
     }
 
@@ -122,7 +125,7 @@ impl Asker<'_> {
             (false, true) => self.saying.say(&pddl),
             (false, false) => self.saying.deny(&pddl),
         };
-        format!("{denied}: {fact}{}", self.source(&word.word))
+        format!("{denied}: {fact}{}", self.source(word))
     }
 
     /// What a number is.
@@ -130,15 +133,20 @@ impl Asker<'_> {
         let objects: Vec<&str> = word.objects.iter().flatten().map(String::as_str).collect();
         let atom = [&[word.word.as_str()], objects.as_slice()].concat().join(" ");
         let pddl = format!("({atom})");
-        format!(": {} is {}{}", self.saying.say(&pddl), self.value(&atom), self.source(&word.word))
+        format!(": {} is {}{}", self.saying.say(&pddl), self.value(&atom), self.source(word))
     }
 
-    /// Who says what a word is where no look does; empty where that is the body, or a program.
-    fn source(&self, name: &str) -> &'static str {
+    /// Who says what a word is where no look does; empty where that is the body, a program, or what was done in this run.
+    pub(super) fn source(&self, decisive: &Decisive) -> &'static str {
+        let name = &decisive.word;
         let Some(word) = self.domain.vocabulary.word(name) else { return "" };
+        let objects: Vec<String> = decisive.objects.iter().flatten().cloned().collect();
+        let words = &self.mind.words;
         match self.domain.vocabulary.ground(&word, &self.domain.config) {
             Ground::Fixed => ", as the domain says",
-            Ground::Remembered if self.mind.words.is_spoken_of(name) => ", as the domain says in the beginning",
+            Ground::Remembered if words.is_spoken_of(name) && !words.is_told(name, &objects) => {
+                ", as the domain says in the beginning"
+            }
             _ => "",
         }
     }
@@ -170,11 +178,15 @@ impl Asker<'_> {
 
     /// Answer to a question of which nothing that can be done tells more.
     pub(super) fn to_question(&self) -> (Verdict, String) {
-        let Judgement { truth, word } = self.judgement();
-        match truth {
+        let Judgement { value, word } = self.judgement();
+        match value {
             Truth::True => self.reached(),
-            Truth::False => (Verdict::NotFound, self.no_of_kinds().unwrap_or_else(|| self.denial(word.as_ref()))),
-            Truth::Unknown => (Verdict::CannotTell, self.another().unwrap_or_else(|| self.open(word.as_ref()))),
+            Truth::False => {
+                (Verdict::NotFound, self.no_of_kinds().unwrap_or_else(|| self.denial(word.as_ref())))
+            }
+            Truth::Unknown => {
+                (Verdict::CannotTell, self.another().unwrap_or_else(|| self.open(word.as_ref())))
+            }
         }
     }
 

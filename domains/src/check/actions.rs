@@ -57,7 +57,12 @@ impl Check<'_> {
         if config.kind.is_some() && config.program.is_none() {
             let message = format!("`{name}` is carried out by a skill, whose effect on the world is known");
             let place = self.toml.at(&["action", name, "kind"]);
-            return vec![self.error("kind-of-skill", message, place, "leave `kind` out: programs alone have one")];
+            return vec![self.error(
+                "kind-of-skill",
+                message,
+                place,
+                "leave `kind` out: programs alone have one",
+            )];
         }
         if let Some(program) = &config.program {
             let both = (!texts.is_empty()).then(|| {

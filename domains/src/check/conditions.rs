@@ -3,8 +3,8 @@
 use descry_planner::{Diagnostic, Severity, Source};
 
 use super::Check;
-use crate::mentions::mentions;
 use crate::declared;
+use crate::mentions::mentions;
 
 impl Check<'_> {
     /// What is wrong with what plans are to make small.

@@ -3,9 +3,9 @@
 use descry_planner::{Diagnostic, Span};
 
 use super::Check;
-use crate::mentions::mentions;
 use crate::config::GoalPhrase;
 use crate::goal::{CONFIDENCE, DEADLINE, pattern, slots_of, type_of_slot};
+use crate::mentions::mentions;
 
 impl Check<'_> {
     /// What nobody would hear of the `n`-th phrase.

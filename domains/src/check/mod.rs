@@ -4,6 +4,7 @@
 mod actions;
 mod conditions;
 mod heard;
+mod looks;
 mod phrases;
 #[doc(hidden)]
 pub mod place;
@@ -40,8 +41,11 @@ pub fn findings(domain: &Domain) -> Findings {
     list.extend(check.minimise());
     list.extend(check.phrases());
     list.extend(check.scenes());
-    let sources = [domain.pddl.clone(), domain.toml.clone()].into_iter().chain(scenes::scenes(domain));
-    Findings { sources: sources.collect(), list }
+    let mut sources = vec![domain.pddl.clone(), domain.toml.clone()];
+    sources.extend(scenes::scenes(domain));
+    list.extend(check.alike(sources.len()));
+    sources.extend(looks::objects(domain));
+    Findings { sources, list }
 }
 
 /// How each word, call and action of a domain is grounded, a line each.

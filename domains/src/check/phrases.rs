@@ -5,10 +5,10 @@ use descry_planner::Diagnostic;
 use super::Check;
 use crate::abilities::{self, learning};
 use crate::answer::CHANGES;
-use crate::mentions::mentions;
 use crate::config::GoalPhrase;
 use crate::goal::{Filled, put_in, slots_of, type_of_slot};
 use crate::lexicon::SENSE;
+use crate::mentions::mentions;
 
 impl Check<'_> {
     /// Every phrase.
@@ -58,6 +58,9 @@ impl Check<'_> {
         match put_in(&means, &filled, |f| f.symbol.clone()) {
             Ok(goal) => list.extend(self.condition(&["goal", n, "means"], &goal, &objects)),
             Err(because) => list.push(self.slots(&["goal", n, "means"], because)),
+        }
+        if list.is_empty() {
+            list.extend(self.untellable(n, phrase, &filled));
         }
         let answers = [
             ("achieved", &phrase.answer.achieved),

@@ -41,6 +41,7 @@ impl Check<'_> {
                 Ground::Fixed | Ground::Remembered | Ground::Planned if self.stays_undefined(&word) => {
                     list.push(never_defined(&word));
                 }
+                Ground::Remembered if self.is_compared_unset(&word) => list.push(not_begun(&word)),
                 Ground::Fixed if !self.begins(&word) => {
                     let name = &word.name;
                     let message =
@@ -137,7 +138,13 @@ impl Check<'_> {
         word.is_number && !is_cost && !self.begins(word) && !self.domain.vocabulary.is_given(&word.name)
     }
 
-    fn begins(&self, word: &Word) -> bool {
+    /// Whether a number without a value in the beginning is compared before an action may be taken.
+    fn is_compared_unset(&self, word: &Word) -> bool {
+        let vocabulary = &self.domain.vocabulary;
+        word.is_number && !self.begins(word) && vocabulary.is_compared(&word.name)
+    }
+
+    pub(super) fn begins(&self, word: &Word) -> bool {
         let lines = self.domain.config.init.iter().filter_map(|line| words::read(line).ok());
         lines.flatten().any(|(name, ..)| name == word.name)
     }
@@ -246,6 +253,16 @@ impl Check<'_> {
         }
         list
     }
+}
+
+/// That a number is compared before anything has given it a value.
+fn not_begun(word: &Word) -> Diagnostic {
+    let name = &word.name;
+    let arguments = if word.types.is_empty() { "" } else { " …" };
+    let message =
+        format!("`{name}` has no value in the beginning, and actions need one before they can be taken");
+    let help = format!("say what it is at first: init = [\"(= ({name}{arguments}) 0)\"]");
+    Diagnostic::warning("no-value", message, word.span, "this number").with_help(help)
 }
 
 /// That what reads a number, or adds to it, can never happen.

@@ -1,9 +1,12 @@
 //! What is done where the planner has no plan.
 
+use descry_planner::NoPlan;
+
 use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
 use crate::abilities;
 use crate::abilities::searching::policies::{self, Look};
 use crate::abilities::searching::reasons;
+use crate::culprit;
 use crate::judge::{Judge, Judgement};
 
 impl World<'_> {
@@ -39,6 +42,11 @@ impl World<'_> {
                 return Ok(choice);
             }
         }
+    }
+
+    /// The reasons why there is no plan, the one that forbids every drive first.
+    pub fn reasons(&self, round: &Round, all: Vec<NoPlan>) -> Vec<NoPlan> {
+        culprit::reasons(self.setting.domain, round, all)
     }
 
     fn judgement(&self, round: &Round) -> Option<Judgement> {

@@ -26,8 +26,9 @@ impl World<'_> {
         let s = &round.situation;
         let direct = s.can_drive_to(from).then(|| deed.clone().after_drive(s, from));
         let plan = direct.and_then(|deeds| self.directly(round, &deeds, is_unadvised));
-        let choice =
-            plan.map(Choice::Steps).or_else(|| self.towards(round, std::slice::from_ref(&deed), is_unadvised));
+        let choice = plan
+            .map(Choice::Steps)
+            .or_else(|| self.towards(round, std::slice::from_ref(&deed), is_unadvised));
         match choice {
             Some(_) => (self.heading_for, self.is_unasked) = (Some(deed), true),
             None => self.barred.extend([deed]),
@@ -48,11 +49,13 @@ impl World<'_> {
         let semantics = Semantics::new(task, &round.attachments);
         let state = semantics.initial().ok()?;
         let duration_s = |action: &str, arguments: &[String]| -> Option<f64> {
-            let step = Step { start_s: None, action: action.into(), arguments: arguments.to_vec(), duration_s: 0.0 };
+            let step =
+                Step { start_s: None, action: action.into(), arguments: arguments.to_vec(), duration_s: 0.0 };
             let (id, binding) = semantics.bind(&step).ok()?;
             let Some(bounds) = &task.action(id).duration else { return Some(0.0) };
             let exact = bounds.iter().find(|b| b.comparison == Comparison::Equal && b.when == When::Start);
-            let least = bounds.iter().find(|b| b.comparison == Comparison::GreaterOrEqual && b.when == When::Start);
+            let least =
+                bounds.iter().find(|b| b.comparison == Comparison::GreaterOrEqual && b.when == When::Start);
             let seconds = semantics.number(&state, &exact.or(least)?.value, &binding).ok()??;
             Some(seconds).filter(|s| s.is_finite())
         };
@@ -96,10 +99,7 @@ impl World<'_> {
         let goal = startable(action, &binding);
         task.goal = goal;
         let step = Step { duration_s: duration_s.unwrap_or(0.0), ..step };
-        Some(Choice::Towards {
-            task: Box::new(task),
-            then: Plan { steps: vec![step], ..Plan::default() },
-        })
+        Some(Choice::Towards { task: Box::new(task), then: Plan { steps: vec![step], ..Plan::default() } })
     }
 
     /// The domain's own actions that do a deed, with all their arguments, those first that do nothing else.

@@ -6,7 +6,9 @@ use descry_domains::config::{ActionKind, Config};
 #[test]
 fn an_action_is_of_the_strongest_kind_of_what_it_does() {
     let check = |action: &str, expected: ActionKind| {
-        let text = format!("name = \"d\"\nabout = \"d\"\nuses = [\"searching\", \"carrying\"]\n[action.act]\n{action}");
+        let text = format!(
+            "name = \"d\"\nabout = \"d\"\nuses = [\"searching\", \"carrying\"]\n[action.act]\n{action}"
+        );
         let config: Config = toml::from_str(&text).unwrap_or_else(|e| panic!("{action}: {e}"));
         assert_eq!(kind(&config, "act"), expected, "{action}");
     };

@@ -47,8 +47,13 @@ fn what_is_asked_is_read_off_the_condition() {
 #[test]
 fn what_must_not_be_so_is_told_from_what_must() {
     let mut domain = Domain::load("home").unwrap();
-    let text = domain.pddl.text.replace("(:durative-action move", "(:derived (absent ?w - thing ?o - surface) (not (on ?w ?o)))\n(:durative-action move");
-    let text = text.replace("(:predicates", "(:predicates (absent ?w - thing ?o - surface)").replace(":modules)", ":modules :derived-predicates)");
+    let text = domain.pddl.text.replace(
+        "(:durative-action move",
+        "(:derived (absent ?w - thing ?o - surface) (not (on ?w ?o)))\n(:durative-action move",
+    );
+    let text = text
+        .replace("(:predicates", "(:predicates (absent ?w - thing ?o - surface)")
+        .replace(":modules)", ":modules :derived-predicates)");
     domain.pddl = descry_planner::Source::new("domain.pddl", text);
     domain.vocabulary = Vocabulary::read(&domain.pddl).unwrap_or_else(|e| panic!("{e}"));
     let check = |condition: &str, denies: bool, things: &[(&str, &[&str])], surfaces: &[&str]| {
@@ -76,8 +81,18 @@ fn what_must_not_be_so_is_told_from_what_must() {
     check("(>= (- (presence cup-a desk) 1) 0.9)", false, desk, &[]);
     check("(>= (* (presence cup-a desk) -1) 0.9)", true, desk, &[]);
     check("(not (>= (confidence cup-a) 0.8))", true, anywhere, &[]);
-    check("(not (exists (?s - surface) (and (in ?s study) (on cup-a ?s))))", true, &[("cup-a", &["study"])], &[]);
-    check("(and (>= (completeness cup) 0.9) (forall (?t - thing) (imply (is ?t cup) (on ?t desk))))", true, &[], &[]);
+    check(
+        "(not (exists (?s - surface) (and (in ?s study) (on cup-a ?s))))",
+        true,
+        &[("cup-a", &["study"])],
+        &[],
+    );
+    check(
+        "(and (>= (completeness cup) 0.9) (forall (?t - thing) (imply (is ?t cup) (on ?t desk))))",
+        true,
+        &[],
+        &[],
+    );
     // Of whichever things there are it is asked on the surface, unless a kind says which.
     check("(not (exists (?t - thing) (and (is ?t mug) (on ?t desk))))", true, &[], &[]);
     check("(not (exists (?t - thing) (on ?t desk)))", true, &[], &["desk"]);
@@ -91,8 +106,7 @@ fn a_thing_is_asked_about_in_the_room_that_is_said_beside_it() {
     let domain = Domain::load("home").unwrap();
     let check = |condition: &str, places: &[Option<&[&str]>]| {
         let own = |list: &&[&str]| list.iter().map(|s| s.to_string()).collect::<Vec<_>>();
-        let found: Vec<_> =
-            asked(&domain, condition).things.into_iter().map(|(_, places)| places).collect();
+        let found: Vec<_> = asked(&domain, condition).things.into_iter().map(|(_, places)| places).collect();
         let expected: Vec<_> = places.iter().map(|places| places.as_ref().map(own)).collect();
         assert_eq!(found, expected, "{condition}");
     };

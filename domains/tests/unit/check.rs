@@ -264,3 +264,98 @@ fn faults_of_scenes_and_places_are_found_at_their_place() {
     );
     check("scenes/default.toml", ("[[surface]]", "[[surfaces]]"), "scene", "surfaces]]", &["surfaces"]);
 }
+
+/// Expects findings of these codes, whatever else is found, of the template with texts replaced in its files.
+fn check_codes(edits: &[(&str, &str, &str)], expected: &[&str]) {
+    let mut files = Files::new();
+    for (path, text) in template::files("mine") {
+        let path = path.display().to_string();
+        let own = edits.iter().filter(|(file, ..)| *file == path);
+        let text = own.fold(text, |text, (_, from, to)| {
+            assert!(text.contains(from), "{path} has no {from}");
+            text.replacen(from, to, 1)
+        });
+        files.insert(path.clone(), (path, text));
+    }
+    let domain = from_files(files, None).unwrap_or_else(|e| panic!("{e}"));
+    let found = findings(&domain);
+    let codes: std::collections::BTreeSet<&str> = found.list.iter().map(|d| d.code).collect();
+    assert_eq!(codes.into_iter().collect::<Vec<_>>(), expected, "{edits:?}\n{found}");
+}
+
+#[test]
+fn what_no_look_tells_is_found() {
+    let shine = "(:durative-action shine :parameters (?from - pose) :duration (= ?duration 1)\n  \
+                 :condition (at start (at ?from)) :effect (at end (shiny ?from)))\n  (:durative-action move";
+    let shiny = ("domain.pddl", "(:predicates", "(:predicates (shiny ?p - pose)");
+    let action = ("domain.pddl", "(:durative-action move", shine);
+    let by = |kind: &str| format!("[action.shine]\nprogram = [\"sh\"]\n{kind}\n[action.move]");
+    let asked = |more: &str| {
+        format!(
+            "[[goal]]\nsay = \"is it shiny\"\nmeans = \"(exists (?p - pose) (shiny ?p))\"\nquestion = {more}\n[said]"
+        )
+    };
+    let check = |question: &str, kind: &str, init: &str, expected: &[&str]| {
+        let (by, asked) = (by(kind), asked(question));
+        let init = format!("{init}scene = \"default\"");
+        let edits = [
+            shiny,
+            action,
+            ("domain.toml", "[action.move]", by.as_str()),
+            ("domain.toml", "[said]", asked.as_str()),
+            ("domain.toml", "scene = \"default\"", init.as_str()),
+        ];
+        check_codes(&edits, expected);
+    };
+    check("true", "", "", &["never-told"]);
+    // A task sets it, a program that only looks tells it, and what the domain says in the beginning is known.
+    check("false", "", "", &[]);
+    check("true", "kind = \"sensing\"", "", &[]);
+    check("true", "", "init = [\"(shiny start)\"]\n", &[]);
+}
+
+#[test]
+fn goals_that_need_a_look_find_an_action_that_looks() {
+    let by_program = ("domain.toml", "does = \"observe ?from ?on\"", "program = [\"sh\"]");
+    check_codes(&[by_program], &["no-look"]);
+}
+
+#[test]
+fn numbers_that_are_compared_begin_somewhere() {
+    let charge = ("domain.pddl", "(:functions", "(:functions (charge)");
+    let needs = (
+        "domain.pddl",
+        "(at start (not (= ?from ?to)))",
+        "(at start (not (= ?from ?to))) (at start (>= (charge) 5))",
+    );
+    let gives = ("domain.pddl", "(at end (at ?to))", "(at end (at ?to)) (at end (assign (charge) 100))");
+    check_codes(&[charge, needs, gives], &["no-value"]);
+    check_codes(
+        &[
+            charge,
+            needs,
+            gives,
+            ("domain.toml", "scene = \"default\"", "init = [\"(= (charge) 9)\"]\nscene = \"default\""),
+        ],
+        &[],
+    );
+}
+
+#[test]
+fn objects_that_nothing_tells_apart_are_found() {
+    let mut files: Files = template::files("mine")
+        .into_iter()
+        .map(|(path, text)| (path.display().to_string(), (path.display().to_string(), text)))
+        .collect();
+    let (_, mug) = files.get("objects/mug.toml").expect("the template's mug").clone();
+    let named = |name: &str| {
+        mug.replace("name = \"mug\"", &format!("name = \"{name}\"")).replace("\"coffee mug\"", "")
+    };
+    let other = named("red mug");
+    files.insert("objects/mug.toml".into(), ("objects/mug.toml".into(), named("blue mug")));
+    files.insert("objects/red-mug.toml".into(), ("objects/red-mug.toml".into(), other.clone()));
+    let found = |files: &Files| findings(&from_files(files.clone(), None).unwrap_or_else(|e| panic!("{e}")));
+    let all = found(&files);
+    assert_eq!(all.list.iter().map(|d| d.code).collect::<Vec<_>>(), ["alike"], "{all}");
+    assert!(all.to_string().contains("colour is not looked at"), "{all}");
+}

@@ -35,8 +35,20 @@ pub const ABILITY: Ability = Ability {
     name: "carrying",
     about: "takes one thing into the hand and puts it down elsewhere",
     facts: &[
-        Fact { name: "holding", types: &["thing"], about: "the thing is in the hand", states: holding, bounds: None },
-        Fact { name: "hand-free", types: &[], about: "nothing is in the hand", states: hand_free, bounds: None },
+        Fact {
+            name: "holding",
+            types: &["thing"],
+            about: "the thing is in the hand",
+            states: holding,
+            bounds: None,
+        },
+        Fact {
+            name: "hand-free",
+            types: &[],
+            about: "nothing is in the hand",
+            states: hand_free,
+            bounds: None,
+        },
     ],
     calls: &[
         Meaning {

@@ -7,7 +7,13 @@ use crate::situation::Situation;
 
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[
-    Fact { name: "waypoint", types: &["pose"], about: "a place is visited from there", states: waypoint, bounds: None },
+    Fact {
+        name: "waypoint",
+        types: &["pose"],
+        about: "a place is visited from there",
+        states: waypoint,
+        bounds: None,
+    },
     Fact {
         name: "stand",
         types: &["pose", "novelty"],

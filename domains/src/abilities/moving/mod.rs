@@ -22,7 +22,13 @@ pub const ABILITY: Ability = Ability {
     name: "moving",
     about: "drives on the map, opens doors",
     facts: &[
-        Fact { name: "at", types: &["pose"], about: "where the body stands", states: at::state, bounds: None },
+        Fact {
+            name: "at",
+            types: &["pose"],
+            about: "where the body stands",
+            states: at::state,
+            bounds: None,
+        },
         Fact {
             name: "time-left",
             types: &[],

@@ -168,7 +168,9 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let deeds = |(way_s, to, thing): (f64, usize, Option<&Thing>)| {
         let there = pose(to);
         let all = match thing {
-            Some(t) => [Deed::new("circle", [&here, &there, &t.symbol]), Deed::new("scan", [&there, &t.symbol])],
+            Some(t) => {
+                [Deed::new("circle", [&here, &there, &t.symbol]), Deed::new("scan", [&there, &t.symbol])]
+            }
             None => [Deed::new(MOVE, [&here, &there]), Deed::new("survey", [&there])],
         };
         (way_s, all.into_iter().skip(usize::from(to == s.at)).collect())

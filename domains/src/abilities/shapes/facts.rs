@@ -14,7 +14,13 @@ pub(super) const ALL: &[Fact] = &[
         states: around,
         bounds: None,
     },
-    Fact { name: "on-floor", types: &["pose"], about: "the pose is around nothing", states: on_floor, bounds: None },
+    Fact {
+        name: "on-floor",
+        types: &["pose"],
+        about: "the pose is around nothing",
+        states: on_floor,
+        bounds: None,
+    },
     Fact {
         name: "looseness",
         types: &["spot"],
@@ -36,7 +42,13 @@ pub(super) const ALL: &[Fact] = &[
         states: sureness,
         bounds: None,
     },
-    Fact { name: "may-be", types: &["spot", "shape"], about: "its scans fit that shape", states: may_be, bounds: None },
+    Fact {
+        name: "may-be",
+        types: &["spot", "shape"],
+        about: "its scans fit that shape",
+        states: may_be,
+        bounds: None,
+    },
     Fact {
         name: "found",
         types: &["shape"],
@@ -44,7 +56,13 @@ pub(super) const ALL: &[Fact] = &[
         states: found,
         bounds: None,
     },
-    Fact { name: "learned", types: &["shape"], about: "its shape was learned in this run", states: learned, bounds: None },
+    Fact {
+        name: "learned",
+        types: &["shape"],
+        about: "its shape was learned in this run",
+        states: learned,
+        bounds: None,
+    },
 ];
 
 fn around(s: &Situation) -> Vec<String> {

@@ -85,7 +85,10 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let rate = |(symbol, look): &(String, descry_perception::mapping::Outlook)| {
         let to = s.candidate(symbol).ok().filter(|to| s.can_drive_to(*to))?;
         let way_s = if to == s.at { 0.0 } else { s.travel_s(s.at, to) };
-        Some((Unseen::default().gain_m2(look) / (way_s + LOOK_S), Deed::new(CHART, [symbol]).after_drive(s, to)))
+        Some((
+            Unseen::default().gain_m2(look) / (way_s + LOOK_S),
+            Deed::new(CHART, [symbol]).after_drive(s, to),
+        ))
     };
     let all = best_first(s.chart.open.iter().filter_map(rate).collect());
     if all.is_empty() { reasons::look_deeds(s) } else { all }

@@ -78,7 +78,13 @@ pub(super) const ALL: &[Fact] = &[
         states: completeness_in::state,
         bounds: Some(completeness_in::bounds),
     },
-    Fact { name: "sure", types: &[], about: "the confidence that was asked for", states: sure::state, bounds: None },
+    Fact {
+        name: "sure",
+        types: &[],
+        about: "the confidence that was asked for",
+        states: sure::state,
+        bounds: None,
+    },
     Fact {
         name: "clarity",
         types: &["surface"],

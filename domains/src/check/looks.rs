@@ -1,0 +1,104 @@
+//! What looks can tell: an action that looks where a goal needs one, questions that nothing answers, objects that nothing tells apart.
+
+use descry_planner::{Diagnostic, Source, Span};
+
+use super::Check;
+use crate::abilities::searching::OBSERVE;
+use crate::actions;
+use crate::asked::{Asked, parsed};
+use crate::config::GoalPhrase;
+use crate::goal::{Filled, put_in};
+use crate::judge;
+use crate::load::Domain;
+use crate::situation::is_alike;
+use crate::vocabulary::Ground;
+
+/// The object files as sources of findings.
+pub(super) fn objects(domain: &Domain) -> Vec<Source> {
+    let files = domain.files.iter().filter(|(key, _)| key.starts_with("objects/"));
+    files.map(|(_, (shown, text))| Source::new(shown.clone(), text.clone())).collect()
+}
+
+impl Check<'_> {
+    /// Known objects of one shape and size.
+    pub(super) fn alike(&self, first_source: usize) -> Vec<Diagnostic> {
+        let files = objects(self.domain);
+        let mut list = Vec::new();
+        for (n, one) in self.domain.objects.iter().enumerate() {
+            let Some(other) = self.domain.objects[..n].iter().find(|other| is_alike(other, one)) else {
+                continue;
+            };
+            let message = format!(
+                "nothing tells \"{}\" from \"{}\": shape and size are the same",
+                one.name, other.name
+            );
+            let named = |source: &Source| source.text.find(&format!("\"{}\"", one.name));
+            let place = files.iter().enumerate().find_map(|(at, file)| {
+                let start = named(file)?;
+                let bytes = |at: usize| u32::try_from(at).unwrap_or(u32::MAX);
+                let end = start + one.name.len() + 2;
+                Some(Span { source: bytes(first_source + at), start: bytes(start), end: bytes(end) })
+            });
+            let help = "give it other measures, or leave one of the two out: colour is not looked at";
+            list.push(
+                Diagnostic::warning("alike", message, place.unwrap_or_default(), "here").with_help(help),
+            );
+        }
+        list
+    }
+
+    /// What a phrase asks of looks that nothing can take or tell.
+    pub(super) fn untellable(&self, n: &str, phrase: &GoalPhrase, filled: &[Filled]) -> Vec<Diagnostic> {
+        let means = phrase.means.replace("<threshold>", "0.5");
+        let Ok(goal) = put_in(&means, filled, |f| f.symbol.clone()) else { return Vec::new() };
+        let Ok(task) = parsed(&goal, self.domain, &self.lexicon) else { return Vec::new() };
+        let place = self.toml.at(&["goal", n, "means"]);
+        if !task.preferences.is_empty() || !task.constraints.is_empty() {
+            let message = "nothing tells whether what is only preferred holds".to_string();
+            let help = "say what is to hold, without `preference` and `always`";
+            return vec![self.error("unjudged", message, place, help)];
+        }
+        let asked = Asked::of(&task, &self.domain.vocabulary);
+        self.without_looks(&asked, place).into_iter().chain(self.never_told(phrase, &asked, place)).collect()
+    }
+
+    /// That a goal is about what is seen, and no action looks.
+    fn without_looks(&self, asked: &Asked, place: Span) -> Option<Diagnostic> {
+        let is_seen = !(asked.things.is_empty() && asked.kinds.is_empty() && asked.surfaces.is_empty());
+        let uses = &self.domain.config.uses;
+        let can_look = crate::abilities::skill(uses, OBSERVE).is_some();
+        if !is_seen || !can_look || actions::does(self.domain, OBSERVE) {
+            return None;
+        }
+        let message = format!(
+            "this is about what is seen on surfaces, and no action looks at one: none does `{OBSERVE}`"
+        );
+        let help = format!("say so of one in domain.toml: does = \"{OBSERVE} ?from ?on\"");
+        Some(Diagnostic::warning("no-look", message, place, "here").with_help(help))
+    }
+
+    /// That a question asks about what no look tells and nothing says.
+    fn never_told(&self, phrase: &GoalPhrase, asked: &Asked, place: Span) -> Option<Diagnostic> {
+        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let is_told = |name: &String| {
+            let Some(word) = vocabulary.word(name) else { return true };
+            let is_remembered = matches!(vocabulary.ground(&word, config), Ground::Remembered);
+            let is_taught =
+                config.action.values().any(|action| action.taught().any(|taught| taught == *name));
+            !is_remembered || judge::is_own(self.domain, name) || is_taught || self.begins(&word)
+        };
+        let name = asked
+            .words
+            .iter()
+            .map(|(name, _)| name)
+            .find(|name| !is_told(name))
+            .filter(|_| phrase.question)?;
+        let message = format!(
+            "the answer is always that it cannot be told: no look tells `{name}`, and a question changes nothing"
+        );
+        let help = format!(
+            "say how it is at first, init = [\"({name} …)\"] or [\"(not ({name} …))\"], or who states it: [word.{name}] program = […]"
+        );
+        Some(Diagnostic::warning("never-told", message, place, "here").with_help(help))
+    }
+}

@@ -318,7 +318,8 @@ impl Asker<'_> {
         // Where a thing is may be open, and the answer known all the same: where it is asked about it is not.
         let is_sound = |n: usize| {
             let thing = &s.things[n];
-            self.nothing_seen(thing).or_else(|| reasons::may_be_none(s, thing)).is_none()
+            let is_elsewhere = thing.on.is_none();
+            is_elsewhere && self.nothing_seen(thing).or_else(|| reasons::may_be_none(s, thing)).is_none()
         };
         let is_settled = self.goal.asked.denies || open.as_ref().is_some_and(|(n, _)| is_sound(*n));
         if self.goal.question && value == Truth::False && is_settled {

@@ -13,9 +13,7 @@ const ALL_ROUND: f64 = 0.9;
 
 /// See the module; none where something else was asked.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
-    if goal.asked.of_word(PATROLLED).next().is_none() {
-        return None;
-    }
+    goal.asked.of_word(PATROLLED).next()?;
     let is_to_learn = goal.asked.of_word("settled").next().is_some();
     let (verdict, why) = told(mind, s, ended, is_to_learn);
     let objects: Vec<Believed> = mind.known.news.novelties.iter().map(|n| believed(mind, n)).collect();

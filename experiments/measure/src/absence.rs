@@ -5,23 +5,18 @@
 //! from the start and then from three random poses of the ring; the camera loses a share of its returns in
 //! patches.
 
+mod searching;
+
 use std::process::ExitCode;
-use std::sync::Arc;
 
 use descry_agent::body::scene_spec;
-use descry_domains::abilities::searching::{policies, reasons};
-use descry_domains::goal;
-use descry_domains::lexicon::{Lexicon, Places};
+use descry_domains::abilities::searching::reasons;
 use descry_domains::load::Domain;
 use descry_domains::situation::Situation;
-use descry_domains::world::{Setting, World};
 use descry_experiments::plot::{Axis, Plot, Point, Series};
-use descry_memory::{Options, Record};
 use descry_perception::calibration::{Bin, Claim, Reliability, reliability};
-use descry_perception::recognise::Descry;
-use descry_robots::sim::{DepthNoise, SceneSpec, SimOptions, SimRobot, arrange};
-use descry_robots::{CancellationToken, Progress, Robot};
-use descry_skills::{Call, Context, SkillFailure};
+use descry_robots::sim::{DepthNoise, SceneSpec, SimOptions, arrange};
+use searching::Search;
 
 const LOOKS: usize = 4;
 const TARGET: &str = "cup A";
@@ -151,63 +146,16 @@ async fn one(
         scene.objects.remove(cup);
         scene.target = None;
     }
+    let true_m = scene.object(TARGET).map(|o| [o.centre_m().x, o.centre_m().y]);
     let noise = DepthNoise { holes, ..DepthNoise::default() };
-    let simulated = Arc::new(SimRobot::new(scene, SimOptions { seed, noise, ..SimOptions::default() }));
-    let truth = simulated.truth();
-    let true_m = truth.objects.iter().find(|o| o.name == TARGET && o.present).map(|o| o.centre_m);
-    let robot: Arc<dyn Robot> = simulated;
-    let folder = tempfile::TempDir::new().map_err(|e| e.to_string())?;
-    let record =
-        Record::create(&folder.path().join("record"), Options::default()).map_err(|e| e.to_string())?;
-    let lexicon = Lexicon::new(domain, &Places::of_body(&*robot));
-    let goal = goal::read("find cup A", domain, &lexicon).map_err(|e| e.to_string())?;
-    let recogniser = Descry::default();
-    let here = robot.pose().await.map_err(|e| e.to_string())?;
-    let setting = Setting {
-        domain,
-        goal: &goal,
-        robot: Arc::clone(&robot),
-        record: &record,
-        recogniser: &recogniser,
-        past: None,
-    };
-    let chooser = policies::named(policies::PLAN, seed, None).map_err(|e| e.to_string())?;
-    let mut world = World::begin(setting, chooser, &here).map_err(|e| e.to_string())?;
-    let mut round = world.round().map_err(|e| e.to_string())?;
-    let mut poses: Vec<String> = round.situation.candidates.iter().map(|c| c.symbol.clone()).collect();
+    let options = SimOptions { seed, noise, ..SimOptions::default() };
     let mut draws = seed;
-    let mut at = round.situation.candidates[round.situation.at].symbol.clone();
-    let mut said = Vec::new();
-    for look in 0..LOOKS {
-        if look > 0 {
-            draws = draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let to = poses[(draws >> 33) as usize % poses.len()].clone();
-            act(&mut world, &*robot, "move", [&at, &to]).await?;
-            at = to;
-        }
-        act(&mut world, &*robot, "observe", [&at, "table"]).await?;
-        poses.retain(|pose| *pose != at);
-        round = world.round().map_err(|e| e.to_string())?;
-        said.push(heard(&round.situation, true_m.as_ref().map(|p| [p[0], p[1]])));
-    }
-    Ok(said)
-}
-
-/// Carries out a call and updates the world model from its outcome.
-async fn act(
-    world: &mut World<'_>,
-    robot: &dyn Robot,
-    action: &str,
-    arguments: [&str; 2],
-) -> Result<(), String> {
-    let call = Call { action: action.into(), arguments: arguments.map(String::from).to_vec() };
-    let job = world.ground(&call, 0).map_err(|e| e.to_string())?.ok_or("no part")?;
-    let (cancel, progress) = (CancellationToken::new(), &|_: &Progress| {});
-    let context = Context { robot, cancel, time_limit_s: job.limit_s, progress };
-    let skill = job.skill.map_err(|e: SkillFailure| e.to_string())?;
-    let outcome = skill.perform(&context).await.map_err(|e| e.to_string())?;
-    world.learn(&call, 0, &outcome, &mut Vec::new()).map_err(|e| e.to_string())?;
-    Ok(())
+    let choose = |poses: &[String]| {
+        draws = draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (draws >> 33) as usize % poses.len()
+    };
+    let search = Search { domain, scene, options, goal: "find cup A", looks: LOOKS };
+    search.run(choose, |situation| (heard(situation, true_m), false)).await
 }
 
 fn heard(s: &Situation, true_m: Option<[f64; 2]>) -> Said {

@@ -10,10 +10,12 @@ pub mod ends;
 mod evidence;
 mod likelihood;
 mod model;
+mod necked;
 mod percept;
 mod published;
 #[doc(hidden)]
 pub mod rays;
+mod resting;
 mod settle;
 mod toppled;
 #[doc(hidden)]
@@ -33,6 +35,7 @@ pub trait Recogniser: Send + Sync {
     /// The name by which it is chosen on the command line and in files.
     fn name(&self) -> &'static str;
 
-    /// One percept a segment, in the order of the segments. The models exclude each other.
+    /// The percepts of all segments, in their order; what rests on or in another thing of its segment follows that. The models
+    /// exclude each other.
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept>;
 }

@@ -1,6 +1,7 @@
 //! What perception promises, from outside: one program, so that what all tests share is built and linked once.
 
 mod boxes;
+mod composed;
 mod constants;
 mod corridor;
 mod damaged;

@@ -11,13 +11,16 @@ use super::likelihood::{
     handle_log, height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
+use super::necked::{self, Necked};
 use super::percept::{Percept, Stance};
+use super::resting;
 use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
 use crate::pool;
 use crate::scale::{APART_M, EDGE_M};
-use crate::segment::{Scene, Segment};
+use crate::segment::{Scene, Segment, middle};
+use crate::surface::nearest_sigma_m;
 use crate::visibility::Visibility;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -120,8 +123,86 @@ impl Recogniser for Descry {
         pool::within(tracing::debug_span!("recognise", segments = scene.segments.len()), || {
             let setting = Setting::of(scene, fitted(scene, seen), models);
             let judge = |segment: &Segment| self.judge(&setting, segment, seen, models);
-            pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge)
+            let percepts = pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge);
+            self.explained(&setting, seen, models, percepts)
         })
+    }
+}
+
+impl Descry {
+    /// Percepts after each segment was also explained by other bodies: a known one on or in another thing, or one with a neck.
+    ///
+    /// Where such a body is more probably a known object than the whole segment is, its percept replaces that of the segment; otherwise
+    /// the segment may still be it, as probably as the body would be.
+    fn explained(
+        &self,
+        setting: &Setting,
+        seen: &Visibility,
+        models: &[ObjectModel],
+        percepts: Vec<Percept>,
+    ) -> Vec<Percept> {
+        let rounds = resting::Rounds::of(models);
+        let viewpoints = seen.viewpoints();
+        let segments = &setting.scene.segments;
+        let world_from_surface = setting.scene.surface.surface_from_world.inverse();
+        let other = |n: usize| {
+            let (segment, percept) = (&segments[n], &percepts[n]);
+            let [x, y] = middle(&segment.points);
+            let sigma_m =
+                nearest_sigma_m(&(world_from_surface * Point3::new(x, y, segment.base_m)), &viewpoints);
+            let better = |all: Vec<Percept>| {
+                let known = |p: &Vec<Percept>| p.first().map_or(0.0, Percept::known);
+                (known(&all) > self.least.max(percept.known())).then_some(all)
+            };
+            let necked = necked::necked(setting.scene, n, models, sigma_m).and_then(|necked| {
+                Some((better(vec![self.judge_necked(setting, &necked, seen, models)])?, necked.pieces))
+            });
+            if necked.is_some() {
+                return necked;
+            }
+            if let Some(body) = resting::in_vessel(setting.scene, n, sigma_m) {
+                return Some((vec![self.judge(setting, &body, seen, models)], vec![n]));
+            }
+            let resting = resting::seek(segment, &rounds, sigma_m)
+                .into_iter()
+                .map(|resting| (self.judge(setting, &resting.body, seen, models), resting.rest));
+            let (body, rest) = resting.max_by(|a, b| a.0.known().total_cmp(&b.0.known()))?;
+            let all = match better(vec![body.clone()]) {
+                Some(mut all) => {
+                    if rest.indices.len() >= FEWEST_LEFT {
+                        all.push(self.judge(setting, &rest, seen, models));
+                    }
+                    all
+                }
+                None => vec![percept.clone().at_least(&body)],
+            };
+            Some((all, vec![n]))
+        };
+        let others: Vec<usize> = (0..segments.len()).collect();
+        let others = pool::map(&others, 1, |n| other(*n));
+        let mut explained: Vec<Vec<Percept>> = percepts.iter().map(|p| vec![p.clone()]).collect();
+        for (all, pieces) in others.into_iter().flatten() {
+            pieces.iter().for_each(|&piece| explained[piece].clear());
+            explained[pieces[0]] = all;
+        }
+        explained.into_iter().flatten().collect()
+    }
+
+    /// What a body with a neck is: its sizes are those of all of it, its form is that of what is below its shoulder.
+    fn judge_necked(
+        &self,
+        setting: &Setting,
+        necked: &Necked,
+        seen: &Visibility,
+        models: &[ObjectModel],
+    ) -> Percept {
+        let mut measured = measure(setting, &necked.body, seen).measured;
+        measured.height_m = necked.height_m;
+        measured.evidence.taper = necked.taper;
+        measured.upper = Default::default();
+        measured.sides = None;
+        let weighed = self.weigh(models, &measured, None, &vec![[0.0; 3]; models.len()]);
+        self.named(setting, &necked.whole, measured, models, weighed)
     }
 }
 
@@ -140,6 +221,8 @@ struct Weighed {
 
 /// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
 const DOUBT: f64 = 0.1;
+/// What is left of a segment is a thing of its own if it has so many points. From: derived, the fewest of a segment.
+const FEWEST_LEFT: usize = 60;
 
 /// How many times as often tins, jars, rolls and boxes lie on their side as what can spill. From: chosen.
 const CLOSED_LIES: f64 = 5.0;
@@ -178,13 +261,23 @@ impl Descry {
             });
             weighed = self.weigh(models, &looked.measured, toppled.as_ref(), &against);
         }
-        let Weighed { probabilities, stances } = weighed;
+        self.named(setting, segment, looked.measured, models, weighed)
+    }
+
+    fn named(
+        &self,
+        setting: &Setting,
+        segment: &Segment,
+        measured: Measured,
+        models: &[ObjectModel],
+        Weighed { probabilities, stances }: Weighed,
+    ) -> Percept {
         let unknown = 1.0 - probabilities.iter().sum::<f64>();
         let best =
             (0..models.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
         let named = best.filter(|&b| probabilities[b] >= self.least);
         let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
-        percept(setting.scene, segment, looked.measured, models, named, stances, probabilities, unknown)
+        percept(setting.scene, segment, measured, models, named, stances, probabilities, unknown)
     }
 
     /// How probable each model is, and how it stands; `against` is the log of what else speaks against each as it stands, and as it lies

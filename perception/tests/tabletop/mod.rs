@@ -34,6 +34,8 @@ pub enum Thing {
         handle_rad: Option<f64>,
         spout: bool,
     },
+    /// An open cup whose foot is at a height above the table, on or in something else.
+    Raised { x: f64, y: f64, radius: f64, height: f64, base: f64 },
     /// A cup, or closed a tin, on its side: its foot behind the middle, its rim before it along a direction; a handle lies beside it.
     Lying { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, open: bool, handle: bool },
 }
@@ -47,6 +49,7 @@ impl Thing {
             | Thing::Sherd { x, y, .. }
             | Thing::Block { x, y, .. }
             | Thing::Turned { x, y, .. }
+            | Thing::Raised { x, y, .. }
             | Thing::Lying { x, y, .. } => (x, y),
         }
     }
@@ -56,7 +59,7 @@ impl Thing {
         let grip = |handle_rad: Option<f64>| if handle_rad.is_some() { 0.03 } else { 0.0 };
         match *self {
             Thing::Cup { radius, handle_rad, .. } => radius + grip(handle_rad),
-            Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } => radius,
+            Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } | Thing::Raised { radius, .. } => radius,
             Thing::Block { half, .. } => half[0].hypot(half[1]),
             Thing::Lying { radius, height, handle, .. } => {
                 (radius + grip(handle.then_some(0.0))).hypot(0.5 * height)
@@ -160,6 +163,10 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
             if let Some(angle) = handle_rad {
                 handle(eye, ray, x, y, radius, height, angle).for_each(&mut offer);
             }
+        }
+        Thing::Raised { x, y, radius, height, base } => {
+            let cup = Thing::Cup { x, y, radius, height, handle_rad: None };
+            return meets(&cup, &(eye - base * Vector3::z()), ray);
         }
         Thing::Tin { x, y, radius, height } => {
             tube(eye, ray, x, y, radius, height).for_each(&mut offer);

@@ -36,6 +36,7 @@ impl Placed {
                 | Thing::Tin { height, .. }
                 | Thing::Sherd { height, .. }
                 | Thing::Block { height, .. } => height,
+                Thing::Raised { height, base, .. } => base + height,
                 Thing::Turned { knots, scale, .. } => scale * knots[knots.len() - 1][0],
                 Thing::Lying { radius, .. } => 2.0 * radius,
             }

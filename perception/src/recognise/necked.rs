@@ -1,0 +1,95 @@
+//! Bodies that narrow in a shoulder towards a neck, as bottles do: one body, though neck and body may have been segmented apart.
+
+use super::model::{ObjectModel, Shape};
+use crate::round::{self, Round, distance};
+use crate::scale::{APART_M, EDGE_M, PLACE_M};
+use crate::segment::{Scene, Segment, quantile, top_m};
+
+/// A model that narrows by more than this may do so in a shoulder. From: chosen, less is a straight side's.
+const NARROWS: f64 = 1.3;
+/// Shares of the height that show body and neck. From: chosen.
+const BODY: f64 = 0.4;
+const NECK: f64 = 0.1;
+/// The body reaches up to where it has this share of its radius. From: chosen.
+const SHOULDER: f64 = 0.9;
+/// Share of the points of the body that lie on its side. From: chosen, more than half.
+const ON_SIDE: f64 = 0.55;
+/// Quantile of the distances from the axis that tells a radius. From: chosen, some points lie on the top.
+const RADIUS: f64 = 0.75;
+
+/// A body with a neck.
+pub(super) struct Necked {
+    /// All of it, and what is below its shoulder.
+    pub whole: Segment,
+    pub body: Segment,
+    pub height_m: f64,
+    /// Diameter at the base over diameter at the top.
+    pub taper: f64,
+    /// Segments that are pieces of it.
+    pub pieces: Vec<usize>,
+}
+
+/// The body with a neck that a segment may be, with what stands coaxially on it, if some model is one as high.
+pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: f64) -> Option<Necked> {
+    let low = &scene.segments[of];
+    let may_be = |height_m: f64| {
+        let narrows = models.iter().filter(|m| m.shape == Shape::Round && m.taper.low > NARROWS);
+        narrows
+            .into_iter()
+            .any(|m| height_m > m.height_m.low - APART_M && height_m < m.height_m.high + APART_M)
+    };
+    let top = top_m(low);
+    let foot_m = low.base_m..low.base_m + BODY * (top - low.base_m);
+    // Most segments are ruled out before anything is fitted.
+    let highest_m = scene.segments.iter().map(top_m).fold(top, f64::max);
+    if !models.iter().any(|m| m.taper.low > NARROWS && highest_m > low.base_m + m.height_m.low - APART_M) {
+        return None;
+    }
+    let axis = round::fit(&low.points, foot_m.start, foot_m.end, sigma_m, round::SEED)?;
+    if axis.inliers < ON_SIDE {
+        return None;
+    }
+    let from_axis_m = |x: f64, y: f64| distance(x - axis.x, y - axis.y);
+    let stands_on = |other: &Segment| {
+        let n = other.points.len().max(1) as f64;
+        let (x, y, z) = other.points.iter().fold((0.0, 0.0, 0.0), |s, p| (s.0 + p.x, s.1 + p.y, s.2 + p.z));
+        from_axis_m(x / n, y / n) < PLACE_M + 0.5 * EDGE_M && z / n > foot_m.end
+    };
+    let others = (0..scene.segments.len()).filter(|&n| n != of && stands_on(&scene.segments[n]));
+    let pieces: Vec<usize> = std::iter::once(of).chain(others).collect();
+    let mut whole = Segment {
+        indices: Vec::new(),
+        points: Vec::new(),
+        base_m: low.base_m,
+        base_sigma_m: low.base_sigma_m,
+    };
+    for piece in pieces.iter().map(|&n| &scene.segments[n]) {
+        whole.indices.extend(&piece.indices);
+        whole.points.extend(&piece.points);
+    }
+    let height_m = top_m(&whole) - low.base_m;
+    let neck_m = radius_m(&whole, &axis, low.base_m + (1.0 - NECK) * height_m..f64::INFINITY)?;
+    let foot_radius_m = axis.radius_at(low.base_m);
+    if !may_be(height_m) || foot_radius_m < NARROWS * neck_m {
+        return None;
+    }
+    let steps = (height_m / PLACE_M) as usize;
+    let level_m = |n: usize| low.base_m + n as f64 * PLACE_M;
+    let is_body = |n: &usize| {
+        radius_m(&whole, &axis, level_m(*n)..level_m(n + 1)).is_some_and(|r| r > SHOULDER * foot_radius_m)
+    };
+    let shoulder_m = level_m((0..steps).rev().find(is_body)? + 1);
+    let below = whole.indices.iter().zip(&whole.points).filter(|(_, p)| p.z < shoulder_m);
+    let (indices, points) = below.map(|(i, p)| (*i, *p)).unzip();
+    let body = Segment { indices, points, base_m: low.base_m, base_sigma_m: low.base_sigma_m };
+    Some(Necked { body, height_m, taper: foot_radius_m / neck_m, pieces, whole })
+}
+
+/// How far a body reaches from an axis between two heights; none where too little of it is seen.
+fn radius_m(of: &Segment, axis: &Round, between_m: std::ops::Range<f64>) -> Option<f64> {
+    /// Fewest points. From: chosen.
+    const FEWEST: usize = 8;
+    let points = of.points.iter().filter(|p| between_m.contains(&p.z));
+    let mut from_axis_m: Vec<f64> = points.map(|p| distance(p.x - axis.x, p.y - axis.y)).collect();
+    (from_axis_m.len() >= FEWEST).then(|| quantile(&mut from_axis_m, RADIUS))
+}

@@ -180,7 +180,7 @@ impl Descry {
         };
         let others: Vec<usize> = (0..segments.len()).collect();
         let others = pool::map(&others, 1, |n| other(*n));
-        let mut explained: Vec<Vec<Percept>> = percepts.iter().map(|p| vec![p.clone()]).collect();
+        let mut explained: Vec<Vec<Percept>> = percepts.into_iter().map(|percept| vec![percept]).collect();
         for (all, pieces) in others.into_iter().flatten() {
             pieces.iter().for_each(|&piece| explained[piece].clear());
             explained[pieces[0]] = all;

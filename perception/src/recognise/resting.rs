@@ -22,13 +22,12 @@ const RADII_M: f64 = EDGE_M;
 /// Circles of one segment that are followed up. From: work.
 const MOST: usize = 3;
 /// What surrounds a body is asked for so far out, metres. From: chosen, no nearer than an edge is known.
-const AROUND_M: (f64, f64) = (EDGE_M, 0.02);
-/// Something bears a body if it is seen around it in so many directions, and at its height in this share of the most that are seen at any.
-/// From: chosen, a single view shows half of what is around a foot.
-const BEARS: (usize, f64) = (9, 0.6);
-/// Spread of the height that it is found to have, metres. From: derived, an edge.
-const LEVEL_SIGMA_M: f64 = EDGE_M;
-/// A body is borne where it is seen to be in so many directions; otherwise it stands in what is around it, if that is in so many.
+const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
+/// Something may bear a body if it is seen around it in so many directions. From: chosen, a single view shows half of what is around a foot.
+const BEARS: usize = 9;
+/// Spread of the height that it is found to have, metres. From: derived, a place.
+const LEVEL_SIGMA_M: f64 = PLACE_M;
+/// A body is borne if that is seen in so many directions; otherwise it stands in what is around it, if that is seen in so many.
 /// From: chosen.
 const BORNE: usize = 14;
 const ALL_AROUND: usize = 27;
@@ -83,8 +82,8 @@ pub(super) fn seek(segment: &Segment, models: &Rounds, sigma_m: f64) -> Vec<Rest
     circles.iter().filter_map(|circle| resting(segment, circle, models.least_m, sigma_m)).collect()
 }
 
-/// A segment that was taken to stand on another, as if it stood on the bottom of that, if that is a vessel: it is seen all around, but
-/// not at the height of the foot.
+/// A segment that was taken to stand on another, as if it stood on the bottom of that, if that is a vessel: it is seen all around and as
+/// high as the foot, but not right beside that.
 pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<Segment> {
     let segment = &scene.segments[of];
     if segment.base_m < BOTTOM_M.0 + PLACE_M {
@@ -215,7 +214,7 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
     let mut beside = [false; SECTORS];
     let lower = segment.points.iter().filter(|p| p.z < circle.top_m - APART_M && outside_m(p) > PLACE_M);
     lower.for_each(|p| beside[sector(p.x - circle.x, p.y - circle.y)] = true);
-    if beside.iter().filter(|seen| **seen).count() < BEARS.0 {
+    if beside.iter().filter(|seen| **seen).count() < BEARS {
         return None;
     }
     let foot_m = (circle.top_m - SIDE * least_m).max(segment.base_m);
@@ -235,7 +234,7 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
         .then(|| parted(segment, &axis, circle.top_m, (level_m, base_m, base_sigma_m)))
 }
 
-/// In how many directions something is seen around the foot of a body, and right beside it as high as that.
+/// In how many directions something is seen around the foot of a body that is no lower, and right beside it as high as that.
 struct Bearing {
     around: usize,
     level: usize,
@@ -250,7 +249,7 @@ impl Bearing {
             let outside_m = axis.outside_m(p);
             if (AROUND_M.0..REACH_M).contains(&outside_m) {
                 let direction = sector(p.x - axis.x, p.y - axis.y);
-                around[direction] = true;
+                around[direction] |= p.z > foot_m - PLACE_M;
                 level[direction] |= (p.z - foot_m).abs() < OFF_M && outside_m < AROUND_M.1;
             }
         }
@@ -275,9 +274,7 @@ fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     // Two levels together: a height may lie on the border.
     let count = |n: usize| (0..SECTORS).filter(|&k| seen[n][k] || seen[n + 1][k]).count();
     let counts: Vec<usize> = (0..seen.len() - 1).map(count).collect();
-    let most = counts.iter().copied().max().unwrap_or(0);
-    let bears = |count: &usize| *count >= BEARS.0 && *count as f64 >= BEARS.1 * most as f64;
-    let highest = counts.iter().rposition(bears)?;
+    let highest = (0..counts.len()).max_by_key(|&n| counts[n]).filter(|&n| counts[n] >= BEARS)?;
     let (sum, n) = (sums[highest].0 + sums[highest + 1].0, sums[highest].1 + sums[highest + 1].1);
     let level_m = sum / n;
     (level_m > segment.base_m + PLACE_M).then_some(level_m)

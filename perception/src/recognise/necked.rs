@@ -32,17 +32,17 @@ pub(super) struct Necked {
 /// The body with a neck that a segment may be, with what stands coaxially on it, if some model is one as high.
 pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: f64) -> Option<Necked> {
     let low = &scene.segments[of];
+    let narrows = |m: &ObjectModel| m.shape == Shape::Round && m.taper.low > NARROWS;
     let may_be = |height_m: f64| {
-        let narrows = models.iter().filter(|m| m.shape == Shape::Round && m.taper.low > NARROWS);
-        narrows
-            .into_iter()
-            .any(|m| height_m > m.height_m.low - APART_M && height_m < m.height_m.high + APART_M)
+        let is_as_high =
+            |m: &ObjectModel| height_m > m.height_m.low - APART_M && height_m < m.height_m.high + APART_M;
+        models.iter().any(|m| narrows(m) && is_as_high(m))
     };
     let top = top_m(low);
     let foot_m = low.base_m..low.base_m + BODY * (top - low.base_m);
     // Most segments are ruled out before anything is fitted.
     let highest_m = scene.segments.iter().map(top_m).fold(top, f64::max);
-    if !models.iter().any(|m| m.taper.low > NARROWS && highest_m > low.base_m + m.height_m.low - APART_M) {
+    if !models.iter().any(|m| narrows(m) && highest_m > low.base_m + m.height_m.low - APART_M) {
         return None;
     }
     let axis = round::fit(&low.points, foot_m.start, foot_m.end, sigma_m, round::SEED)?;

@@ -25,6 +25,8 @@ const MOST: usize = 3;
 const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
 /// Something may bear a body if it is seen around it in so many directions. From: chosen, a single view shows half of what is around a foot.
 const BEARS: usize = 9;
+/// That is as high as the highest level that is seen in this share of the most directions in which any is. From: chosen, nearly all.
+const NEARLY: f64 = 0.8;
 /// Spread of the height that it is found to have, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
 /// A body is borne if that is seen in so many directions; otherwise it stands in what is around it, if that is seen in so many.
@@ -274,7 +276,10 @@ fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     // Two levels together: a height may lie on the border.
     let count = |n: usize| (0..SECTORS).filter(|&k| seen[n][k] || seen[n + 1][k]).count();
     let counts: Vec<usize> = (0..seen.len() - 1).map(count).collect();
-    let highest = (0..counts.len()).max_by_key(|&n| counts[n]).filter(|&n| counts[n] >= BEARS)?;
+    let most = counts.iter().copied().max().unwrap_or(0);
+    // Below the top of what bears it, its side may be seen in as many directions.
+    let bears = |count: &usize| *count >= BEARS && *count as f64 >= NEARLY * most as f64;
+    let highest = counts.iter().rposition(bears)?;
     let (sum, n) = (sums[highest].0 + sums[highest + 1].0, sums[highest].1 + sums[highest + 1].1);
     let level_m = sum / n;
     (level_m > segment.base_m + PLACE_M).then_some(level_m)

@@ -40,7 +40,6 @@ fn models() -> Vec<ObjectModel> {
 }
 
 const SAUCER: &[[f64; 2]] = &[[0.0, 0.05], [0.02, 0.075]];
-const BOWL: &[[f64; 2]] = &[[0.0, 0.05], [0.055, 0.08]];
 const BOTTLE: &[[f64; 2]] = &[[0.0, 0.035], [0.16, 0.035], [0.2, 0.014], [0.25, 0.014]];
 const JAR: &[[f64; 2]] = &[[0.0, 0.0425], [0.125, 0.0425], [0.127, 0.025], [0.16, 0.025]];
 
@@ -52,16 +51,8 @@ fn tin(radius: f64, height: f64) -> Thing {
     Thing::Tin { x: 0.05, y: 0.02, radius, height }
 }
 
-fn block(half: [f64; 2], height: f64) -> Thing {
-    Thing::Block { x: 0.06, y: 0.03, half, height, turn_rad: 0.4 }
-}
-
 fn cup_at(base: f64) -> Thing {
     Thing::Raised { x: 0.052, y: 0.016, radius: 0.035, height: 0.104, base }
-}
-
-fn other_at(base: f64) -> Thing {
-    Thing::Raised { x: 0.052, y: 0.016, radius: 0.041, height: 0.12, base }
 }
 
 /// What several views of some things are taken for.
@@ -118,27 +109,4 @@ fn a_bottle_of_body_shoulder_and_neck_is_one_body() {
         ],
         1,
     );
-}
-
-#[test]
-#[ignore = "slow: 44 merged scenes"]
-fn what_rests_on_or_in_other_things_is_found_and_nothing_else_is() {
-    let open = |radius: f64, height: f64| Thing::Cup { x: 0.05, y: 0.02, radius, height, handle_rad: None };
-    let mug = Thing::Cup { x: 0.05, y: 0.02, radius: 0.041, height: 0.095, handle_rad: Some(1.0) };
-    let cases = || -> Vec<Case> {
-        vec![
-            ("on a saucer", vec![turned(SAUCER, false), cup_at(0.02)], "cup A", [0.5, 1.0]),
-            ("on a tin", vec![tin(0.045, 0.13), cup_at(0.13)], "cup A", [0.2, 1.0]),
-            ("on a book", vec![block([0.085, 0.115], 0.03), cup_at(0.03)], "cup A", [0.5, 1.0]),
-            ("on a box", vec![block([0.11, 0.08], 0.06), cup_at(0.06)], "cup A", [0.2, 1.0]),
-            ("on a tray", vec![block([0.2, 0.15], 0.02), cup_at(0.02)], "cup A", [0.5, 1.0]),
-            ("in a bowl", vec![turned(BOWL, true), cup_at(0.004)], "cup A", [0.1, 1.0]),
-            ("in a tin", vec![open(0.065, 0.07), cup_at(0.004)], "cup A", [0.1, 1.0]),
-            ("on a taller cup", vec![tin(0.044, 0.155), cup_at(0.155)], "cup A", [0.1, 1.0]),
-            ("another on a tin", vec![tin(0.045, 0.13), other_at(0.13)], "cup A", [0.0, 0.2]),
-            ("a mug", vec![mug], "mug", [0.8, 1.0]),
-            ("a bottle", vec![turned(BOTTLE, false)], "bottle", [0.5, 1.0]),
-        ]
-    };
-    (1..=4).for_each(|seed| check(cases(), seed));
 }

@@ -3,7 +3,7 @@
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
 use crate::pool;
 use crate::round::{SECTORS, sector};
-use crate::scale::{APART_M, EDGE_M, PLACE_M};
+use crate::scale::{APART_M, PLACE_M};
 use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
 use std::sync::OnceLock;
@@ -38,7 +38,7 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
         let lifted = below.iter().filter(|_| low > PLACE_M);
         let borne = lifted.filter_map(|&other| borne_at_m(outline(i), (place, low), &parts[other].points));
         if let Some(at) = borne.max_by(f64::total_cmp) {
-            return (at, EDGE_M);
+            return (at, 0.0);
         }
         let is_around = |&other: &usize| {
             is_wider(&boxes[other], &boxes[i])

@@ -1,4 +1,5 @@
-//! What one round of the main job takes in the default scene: planning, merging five views from the record, recognising.
+//! Benchmark of one round of the main job in the default scene: planning, merging five views from the record,
+//! recognising.
 //!
 //! `cargo bench -p descry-agent`
 
@@ -22,7 +23,7 @@ use descry_skills::{Call, Context};
 use divan::Bencher;
 use tempfile::TempDir;
 
-/// As the program has it.
+/// The allocator of the program.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -119,7 +120,7 @@ fn round(looked: &Looked, goal: &Goal, recogniser: &Descry, seen: bool) -> Round
     world.round().expect("the problem is right")
 }
 
-/// From a round's task to the plan, geometry answered anew.
+/// Benchmark of planning from a round's task, with all geometry computed anew.
 #[divan::bench(args = [false, true])]
 fn plan(bencher: Bencher, after_a_look: bool) {
     let looked = looked();
@@ -138,7 +139,7 @@ fn merge_five_views_from_the_record(bencher: Bencher) {
     bencher.bench(|| looked.merged());
 }
 
-/// From the merged cloud to percepts.
+/// Benchmark of recognition from the merged cloud to percepts.
 #[divan::bench(sample_count = 10, sample_size = 1)]
 fn recognise_the_merged_cloud(bencher: Bencher) {
     let looked = looked();

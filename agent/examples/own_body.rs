@@ -103,7 +103,8 @@ impl Disc {
         }
     }
 
-    /// Where the base comes by, and what each step takes: a turn, then straight on, and a turn at the end.
+    /// Poses along the route of the base, with the distance and time of each step: a turn, then straight on,
+    /// and a turn at the end.
     fn steps(&self, from: &Pose2, to: &Pose2) -> Result<Vec<(Pose2, f64, f64)>, Failure> {
         let Speeds { linear_m_s, angular_rad_s } = SPEEDS;
         let turn = |a: f64, b: f64| descry_robots::route::turn(a, b).abs() / angular_rad_s;

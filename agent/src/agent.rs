@@ -21,7 +21,8 @@ use crate::report::Event;
 use crate::stop::Stop;
 use crate::{standing, weigh, written};
 
-/// A planning call ends after so many evaluated states; then the best plan so far, or one good look, has to do.
+/// The maximum number of evaluated states of a planning call; at this limit the best plan so far, or one good
+/// look, is taken.
 const MOST_EVALUATED: u64 = 2_500;
 
 /// An agent at work on one goal.
@@ -34,18 +35,19 @@ pub struct Agent<'a> {
     /// The call that failed and left no plan.
     failed: Option<Call>,
     totals: Totals,
-    /// What plans are weighed by; none where that would ask programs.
+    /// Goal, in PDDL, by which plans are compared; `None` if the domain has attachments, as that would call
+    /// programs.
     weighed_by: Option<String>,
 }
 
-/// What a run has taken so far.
+/// Totals of a run so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Totals {
     /// Views taken.
     pub views: usize,
     /// Plans made.
     pub plans: usize,
-    /// Driven, metres.
+    /// Distance driven, metres.
     pub distance_m: f64,
     /// Longest time that one planning call took, what it asked of geometry apart, seconds.
     pub planning_s: f64,
@@ -53,9 +55,9 @@ pub struct Totals {
     pub geometry_s: f64,
 }
 
-/// What came of a choice of the world.
+/// Result of asking the world model to choose the next steps.
 enum Taken {
-    /// It is the plan now.
+    /// The world's choice is the plan now.
     Up,
     /// There is nothing to choose, and why.
     Nothing(String),
@@ -63,7 +65,7 @@ enum Taken {
     LeftToPlanner,
 }
 
-/// How a call went: the part that was reached, and how that ended.
+/// Result of a call: the part of it that was reached, and how that part ended.
 type Performed = (usize, Result<(), SkillFailure>);
 
 impl<'a> Agent<'a> {
@@ -111,7 +113,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// One turn of the loop. Returns why the run ends here, if it does.
+    /// One iteration of the loop. Returns the reason the run ends here, if it does.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
             let reason = Reason::of(Trigger::NotDenied);
@@ -410,7 +412,7 @@ impl<'a> Agent<'a> {
         job.skill?.perform(&context).await
     }
 
-    /// What a part of a call brought about: the world takes it in.
+    /// Updates the world model from the outcome of one part of a call, and reports what it learned.
     fn learn(
         &mut self,
         world: &mut World<'_>,
@@ -429,7 +431,7 @@ impl<'a> Agent<'a> {
         Ok(())
     }
 
-    /// What a failure teaches; where the body now is, it says itself.
+    /// Updates the world model from a failure; the pose is read from the body again.
     async fn learn_from_failure(
         &mut self,
         world: &mut World<'_>,
@@ -505,7 +507,7 @@ fn reached(round: &Round) -> bool {
     descry_planner::monitor(&round.task, &round.attachments, &Plan::default()).is_ok()
 }
 
-/// How often each attachment was asked.
+/// Number of queries of each attachment, by name.
 fn asked_of(statistics: &Statistics) -> Vec<(String, u64)> {
     statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect()
 }

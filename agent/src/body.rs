@@ -25,7 +25,7 @@ pub struct Body {
     truth: Option<Told>,
 }
 
-/// Who says how everything really stands.
+/// Source of the true positions of objects.
 enum Told {
     Simulator(Arc<SimRobot>),
     Program(program::TruthFile),

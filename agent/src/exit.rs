@@ -23,7 +23,7 @@ pub enum Exit {
     HungUp = 129,
     /// Stopped by Ctrl-C.
     Interrupted = 130,
-    /// Told to end.
+    /// The program was told to end.
     Terminated = 143,
     /// A bug of descry.
     Bug = 70,
@@ -55,7 +55,7 @@ pub enum CommandError {
     /// The robot or a store failed for good.
     #[error("{0}")]
     Broken(String),
-    /// Somebody stopped it; the text says how to go on.
+    /// The run was stopped; the text says how to go on.
     #[error("{said}")]
     Stopped {
         /// Kept results, and the way to go on.

@@ -17,7 +17,7 @@ pub use remote::{Address, is_address};
 pub struct Keeping {
     /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: the run's folder.
     pub memory: Option<String>,
-    /// When something counts as recorded; none: when it is on the disk.
+    /// Durability of the record; none: data counts as recorded once it is on the disk.
     pub durability: Option<Kept>,
     /// Greatest size of the record, bytes; what is over goes oldest first, unless a belief or a plan rests on it.
     pub max_bytes: Option<u64>,
@@ -27,13 +27,13 @@ pub struct Keeping {
     pub min_free: Option<u64>,
 }
 
-/// When something counts as recorded.
+/// Durability: the point at which data counts as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
-    /// When it is on the disk.
+    /// Data is on the disk.
     Disk,
-    /// When the system has it.
+    /// The operating system has the data.
     Process,
 }
 

@@ -1,6 +1,6 @@
 //! Numbers as people read them.
 
-/// So many of something.
+/// A count with its noun in the singular or plural: `3 steps`.
 pub fn count(n: usize, of: &str) -> String {
     let all = if n == 1 { "" } else { "s" };
     format!("{n} {of}{all}")
@@ -29,7 +29,7 @@ fn below(value: f64) -> String {
     format!("{:.4}", (value * 1e4).floor() / 1e4)
 }
 
-/// Whether a number reads as a share: it lies between 0 and 1.
+/// True if a number reads as a share: it lies strictly between 0 and 1.
 pub fn is_share(value: f64) -> bool {
     value > 0.0 && value < 1.0
 }

@@ -13,20 +13,20 @@ use serde::{Deserialize, Serialize};
 use crate::numbers::{is_share, number, share_of};
 use crate::written;
 
-/// Why a plan was made.
+/// The reason a plan was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
-    /// What made it necessary.
+    /// The event that made the plan necessary.
     pub trigger: Trigger,
     /// States after which the planner's search was ended without a proof; none: the search ended by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search_ended_after: Option<u64>,
-    /// Whether no plan reaches the goal in the time that is left.
+    /// True if no plan reaches the goal in the time that is left.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_late: bool,
 }
 
-/// What makes a plan necessary.
+/// An event that makes a new plan necessary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "because")]
 pub enum Trigger {
@@ -44,16 +44,16 @@ pub enum Trigger {
     NotDenied,
 }
 
-/// What keeps steps from reaching the goal.
+/// The obstacle that keeps steps from reaching the goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Break {
     /// The step at fault; none: the goal is missed.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "written::maybe")]
     pub step: Option<Call>,
-    /// Whether other steps come before: the values are those that they should leave.
+    /// True if other steps come before: the values are then those expected after these steps.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_expected: bool,
-    /// Why, with the values.
+    /// The cause, with the values that decide it.
     pub cause: Cause,
 }
 
@@ -82,7 +82,7 @@ impl Reason {
 }
 
 impl Break {
-    /// What the planner's monitor found in steps.
+    /// Converts a finding of the planner's monitor in `steps`.
     pub fn of(broken: &Broken, steps: &Plan) -> Self {
         let step = broken.step.and_then(|at| steps.steps.get(at));
         Break {
@@ -108,7 +108,7 @@ impl Break {
         }
     }
 
-    /// Whether a number is too small for what is left to do.
+    /// True if a number is too small for what is left to do.
     pub(crate) fn is_of_too_little(&self) -> bool {
         let (Cause::Goal(unmet) | Cause::Condition { unmet, .. }) = &self.cause else { return false };
         unmet.compared.as_ref().is_some_and(|compared| compared.comparison == Comparison::GreaterOrEqual)
@@ -150,7 +150,7 @@ impl fmt::Display for Break {
     }
 }
 
-/// That a goal is missed, with the number that is too small or too large.
+/// Sentence about a missed goal, with the number that is too small or too large.
 fn missed(unmet: &Unmet, is: &str, saying: &Saying) -> String {
     match &unmet.compared {
         Some(compared) => {
@@ -162,7 +162,7 @@ fn missed(unmet: &Unmet, is: &str, saying: &Saying) -> String {
     }
 }
 
-/// What a step needs and does not have.
+/// Sentence about a condition that a step needs and that does not hold.
 fn needs(call: &str, when: Moment, unmet: &Unmet, is: &str, saying: &Saying) -> String {
     if let (Some(compared), false) = (&unmet.compared, when == Moment::OverAll) {
         let (number, found) = found(compared, saying);
@@ -186,7 +186,7 @@ fn found(compared: &Compared, saying: &Saying) -> (String, String) {
     (saying.say(&compared.left), value)
 }
 
-/// What a comparison wants of its number: `at least 0.80`.
+/// The bound that a comparison sets for its number, as read aloud: `at least 0.80`.
 fn wanted(compared: &Compared, saying: &Saying) -> String {
     let sign = match compared.comparison {
         Comparison::Less => "less than ",

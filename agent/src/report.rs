@@ -1,4 +1,4 @@
-//! What a run says: events as they happen, for people and for the record, and the result at the end.
+//! Reports of a run: events as they happen, for people and for the record, and the result at the end.
 
 use std::fmt;
 
@@ -25,16 +25,16 @@ pub enum Event {
         said: String,
         /// The goal in PDDL.
         pddl: String,
-        /// From where the body starts.
+        /// The place where the body starts.
         start: String,
-        /// How many poses there are to look from.
+        /// The number of viewpoints in the candidate set.
         candidates: usize,
     },
     /// A new plan was made.
     Planned {
         /// Number of the planning round, from 1.
         round: usize,
-        /// Why the previous plan no longer does, in a sentence.
+        /// The reason the previous plan no longer works, in a sentence.
         because: String,
         /// The same with the values that decide it; records of earlier versions do not have it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -57,7 +57,7 @@ pub enum Event {
         /// The call.
         #[serde(with = "written::call")]
         call: Call,
-        /// What it costs and what is hoped from it.
+        /// Cost and expected gain of the step, in a sentence.
         because: String,
     },
     /// A step ended well.
@@ -65,7 +65,7 @@ pub enum Event {
         /// The call.
         #[serde(with = "written::call")]
         call: Call,
-        /// What came of it.
+        /// The outcome, in a sentence.
         outcome: String,
     },
     /// A step failed.
@@ -73,12 +73,12 @@ pub enum Event {
         /// The call.
         #[serde(with = "written::call")]
         call: Call,
-        /// What the body said.
+        /// The error that the body reported.
         because: String,
         /// The condition in PDDL that should have held until the end, if that is what failed.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unkept: Option<String>,
-        /// What is concluded from it, in a sentence.
+        /// The conclusion drawn from the failure, in a sentence.
         therefore: String,
         /// The same as a value; records of earlier versions do not have it.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -149,7 +149,7 @@ pub fn timed(step: &Step, saying: &Saying) -> String {
     }
 }
 
-/// Why a step failed, in a sentence.
+/// The reason a step failed, in a sentence.
 pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
     match unkept {
         Some(condition) => {
@@ -166,26 +166,27 @@ pub struct Report {
     pub goal: String,
     /// The goal in PDDL.
     pub pddl_goal: String,
-    /// How it ended.
+    /// The verdict at the end of the run.
     pub verdict: Verdict,
     /// "yes", "no" or "cannot tell", if the goal was a question.
     pub answer: Option<String>,
-    /// Why, in a sentence.
+    /// The reason for the verdict, in a sentence.
     pub why: String,
-    /// What was looked for, if it was one thing.
+    /// The requested object, if the goal is about a single one.
     pub object: Option<String>,
-    /// How sure it is.
+    /// Confidence that was reached, 0 to 1.
     pub confidence: f64,
-    /// How sure it had to be.
+    /// Confidence that was required, 0 to 1.
     pub threshold: f64,
     /// Probability that what was looked for is there after all.
     pub remaining: Option<f64>,
-    /// Where it is believed to be: the middle of its body, in the map; none in the hand.
+    /// Believed position of the requested object: the centre of its body in the map frame; none while the
+    /// robot holds it.
     pub position_m: Option<[f64; 3]>,
     /// Standard deviation of that, in the direction in which it is known worst.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
-    /// Where it is; simulation only.
+    /// True position of the requested object; simulation only.
     pub true_position_m: Option<[f64; 3]>,
     /// The surface that it is believed to stand on, as people call it.
     pub on: Option<String>,
@@ -203,16 +204,16 @@ pub struct Report {
     pub views: usize,
     /// Plans after the first.
     pub replans: usize,
-    /// Driven.
+    /// Distance driven, metres.
     pub distance_m: f64,
-    /// On the body's clock.
+    /// Duration of the run on the clock of the body, seconds.
     pub sim_time_s: f64,
-    /// On the wall.
+    /// Duration of the run on the wall clock, seconds.
     pub wall_s: f64,
     /// The longest that one planning call took on the wall, what it asked of geometry apart; 0: nothing was planned, or it is not known.
     #[serde(default)]
     pub planning_s: f64,
-    /// The longest that one planning call waited for geometry.
+    /// The longest time that the attachments of one planning call took, seconds.
     #[serde(default)]
     pub geometry_s: f64,
     /// The run's folder.
@@ -220,7 +221,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// It without what differs however often the run is lived through, and without what only a simulation knows.
+    /// The report without values that differ between repetitions of the run, and without those known only to
+    /// a simulation.
     pub(crate) fn as_recorded(&self) -> Self {
         Self {
             true_position_m: None,

@@ -39,7 +39,7 @@ pub use files::{finish, has_ended, header, keep_header, lost_of_header, report};
 pub use folder::Folder;
 pub use resumed::{GoingOn, Prepare, Resumed, resume};
 
-/// What a run was started with: enough to start it again.
+/// Settings that a run was started with: enough to start it again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The body, as on the command line.
@@ -50,12 +50,12 @@ pub struct Settings {
     pub seed: u64,
     /// The domain, as on the command line.
     pub domain: String,
-    /// Who chooses where to look next, by name.
+    /// Name of the policy that chooses where to look next.
     pub policy: String,
-    /// How the record is kept.
+    /// Storage options of the record.
     #[serde(default)]
     pub keeping: Keeping,
-    /// Where it is remembered from run to run what was seen last; none: nowhere.
+    /// Store in which the last seen objects are remembered from run to run; none: nothing is remembered.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remember: Option<String>,
 }
@@ -69,28 +69,28 @@ pub struct Header {
     pub goal: String,
     /// The goal in PDDL.
     pub pddl_goal: String,
-    /// When it was started, seconds since 1970.
+    /// Time at which it was started, seconds since 1970.
     pub started_unix_s: u64,
-    /// How often it was cut off and gone on with, and where.
+    /// The interruptions after which the run was resumed, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resumed: Vec<Resumed>,
-    /// What it was started with.
+    /// Settings that it was started with.
     #[serde(flatten)]
     pub settings: Settings,
 }
 
-/// What a run is about.
+/// The task of a run.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
-    /// What may be said and what it means.
+    /// The domain: its vocabulary and actions.
     pub domain: &'a Domain,
-    /// What is pursued.
+    /// The goal that is pursued.
     pub goal: &'a Goal,
-    /// What is remembered of earlier runs.
+    /// Persistent belief from earlier runs.
     pub past: Option<&'a Past>,
 }
 
-/// Who watches over a run.
+/// Observer of a run.
 pub struct Watcher<'a> {
     /// Ends it, the body first.
     pub stop: &'a Stop,
@@ -153,7 +153,7 @@ pub fn understood(
     goal::read(said, domain, &lexicon).map_err(CommandError::bad_input)
 }
 
-/// What is remembered of earlier runs in a store, if one is named.
+/// Reads the persistent belief of earlier runs from a store, if one is named.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if there is a store and it cannot be read.
@@ -261,7 +261,7 @@ pub fn how_to_go_on(error: CommandError, folder: &Path, is_at_bound: bool) -> Co
     }
 }
 
-/// Where the thing is; simulation only.
+/// Fills in the true position of the requested object; simulation only.
 fn show_true_position(report: &mut Report, body: &Body) {
     let object = report.object.as_deref();
     let true_place = object.and_then(|name| body.true_place(name, report.position_m));
@@ -270,7 +270,7 @@ fn show_true_position(report: &mut Report, body: &Body) {
     report.true_room = true_place.and_then(|p| p.room);
 }
 
-/// What a verdict says to a question.
+/// The answer that a verdict gives to a yes/no question.
 fn answer(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Achieved => "yes",

@@ -1,5 +1,6 @@
-//! How a run stands: how sure it is of what was asked for, what of the places was seen where that may be, and what hangs on the rest. It is
-//! kept with every plan and whenever a plan is kept, so that it can be told later what each look has brought.
+//! State of belief in a run: confidence about what was asked for, coverage of the places where it may be, and
+//! the probability that is still undecided. It is recorded with every plan, made or kept, so that the gain of
+//! each look can be told later.
 
 pub use descry_domains::abilities::searching::FirstLook;
 use descry_domains::abilities::searching::doubt::Doubt;
@@ -14,25 +15,25 @@ use serde_json::Value;
 
 use crate::exit::CommandError;
 
-/// The blob under which it is kept beside the event of a plan.
+/// Name of the blob of doubts beside the event of a plan.
 pub const BLOB: &str = "in-doubt";
-/// The kind under which it is recorded what the end of a run rests on.
+/// The kind under which the facts are recorded on which the end of a run rests.
 pub const RESTS: &str = "rests-on";
 
-/// Something that is in doubt.
+/// An object, kind or surface that is in doubt.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InDoubt {
-    /// What it is about, as people call it.
+    /// The object, kind or surface that is in doubt, as people call it.
     pub about: String,
-    /// What that is.
+    /// The type of the doubt.
     pub of: Of,
-    /// Of a kind the rooms in which it is asked about, as in " in the kitchen"; empty: wherever it is.
+    /// For a kind: the rooms the question is restricted to, as in " in the kitchen"; empty: no restriction.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub within: String,
-    /// How sure it is of it, 0 to 1; records of earlier versions do not say.
+    /// Confidence reached so far, 0 to 1; records of earlier versions do not say.
     pub sure: Option<f64>,
-    /// How sure it has to be.
+    /// Confidence that is required, 0 to 1.
     pub wanted: f64,
     /// The probability that hangs on it, 0 to 1.
     pub left: f64,
@@ -40,31 +41,31 @@ pub struct InDoubt {
     pub hidden: f64,
     /// The part of that for which it was lost out of the hand, and no look at a surface shows it.
     pub lost: f64,
-    /// What was seen of where it may be.
+    /// Coverage of each place where the object may be.
     pub seen: Vec<Seen>,
 }
 
-/// What a doubt is about.
+/// The type of a doubt.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
-    /// Where a thing stands.
+    /// The place of one object is in doubt.
     #[default]
     Thing,
-    /// Which objects are of a kind.
+    /// The set of objects of one kind is in doubt.
     Kind,
-    /// What stands on a surface.
+    /// The objects on one surface are in doubt.
     Surface,
 }
 
-/// How much of a place was seen.
+/// Coverage of one place.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The place, as people call it.
     pub on: String,
     /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
     pub share: Option<f64>,
-    /// From so many places, by views that still hold.
+    /// The number of places from which it was seen, by views that still hold.
     pub places: usize,
     /// The probability that it is there where it was not seen, 0 to 1; records of earlier versions do not say.
     #[serde(default)]
@@ -72,26 +73,27 @@ pub struct Seen {
     /// The part of that where something was measured that no object explains.
     #[serde(default)]
     pub measured: f64,
-    /// What counts for a first look there, where looks in vain are counted; records of earlier versions do not say.
+    /// Evidence for a first look at this place, where looks in vain are counted; records of earlier versions
+    /// do not say.
     #[serde(default)]
     pub first: Option<FirstLook>,
 }
 
-/// What the end of a run rests on.
+/// The facts on which the end of a run rests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rests {
-    /// Why there was nothing more to do.
+    /// The reason the run ended.
     pub ended: End,
-    /// What a limit or a failure said of it; empty: nothing.
+    /// Message of the limit or failure; empty: none.
     pub said: String,
-    /// Why there is no plan.
+    /// The reasons there is no plan.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_plan: Vec<NoPlan>,
-    /// What is in doubt in the end.
+    /// The doubts that remain at the end.
     pub in_doubt: Vec<InDoubt>,
 }
 
-/// Why there was nothing more to do in a run.
+/// The reason a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum End {
     /// The goal held.
@@ -106,12 +108,12 @@ pub enum End {
     /// A limit of looks, plans or time was reached.
     #[serde(rename = "limit")]
     Limit,
-    /// What was done failed for good.
+    /// A step failed for good.
     #[serde(rename = "failed")]
     Failed,
 }
 
-/// What the end of a run rests on, as it is recorded.
+/// Collects the facts on which the end of a run rests, as they are recorded.
 pub fn rests(round: &Round, of: &Ended) -> Rests {
     let (ended, said) = match of {
         Ended::Reached => (End::Reached, String::new()),
@@ -124,7 +126,7 @@ pub fn rests(round: &Round, of: &Ended) -> Rests {
     Rests { ended, said, no_plan, in_doubt: in_doubt(round) }
 }
 
-/// How things stand in a round, as it is kept beside an event.
+/// The doubts of a round as a blob that is kept beside an event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.
@@ -133,7 +135,7 @@ pub fn blob(round: &Round) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// What is in doubt in a round about what was asked for.
+/// The remaining doubts of a round about what was asked for.
 fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let s = &round.situation;
     let places = |on: usize| s.spaces[on].seen_from().len();

@@ -1,4 +1,4 @@
-//! Being told to stop. Whoever listens for it (a signal handler, a button) asks once; everything that runs sees it soon.
+//! Stop signal. A listener (a signal handler, a button) asks once; everything that runs sees it soon.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};

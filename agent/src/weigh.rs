@@ -1,5 +1,6 @@
-//! What a plan was weighed against: the same steps with other objects, what each would take and gain, by the answers of the calls
-//! that the plan itself rests on. It is kept beside the plan, so that it can be told later why it was this one.
+//! Comparison of a plan with its alternatives: the same steps with other objects, with the duration and gain
+//! of each by the same attachment answers as the plan. It is recorded beside the plan, so that the choice can
+//! be explained later.
 
 #[doc(hidden)]
 pub mod steps;
@@ -22,22 +23,22 @@ use crate::reason::Break;
 use crate::written::{self, call_of};
 use steps::{Instead, brought, joined, leads, words};
 
-/// The blob under which it is kept beside the event of a plan.
+/// Name of the blob of the comparison beside the event of a plan.
 pub const BLOB: &str = "weighed";
-/// More combinations of objects than this are not tried.
+/// The maximum number of combinations of objects that are tried.
 const MOST_TRIED: usize = 600;
-/// So many others are kept.
+/// The maximum number of alternatives that are kept.
 pub const MOST_KEPT: usize = 12;
-/// Plans with more steps than this until something is gained are not compared.
+/// The maximum number of steps until the first gain in plans that are compared.
 pub const MOST_STEPS: usize = 6;
-/// What is shorter by less than this, seconds, is as long.
+/// Durations that differ by less than this count as equal, seconds.
 const SHORTER_S: f64 = 0.05;
-/// A way this many times as long is none.
+/// Detours that take more than this many times as long as the step they replace are left out.
 const FAR: f64 = 2.0;
-/// Less than this is no gain.
+/// Gains below this count as none.
 const GAINED: f64 = 1e-6;
 
-/// What a plan was weighed against.
+/// Comparison of a plan with its alternatives.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
@@ -47,22 +48,22 @@ pub struct Weighed {
     pub chosen: Option<Way>,
     /// Others that could have been taken, those that gain most a second first.
     pub others: Vec<Way>,
-    /// How many could have been taken in all, these among them.
+    /// The number of ways that were open in all, the chosen one and those left out here among them.
     pub open: usize,
     /// The plan until it first gains something, where several steps of it could be one.
     pub shorter: Option<Way>,
     /// The same with a step more, that makes one of its steps shorter: a door opened on the way. The quickest.
     pub through: Option<Way>,
-    /// What was left of the plan before, where that is another.
+    /// The remaining steps of the previous plan, where they differ from the new one.
     pub left: Option<Way>,
-    /// What that would bring the numbers that count to, if all goes as expected.
+    /// Values of the numbers that count after the rest of the previous plan, if all goes as expected.
     pub left_numbers: Vec<Expected>,
 }
 
 /// A number of the domain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
-    /// As it is written in PDDL.
+    /// Name in PDDL.
     pub name: String,
     /// Its value now.
     pub now: f64,
@@ -76,21 +77,22 @@ pub struct Way {
     /// The calls.
     #[serde(with = "written::calls")]
     pub steps: Vec<Call>,
-    /// What each takes, seconds; records of earlier versions do not say.
+    /// Duration of each step, seconds; records of earlier versions do not say.
     #[serde(default)]
     pub each_s: Vec<f64>,
-    /// What they take, one after the other, seconds.
+    /// Total duration of the steps in sequence, seconds.
     pub takes_s: f64,
-    /// By how much they bring the numbers that count nearer to what is wanted, together.
+    /// Total gain: by how much the steps bring the numbers that count nearer to their bounds.
     pub gains: f64,
-    /// Whether the goal is expected to hold then; records of earlier versions do not say.
+    /// True if the goal is expected to hold after the steps; records of earlier versions do not say.
     #[serde(default)]
     pub reaches: Option<bool>,
-    /// What it comes to with the rest of the plan behind it; none where that cannot be done then, and in records of earlier
-    /// versions.
+    /// Totals with the rest of the plan appended; none where the rest cannot be done then, and in records of
+    /// earlier versions.
     #[serde(default)]
     pub whole: Option<Whole>,
-    /// What keeps the rest of the plan from being done behind it, where something does; records of earlier versions do not say.
+    /// The obstacle that keeps the rest of the plan from following, if any; records of earlier versions do
+    /// not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocked: Option<Break>,
 }
@@ -98,27 +100,27 @@ pub struct Way {
 /// A way to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Whole {
-    /// What its steps count for, one after the other, seconds: by what plans are to make small.
+    /// Cost of the steps in sequence by the plan metric, seconds.
     pub takes_s: f64,
-    /// How many they are.
+    /// The number of steps.
     pub steps: usize,
-    /// Whether the goal is expected to hold then.
+    /// True if the goal is expected to hold after the steps.
     pub reaches: bool,
 }
 
 impl Way {
-    /// What it gains a second.
+    /// Gain per second.
     pub fn rate(&self) -> f64 {
         self.gains / self.takes_s.max(1e-9)
     }
 
-    /// What its last step is about: its last object.
+    /// The last argument of the last step: the object that the alternative is about.
     pub fn about(&self) -> Option<&str> {
         self.steps.last()?.arguments.last().map(String::as_str)
     }
 }
 
-/// What was weighed, as it is kept beside the event.
+/// The comparison as a blob that is kept beside the event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.
@@ -142,9 +144,10 @@ struct Scale<'r> {
     state: State,
     /// Functions of the task that count, each with whether less of it is wanted.
     counting: Vec<(FunctionId, bool)>,
-    /// What says so.
+    /// Text of the goal, or else of the steps' conditions, that compares these numbers.
     asked: String,
-    /// Where the goal does not say so itself: the objects that it names and that the steps bring it nearer to.
+    /// Objects of the goal about which the steps that ask for these numbers make facts true; `None` if the
+    /// goal itself names the numbers.
     aims: Option<Vec<String>>,
 }
 
@@ -208,7 +211,7 @@ impl<'r> Scale<'r> {
         of.into_iter().map(|object| if !any_is || is_aim(&object) { object } else { "?" }).collect()
     }
 
-    /// By how much a number comes nearer to what is wanted.
+    /// Gain of a number: by how much it comes nearer to its bound.
     fn gain(now: f64, then: f64, less: bool) -> f64 {
         (if less { now - then } else { then - now }).max(0.0)
     }
@@ -220,7 +223,7 @@ impl<'r> Scale<'r> {
         Some((each, state))
     }
 
-    /// What a step takes in a state, seconds.
+    /// Duration of a step in a state, seconds.
     fn takes_s(&self, state: &State, step: &Step) -> Option<f64> {
         let (id, binding) = self.semantics.bind(step).ok()?;
         let Some(bounds) = &self.semantics.task.action(id).duration else { return Some(0.0) };
@@ -273,13 +276,13 @@ impl<'r> Scale<'r> {
         Some(Way { steps, each_s, takes_s, gains, reaches, ..Way::default() })
     }
 
-    /// Whether the goal holds in a state; none where it cannot be told.
+    /// True if the goal holds in a state; none where its value is undefined.
     fn reaches(&self, state: &State) -> Option<bool> {
         let goal = &self.semantics.task.goal;
         self.semantics.holds(state, &goal.body, &mut Binding::new(goal.slots)).ok()
     }
 
-    /// What steps come to, one after the other.
+    /// Totals of steps done in sequence.
     fn whole(&self, steps: &[Step]) -> Option<Whole> {
         let (each_s, state) = self.after(steps)?;
         let takes_s = each_s.iter().sum();
@@ -289,8 +292,9 @@ impl<'r> Scale<'r> {
         Some(Whole { takes_s: counted.unwrap_or(takes_s), steps: steps.len(), reaches })
     }
 
-    /// What other steps come to with the rest of a plan behind them, or with so much of it as is needed then: with objects
-    /// exchanged, or once a step has led to where it begins. Where that cannot be done, why.
+    /// Totals of other steps followed by the rest of a plan, or by as much of it as is still needed: with
+    /// objects exchanged, or after one step that leads to where the rest begins. If that cannot be done, the
+    /// obstacle.
     fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<Break>) {
         let ends = self.ends(other, rest);
         let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
@@ -314,7 +318,7 @@ impl<'r> Scale<'r> {
         }
     }
 
-    /// What may be done behind other steps to bring the rest of a plan about.
+    /// Candidate continuations after other steps that bring the rest of a plan about.
     fn ends(&self, other: &Other, rest: &[Step]) -> Vec<Vec<Step>> {
         let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
         let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
@@ -355,8 +359,8 @@ impl<'r> Scale<'r> {
         bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect()
     }
 
-    /// Why the rest of a plan cannot be done behind other steps: that a number is too small then for what is left to do but looking, or
-    /// else the first that is in the way of all of it.
+    /// The obstacle to the rest of a plan after other steps: a number that is too small for all that remains
+    /// besides looking, or else the first obstacle in the whole rest.
     fn short_of(&self, other: &Other, rest: &[Step]) -> Option<Break> {
         let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
         let looked = rest.iter().rposition(is_look);
@@ -370,12 +374,12 @@ impl<'r> Scale<'r> {
         by_number.or_else(|| stuck(&exchanged))
     }
 
-    /// Whether something changes by itself: a deadline passes.
+    /// True if the task has timed initial literals: something changes by itself, such as a deadline.
     fn is_timed(&self) -> bool {
         !self.semantics.task.init.timed.is_empty()
     }
 
-    /// What the monitor finds in steps, one after the other.
+    /// The first obstacle that the monitor finds in steps done in sequence.
     fn stuck(&self, steps: &[Step]) -> Option<Break> {
         let (mut state, mut begins_s, mut timed) = (self.state.clone(), 0.0, Vec::new());
         for step in steps {
@@ -401,7 +405,8 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
-    /// What a plan expects of the numbers in the end; where it uses up what it gains, when it has most.
+    /// Values that a plan expects of the numbers at its end; where it uses up what it gains, at its best
+    /// moment.
     fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
         let whole = self.expected(steps);
         if !whole.is_empty() {
@@ -436,7 +441,7 @@ impl<'r> Scale<'r> {
         Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, ..Weighed::default() })
     }
 
-    /// What is left of the plan before, and what it comes to, or why it would not do.
+    /// The remaining steps of the previous plan, with their totals or the obstacle that rules them out.
     fn left(&self, plan: &Plan, left: &Plan) -> Option<Way> {
         let steps: Vec<Call> = left.steps.iter().map(call_of).collect();
         if steps.is_empty() || plan.steps.iter().map(call_of).eq(steps.iter().cloned()) {
@@ -562,7 +567,8 @@ struct Other {
     way: Way,
 }
 
-/// Those that gain most a second, and of the others the quickest, the one that gains most, and the best about each object.
+/// The alternatives to keep: those with the highest gain per second, and of the others the quickest, the one
+/// with the highest gain, and the best about each object.
 fn kept(mut all: Vec<Other>) -> Vec<Other> {
     let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
     all.sort_by(|a, b| rate(a, b).then_with(|| a.way.steps.cmp(&b.way.steps)));

@@ -30,7 +30,7 @@ pub enum Tried {
     Found(Plan),
     /// There is none, and why.
     None(String),
-    /// It was not settled.
+    /// The search came to no result.
     Open,
 }
 
@@ -161,7 +161,7 @@ fn size(plan: &Plan) -> String {
 }
 
 impl Answer {
-    /// It in sentences, beside the plan that was found.
+    /// The answer in sentences, beside the plan that was found.
     pub fn said(&self, found: Option<&Plan>) -> String {
         let action = &self.action;
         let mut lines = Vec::new();

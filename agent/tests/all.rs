@@ -1,4 +1,5 @@
-//! What the agent promises, from outside: one program, so that what all tests share is built and linked once.
+//! Promises of the agent, tested from outside: one program, so that what all tests share is built and linked
+//! once.
 
 #[path = "../examples/own_body.rs"]
 mod own_body;

@@ -60,7 +60,7 @@ enum Goal {
         thing: usize,
         wording: usize,
     },
-    /// Whether any of a kind, or anything, stands on a surface.
+    /// True if any of a kind, or anything, stands on a surface.
     Any {
         kind: Option<usize>,
         on: usize,
@@ -193,12 +193,12 @@ fn home(goal: &Goal, is_question: bool, draws: &mut Draws) -> Domain {
     domain
 }
 
-/// How a goal fared.
+/// The result of pursuing a goal.
 struct Fared {
     pddl: String,
     verdict: Verdict,
     views: usize,
-    /// Whether it was true in the end.
+    /// True if the goal held in the end.
     is_true: bool,
     why: String,
 }

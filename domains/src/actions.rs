@@ -1,4 +1,5 @@
-//! What the actions of a domain are for the body: skills with their arguments, limits, checks, what failures teach.
+//! Actions of a domain as carried out by the body: skills with their arguments, limits, checks, lessons from
+//! failures.
 
 use std::sync::Arc;
 
@@ -22,7 +23,7 @@ pub struct Carried {
 
 /// A skill with its arguments by name.
 pub(crate) struct Grounded {
-    /// What it is.
+    /// Its skill.
     pub word: &'static SkillWord,
     arguments: Vec<String>,
 }
@@ -33,19 +34,19 @@ impl Grounded {
         self.arguments.iter().map(String::as_str).collect()
     }
 
-    /// Why it is done now.
+    /// The reason for doing it now.
     pub fn because(&self, situation: &Situation) -> String {
         (self.word.because)(situation, &self.arguments())
     }
 
-    /// What it is for the body now.
+    /// The skill ready to run, grounded in the situation.
     pub fn skill(&self, situation: &Situation) -> Result<Box<dyn Skill>, SkillFailure> {
         (self.word.ground)(situation, &self.arguments())
             .map_err(|because| SkillFailure::Meaningless { because })
     }
 }
 
-/// How an action is carried out; by the skill of its name where nothing is said.
+/// Configuration of an action; where the domain has none, the skill of the action's name.
 pub(crate) fn config(domain: &Domain, call: &Call) -> ActionConfig {
     domain.config.action.get(&call.action).cloned().unwrap_or_default()
 }
@@ -55,12 +56,12 @@ pub(crate) fn limit_s(domain: &Domain, call: &Call) -> f64 {
     config(domain, call).limit_s()
 }
 
-/// What must hold after a call.
+/// Condition that must hold after a call.
 pub(crate) fn check(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).check.map(|text| substitute(domain, call, &text, None))
 }
 
-/// Why a call is made, where the domain says so.
+/// The reason for a call, where the domain gives one.
 pub(crate) fn because(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).because.map(|text| substitute(domain, call, &text, None))
 }
@@ -124,7 +125,7 @@ pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
     found.into_iter().map(|(_, performer)| performer).collect()
 }
 
-/// Whether an action of the domain does a skill.
+/// True if an action of the domain uses a skill.
 pub(crate) fn does(domain: &Domain, skill: &str) -> bool {
     let is_it = |text: &String| text.split_whitespace().next() == Some(skill);
     domain
@@ -148,7 +149,7 @@ fn texts(config: &Config, action: &str, parameters: &[String]) -> Vec<String> {
     }
 }
 
-/// What a deed says of an action's parameters, where a skill of the action is that deed.
+/// Values that a deed gives to an action's parameters, if a skill of the action is that deed.
 fn unified(text: &str, deed: &Deed, parameters: &[String]) -> Option<Vec<Option<String>>> {
     let mut tokens = text.split_whitespace();
     if tokens.next() != Some(deed.skill) {
@@ -173,7 +174,7 @@ pub(crate) fn only_looking(config: &Config, task: &mut Task) {
     task.actions.retain(|action| kind(config, &action.name) < ActionKind::Changing);
 }
 
-/// Of the parts of a call the one that its action is called after, else the first.
+/// The main part of a call: the one that its action is named after, else the first.
 pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
     let parts = || (0..).map_while(|step| grounded(domain, call, step));
     parts().find(|part| part.word.name == call.action).or_else(|| parts().next())
@@ -217,7 +218,7 @@ fn substitute(domain: &Domain, call: &Call, text: &str, by: Option<&str>) -> Str
     out + rest
 }
 
-/// What an outcome is in a record.
+/// An outcome as it is recorded.
 pub(crate) fn outcome(outcome: &Outcome) -> Value {
     match outcome {
         Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),

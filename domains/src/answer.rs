@@ -1,4 +1,4 @@
-//! What is answered in the end: about what was asked, with where it is and what it rests on.
+//! Final answers: about the goal, with the place of what was found and the evidence.
 
 mod judged;
 
@@ -28,7 +28,7 @@ use crate::saying::Saying;
 use crate::situation::{Situation, Thing, is_alike};
 use crate::world::Round;
 
-/// Why a run ended.
+/// The reason a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
     /// The goal holds.
@@ -39,11 +39,11 @@ pub enum Ended {
     Undecided(String),
     /// A limit of looks, plans or time was reached.
     Limit(String),
-    /// What is done fails for good, or changes nothing.
+    /// A step fails for good, or steps change nothing.
     Failed(String),
 }
 
-/// How a run ended.
+/// The verdict on a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -53,7 +53,7 @@ pub enum Verdict {
     NotFound,
     /// Nothing that the body can do would settle it.
     CannotTell,
-    /// What was asked for is known, and nothing that the body can do brings it about.
+    /// The requested facts are known, and nothing that the body can do brings about the goal.
     Impossible,
     /// The body or the store failed, or what is done changes nothing.
     Failed,
@@ -82,33 +82,33 @@ pub struct Believed {
     /// The room that this is in.
     #[serde(default, rename = "in")]
     pub room: Option<String>,
-    /// Whether it is of what was asked for.
+    /// True if the goal asks about it.
     #[serde(default)]
     pub asked: bool,
 }
 
-/// What is answered.
+/// The conclusion of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conclusion {
-    /// How it ended.
+    /// The verdict.
     pub verdict: Verdict,
-    /// What is said, and why, in a sentence.
+    /// The answer with its reason, in a sentence.
     pub why: String,
-    /// How sure it is.
+    /// Confidence of the answer, 0 to 1.
     pub confidence: f64,
     /// Probability that what was looked for is there after all.
     pub remaining: Option<f64>,
-    /// What was looked for, if it was one thing.
+    /// The requested object, if the goal is about a single one.
     pub object: Option<String>,
-    /// Where it is believed to be, if it is.
+    /// The requested object as it is believed to stand, if it is.
     pub found: Option<Believed>,
     /// Everything that is believed.
     pub objects: Vec<Believed>,
-    /// What is to be remembered, where anything is.
+    /// Persistent belief for later runs, if any.
     pub remembered: Option<Remembered>,
 }
 
-/// What is answered when a run has ended.
+/// Draws the conclusion of a run that has ended.
 pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
     let (s, config) = (asker.s, &asker.domain.config);
     let (verdict, why) = match ended {
@@ -151,7 +151,7 @@ pub(crate) const CHANGES: &str = "changes";
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;
 
-/// What answering needs.
+/// Context of an answer.
 pub(crate) struct Asker<'a> {
     pub domain: &'a Domain,
     pub goal: &'a Goal,
@@ -161,9 +161,9 @@ pub(crate) struct Asker<'a> {
     /// A part that the domain needs and the body does not have.
     pub lacks: Option<Part>,
     pub s: &'a Situation,
-    /// How the domain says what is written in PDDL.
+    /// The domain's wording of PDDL.
     pub saying: &'a Saying,
-    /// What the phrase's own answer may list; none: it lists nothing.
+    /// Atoms that the phrase's own answer may list; none: it lists nothing.
     pub listed: Option<&'a Listed>,
 }
 
@@ -233,7 +233,7 @@ impl Asker<'_> {
         (Verdict::Achieved, said.join("; "))
     }
 
-    /// What is told of a surface on which each object is known, or surely none of the known ones.
+    /// Sentence about a surface on which each object is known, or surely none of the known ones.
     fn identified(&self, on: usize) -> String {
         let surface = &self.s.surfaces[on];
         let there = self.s.belief.tracks.iter().filter(|track| track.on == surface.symbol);
@@ -272,7 +272,8 @@ impl Asker<'_> {
         }
     }
 
-    /// That nothing is known on which a kind could stand in a room in which it is asked about; none if something is.
+    /// Sentence about a room in which no surface is known where the requested kind could stand; none if there
+    /// is one.
     fn nowhere(&self) -> Option<String> {
         let asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
         let mut rooms = asked.flat_map(|(kind, (_, rooms))| rooms.iter().flatten().map(move |r| (kind, r)));
@@ -367,7 +368,8 @@ impl Asker<'_> {
         (Verdict::Impossible, self.impossible(&says))
     }
 
-    /// That a question about kinds has the answer no: all of them are known, and it is not so; none if it is another question.
+    /// Sentence that answers a question about kinds with no: all of them are known, and the condition is
+    /// false; none if it is another question.
     fn no_of_kinds(&self) -> Option<String> {
         let s = self.s;
         let is_of_kinds = self.goal.question && !s.kinds.is_empty() && self.own().next().is_none();
@@ -384,7 +386,8 @@ impl Asker<'_> {
         })
     }
 
-    /// Why looks for a thing prove nothing: they showed nothing that it could stand on, or too few agree.
+    /// The reason looks for a thing prove nothing: they showed nothing that it could stand on, or too few
+    /// agree.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
         let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
         if let Some((on, _)) = asked().find(|(_, region)| region.disputed) {
@@ -407,7 +410,7 @@ impl Asker<'_> {
         format!("{known}{lacks}nothing that can be done brings about {wanted}{says}")
     }
 
-    /// Where the things stand that were asked for by name, of those of which it is sure.
+    /// Places of the things that were asked for by name, of those whose place is sure.
     fn surely(&self) -> Vec<String> {
         let is_sure = |what: usize| {
             let anywhere = (0..self.s.surfaces.len()).map(|on| self.s.presence(what, on));
@@ -437,7 +440,7 @@ impl Asker<'_> {
         }
     }
 
-    /// That it may be another known object, where no look tells the two apart; empty where looks do.
+    /// Addition that a thing may also be another known object that no look tells apart; empty where looks do.
     fn or_other(&self, thing: &Thing) -> String {
         let [model] = thing.models.as_slice() else { return String::new() };
         let mut others = self.domain.objects.iter().filter(|o| o.name != model.name && is_alike(o, model));
@@ -460,7 +463,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Where a thing surely stands that is not where it was asked about.
+    /// Place where a thing surely stands, outside the places it was asked about.
     fn elsewhere(&self, thing: &Thing) -> Option<String> {
         thing.on.as_ref()?;
         let anywhere = Thing { on: None, ..thing.clone() };
@@ -484,7 +487,7 @@ impl Asker<'_> {
         self.s.belief.tracks.iter().filter(is).map(named).collect()
     }
 
-    /// What is surely of the kinds of which not all are known; empty if nothing is.
+    /// Sure members of the kinds of which not all are known; empty if there are none.
     fn known_members(&self) -> String {
         let s = self.s;
         let is_open = |&n: &usize| s.completeness(n) < s.wanted_of(n);
@@ -555,13 +558,13 @@ impl Asker<'_> {
         Some(out + rest)
     }
 
-    /// What has changed on a surface since an earlier run looked at it.
+    /// Changes on a surface since an earlier run looked at it.
     fn changes(&self, surface: &str) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         changes(&past.remembered, &self.s.belief.tracks, surface, self.lexicon.name_of(surface))
     }
 
-    /// What has changed on all surfaces at which an earlier run looked, and at which none did.
+    /// Changes on all surfaces that an earlier run looked at, and the surfaces that none did.
     fn all_changes(&self) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         let (known, new): (Vec<_>, Vec<_>) =
@@ -572,7 +575,7 @@ impl Asker<'_> {
         told.chain(left_out).collect::<Vec<_>>().join("; ")
     }
 
-    /// What holds of an atom now: the names in the place of the question mark, or a number, or yes or no.
+    /// Value of an atom now: the names in the place of the question mark, or a number, or yes or no.
     fn value(&self, atom: &str) -> String {
         let tokens: Vec<String> =
             atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();
@@ -627,7 +630,7 @@ fn counted(names: Vec<String>) -> String {
     all.into_iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// What has changed on a surface since an earlier run looked at it; `name` is what people call it.
+/// Changes on a surface since an earlier run looked at it; `name` is what people call it.
 pub fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
     if !past.has_looked_at(surface) {
         return never_seen(name);

@@ -1,4 +1,4 @@
-//! What a goal asks about: a visitor of its parsed condition.
+//! Subjects of a goal: a visitor of its parsed condition.
 
 use descry_planner::Source;
 use descry_planner::task::{Comparison, Condition, Expression, PredicateId, Quantified, Task, Term};
@@ -19,9 +19,10 @@ pub struct Asked {
     pub kinds: Vec<(String, Option<Vec<String>>)>,
     /// Surfaces of which it is asked what stands there.
     pub surfaces: Vec<String>,
-    /// Whether the condition wants something of seen objects to be false, or a certainty about them to be small.
+    /// True if the condition wants something of seen objects to be false, or a certainty about them to be
+    /// small.
     pub denies: bool,
-    /// Whether it asks for more than looking can tell.
+    /// True if it asks for more than looking can tell.
     pub more: bool,
     /// Words of the condition with their objects, in its order; those behind derived words too. Variables are left as `?`.
     pub words: Vec<(String, Vec<String>)>,
@@ -35,7 +36,7 @@ const PLACED: &str = "placed";
 const CLARITY: &str = "clarity";
 /// The predicate that says in which room a surface is.
 const IN: &str = "in";
-/// What is said of objects that were seen: the less was seen, the less of it holds.
+/// Words about seen objects: the less was seen, the fewer of them hold.
 const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
 
 /// Parses a condition over the words of a domain and the names of a lexicon. A name that nobody knows yet, such as a pose of the

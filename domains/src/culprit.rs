@@ -34,7 +34,7 @@ pub fn of_drives(domain: &Domain, round: &Round) -> Option<Compared> {
     nearest
 }
 
-/// How far a comparison is from holding; infinite where a side has no value.
+/// Distance of a comparison from holding; infinite where a side has no value.
 fn lacks(compared: &Compared) -> f64 {
     let sides = compared.left_value.zip(compared.right_value);
     sides.map_or(f64::INFINITY, |(left, right)| (left - right).abs())
@@ -87,7 +87,7 @@ struct Drives<'a> {
 }
 
 impl Drives<'_> {
-    /// Whether some binding of the parameters from the `n`-th on can be taken.
+    /// True if the action is possible for some binding of the parameters from the `n`-th on.
     fn some_is_free(&mut self, n: usize, binding: &mut Binding) -> bool {
         let Some(parameter) = self.action.parameters.get(n) else {
             self.left = self.left.saturating_sub(1);
@@ -124,7 +124,7 @@ impl Drives<'_> {
         false
     }
 
-    /// Whether the action comes to an end: no way there takes for ever.
+    /// True if the duration of the action is finite: it is infinite where no route leads there.
     fn lasts(&self, binding: &Binding) -> bool {
         let mut bounds = self.action.duration.iter().flatten();
         bounds.all(|bound| {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-/// What answers where a program is named. It hears the questions that a program hears, without their `id`, and what it answers is
-/// recorded as that of a program is.
+/// A function in the place of a program. It gets the questions that the program would get, without their
+/// `id`, and its answers are recorded as those of a program are.
 pub trait Function: std::fmt::Debug + Send + Sync {
     /// The `value` of the answer.
     ///

@@ -1,4 +1,4 @@
-//! From what a person says to a PDDL goal, by the phrases of the domain.
+//! Translation of a person's words into a PDDL goal, by the phrases of the domain.
 
 mod ending;
 mod english;
@@ -22,13 +22,13 @@ pub struct Goal {
     pub phrase: String,
     /// The goal condition in PDDL.
     pub pddl: String,
-    /// What the condition asks about.
+    /// Subjects of the condition.
     pub asked: Asked,
-    /// What the slots hold.
+    /// Values of the slots.
     pub slots: Vec<Filled>,
-    /// Whether the answer is yes or no.
+    /// True if the answer is yes or no.
     pub question: bool,
-    /// What is answered.
+    /// Answers of the phrase.
     pub answer: Answers,
     /// The confidence that ends the search, 0 to 1.
     pub threshold: f64,
@@ -41,7 +41,7 @@ pub struct Goal {
 pub struct Filled {
     /// As it stands in the phrase: `thing`, or `first:thing`.
     pub slot: String,
-    /// Which of several of the same name, from 0.
+    /// Index among several slots of the same name, from 0.
     pub number: usize,
     /// The PDDL symbol.
     pub symbol: String,
@@ -49,7 +49,7 @@ pub struct Filled {
     pub name: String,
 }
 
-/// Why a goal was not understood, with what could have been said.
+/// The reason a goal was not understood, with suggestions.
 #[derive(Debug, thiserror::Error)]
 pub enum GoalError {
     /// No phrase of the domain fits.
@@ -65,7 +65,7 @@ pub enum GoalError {
     /// A phrase fits, but a slot holds a word that nothing is called.
     #[error("nothing is called \"{found}\" in the domain {domain}\n{suggestions}")]
     NoSuchName {
-        /// What stood in the slot.
+        /// Content of the slot.
         found: String,
         /// The domain's name.
         domain: String,
@@ -77,7 +77,7 @@ pub enum GoalError {
         "\"with confidence {found}\" asks for no probability\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
     )]
     BadConfidence {
-        /// What followed "with confidence".
+        /// The words after "with confidence".
         found: String,
     },
     /// With the confidence that was asked for, a yes would be no likelier than a no.
@@ -85,7 +85,7 @@ pub enum GoalError {
         "\"with confidence {found}\" asks for a yes that is no likelier than a no\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
     )]
     LowConfidence {
-        /// What followed "with confidence".
+        /// The words after "with confidence".
         found: String,
     },
     /// The deadline that was asked for is no time.
@@ -93,7 +93,7 @@ pub enum GoalError {
         "\"within {found}\" asks for no time\n  a number of seconds or minutes was expected, as in \"within 60 seconds\""
     )]
     BadDeadline {
-        /// What followed "within".
+        /// The words after "within".
         found: String,
     },
     /// The deadline that was asked for is a number of nothing.
@@ -101,15 +101,15 @@ pub enum GoalError {
         "\"within {found}\" does not say of what\n  seconds or minutes were expected, as in \"within {found} seconds\" or \"within {found} minutes\""
     )]
     NoUnit {
-        /// What followed "within".
+        /// The words after "within".
         found: String,
     },
-    /// How sure, or how soon, is said more than once.
+    /// A confidence or deadline is given more than once.
     #[error("\"{condition}\" is said twice\n  expected it once, as in \"find cup A {condition} {example}\"")]
     SaidTwice {
-        /// What begins it.
+        /// Its first words.
         condition: &'static str,
-        /// What may follow.
+        /// An example of the words after them.
         example: &'static str,
     },
     /// "and" beside "or", two lists of names, and "or" between what is to be known as a whole may be meant in several ways.
@@ -131,7 +131,7 @@ pub enum GoalError {
     BadPhrase {
         /// The phrase.
         phrase: String,
-        /// What is wrong with it, and a mend.
+        /// The fault, and a remedy.
         because: String,
     },
 }
@@ -287,7 +287,7 @@ fn goal_of(
     })
 }
 
-/// What a clause means, in PDDL.
+/// Meaning of a clause, in PDDL.
 fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<String, GoalError> {
     let phrase = clause.phrase;
     let bad = |because: String| GoalError::BadPhrase { phrase: phrase.say.clone(), because };
@@ -297,8 +297,8 @@ fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<Str
     sentence::restricted(&means, &clause.within, domain).ok_or_else(nowhere)
 }
 
-/// What the clauses answer, with what fills their slots: one after the other where all are asked for; their own answers are none of
-/// which may hold alone, nor where one of them has none.
+/// Answers of the clauses, with the values of their slots: one after the other where the clauses are joined
+/// by "and"; none if they are alternatives, or if one of them has none.
 fn answers(sentence: &Sentence<'_>) -> Result<Answers, GoalError> {
     let is_joined = sentence.joint == Joint::And;
     let of = |pick: &dyn Fn(&Answers) -> &Option<String>| -> Result<Option<String>, GoalError> {

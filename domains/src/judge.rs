@@ -49,7 +49,7 @@ impl Truth {
 /// Truth of a condition, with the word that decides it or leaves it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
-    /// Whether it holds.
+    /// Its truth value.
     pub value: Truth,
     /// The word; none where a condition of no words decides.
     pub word: Option<Decisive>,
@@ -62,11 +62,11 @@ pub struct Decisive {
     pub word: String,
     /// Its objects: symbols of the problem; none where nobody has seen such an object, or it is none of the problem.
     pub objects: Vec<Option<String>>,
-    /// Whether it is a number.
+    /// True if it is a number.
     pub is_number: bool,
-    /// Whether looks tell what it is.
+    /// True if looks tell its value.
     pub is_seen: bool,
-    /// Whether it holds, as believed now; of a number whether it has a value.
+    /// True if it holds, as believed now; for a number, true if it has a value.
     pub holds: bool,
 }
 
@@ -83,13 +83,13 @@ impl Judgement {
         Judgement { value, word: None }
     }
 
-    /// Whether looks may decide it.
+    /// True if looks may decide it.
     pub fn is_open_to_looks(&self) -> bool {
         self.value == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
     }
 }
 
-/// What a slot holds.
+/// Value of a slot.
 type Bound<'a> = Option<Held<'a>>;
 
 #[derive(Clone, Copy)]
@@ -202,7 +202,7 @@ impl<'a> Judge<'a> {
         )
     }
 
-    /// What a variable may stand for besides the objects of the problem.
+    /// Values of a variable besides the objects of the problem.
     fn others(&self, variable: &Quantified) -> Vec<Referent<'a>> {
         let task = self.semantics.task;
         let takes = |wanted: &str| {
@@ -366,7 +366,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// What looks tell of a word; none where something else does.
+    /// Bounds that looks give for a word; none where looks do not tell it.
     fn bounds(&self, name: &str) -> Option<Bounds> {
         let word = self.vocabulary.iter().find(|word| word.name == name)?;
         match self.domain.vocabulary.ground(word, &self.domain.config) {
@@ -375,7 +375,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Whether a word that is not said to hold is known not to.
+    /// True if a word that is not stated to hold is known to be false.
     fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
         if !matches!(self.domain.vocabulary.ground(word, &self.domain.config), Ground::Remembered) {
@@ -412,7 +412,7 @@ impl<'a> Judge<'a> {
         held.object().map(|id| self.semantics.task.object(id).name.clone())
     }
 
-    /// What terms stand for; none where one of them is undefined.
+    /// Objects that terms denote; none where one of them is undefined.
     fn referents(&self, terms: &[Term], scope: &[Bound<'a>]) -> Option<Vec<Held<'a>>> {
         terms.iter().map(|term| self.referent(term, scope)).collect()
     }
@@ -451,7 +451,7 @@ impl Held<'_> {
     }
 }
 
-/// Whether a remembered word tells of what the robot has done alone: no action that changes the world sets it.
+/// True if a remembered word tells only of what the robot has done: no action that changes the world sets it.
 pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
     let changers = domain.vocabulary.changers(word);
     changers.into_iter().all(|action| actions::kind(&domain.config, action) < ActionKind::Changing)

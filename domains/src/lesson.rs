@@ -1,15 +1,15 @@
-//! What the failure of a step teaches.
+//! Lessons from the failure of a step.
 
 use descry_skills::Call;
 use serde::{Deserialize, Serialize};
 
 use crate::saying::Saying;
 
-/// What is concluded from the failure of a step.
+/// The lesson from the failure of a step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Lesson {
-    /// What an ability concludes, in a sentence.
+    /// Conclusion of an ability, in a sentence.
     Said {
         /// The sentence.
         text: String,

@@ -1,4 +1,4 @@
-//! What things are called: the names of the objects of every type, from the domain and from the body's map.
+//! Names of things: of the objects of every type, from the domain and from the body's map.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ pub const SENSE: &str = "sense";
 /// Types whose objects have names in every domain: their symbols are these names.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
-/// How two names must differ.
+/// Advice for names that are not distinct.
 pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
 
 /// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
@@ -168,7 +168,7 @@ impl Lexicon {
         }
     }
 
-    /// Whether a symbol is one, and nothing has it yet.
+    /// True if a symbol is valid and not taken yet.
     pub fn is_free(&self, symbol: &str) -> bool {
         !symbol.is_empty() && self.by_type.values().flatten().all(|known| known.symbol != symbol)
     }
@@ -183,7 +183,7 @@ impl Lexicon {
         self.by_type.keys().map(String::as_str)
     }
 
-    /// What a symbol is usually called; the symbol itself if it has no name.
+    /// Usual name of a symbol; the symbol itself if it has no name.
     pub fn name_of<'a>(&'a self, symbol: &'a str) -> &'a str {
         let all = self.by_type.iter().filter(|(of, _)| *of != "kind").flat_map(|(_, list)| list);
         let found = all.into_iter().find(|n| n.symbol == symbol);

@@ -39,7 +39,7 @@ pub const DEFAULT: &str = "tabletop";
 pub struct Domain {
     /// `domain.pddl`.
     pub pddl: Source,
-    /// What it declares.
+    /// Its vocabulary.
     pub vocabulary: Vocabulary,
     /// `domain.toml`, as text.
     pub toml: Source,
@@ -55,13 +55,13 @@ pub struct Domain {
     pub folder: Option<PathBuf>,
     /// The texts that all this was read from.
     pub files: Files,
-    /// What answers in the places of its programs.
+    /// Functions in the places of its programs.
     pub functions: Functions,
-    /// Where the answers of its programs are kept, and come from.
+    /// Recording of its programs' answers, for writing and for replay.
     pub tape: Option<Arc<dyn Tape>>,
 }
 
-/// Why a domain's folder could not be loaded.
+/// The reason a domain's folder could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Neither a built-in name nor a folder.
@@ -69,7 +69,7 @@ pub enum LoadError {
         "there is no domain \"{name}\"\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
     )]
     NoDomain {
-        /// What was asked for.
+        /// The requested domain.
         name: String,
         /// The built-in domains.
         known: String,
@@ -79,9 +79,9 @@ pub enum LoadError {
     File {
         /// The file.
         path: String,
-        /// What the system said.
+        /// Error of the operating system.
         because: String,
-        /// What should be there.
+        /// Expected content.
         expected: &'static str,
     },
     /// A TOML file says what cannot be understood; the drawing points at the place.
@@ -101,7 +101,7 @@ pub enum LoadError {
     /// The objects make no sense together or alone.
     #[error("{because}")]
     Objects {
-        /// Which, and what was expected.
+        /// The object at fault, and the expected values.
         because: descry_perception::recognise::ModelError,
     },
 }

@@ -1,4 +1,4 @@
-//! What a world knows and keeps from round to round.
+//! Knowledge of a world, kept from round to round.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,13 +14,13 @@ use crate::words::Words;
 
 /// Everything that a world has come to know.
 pub struct Mind {
-    /// What rounds are grounded in.
+    /// Knowledge that rounds are grounded in.
     pub known: Known,
     /// The values of remembered and fixed words.
     pub words: Words,
     /// Looks at each surface, and what was changed there.
     pub regions: Vec<Region>,
-    /// What was merged last, if other surfaces may be in the same views.
+    /// Last merge, if other surfaces may be in the same views.
     pub merged: Option<LastMerged>,
     /// Views taken so far.
     pub views: usize,
@@ -28,26 +28,26 @@ pub struct Mind {
     pub pushes: usize,
     /// Driven so far, metres.
     pub distance_m: f64,
-    /// What learned things views suggest by themselves.
+    /// Recognition results of learned things in single views.
     pub glances: Glances,
-    /// What each sense of the body said last, by its symbol.
+    /// Last reading of each sense of the body, by its symbol.
     pub readings: BTreeMap<String, serde_json::Value>,
 }
 
-/// What was done about one surface.
+/// View history of one surface.
 #[derive(Debug, Default)]
 pub struct Region {
     /// Views that still hold.
     pub looks: Vec<Look>,
-    /// What merging them left that a further one does not need anew.
+    /// State of their last merge, reused by the next one.
     pub merger: Merger,
     /// The views that its space holds, by their times, and from where they saw it.
     pub taken_in: Vec<(i64, Isometry3<f64>)>,
     /// Places where something has moved.
     pub changes: Vec<Change>,
-    /// How many looks have been taken in all.
+    /// The number of looks taken in all.
     pub taken: usize,
-    /// Why the last look showed no surface; none if it did.
+    /// The reason the last look showed no surface; none if it did.
     pub nothing: Option<String>,
     /// As many of its views as agree contradict them: which are wrong is not known.
     pub disputed: bool,
@@ -62,11 +62,11 @@ pub struct Look {
     pub record: RecordId,
     /// From how far away it shows the middle of its surface, as far as that is known, metres.
     pub away_m: f64,
-    /// How what it alone shows of a surface of the map lies on the outline there.
+    /// Alignment of this view alone with the outline of its surface on the map.
     pub laid: Laid,
 }
 
-/// How a view lies on the outline of a surface.
+/// Alignment of a view with the outline of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Laid {
     /// As localisation has it: the map has no outline, or nobody has tried.

@@ -1,8 +1,8 @@
-//! Why there is no plan, in a sentence.
+//! The reasons there is no plan, in a sentence.
 
 use descry_planner::{NoPlan, Refusal};
 
-/// What a call of a domain asks, in words; none: nobody says.
+/// Meaning of a domain's call, in words; `None`: not known.
 pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 /// The reasons why there is no plan. Refused calls are told by what they ask, and counted: which of them comes first says nothing.
@@ -21,7 +21,7 @@ fn one(reason: &NoPlan, meanings: Meanings<'_>) -> String {
     }
 }
 
-/// What was asked in vain.
+/// Sentence about the calls that an attachment refused.
 fn refused(module: &str, answer: Refusal, calls: &[String], meanings: Meanings<'_>) -> String {
     let said = match answer {
         Refusal::No => "no",

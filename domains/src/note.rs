@@ -1,4 +1,4 @@
-//! What a world has learned, for people and for the record.
+//! Notes on what a world has learned, for people and for the record.
 
 use std::fmt;
 
@@ -21,9 +21,9 @@ pub enum Note {
         points: usize,
         /// Root mean square distance between the views, metres.
         residual_m: f64,
-        /// What each object on the surface is taken for.
+        /// Believed identity of each object on the surface.
         objects: Vec<String>,
-        /// What the last view changed in the belief.
+        /// Changes of the belief by the last view.
         changed: Vec<BeliefChange>,
     },
     /// A surface that no map knows has come into view.
@@ -37,7 +37,7 @@ pub enum Note {
     },
     /// The laser has swept.
     Swept {
-        /// What is on the floor, and what is known of its shape.
+        /// Things on the floor, and the knowledge of their shapes.
         things: Vec<OnTheFloor>,
     },
     /// A look was taken into the map.
@@ -46,7 +46,7 @@ pub enum Note {
         walls: usize,
         /// Pillars and round walls.
         cylinders: usize,
-        /// How long the walls are together, openings left out, metres.
+        /// Total length of the walls, openings left out, metres.
         walls_m: f64,
         /// Open floor, square metres.
         open_m2: f64,
@@ -54,7 +54,7 @@ pub enum Note {
         unseen_m2: f64,
         /// Level surfaces to put things on.
         surfaces: Vec<String>,
-        /// By how much the body stands elsewhere than it believed, by what it sees, metres and radians.
+        /// Correction of the body's believed pose by what it sees, metres and radians.
         moved_m: f64,
         /// See there.
         turned_rad: f64,
@@ -63,32 +63,32 @@ pub enum Note {
     Visited {
         /// From where.
         waypoint: String,
-        /// How often it was seen so far, this time too; 0 if this visit could not be compared.
+        /// The number of visits so far, this one too; 0 if this visit could not be compared.
         visits: usize,
-        /// By how much the body stood elsewhere than it believed, by what it saw, metres and radians.
+        /// Correction of the body's believed pose by what it saw, metres and radians.
         moved_m: f64,
         /// See there.
         turned_rad: f64,
-        /// Why it could not be compared.
+        /// The reason it could not be compared.
         strange: Option<String>,
-        /// What has come.
+        /// Objects that appeared.
         came: Vec<String>,
-        /// What is gone.
+        /// Objects that are gone.
         gone: Vec<String>,
     },
     /// Somebody has moved something: what was seen before the last view no longer holds.
     Changed {
-        /// What shows it.
+        /// The evidence.
         because: String,
     },
     /// Nothing could be made of what has been seen so far.
     Nothing {
-        /// Why.
+        /// The reason.
         because: String,
-        /// What could be set otherwise; empty: nothing.
+        /// Advice on settings; empty: none.
         #[serde(default, skip_serializing_if = "String::is_empty")]
         advice: String,
-        /// Whether the view is left out for good; else further views may still make use of it.
+        /// True if the view is left out for good; else further views may still make use of it.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         is_left_out: bool,
     },
@@ -102,7 +102,7 @@ pub enum LeftOut {
     View {
         /// The number.
         view: usize,
-        /// Why, behind the number.
+        /// The reason, said after the number.
         why: String,
     },
     /// As an earlier version said it.
@@ -122,9 +122,9 @@ impl fmt::Display for LeftOut {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum BeliefChange {
-    /// How sure it is of where something stands.
+    /// Change of the confidence in the place of a thing.
     Confidence {
-        /// Of what.
+        /// The thing.
         of: String,
         /// Before.
         before: f64,
@@ -150,11 +150,11 @@ impl fmt::Display for BeliefChange {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum OnTheFloor {
-    /// What is known of it.
+    /// Knowledge of its shape.
     Thing {
         /// In a line.
         text: String,
-        /// Whether no sweep was taken from near it.
+        /// True if no sweep was taken from near it.
         is_far: bool,
     },
     /// As an earlier version said it.
@@ -162,7 +162,7 @@ pub enum OnTheFloor {
 }
 
 impl OnTheFloor {
-    /// What is known of it, in a line.
+    /// The knowledge of its shape, in a line.
     pub fn text(&self) -> &str {
         match self {
             OnTheFloor::Thing { text, .. } | OnTheFloor::Said(text) => text,

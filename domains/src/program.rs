@@ -28,19 +28,19 @@ use serde_json::{Value, json};
 use crate::config::Program;
 use crate::function::Function;
 
-/// How many of its last words on standard error are shown when a program ends.
+/// The number of last lines on standard error that are shown when a program ends.
 const LAST_WORDS: usize = 5;
-/// How much of such a line is shown, bytes.
+/// Maximum length of such a line, bytes.
 const MOST_WORD_BYTES: u64 = 1 << 10;
 /// A line of answer is at most so long: some ten thousand proposals.
 const MOST_LINE_BYTES: u64 = 1 << 20;
-/// So many lines of answer are read ahead.
+/// The number of lines of answer that are read ahead.
 const LINES_AHEAD: usize = 16;
-/// What a process of a program may allocate.
+/// Maximum memory of a program's process, bytes.
 const MOST_DATA_BYTES: u64 = 4 << 30;
 /// A program that has closed its output has so long to end by itself.
 const END_WAIT: Duration = Duration::from_millis(500);
-/// What a program sees of the environment, beside `LC_…`: where things are, and the language.
+/// Environment variables that a program gets, beside `LC_…`: locations and the language.
 const SEEN: [&str; 12] = [
     "PATH",
     "HOME",
@@ -98,7 +98,7 @@ struct Reply {
     said: Said,
 }
 
-/// What a program says to a question.
+/// Answer of a program to a question.
 #[derive(Deserialize)]
 struct Said {
     #[serde(default)]
@@ -309,7 +309,7 @@ impl Running {
         self.child.wait()
     }
 
-    /// That nothing is left to be killed is as well.
+    /// Kills the process group; one that is already gone is no error.
     fn kill(&self) {
         let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
     }
@@ -327,7 +327,7 @@ pub fn is_seen(variable: &str) -> bool {
     SEEN.contains(&variable) || variable.starts_with("LC_")
 }
 
-/// What cannot be limited is not: time and length of lines are.
+/// Limits the memory of a program; on platforms without such a limit, only time and line length are limited.
 fn limit_memory(child: &Child) {
     #[cfg(target_os = "linux")]
     {

@@ -60,9 +60,9 @@ impl Programs {
         self.actions.get(name)
     }
 
-    /// What the program behind a word says holds of it now, a line of PDDL each. It is asked
-    /// `{"id": 0, "fact": "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`. Once senses of the
-    /// body were read, the question holds what each said last: `"readings": {"rain-gauge": 1.5}`.
+    /// Facts that the program behind a word states now, a line of PDDL each. It is asked `{"id": 0, "fact":
+    /// "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`. Once senses of
+    /// the body were read, the question holds the last reading of each: `"readings": {"rain-gauge": 1.5}`.
     ///
     /// # Errors
     /// Why there is no usable answer.

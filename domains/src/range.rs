@@ -48,7 +48,8 @@ impl Range {
         Range { believed: value, least: if value >= wanted { value } else { 0.0 }, greatest: 1.0 }
     }
 
-    /// What a predicate is that holds with a probability: settled where that is as great, or as small, as was asked for.
+    /// Truth of a predicate that holds with a probability: settled where the probability, or its complement,
+    /// reaches `wanted`.
     pub fn settled(probability: f64, wanted: f64) -> Range {
         match probability {
             p if p >= wanted => Range::exactly(1.0),
@@ -57,7 +58,7 @@ impl Range {
         }
     }
 
-    /// Whether it may be but one value.
+    /// True if only one value is possible.
     pub fn is_exact(&self) -> bool {
         self.least == self.greatest
     }
@@ -88,12 +89,12 @@ impl Situation {
         (1.0 - none_is + self.doubt_about_on(what, on).hidden).min(1.0)
     }
 
-    /// Whether it is as sure as was asked for what stands on a surface.
+    /// True if the objects on a surface are known with the requested confidence.
     pub(crate) fn is_clear(&self, on: usize) -> bool {
         self.is_looked_at(on) && self.clarity(on) >= self.threshold
     }
 
-    /// Whether a view of a surface was taken in this run.
+    /// True if a view of a surface was taken in this run.
     pub(crate) fn is_looked_at(&self, on: usize) -> bool {
         !self.spaces[on].seen_from().is_empty()
     }

@@ -1,5 +1,5 @@
-//! What is written in PDDL, as the domain says it to people: its `[said]` has a line for an action, a word or a call. What has none is
-//! shown as it is written.
+//! Wording of PDDL for people: the domain's `[said]` has a line for an action, a word or a call. An
+//! expression without a line is shown as it is written.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use crate::goal::spoken_types;
 use crate::lexicon::{Lexicon, NAMED, Places, one};
 use crate::load::Domain;
 
-/// What a line of `[said]` is about: the parameters, in their order, with their types.
+/// A line of `[said]`: the parameters, in their order, with their types; and the text.
 type Form = (Vec<(String, String)>, String);
 
-/// How a domain says what is written in PDDL.
+/// The domain's wording of PDDL.
 #[derive(Debug, Default)]
 pub struct Saying {
     forms: BTreeMap<String, Form>,
@@ -27,7 +27,7 @@ enum Written<'t> {
     List(Vec<Written<'t>>),
 }
 
-/// Whether something is so, or would be.
+/// Mood of a sentence: indicative or conditional.
 #[derive(Debug, Clone, Copy)]
 enum Mood {
     Is,
@@ -43,7 +43,7 @@ impl Mood {
     }
 }
 
-/// What a variable stands for where something is said of it: the type that it is of, and how it is called there.
+/// Variables in scope, each with its type and its name in the sentence.
 type Bound<'t> = [(&'t str, String)];
 
 impl Saying {
@@ -105,12 +105,12 @@ impl Saying {
         expression(pddl.trim()).filter(|(_, after)| after.is_empty()).map(|(written, _)| written)
     }
 
-    /// Whether the domain has a line for an action, a word or a call.
+    /// True if the domain has a line for an action, a word or a call.
     pub fn has(&self, name: &str) -> bool {
         self.forms.contains_key(name)
     }
 
-    /// What an action, a word or a call is about in general: `looking at the surface from a pose`.
+    /// Wording of an action, a word or a call in general: `looking at the surface from a pose`.
     pub fn in_general(&self, name: &str) -> String {
         let Some((parameters, text)) = self.forms.get(name) else { return name.to_string() };
         let general = |text: String, (variable, of): &(String, String)| {
@@ -119,7 +119,7 @@ impl Saying {
         parameters.iter().fold(text.clone(), general)
     }
 
-    /// What an object is called that people have a name for.
+    /// Name of an object, if people have one for it.
     pub fn name_of(&self, symbol: &str) -> String {
         self.name(symbol, NAMED[0], &[])
     }
@@ -153,7 +153,7 @@ impl Saying {
         }
     }
 
-    /// That an expression does not hold.
+    /// Sentence that denies an expression.
     fn denied(&self, written: &Written<'_>, bound: &Bound<'_>, mood: Mood) -> Option<String> {
         let Written::List(parts) = written else { return None };
         let (Written::One(head), arguments) = parts.split_first()? else { return None };
@@ -181,7 +181,7 @@ impl Saying {
         Some(format!("{} is {is}{}", side(a)?, side(b)?))
     }
 
-    /// What is said of all, or of one, of a type: what it is called, and what is said.
+    /// Parts of a sentence about all, or about one, of a type: its subject and its statement.
     fn quantified(
         &self,
         over: &Written<'_>,
@@ -235,7 +235,7 @@ impl Saying {
         Some(said + rest)
     }
 
-    /// What a symbol, or what a variable stands for, is called.
+    /// Name of a symbol, or of the value of a variable.
     fn name(&self, symbol: &str, of: &str, bound: &Bound<'_>) -> String {
         if let Some((_, it)) = bound.iter().find(|(variable, _)| *variable == symbol) {
             return it.clone();

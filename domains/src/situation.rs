@@ -32,7 +32,7 @@ pub use surface::KnownSurface;
 pub struct Candidate {
     /// Its PDDL symbol.
     pub symbol: String,
-    /// Where it is.
+    /// Its pose or station.
     pub place: Place,
 }
 
@@ -59,7 +59,7 @@ impl Thing {
         if meant && asked { track.probability_of(&self.name) } else { 0.0 }
     }
 
-    /// Whether it may be on a surface, as far as it is asked.
+    /// True if it may be on a surface, as far as it is asked about.
     pub fn may_be_on(&self, surface: usize) -> bool {
         self.track.is_none() && self.on.as_ref().is_none_or(|on| on.contains(&surface))
     }
@@ -70,36 +70,36 @@ impl Thing {
 pub struct KnownDoor {
     /// Its PDDL symbol.
     pub symbol: String,
-    /// What the map says of it.
+    /// The door as the map has it.
     pub door: descry_robots::Door,
 }
 
-/// What the hand holds.
+/// The object in the hand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Held {
     /// The number of the track that it was.
     pub track: u64,
 }
 
-/// What is remembered of earlier runs, and when this one began.
+/// Persistent belief from earlier runs, and the time at which this run began.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Past {
-    /// What they saw last.
+    /// Objects as they were seen last.
     pub remembered: Arc<Remembered>,
     /// Seconds since 1970.
     pub now_unix_s: f64,
 }
 
-/// What is known when a round begins.
+/// World model at the beginning of a round.
 #[derive(Clone)]
 pub struct Known {
     /// The body, which is only asked.
     pub robot: Arc<dyn Robot>,
-    /// What is believed.
+    /// Belief state about objects.
     pub belief: Arc<Belief>,
     /// Everything to stand things on.
     pub surfaces: Vec<KnownSurface>,
-    /// What has been seen free, occupied, or not at all around each surface.
+    /// Free, occupied and unobserved space around each surface.
     pub spaces: Vec<Arc<Space>>,
     /// Poses to look from.
     pub candidates: Vec<Candidate>,
@@ -109,15 +109,15 @@ pub struct Known {
     pub looked_from: usize,
     /// Since when the body stands where it does.
     pub stands_since_ns: i64,
-    /// How localisation errs there, as the last look from there shows it: `map_from_localised`. None before one.
+    /// Localisation error there, as the last look from there shows it: `map_from_localised`. None before one.
     pub errs_by: Option<Isometry3<f64>>,
-    /// What is looked for.
+    /// Requested objects.
     pub things: Vec<Thing>,
-    /// Of what all are looked for.
+    /// Kinds of which all members are requested.
     pub kinds: Vec<Thing>,
     /// The surfaces of which it is asked what stands there.
     pub asked: Vec<usize>,
-    /// How sure one wants to be, 0 to 1.
+    /// Confidence that is required, 0 to 1.
     pub threshold: f64,
     /// Seconds until the deadline, if there is one.
     pub time_left_s: Option<f64>,
@@ -133,24 +133,26 @@ pub struct Known {
     pub doors: Vec<KnownDoor>,
     /// Those that are believed to be shut, by number.
     pub shut: BTreeSet<usize>,
-    /// What the hand holds.
+    /// The object in the hand.
     pub held: Option<Held>,
-    /// What is remembered of earlier runs.
+    /// Persistent belief from earlier runs.
     pub past: Option<Past>,
-    /// What the laser has found on the floor.
+    /// Objects on the floor that the laser has found.
     pub floor: Arc<Floor>,
     /// The map that the body has made itself.
     pub chart: Arc<Chart>,
-    /// What is new, and the things that were learned.
+    /// Novel objects and learned things.
     pub news: Arc<News>,
-    /// How much more often each thing, then each kind, then anything is expected on each surface than on another.
+    /// Prior weight of each thing, then each kind, then anything on each surface, relative to another
+    /// surface.
     pub expected: Vec<Vec<f64>>,
 }
 
-/// What grounds the symbols of one planning round: all that is [`Known`], and what follows from it. Nothing in it moves anything.
+/// Snapshot of the world model that grounds the symbols of one planning round: all that is [`Known`], and
+/// values derived from it. Nothing in it moves anything.
 pub struct Situation {
     known: Known,
-    /// What counts as sure.
+    /// Thresholds of confidence.
     pub thresholds: Thresholds,
     derived: Derived,
 }
@@ -158,7 +160,7 @@ pub struct Situation {
 /// A candidate to drive from, and the doors that are shut then.
 type Departure = (usize, Vec<usize>);
 
-/// What is computed at the first question and kept.
+/// Values that are computed on demand and kept.
 #[derive(Default)]
 struct Derived {
     /// Candidates by their symbols.
@@ -278,19 +280,20 @@ impl Situation {
         travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
     }
 
-    /// Whether the body can drive to a candidate from where it stands without opening anything.
+    /// True if the body can drive to a candidate from where it stands without opening anything.
     pub fn can_drive_to(&self, to: usize) -> bool {
         to == self.at || (!self.out_of_reach.contains(&to) && self.travel_s(self.at, to).is_finite())
     }
 
-    /// Whether the body can get to a candidate from where it stands, through doors that it would have to open too.
+    /// True if the body can get to a candidate from where it stands, through doors that it would have to open
+    /// too.
     pub fn can_reach(&self, to: usize) -> bool {
         let through_doors =
             || !self.shut.is_empty() && self.travel_past_s(self.at, to, &BTreeSet::new()).is_finite();
         self.can_drive_to(to) || (!self.out_of_reach.contains(&to) && through_doors())
     }
 
-    /// Whether a look from a candidate may settle anything that is in doubt about what is asked for, once an obstacle has
+    /// True if a look from a candidate may settle a doubt about the requested objects, once an obstacle has
     /// been moved out of the way.
     pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
         let taken = Taken { looks: &[], moved };
@@ -315,7 +318,7 @@ impl Situation {
         self.derived.obstacles.get_or_init(|| obstacle::all(self))
     }
 
-    /// Whether looks would settle enough that is in doubt once an obstacle were out of the way.
+    /// True if looks would settle enough doubt once an obstacle were out of the way.
     pub(crate) fn would_uncover(&self, what: usize) -> bool {
         self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
     }
@@ -336,7 +339,7 @@ impl Situation {
         find(self.obstacles().iter().map(|o| &o.symbol), name, "something that may be pushed aside")
     }
 
-    /// Where the camera would be if the body stood at a candidate and looked at a surface.
+    /// Pose of the camera if the body stood at a candidate and looked at a surface.
     pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
         *self.derived.cameras[from * self.surfaces.len() + on].get_or_init(|| {
             let centre = self.surfaces[on].centre();
@@ -344,7 +347,7 @@ impl Situation {
         })
     }
 
-    /// Whether a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
+    /// True if a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
     pub fn sees(&self, from: usize, on: usize) -> bool {
         let surface = &self.surfaces[on];
         let Some(centre) = surface.centre() else { return true };
@@ -364,8 +367,8 @@ impl Situation {
             .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
     }
 
-    /// How clearly a look from a candidate shows what stands on a surface, 0 to 1: the weight that a depth of its noise has
-    /// (a Kalman gain) where it must tell half of the smallest thing that tells objects apart.
+    /// Clearness of a look from a candidate at objects on a surface, 0 to 1: the weight that a depth of its
+    /// noise has (a Kalman gain) where it must tell half of the smallest thing that distinguishes objects.
     pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
         let middle = self.camera(from, on).zip(self.surfaces[on].centre());
         let Some((camera, centre)) = middle else { return 1.0 };
@@ -374,15 +377,16 @@ impl Situation {
         1.0 / (1.0 + (sigma_m / (SMALLEST_M / 2.0)).powi(2))
     }
 
-    /// Whether a point lies in the camera's field of view and range.
+    /// True if a point lies in the camera's field of view and range.
     pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
         let camera = self.robot.description().camera.as_ref();
         camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
     }
 
-    /// How far a look from a candidate at a surface would settle a hypothesis, 0 to 1: not at all unless most of its points are
-    /// in view and not behind what has been seen (but for an obstacle that is moved before); else as clearly as that look
-    /// shows things, and as likely as nothing stands in the way where nothing has been seen yet.
+    /// Share of a hypothesis that a look from a candidate at a surface would settle, 0 to 1: zero unless most
+    /// of its points are in view and not behind known occupied space (except an obstacle that is moved
+    /// before); else the clearness of the look times the probability that nothing stands in unseen space
+    /// before them.
     pub(crate) fn would_settle(
         &self,
         from: usize,
@@ -415,8 +419,9 @@ impl Situation {
         self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
     }
 
-    /// How sure it is where a thing stands, 0 to 1: the most probable object that it may be, where it is asked about, and that this stands
-    /// where it is believed to, as far as looks can tell.
+    /// Confidence in the place of a thing, 0 to 1: the probability of the likeliest object that it may be,
+    /// where it is asked about, times the probability that this object stands where it is believed to, as far
+    /// as looks can tell.
     pub fn confidence(&self, what: usize) -> f64 {
         let thing = &self.things[what];
         let there = |t| match thing.probability(t, &self.surfaces) {
@@ -433,7 +438,8 @@ impl Situation {
         best.filter(|t| p(t) > 0.5)
     }
 
-    /// How sure it is that a thing, where one is believed in, stands where on its surface it is believed to, 0 to 1.
+    /// Confidence in the position of a thing along its surface, 0 to 1; 1 where no such object is believed
+    /// in.
     pub fn placed(&self, what: usize) -> f64 {
         self.best(what).map_or(1.0, |track| 1.0 - adrift::chance_off(self, track))
     }
@@ -443,7 +449,7 @@ impl Situation {
         self.derived.unseen_ends[on].get_or_init(|| adrift::unseen_ends(self, on))
     }
 
-    /// How sure it is that a thing stands on a surface, 0 to 1.
+    /// Probability that a thing stands on a surface, 0 to 1.
     pub fn presence(&self, what: usize, on: usize) -> f64 {
         let (thing, surface) = (&self.things[what], &self.surfaces[on].symbol);
         let there = self.belief.tracks.iter().filter(|t| t.on == *surface);
@@ -468,7 +474,7 @@ impl Situation {
         (1.0 - none_is + self.doubt_about(what).hidden).min(1.0)
     }
 
-    /// How sure it is what each object on a surface is and that none is hidden, 0 to 1.
+    /// Confidence that each object on a surface is identified and none is hidden, 0 to 1.
     pub fn clarity(&self, on: usize) -> f64 {
         let sure = self.on_surface(on).map(Track::certainty).fold(1.0, f64::min);
         sure * (1.0 - self.doubt_on(on).hidden)
@@ -485,7 +491,7 @@ impl Situation {
         self.surfaces.iter().position(|s| s.symbol == track.on)
     }
 
-    /// How sure it is which objects are of a kind and that no other is hidden, 0 to 1.
+    /// Confidence that all members of a kind are known and no other is hidden, 0 to 1.
     pub fn completeness(&self, of: usize) -> f64 {
         let kind = &self.kinds[of];
         let sure = |t: &Track| {
@@ -495,34 +501,35 @@ impl Situation {
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
     }
 
-    /// Whether an object that was seen is believed to be of a kind, where it is asked about.
+    /// True if a seen object is believed to be of a kind, where it is asked about.
     pub fn has_member(&self, of: usize) -> bool {
         self.belief.tracks.iter().any(|t| self.kinds[of].probability(t, &self.surfaces) > 0.5)
     }
 
-    /// How sure it must be that all of a kind are found. As sure as was asked for that there is none is not sure enough to say so.
+    /// Confidence required to say that all of a kind are found. To say that there is none, at least the
+    /// confidence of *not there* is required.
     pub fn wanted_of(&self, of: usize) -> f64 {
         let is_empty = self.completeness(of) >= self.threshold && !self.has_member(of);
         if is_empty { self.threshold.max(1.0 - self.thresholds.not_there) } else { self.threshold }
     }
 
-    /// What is in doubt about which objects are of a kind.
+    /// Doubt about the members of a kind.
     pub fn doubt_of(&self, of: usize) -> &Doubt {
         self.derived.of[of].get_or_init(|| Doubt::of(self, of))
     }
 
-    /// What is in doubt about a thing.
+    /// Doubt about a thing.
     pub fn doubt_about(&self, what: usize) -> &Doubt {
         self.derived.about[what].get_or_init(|| Doubt::about(self, what))
     }
 
-    /// What is in doubt about a thing on one surface.
+    /// Doubt about a thing on one surface.
     pub fn doubt_about_on(&self, what: usize, on: usize) -> &Doubt {
         self.derived.about_on[what * self.surfaces.len() + on].get_or_init(|| Doubt::about_on(self, what, on))
     }
 
-    /// What going to a surface and looking at it takes, seconds, doors left out. It is told from where the last look was taken, so
-    /// that it stays the same while the body moves.
+    /// Time to go to a surface and look at it, seconds, doors left out. It is counted from the place of the
+    /// last look, so that it stays the same while the body moves.
     pub fn going_there_s(&self, on: usize) -> f64 {
         *self.derived.going_there_s[on].get_or_init(|| {
             let is_open = |n: &usize| self.sees(*n, on) && !self.observed.contains(&(*n, on));
@@ -536,12 +543,12 @@ impl Situation {
         })
     }
 
-    /// Where a place of the map is in the frame that localisation has where the body stands, in which it moves its hand.
+    /// Position of a point of the map in the localised frame, in which the body moves its hand.
     pub(crate) fn as_localised(&self, p: &Point3<f64>) -> Point3<f64> {
         self.errs_by.map_or(*p, |map_from_localised| map_from_localised.inverse() * p)
     }
 
-    /// What is in doubt on a surface.
+    /// Doubt about a surface.
     pub fn doubt_on(&self, on: usize) -> &Doubt {
         self.derived.on[on].get_or_init(|| Doubt::on(self, on))
     }
@@ -562,10 +569,11 @@ impl Situation {
     }
 }
 
-/// How far before the middle of a place that may hold something the way to it begins, metres.
+/// Distance before the middle of a place that may hold something at which the line of sight to it ends,
+/// metres.
 const BEFORE_M: f64 = 0.05;
-/// How far before it something unseen may stand in the way, and how far one sees on average through what has not been seen
-/// among the things on a surface, metres.
+/// Distance before it within which something unseen may stand in the way; and the mean free path of sight
+/// through unseen space among the things on a surface, metres.
 const UNSEEN_WITHIN_M: f64 = 0.4;
 const FREE_PATH_M: f64 = 0.5;
 /// A look at a known surface that shows things less clearly than this shows nothing of use: from over three metres for a Kinect.
@@ -595,7 +603,7 @@ fn find<'a>(
     symbols.position(|s| s == name).ok_or_else(|| CallError::Failed(format!("`{name}` is not {expected}")))
 }
 
-/// Whether two known objects have one shape and size: only their names tell them apart.
+/// True if two known objects have one shape and size: only their names distinguish them.
 pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     let named = ObjectModel {
         name: one.name.clone(),

@@ -8,7 +8,7 @@ use crate::lexicon::symbol;
 
 static TEMPLATE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/template");
 
-/// What the template is called in its own files.
+/// Name of the template in its own files.
 const NAME: &str = "new-domain";
 
 /// The files of a new domain: the path of each in the domain's folder, and its text.

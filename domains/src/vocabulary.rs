@@ -10,7 +10,7 @@ use descry_planner::{Findings, Source, Span};
 use crate::abilities::{self, Fact};
 use crate::config::{Config, Source as Kept};
 
-/// What a domain's PDDL text declares.
+/// Declarations of a domain's PDDL text.
 #[derive(Debug, Clone)]
 pub struct Vocabulary {
     /// The domain with an empty problem.
@@ -26,15 +26,15 @@ pub struct Word {
     pub name: String,
     /// The types of its arguments, by name; a type that is `either` of several by the first.
     pub types: Vec<String>,
-    /// Whether it is a numeric function.
+    /// True if it is a numeric function.
     pub is_number: bool,
-    /// Whether rules of the domain derive it.
+    /// True if rules of the domain derive it.
     pub is_derived: bool,
-    /// Where it is declared.
+    /// Span of its declaration.
     pub span: Span,
 }
 
-/// Where the value of a word comes from in a run.
+/// The source of a word's value in a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Ground {
     /// A fact of an ability states it, from what is known now.
@@ -68,12 +68,12 @@ impl Vocabulary {
         Ok(Self { task, changed, given })
     }
 
-    /// Whether a type is declared.
+    /// True if a type is declared.
     pub fn has_type(&self, name: &str) -> bool {
         self.task.types.iter().any(|t| t.name == name)
     }
 
-    /// Whether a type is the other or a subtype of it.
+    /// True if a type is the other or a subtype of it.
     pub fn is_a(&self, name: &str, other: &str) -> bool {
         let Some(found) = self.task.types.iter().find(|t| t.name == name) else { return false };
         found.ancestors.iter().any(|id| self.task.type_of(*id).name == other)
@@ -129,7 +129,7 @@ impl Vocabulary {
         self.task.objects.iter().filter(|o| is(&o.types)).map(|o| o.name.clone()).collect()
     }
 
-    /// Where a word of the domain has its value from.
+    /// The source of a word's value.
     pub fn ground(&self, word: &Word, config: &Config) -> Ground {
         let configured = config.word.get(&word.name);
         if word.is_derived {
@@ -151,7 +151,7 @@ impl Vocabulary {
         }
     }
 
-    /// Whether an action's effects change a word.
+    /// True if an action's effects change a word.
     pub fn is_changed(&self, word: &str) -> bool {
         self.changed.contains(word)
     }
@@ -168,13 +168,13 @@ impl Vocabulary {
         self.task.actions.iter().filter(|action| changes(action)).map(|action| action.name.as_str()).collect()
     }
 
-    /// Whether an action can be taken only where a number compares as it should.
+    /// True if an action's condition compares a number.
     pub fn is_compared(&self, word: &str) -> bool {
         let is_it = |fluent: &Fluent| self.task.function(fluent.function).name == *word;
         self.task.actions.iter().any(|action| compares(&action.condition.start, &is_it))
     }
 
-    /// Whether an action's effects give a word a value whatever it had before.
+    /// True if an action's effects give a word a value regardless of its earlier value.
     pub fn is_given(&self, word: &str) -> bool {
         self.given.contains(word)
     }
@@ -194,7 +194,7 @@ fn domain_name(text: &str) -> String {
     found.unwrap_or("domain").to_string()
 }
 
-/// Whether a condition compares a number.
+/// True if a condition compares a number.
 fn compares(condition: &Condition, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| compares(part, is_it)),

@@ -1,17 +1,17 @@
-//! What the walls of the map hide: a line of sight leads from room to room through open doors only.
+//! Occlusion by the walls of the map: a line of sight leads from room to room through open doors only.
 
 use descry_robots::nalgebra::{Point2, Vector2};
 use descry_robots::{Door, Room};
 
 use crate::situation::Situation;
 
-/// What is this near to where a line of sight ends stands before the wall behind it, metres.
+/// Distance from the end of a line of sight within which a point stands before the wall behind it, metres.
 const BEFORE_M: f64 = 0.05;
 /// A wall is at most so thick, metres: the outlines of two rooms lie so far from the middle of the door between them.
 const THICK_M: f64 = 0.3;
 
 impl Situation {
-    /// Whether a wall of the map, or a door that is believed to be shut, stands between two places.
+    /// True if a wall of the map, or a door that is believed to be shut, stands between two places.
     pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let is_open = |n: &usize| !self.shut.contains(n);
         let open = (0..self.doors.len()).filter(is_open).map(|n| &self.doors[n].door);
@@ -19,7 +19,7 @@ impl Situation {
     }
 }
 
-/// Whether the way between two places leads through the outline of a room anywhere but at one of the doors.
+/// True if the way between two places leads through the outline of a room anywhere but at one of the doors.
 pub fn crosses_a_wall<'a>(
     rooms: &[Room],
     doors: impl Iterator<Item = &'a Door> + Clone,

@@ -19,11 +19,11 @@ pub struct Words {
     told: BTreeSet<(String, Vec<String>)>,
 }
 
-/// What an atom has for a value that holds.
+/// Value of an atom that holds.
 const HOLDS: f64 = 1.0;
 
 impl Words {
-    /// What the domain says holds in the beginning.
+    /// Words with the initial values of the domain.
     ///
     /// # Errors
     /// Why a line of `init` cannot be read.
@@ -80,12 +80,12 @@ impl Words {
         self.held.remove(name);
     }
 
-    /// Whether `init` says something of a word: what it leaves out does not hold in the beginning.
+    /// True if `init` speaks of a word: its other atoms do not hold in the beginning.
     pub fn is_spoken_of(&self, name: &str) -> bool {
         self.begun.contains(name)
     }
 
-    /// Whether an action, a look or a failure of this run has said whether an atom holds.
+    /// True if an action, a look or a failure of this run has decided if an atom holds.
     pub fn is_told(&self, name: &str, arguments: &[String]) -> bool {
         self.told.contains(&(name.to_string(), arguments.to_vec()))
     }
@@ -95,7 +95,7 @@ impl Words {
         self.held.get(name).into_iter().flat_map(|i| i.keys().map(Vec::as_slice))
     }
 
-    /// Whether an atom holds.
+    /// True if an atom holds.
     pub fn holds(&self, name: &str, arguments: &[String]) -> bool {
         self.held.get(name).is_some_and(|i| i.contains_key(arguments))
     }
@@ -172,7 +172,7 @@ pub fn read(text: &str) -> Result<Vec<Instance>, String> {
     found.map(|instance| vec![instance]).ok_or_else(expected)
 }
 
-/// Whether every name in a condition stands in a problem's text or is a word of the domain.
+/// True if every name in a condition stands in a problem's text or is a word of the domain.
 pub(crate) fn are_known(condition: &str, problem: &str, domain: &Domain) -> bool {
     let split = |c: char| c.is_whitespace() || "()".contains(c);
     let objects: BTreeSet<&str> = problem.split(split).collect();

@@ -40,15 +40,15 @@ use crate::words::{self, Words};
 pub use error::WorldError;
 use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled, things};
 
-/// Why there is nothing to choose.
+/// Message where there is nothing to choose.
 const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 
-/// What a world is made of.
+/// Parts of a world.
 #[derive(Clone)]
 pub struct Setting<'a> {
-    /// What may be said and what it means.
+    /// The domain: its vocabulary and actions.
     pub domain: &'a Domain,
-    /// What is pursued.
+    /// The goal that is pursued.
     pub goal: &'a Goal,
     /// The body, which is only asked.
     pub robot: Arc<dyn Robot>,
@@ -56,11 +56,11 @@ pub struct Setting<'a> {
     pub record: &'a Record,
     /// Tells which object a segment is.
     pub recogniser: &'a dyn Recogniser,
-    /// What is remembered of earlier runs.
+    /// Persistent belief from earlier runs.
     pub past: Option<Past>,
 }
 
-/// See the module.
+/// The world model of a run, with its goal, policy and programs.
 pub struct World<'a> {
     setting: Setting<'a>,
     chooser: Chooser,
@@ -75,7 +75,7 @@ pub struct World<'a> {
     given_up: Option<String>,
     /// The deed that is planned towards.
     heading_for: Option<Deed>,
-    /// Whether the steps are a policy's, which does not say that they will be enough.
+    /// True if the steps are a policy's, which does not claim that they will be enough.
     is_unasked: bool,
     /// Deeds that nothing leads to, and that cannot be done.
     barred: BTreeSet<Deed>,
@@ -83,7 +83,7 @@ pub struct World<'a> {
 
 /// The planning problem of one round, and what its calls are bound to.
 pub struct Round {
-    /// What the calls are answered from.
+    /// Snapshot from which the calls are answered.
     pub situation: Arc<Situation>,
     /// The problem.
     pub task: Task,
@@ -105,7 +105,7 @@ pub enum Choice {
     Towards {
         /// The round's problem with getting there for its goal.
         task: Box<Task>,
-        /// What is done there.
+        /// Steps to take there.
         then: Plan,
     },
     /// Somebody gives up.
@@ -192,7 +192,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// How many poses there are to look from.
+    /// The number of viewpoints in the candidate set.
     pub fn poses(&self) -> usize {
         self.mind.known.candidates.len()
     }
@@ -354,8 +354,8 @@ impl<'a> World<'a> {
         self.is_unasked = false;
     }
 
-    /// Whether the steps are taken whatever they promise: a policy chooses one look at a time and does not say that it will be
-    /// enough.
+    /// True if the steps are taken regardless of their expected gain: a policy chooses one look at a time and
+    /// does not claim that it will be enough.
     pub fn takes_steps_unasked(&self) -> bool {
         self.is_unasked
     }
@@ -365,7 +365,7 @@ impl<'a> World<'a> {
         self.plans += 1;
     }
 
-    /// Why a call is made: what it costs and what is hoped from it.
+    /// The reason for a call: its cost and expected gain.
     pub fn explain(&self, round: &Round, call: &Call) -> String {
         match actions::because(self.setting.domain, call) {
             Some(said) => said,
@@ -374,7 +374,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// What the `step`-th part of a call is for the body, and its time limit; none where the call has no such part.
+    /// The `step`-th part of a call for the body, with its time limit; none where the call has no such part.
     ///
     /// # Errors
     /// [`SkillFailure`] where it has no meaning now; [`WorldError`] where it never has.
@@ -461,7 +461,7 @@ impl<'a> World<'a> {
         Ok(unmet)
     }
 
-    /// Whether a condition holds as things are believed now.
+    /// True if a condition holds as things are believed now.
     fn holds_now(&mut self, condition: &str) -> Result<bool, WorldError> {
         self.attend();
         let domain = self.setting.domain;
@@ -557,7 +557,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// What perceiving needs.
+/// Perception context of a world.
 fn eyes<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
     Eyes {
         record: setting.record,
@@ -570,7 +570,7 @@ fn eyes<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
 
 /// A part of a call for the body.
 pub struct Job {
-    /// What is to be done, or why it has no meaning now.
+    /// The skill to run, or the reason it has no meaning now.
     pub skill: Result<Box<dyn Skill>, SkillFailure>,
     /// Time for it, on the body's clock.
     pub limit_s: f64,
@@ -581,7 +581,7 @@ fn domain_name(domain: &Domain) -> &str {
     &domain.vocabulary.task.domain
 }
 
-/// What held of some words when a round began.
+/// Values of some words at the beginning of a round.
 fn initial(round: &Round, names: &[&str]) -> Vec<descry_planner::Reading> {
     after(&round.task, &round.attachments, &Plan::default(), names).unwrap_or_default()
 }

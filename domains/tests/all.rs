@@ -1,4 +1,5 @@
-//! What domains promise, from outside: one program, so that what all tests share is built and linked once.
+//! Promises of domains, tested from outside: one program, so that what all tests share is built and linked
+//! once.
 
 mod phrases;
 mod unit;

@@ -38,7 +38,7 @@ impl Speech {
         goal::read(said, &self.domain, &self.lexicon)
     }
 
-    /// What is wrong with how a sentence is taken.
+    /// The fault in how a sentence is understood, if any.
     fn fault(&self, said: &Said) -> Option<String> {
         let found = self.read(&said.say).map_err(|e| e.to_string());
         let pddl = found.as_ref().map(|goal| goal.pddl.as_str());

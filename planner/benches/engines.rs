@@ -1,4 +1,5 @@
-//! How many states a second each engine evaluates, translating and grounding included: `cargo bench -p descry-planner`.
+//! Benchmark of the states each engine evaluates per second, translating and grounding included: `cargo bench
+//! -p descry-planner`.
 //!
 //! Tasks are made by a rule, large enough that the limit on evaluations or the improvement of plans ends the search.
 

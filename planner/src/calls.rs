@@ -128,7 +128,7 @@ impl<'a> Calls<'a> {
         Ok(calls)
     }
 
-    /// Those that are asked.
+    /// The attachments that the calls are bound to.
     pub fn attachments(&self) -> &'a Attachments {
         self.attachments
     }

@@ -42,7 +42,7 @@ pub struct Span {
     pub source: u32,
     /// First byte.
     pub start: u32,
-    /// One past the last byte.
+    /// The byte after its last one.
     pub end: u32,
 }
 
@@ -72,14 +72,14 @@ pub struct Label {
     pub text: String,
 }
 
-/// One finding: what is wrong, the places that show it, and a mend where one is known.
+/// A finding: the fault, the places that show it, and a remedy where one is known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
     /// Fault or warning.
     pub severity: Severity,
     /// A stable name of the kind of finding, such as `undeclared-predicate`.
     pub code: &'static str,
-    /// One sentence, without the place.
+    /// The fault in one sentence, without the place.
     pub message: String,
     /// The places; the first is where the finding is reported.
     pub labels: Vec<Label>,

@@ -1,4 +1,4 @@
-//! Why there is no plan.
+//! Explanations of unsolvable tasks.
 
 mod core;
 mod relaxed;
@@ -25,7 +25,8 @@ use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
 pub(crate) use self::within::too_slow;
 
-/// Why a task has no plan: findings that point at the goal, at what nobody achieves, and at who said no.
+/// Explanation of why a task has no plan: findings that point at the goal, at atoms that nothing achieves,
+/// and at attachments that refused.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Explanation {
     /// The reasons, the goal's first.
@@ -33,7 +34,7 @@ pub struct Explanation {
     /// Actions that could start while they run, which might help, and which no search tries to the end: where there are any, the proof
     /// holds for plans in which no action overlaps itself. The last finding says so.
     pub overlapping: BTreeSet<String>,
-    /// Whether the goal could surely be had if nothing were ever taken away.
+    /// True if the goal is surely reachable when nothing is ever deleted.
     #[serde(skip)]
     pub(crate) only_lost: bool,
     /// Attachments that did not answer as needed, in the order of their findings.
@@ -49,7 +50,7 @@ pub enum NoPlan {
     Refused {
         /// Name of the attachment.
         module: String,
-        /// What it answered.
+        /// The answer of the attachment.
         answer: Refusal,
         /// Its calls, in PDDL.
         calls: Vec<String>,
@@ -60,7 +61,7 @@ pub enum NoPlan {
     Finding {
         /// The sentence.
         message: String,
-        /// What to do about it.
+        /// Advice on how to mend it.
         help: Option<String>,
     },
 }
@@ -116,9 +117,9 @@ impl Explanation {
     }
 }
 
-/// What findings that tell of attachments that did not answer as needed are called.
+/// Code of findings about attachments that did not answer as needed.
 const REFUSED: &str = "attachment-refused";
-/// What findings that tell of actions that overlap themselves are called.
+/// Code of findings about actions that could overlap themselves.
 const OVERLAP: &str = "overlap-untried";
 
 impl fmt::Display for Explanation {
@@ -139,7 +140,7 @@ impl fmt::Display for Explanation {
 /// Calls that were not answered as needed, by module and whether yes was needed (of a cost: a finite one).
 pub(crate) type Refusals = BTreeMap<(u32, bool), Vec<String>>;
 
-/// How many refused calls of one module are shown.
+/// The maximum number of refused calls shown for one module.
 const SHOWN: usize = 8;
 
 /// The reasons why a task has no plan: what stands in the goal itself, what grounding found out, who said no; and where
@@ -187,7 +188,7 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     Explanation { only_lost, refused: told_refused, ..Explanation::new(task, list) }
 }
 
-/// What is said where no relaxation knows better.
+/// Message where no relaxation gives a better reason.
 const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
 
 /// No way to the goal keeps the constraints. `reachable` where there is a way that breaks them.
@@ -209,8 +210,8 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     Explanation::new(task, vec![finding])
 }
 
-/// What may be in the way of all parts of the goal. `narrowed` where these parts alone cannot be had; `only_lost` where they could, if
-/// nothing were ever taken away.
+/// Finding about parts of the goal that cannot be had together. `narrowed`: these parts alone cannot be had;
+/// `only_lost`: they could be had if nothing were ever deleted.
 fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) -> Diagnostic {
     let message = match (narrowed, parts.len()) {
         (false, _) => UNREACHED.to_string(),
@@ -478,7 +479,7 @@ fn trace(
     ))
 }
 
-/// What an attachment refused, under the calls in the domain.
+/// Finding about the calls of one module that were refused, pointing at its calls in the domain.
 fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<(Diagnostic, NoPlan)> {
     let mut sites = sites(task, module).into_iter();
     let (who, span) = sites.next()?;
@@ -558,7 +559,7 @@ fn first_span(condition: &Condition) -> Option<Span> {
     }
 }
 
-/// Where a condition asks for an atom.
+/// Span at which a condition asks for an atom.
 fn asked(condition: &Condition, (predicate, arguments): (u32, &[Option<u32>])) -> Option<Span> {
     let same = |term: &Term, object: &Option<u32>| match term {
         Term::Object(own) => object.is_none_or(|object| own.0 == object),
@@ -575,7 +576,7 @@ fn asked(condition: &Condition, (predicate, arguments): (u32, &[Option<u32>])) -
     found
 }
 
-/// Where an action asks for the first of some atoms.
+/// Span at which an action asks for the first of some atoms.
 fn needed(action: &Action, missing: &[MissingAtom]) -> Option<Span> {
     let condition = &action.condition;
     let asks = |(predicate, arguments): &MissingAtom| {

@@ -33,7 +33,7 @@ impl MemoryLimit {
         }
     }
 
-    /// Whether there is room for so many more bytes beside those `counted`.
+    /// True if there is room for so many more bytes beside those `counted`.
     pub fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
         let used = match self.used {
             Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
@@ -68,7 +68,7 @@ impl<T> Rows<T> {
         Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }
     }
 
-    /// How many rows.
+    /// The number of rows.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -171,7 +171,7 @@ impl<T> Default for Heap<T> {
 }
 
 impl<T: Ord + Copy> Heap<T> {
-    /// Whether nothing is left.
+    /// True if the heap is empty.
     pub fn is_empty(&self) -> bool {
         self.items.len() == 0
     }

@@ -13,7 +13,7 @@ pub const EPSILON_S: f64 = 0.001;
 /// One step of a plan.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Step {
-    /// When it starts, from the beginning of the plan; `None` in a classical plan.
+    /// Start time from the beginning of the plan, seconds; `None` in a classical plan.
     pub start_s: Option<f64>,
     /// Name of the action.
     pub action: String,
@@ -74,7 +74,7 @@ impl Plan {
         plan
     }
 
-    /// When the last step ends; 0 for an empty plan, `None` for a classical one.
+    /// End of the last step, seconds; 0 for an empty plan, `None` for a classical one.
     pub fn makespan_s(&self) -> Option<f64> {
         self.steps.iter().try_fold(0.0, |last: f64, step| Some(last.max(step.start_s? + step.duration_s)))
     }

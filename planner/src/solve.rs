@@ -66,8 +66,8 @@ pub fn plan(
 
 /// Goals of tasks with more ground actions than this are not taken apart to find out which parts are to blame.
 const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
-/// Times are not told apart where numbers are further from each other than this part of what is kept between happenings.
-/// From: a few times, each rounded by half of that, are added up between two happenings.
+/// Spacing of `f64` at the end of a plan, as a fraction of epsilon, above which planning fails as `too-long`.
+/// From: a few times, each rounded by half of that spacing, are added up between two happenings.
 const LEAST_SPACING: f64 = 0.1;
 /// Bytes that a search's own form of the task takes, as a multiple of the grounded task's.
 const FORMS: usize = 2;
@@ -234,7 +234,7 @@ fn search_for(
     Ok((found_at_least(outcome, unchecked.get()), earns))
 }
 
-/// Where a plan was found and there was no time left to validate it, nothing is proven.
+/// The outcome with its proof withdrawn, if some plan was found and no time was left to validate it.
 fn found_at_least(outcome: Outcome, unchecked: bool) -> Outcome {
     match outcome {
         Outcome::Unsolvable { statistics, .. } if unchecked => Outcome::OutOfTime { best: None, statistics },
@@ -311,7 +311,7 @@ fn plan_in_time(
     Ok(ended(best, reason, why, statistics))
 }
 
-/// What a search with times has come to.
+/// Outcome of a temporal search.
 fn ended(
     best: Option<Plan>,
     reason: Reason,
@@ -362,7 +362,7 @@ fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// What plans of a task are measured by.
+/// Measure of the plans of a task.
 fn measure(grounded: &GroundTask) -> Measure {
     match &grounded.metric {
         None => Measure::Makespan,
@@ -419,7 +419,7 @@ fn checked(
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
 }
 
-/// Where a plan takes so long that times near its end are not told apart: its longest action.
+/// Finding about the longest action of a plan so long that `f64` cannot resolve times near its end.
 fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
     let spacing_s = plan.makespan_s()? * f64::EPSILON;
     let longest = plan.steps.iter().max_by(|one, other| one.duration_s.total_cmp(&other.duration_s))?;
@@ -432,7 +432,7 @@ fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
         .then(|| finding.with_help("give durations and times in a larger unit, such as hours"))
 }
 
-/// Where nothing that happens at a time matters to a plan, its steps come one after the other, and apart from all of that.
+/// Gives consecutive start times to the steps of a plan without times, apart from all timed literals.
 fn give_times(task: &Task, plan: &mut Plan) {
     let is_taken =
         |at_s: f64| task.init.timed.iter().any(|timed| (timed.time_s - at_s).abs() < EPSILON_S / 2.0);

@@ -350,7 +350,7 @@ pub struct Action {
     pub slots: usize,
     /// `None` for an instantaneous action. Bounds on the duration of a durative one (all must hold).
     pub duration: Option<Vec<DurationBound>>,
-    /// When it may be taken.
+    /// Its precondition.
     pub condition: Timed<Condition>,
     /// Effects at start and at end (`over_all` is always empty).
     pub effects: Timed<Vec<Effect>>,
@@ -374,7 +374,7 @@ impl Action {
 /// `?duration` compared with a bound, in seconds.
 #[derive(Debug, Clone)]
 pub struct DurationBound {
-    /// When the bound is evaluated: start or end.
+    /// The time at which the bound is evaluated: start or end.
     pub when: When,
     /// `?duration` stands on the left of it: `<=`, `=`, `>=`, `<` or `>`.
     pub comparison: Comparison,
@@ -538,7 +538,7 @@ pub struct PreferredGoal {
 /// The metric.
 #[derive(Debug, Clone)]
 pub struct Metric {
-    /// Minimised, or else maximised.
+    /// True if it is minimised, false if it is maximised.
     pub minimise: bool,
     /// Expression to minimise or maximise.
     pub value: Expression,

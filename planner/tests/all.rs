@@ -1,4 +1,5 @@
-//! What the planner promises, from outside: one program, so that what all tests share is built and linked once.
+//! Promises of the planner, tested from outside: one program, so that what all tests share is built and
+//! linked once.
 
 mod attachments;
 mod broken;

@@ -7,7 +7,7 @@ use descry_planner::{Attachments, Options, Outcome, plan};
 
 use crate::solving::{read, solve, solve_twice};
 
-/// What must come out.
+/// Expected result.
 enum Expect {
     /// A plan whose cost is at most this.
     CostAtMost(f64),

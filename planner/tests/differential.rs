@@ -14,7 +14,7 @@ const MOST_STATES: usize = 1_500;
 /// States that the planner evaluates, at most.
 const MOST_EVALUATED: u64 = 400;
 
-/// What came of the tasks that were compared.
+/// Counts of the results of the tasks that were compared.
 #[derive(Debug, Default)]
 struct Tally {
     tasks: u64,
@@ -51,7 +51,7 @@ impl Compared<'_> {
         Plan { steps: steps.collect(), cost: None }
     }
 
-    /// Whether validator and monitor say of a plan what the plain account says.
+    /// Checks that validator and monitor agree with the reference implementation about a plan.
     fn compare_plan(&mut self, steps: &[oracle::Step], timed: bool) {
         let plan = self.to_plan(steps, timed);
         let last = self.oracle.replay(steps, timed).filter(|state| self.oracle.is_goal(state));

@@ -4,7 +4,7 @@ use descry_planner::Options;
 
 use crate::solving::{read, solve};
 
-/// What must come out of a task with times.
+/// Expected result of a task with times.
 enum Expect {
     /// A plan of this metric, or of this makespan where there is none; whether it is said to be the best.
     Plan(f64, bool),

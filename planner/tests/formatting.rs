@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use descry_planner::Source;
 use descry_planner::pddl::{self, lex};
 
-/// What is read of a text: every sign and word in its order, names in any case alike, and every comment.
+/// Tokens of a text in order, with names in lower case, and its comments.
 fn read(text: &str) -> (Vec<String>, Vec<String>) {
     let mut symbols = lex::Symbols::default();
     let mut findings = Vec::new();

@@ -174,7 +174,7 @@ fn a_room_is_tidied() {
     assert!(attachments.statistics()["updatePutdownPose"].calls > 0);
 }
 
-/// Where the tables of the task stand, and where a robot stands that drove to them.
+/// Position of a table of the task, metres; a robot that drove to it stands there, too.
 fn table_m(name: &str) -> (f64, f64) {
     if name.ends_with('1') { (4.81, 5.28) } else { (0.5, 6.44) }
 }

@@ -4,7 +4,7 @@ use descry_planner::{Options, Outcome};
 
 use crate::solving::solve_twice;
 
-/// What must come out.
+/// Expected result.
 enum Expect {
     /// A plan.
     Plan,

@@ -23,7 +23,7 @@ const ROUND: &str = "(:domain rooms) (:objects a b c e d - room)
   (:init (at a) (= (wear) 0) (next a b) (next b a) (next b d) (next d b)
          (next a c) (next c a) (next c e) (next e c) (next e d) (next d e))";
 
-/// What is expected of a task: its least value, or that it has no plan.
+/// Expected result of a task: its least value, or that it has no plan.
 #[derive(Debug, Clone, Copy)]
 enum Expected {
     Least(f64),

@@ -24,7 +24,7 @@ fn old_habits_are_read() {
     assert_eq!(task.module_options[0].arguments, ["-Scene", "Table.xml"]);
 }
 
-/// Where the published tasks are.
+/// Folder of the published tasks.
 fn published() -> PathBuf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/pddl");
     assert!(path.is_dir(), "{} is not there", path.display());

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use descry_planner::{Attachments, Options, Outcome, PlanError, Source, Task, plan};
 
-/// What comes of a task; it must be read.
+/// Outcome of a task, which must be readable.
 pub(crate) fn outcome(domain: Source, problem: Source) -> Outcome {
     let task = match Task::read(&domain, &problem) {
         Ok(task) => task,

@@ -10,11 +10,12 @@ use super::{Body, Told};
 use crate::exit::CommandError;
 use crate::shell;
 
-/// Stands in a command line for the seed.
+/// Placeholder in a command line for the seed.
 pub const SEED: &str = "{seed}";
-/// Stands there for a file to which the program writes how everything really stands.
+/// Placeholder in a command line for a file to which the program writes the true positions of objects.
 pub const TRUTH: &str = "{truth}";
-/// Stands there for what is not to be in its world: kinds, with commas between, as one word of the shell.
+/// Placeholder in a command line for the kinds of objects that are left out of the program's world, with
+/// commas between, as one word of the shell.
 pub const WITHOUT: &str = "{without}";
 
 /// A file that a program writes for reports. It is removed with its body.

@@ -13,7 +13,7 @@ use crate::exit::CommandError;
 
 /// The kind under which a body's answers are recorded.
 pub const ANSWER: &str = "answer";
-/// The kind under which it is recorded what a body is.
+/// The kind under which the description of a body is recorded.
 pub const BODY: &str = "body";
 /// The blob that holds the map of the room.
 const MAP: &str = "map";

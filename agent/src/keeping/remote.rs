@@ -12,7 +12,7 @@ const LOGIN: &str = "DESCRY_MONGODB_LOGIN";
 /// A store in MongoDB, and whose records in it are meant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
-    /// As the driver takes it.
+    /// Address of the server, as the driver takes it.
     server: String,
     /// The run's name in the store; none for everything there.
     pub run: Option<String>,

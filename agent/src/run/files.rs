@@ -17,9 +17,9 @@ use crate::report::Report;
 pub(super) const HEADER: &str = "run.json";
 /// Report of a run, in its folder.
 const REPORT: &str = "report.json";
-/// The kind under which it is recorded how a run ended.
+/// The kind under which the report of a run is recorded.
 const REPORTED: &str = "report";
-/// Under this key a file says the checksum of all else in it.
+/// Key of the checksum of all else in a file.
 const CHECKSUM: &str = "crc32";
 
 /// Settings of a run from its folder, or from its record if the file is missing or damaged.
@@ -154,7 +154,7 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
 }
 
-/// Bytes of the longest such file. From: chosen.
+/// The maximum size of such a file, bytes. From: chosen.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Reads such a file; says why if it is not what was written.

@@ -12,9 +12,9 @@ use crate::exit::CommandError;
 use crate::keeping::{Address, is_address};
 use crate::run::files::is_run;
 
-/// So long it is waited for another process that is keeping something in the same store.
+/// The longest wait for another process that writes to the same store.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
-/// So often it is looked whether that one is done.
+/// The interval at which the other process is checked.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Memory of earlier runs in a store; empty for a new store.

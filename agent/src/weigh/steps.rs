@@ -49,7 +49,7 @@ pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     (all.len() < steps.len()).then_some(all)
 }
 
-/// Whether a step leads from an object to another one, if it leads at all.
+/// True unless a step has exactly two arguments and they are equal: it leads nowhere.
 pub fn leads(step: &Step) -> bool {
     !matches!(step.arguments.as_slice(), [from, to] if from == to)
 }

@@ -24,26 +24,26 @@ use crate::situation::Situation;
 use crate::vocabulary::Vocabulary;
 use crate::world::WorldError;
 
-/// What a body can do and know, in the words of a domain.
+/// An ability of a body, in the words of a domain.
 #[derive(Debug)]
 pub struct Ability {
-    /// By which a domain takes it.
+    /// The name by which a domain uses it.
     pub name: &'static str,
-    /// What it is for, in a line.
+    /// Its purpose, in a line.
     pub about: &'static str,
     /// The words that it states.
     pub facts: &'static [Fact],
     /// The calls that it answers.
     pub calls: &'static [Meaning],
-    /// What it can carry out.
+    /// Skills that it can carry out.
     pub skills: &'static [SkillWord],
     /// The parts of a body without which it can do nothing.
     pub needs: &'static [Part],
-    /// What it prepares when a run begins, if anything.
+    /// Preparation at the beginning of a run, if any.
     pub begins: Option<Begins>,
-    /// What is surely no waste when no plan is found, where it has something of its own.
+    /// Fallback plan of this ability when the planner finds none, if it has its own.
     pub fallback: Option<Fallback>,
-    /// What it answers in the end, where it has an answer of its own.
+    /// Final answer of this ability, if it has its own.
     pub answers: Option<Answers>,
 }
 
@@ -54,11 +54,11 @@ pub struct Fact {
     pub name: &'static str,
     /// The types of its arguments.
     pub types: &'static [&'static str],
-    /// What it says, in a line.
+    /// Its meaning, in a line.
     pub about: &'static str,
     /// The instances that hold now, a line of PDDL each.
     pub states: fn(&Situation) -> Vec<String>,
-    /// What it may turn out to be, where looks tell; none: what it states is known.
+    /// Bounds on the value that looks may still reveal; none: its value is known.
     pub bounds: Option<Bounds>,
 }
 
@@ -67,7 +67,8 @@ pub struct Fact {
 pub struct Reads {
     /// The predicate.
     pub word: &'static str,
-    /// Of its arguments, where not all make a difference: those that are the call's one argument of a type; `None`: any.
+    /// Types of the arguments that matter, if not all do: each is the call's only argument of that type;
+    /// `None`: any.
     pub of: &'static [Option<&'static str>],
 }
 
@@ -102,9 +103,9 @@ pub struct Meaning {
     pub name: &'static str,
     /// The facts that its answer depends on besides its arguments.
     pub reads: &'static [Reads],
-    /// Whether it says what is worth doing, not what can be done.
+    /// True if its answer is advice about usefulness, not about possibility.
     pub is_advice: bool,
-    /// What it says, in a line.
+    /// Its meaning, in a line.
     pub about: &'static str,
     /// The answer.
     pub answers: fn(&Situation, &Call) -> Result<Answer, CallError>,
@@ -113,21 +114,22 @@ pub struct Meaning {
 /// Something that an ability can carry out.
 #[derive(Debug)]
 pub struct SkillWord {
-    /// By which actions take it.
+    /// The name by which actions use it.
     pub name: &'static str,
     /// Effect on the world.
     pub kind: ActionKind,
     /// The types of its arguments.
     pub types: &'static [&'static str],
-    /// What it does, in a line.
+    /// Its effect, in a line.
     pub about: &'static str,
     /// Its meaning for the body now, or why it has none.
     pub ground: Ground,
-    /// What it costs and what is hoped from it.
+    /// Its cost and expected gain, in words.
     pub because: fn(&Situation, &[&str]) -> String,
-    /// What follows from what came of it; in words, if there is anything to say.
+    /// Update of the world model from its outcome; in words, if there is anything to say.
     pub learn: Learn,
-    /// What follows from its failure besides what the domain says; in words, if no second try is worth it.
+    /// Update of the world model from its failure, besides what the domain says; in words, if a second try is
+    /// not worthwhile.
     pub failed: Failed,
 }
 
@@ -148,7 +150,8 @@ pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
-/// What is surely no waste: alternatives, the best first. Each is a deed, with the drive to it where one is needed.
+/// Fallback plans that are surely useful, the best first. Each is a deed, with the drive to it where one is
+/// needed.
 pub type Fallback = fn(&Situation) -> Vec<Vec<Deed>>;
 
 /// A skill with its arguments, for an action of the domain to do.
@@ -210,7 +213,7 @@ pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {
         .map(|(_, a)| a)
 }
 
-/// What a call of a domain asks, if an ability answers it.
+/// The meaning of a domain's call, if an ability answers it.
 pub fn meaning(config: &crate::config::Config, call: &str) -> Option<String> {
     let is_own = config.attachments.contains_key(call);
     let mut calls = used(&config.uses).flat_map(|ability| ability.calls);

@@ -17,7 +17,7 @@ impl Asker<'_> {
         judge.map_or(Judgement { value: Truth::Unknown, word: None }, |judge| judge.goal())
     }
 
-    /// Why it cannot be told whether the goal holds.
+    /// The reason it cannot be told if the goal holds.
     pub(super) fn open(&self, word: Option<&Decisive>) -> String {
         let Some(word) = word else {
             return format!("it cannot be told whether {}", self.saying.say(&self.goal.pddl));
@@ -62,7 +62,7 @@ impl Asker<'_> {
         format!("it cannot be told that {thing} is not on the {surface}: {why}")
     }
 
-    /// Why looks at a surface tell too little.
+    /// The reason looks at a surface tell too little.
     fn why_open(&self, on: usize) -> Option<String> {
         let there = Thing { on: Some(vec![on]), ..Thing::default() };
         let looks = self.mind.regions[on].taken;
@@ -72,7 +72,7 @@ impl Asker<'_> {
         unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(self.s, &there))
     }
 
-    /// That a door is shut, which stays so where it is only asked; none if none is in the way.
+    /// Sentence about a shut door, which stays shut during a question; none if no door is in the way.
     pub(super) fn closed(&self) -> Option<String> {
         let s = self.s;
         let shut: Vec<&str> = s.shut.iter().map(|&door| s.doors[door].door.name.as_str()).collect();
@@ -83,7 +83,7 @@ impl Asker<'_> {
             .then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
     }
 
-    /// That no look tells of a word, and nothing else has.
+    /// Sentence about a word that no look tells and nothing else has told.
     fn untold(&self, word: &Decisive) -> String {
         let said = word.pddl().map_or_else(|| word.word.clone(), |pddl| self.saying.say(&pddl));
         match word.is_number {
@@ -108,7 +108,7 @@ impl Asker<'_> {
         named.find_map(|(name, _)| self.s.kind(name.as_ref()?).ok())
     }
 
-    /// That the goal does not hold, and what says so.
+    /// Sentence that denies the goal, with the evidence.
     pub(super) fn denial(&self, word: Option<&Decisive>) -> String {
         let denied = format!("it does not hold that {}", self.saying.say(&self.goal.pddl));
         let Some(word) = word else { return denied };
@@ -128,7 +128,7 @@ impl Asker<'_> {
         format!("{denied}: {fact}{}", self.source(word))
     }
 
-    /// What a number is.
+    /// Value of a number, in words, with its source.
     fn value_of(&self, word: &Decisive) -> String {
         let objects: Vec<&str> = word.objects.iter().flatten().map(String::as_str).collect();
         let atom = [&[word.word.as_str()], objects.as_slice()].concat().join(" ");
@@ -151,7 +151,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Where something stands that the goal wants not to stand there.
+    /// Place of an object that the goal wants not to stand there.
     fn stands_against(&self, word: &Decisive) -> Option<String> {
         let s = self.s;
         if !self.goal.asked.denies {
@@ -190,7 +190,8 @@ impl Asker<'_> {
         }
     }
 
-    /// That another thing of the same may stand where it is asked about, though it is known where one stands.
+    /// Sentence that another object of the same kind may stand where it is asked about, though the place of
+    /// one is known.
     fn another(&self) -> Option<String> {
         let s = self.s;
         let is_known = |what: usize, on: usize| s.presence(what, on) >= s.threshold;

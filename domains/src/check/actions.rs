@@ -137,7 +137,8 @@ impl Check<'_> {
         None
     }
 
-    /// What a failure leaves behind, and what must hold afterwards, are conditions over the action's variables.
+    /// Checks that the lessons of a failure, the reason and the check of an action are texts over the
+    /// action's variables.
     fn configured(&self, name: &str, config: &ActionConfig) -> Vec<Diagnostic> {
         let mut list = Vec::new();
         for (n, atom) in config.gives_up.iter().enumerate() {
@@ -163,7 +164,7 @@ impl Check<'_> {
         list
     }
 
-    /// What is said when an action fails is of a word that is remembered.
+    /// Checks that the lesson of a failing action is about a remembered word.
     fn teaches(&self, action: &str, path: &[&str], atom: &str) -> Option<Diagnostic> {
         let (condition, objects) = self.over(action, atom);
         if let Some(fault) = self.condition(path, &condition, &objects) {

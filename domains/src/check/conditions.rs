@@ -7,13 +7,13 @@ use crate::declared;
 use crate::mentions::mentions;
 
 impl Check<'_> {
-    /// What is wrong with what plans are to make small.
+    /// The fault of the expression that plans are to minimise, if any.
     pub(super) fn minimise(&self) -> Option<Diagnostic> {
         let expression = &self.domain.config.minimise;
         self.aim(&["minimise"], "", &format!("(:goal (and)) (:metric minimize {expression})"))
     }
 
-    /// What is wrong with a condition over the domain's words, its objects and a few more (name and type).
+    /// The fault of a condition over the domain's words, its objects and a few more (name and type), if any.
     pub(super) fn condition(
         &self,
         path: &[&str],
@@ -41,7 +41,7 @@ impl Check<'_> {
         self.aim(path, &objects, &format!("(:goal {condition})"))
     }
 
-    /// What is wrong with what a problem with these objects is to bring about.
+    /// The fault of a problem's goal or metric over these objects, if any.
     fn aim(&self, path: &[&str], objects: &str, aim: &str) -> Option<Diagnostic> {
         let domain = &self.domain.vocabulary.task.domain;
         let problem = format!("(define (problem p) (:domain {domain}) (:objects {objects}) (:init) {aim})");

@@ -1,4 +1,5 @@
-//! Whether all that a phrase says is heard: it can be said, it is no other phrase, and what its slots hold means something.
+//! Checks of the wording of phrases: it can be said, it differs from other phrases, and its slots have
+//! meanings.
 
 use descry_planner::{Diagnostic, Span};
 
@@ -8,7 +9,7 @@ use crate::goal::{CONFIDENCE, DEADLINE, pattern, slots_of, type_of_slot};
 use crate::mentions::mentions;
 
 impl Check<'_> {
-    /// What nobody would hear of the `n`-th phrase.
+    /// Faults of the `n`-th phrase that make parts of it unheard.
     pub(super) fn unheard(&self, n: usize, phrase: &GoalPhrase) -> Vec<Diagnostic> {
         let unused = slots_of(&phrase.say).into_iter().filter(|slot| !is_used(phrase, slot));
         let unused = unused.map(|slot| {
@@ -24,7 +25,7 @@ impl Check<'_> {
         unused.chain(otherwise.into_iter().flatten()).collect()
     }
 
-    /// That a phrase is true of whatever is so.
+    /// Fault of a phrase whose meaning is always true.
     fn asks_for_nothing(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let place = self.toml.at(&["goal", &n.to_string(), "means"]);
         let message = "this asks for nothing: it holds before anything is done".to_string();
@@ -34,7 +35,7 @@ impl Check<'_> {
         is_empty.then(|| self.error("no-goal", message, place, help))
     }
 
-    /// That a phrase has words in it that end every goal: how sure, how soon.
+    /// Fault of a phrase that contains words which end every goal: confidence and deadline.
     fn never_said(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let ends = |say: &str| {
             let words = shape(say);
@@ -48,7 +49,7 @@ impl Check<'_> {
         Some(self.error("unsayable", message, place, "say it in other words"))
     }
 
-    /// That an earlier phrase has the same words and slots.
+    /// Fault of a phrase with the same words and slots as an earlier one.
     fn said_before(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let all = self.domain.config.goal[..n].iter().flat_map(GoalPhrase::ways);
         let mut earlier: Vec<&str> = all.collect();
@@ -63,7 +64,7 @@ impl Check<'_> {
         None
     }
 
-    /// Where a wording of the `n`-th phrase stands, or a part of it.
+    /// Span of a wording of the `n`-th phrase, or of a part of it.
     fn way(&self, n: usize, way: usize, part: &str) -> Span {
         let n = n.to_string();
         match way.checked_sub(1) {

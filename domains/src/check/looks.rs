@@ -1,4 +1,5 @@
-//! What looks can tell: an action that looks where a goal needs one, questions that nothing answers, objects that nothing tells apart.
+//! Checks of what looks can tell: an action that looks where a goal needs one, questions that nothing
+//! answers, objects that nothing tells apart.
 
 use descry_planner::{Diagnostic, Source, Span};
 
@@ -47,7 +48,7 @@ impl Check<'_> {
         list
     }
 
-    /// What a phrase asks of looks that nothing can take or tell.
+    /// Faults of a phrase that asks for looks which nothing can take, or for facts that no look tells.
     pub(super) fn untellable(&self, n: &str, phrase: &GoalPhrase, filled: &[Filled]) -> Vec<Diagnostic> {
         let means = phrase.means.replace("<threshold>", "0.5");
         let Ok(goal) = put_in(&means, filled, |f| f.symbol.clone()) else { return Vec::new() };
@@ -62,7 +63,7 @@ impl Check<'_> {
         self.without_looks(&asked, place).into_iter().chain(self.never_told(phrase, &asked, place)).collect()
     }
 
-    /// That a goal is about what is seen, and no action looks.
+    /// Fault of a goal about seen objects in a domain without an action that looks.
     fn without_looks(&self, asked: &Asked, place: Span) -> Option<Diagnostic> {
         let is_seen = !(asked.things.is_empty() && asked.kinds.is_empty() && asked.surfaces.is_empty());
         let uses = &self.domain.config.uses;
@@ -77,7 +78,7 @@ impl Check<'_> {
         Some(Diagnostic::warning("no-look", message, place, "here").with_help(help))
     }
 
-    /// That a question asks about what no look tells and nothing says.
+    /// Fault of a question about something that no look tells and no other source states.
     fn never_told(&self, phrase: &GoalPhrase, asked: &Asked, place: Span) -> Option<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let is_told = |name: &String| {

@@ -1,5 +1,5 @@
-//! Whether a domain's folder makes sense as a whole: every action is carried out by something, every call is answered, every
-//! phrase means something. Each finding is drawn under the text that it is about.
+//! Checks of a domain's folder as a whole: every action is carried out by something, every call is answered,
+//! every phrase means something. Each finding is drawn under the text that it is about.
 
 mod actions;
 mod conditions;
@@ -18,7 +18,7 @@ use crate::lexicon::{Lexicon, Places};
 use crate::load::Domain;
 use crate::vocabulary::Ground;
 
-/// What keeps a domain from being run.
+/// Checks that a domain can be run.
 ///
 /// # Errors
 /// The findings that are faults.
@@ -48,7 +48,7 @@ pub fn findings(domain: &Domain) -> Findings {
     Findings { sources, list }
 }
 
-/// How each word, call and action of a domain is grounded, a line each.
+/// The grounding of each word, call and action of a domain, a line each.
 pub fn grounding(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let mut lines = vec!["words:".to_string()];
@@ -96,7 +96,7 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
     lines
 }
 
-/// What checking needs.
+/// Context of the checks.
 struct Check<'a> {
     domain: &'a Domain,
     toml: place::Places<'a>,
@@ -105,7 +105,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// What could have been meant: the nearest of the names that are known, and all of them.
+    /// Suggestion for an unknown name: the nearest of the known names, and all of them.
     fn known<'n>(&self, found: &str, names: impl IntoIterator<Item = &'n str>) -> String {
         let names: Vec<&str> = names.into_iter().collect();
         let near = |name: &&&str| strsim::levenshtein(name, found) <= 3.min(found.len() / 2);

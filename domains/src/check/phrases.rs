@@ -74,7 +74,7 @@ impl Check<'_> {
         list
     }
 
-    /// What could fill the slots of a phrase.
+    /// Example values for the slots of a phrase.
     fn filled(&self, n: &str, phrase: &GoalPhrase) -> Result<Vec<Filled>, Vec<Diagnostic>> {
         let mut filled: Vec<Filled> = Vec::new();
         let mut faults = Vec::new();

@@ -1,4 +1,4 @@
-//! Where something stands in `domain.toml`.
+//! Spans of values in `domain.toml`.
 
 use std::ops::Range;
 

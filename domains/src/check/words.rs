@@ -86,7 +86,7 @@ impl Check<'_> {
         list
     }
 
-    /// What is said to people is about an action, a word or a call, and about its parameters.
+    /// Checks that each line of `[said]` is about an action, a word or a call, and about its parameters.
     fn said(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -131,14 +131,14 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
-    /// Whether a word is a number that has no value in the beginning and is given none by any action.
+    /// True if a word is a number without an initial value that no action assigns one.
     fn stays_undefined(&self, word: &Word) -> bool {
         // Costs begin at 0.
         let is_cost = word.name == "total-cost" && word.types.is_empty();
         word.is_number && !is_cost && !self.begins(word) && !self.domain.vocabulary.is_given(&word.name)
     }
 
-    /// Whether a number without a value in the beginning is compared before an action may be taken.
+    /// True if a number without an initial value is compared in an action's condition.
     fn is_compared_unset(&self, word: &Word) -> bool {
         let vocabulary = &self.domain.vocabulary;
         word.is_number && !self.begins(word) && vocabulary.is_compared(&word.name)
@@ -149,7 +149,7 @@ impl Check<'_> {
         lines.flatten().any(|(name, ..)| name == word.name)
     }
 
-    /// What holds in the beginning is about words that are not sensed, and about objects that there are.
+    /// Checks that `init` is about words that are not sensed, and about existing objects.
     fn init(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -255,7 +255,7 @@ impl Check<'_> {
     }
 }
 
-/// That a number is compared before anything has given it a value.
+/// Fault of a number that is compared before anything has given it a value.
 fn not_begun(word: &Word) -> Diagnostic {
     let name = &word.name;
     let arguments = if word.types.is_empty() { "" } else { " …" };
@@ -265,7 +265,7 @@ fn not_begun(word: &Word) -> Diagnostic {
     Diagnostic::warning("no-value", message, word.span, "this number").with_help(help)
 }
 
-/// That what reads a number, or adds to it, can never happen.
+/// Fault of a number that is read or added to, and never has a value.
 fn never_defined(word: &Word) -> Diagnostic {
     let name = &word.name;
     let arguments = if word.types.is_empty() { "" } else { " …" };

@@ -2,7 +2,7 @@
 
 use super::{GoalError, english};
 
-/// How sure, and how soon.
+/// Confidence and deadline requested at the end of a goal.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted {
     pub(super) confidence: Option<f64>,
@@ -37,12 +37,12 @@ pub(super) fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError>
     }
 }
 
-/// What is said behind a condition, without commas and courtesies.
+/// The words after a condition, without commas and courtesies.
 fn ended(words: &[String]) -> String {
     english::unlisted(english::without_endings(words)).join(" ")
 }
 
-/// That nothing was said of a condition before.
+/// Checks that a condition is given only once.
 fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> Result<(), GoalError> {
     other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
 }

@@ -171,12 +171,12 @@ pub(super) fn joined(words: &[String]) -> Vec<String> {
     out
 }
 
-/// Whether two words request the same.
+/// True if two words request the same.
 pub(super) fn is_same(one: &str, other: &str) -> bool {
     one == other || in_one(&SAME, one, other)
 }
 
-/// Whether two words are of one field.
+/// True if two words are of one field.
 pub(super) fn is_related(one: &str, other: &str) -> bool {
     is_same(one, other) || in_one(&RELATED, one, other)
 }

@@ -1,4 +1,5 @@
-//! What could have been said instead: the phrases of the domain that are nearest to the words, with the names that were given.
+//! Suggestions for words that are no goal: the phrases of the domain that are nearest to the words, with the
+//! names that were given.
 
 use super::{english, pattern, sentence, spoken_types, type_of_slot};
 use crate::lexicon::Lexicon;
@@ -28,7 +29,7 @@ struct Candidate {
     score: f64,
 }
 
-/// What is near to words that are no goal.
+/// Suggestions for words that are no goal.
 pub(super) struct Nearest {
     /// Goals that could be said, the nearest first.
     pub(super) goals: Vec<String>,
@@ -83,7 +84,7 @@ fn mentions(words: &[String], domain: &Domain, lexicon: &Lexicon, is_exact: bool
     found
 }
 
-/// Whether a name that is known occurs among words.
+/// True if a known name occurs among words.
 pub(super) fn has_name(words: &str, domain: &Domain, lexicon: &Lexicon) -> bool {
     let words: Vec<String> = words.split(' ').map(str::to_string).collect();
     !mentions(&words, domain, lexicon, true).is_empty()
@@ -96,13 +97,13 @@ fn mistyped<'n>(names: impl Iterator<Item = &'n String>, found: &str) -> Option<
     is_mistyped(found, &nearest.to_lowercase()).then(|| nearest.clone())
 }
 
-/// Whether few letters differ.
+/// True if few letters differ.
 fn is_mistyped(found: &str, wanted: &str) -> bool {
     let letters = wanted.chars().count().max(found.chars().count());
     strsim::damerau_levenshtein(found, wanted) as f64 <= MISTYPED * letters as f64
 }
 
-/// How near one word of a phrase is to any of the words; and which.
+/// Likeness of a phrase's word to the nearest of the words, and the index of that word.
 fn likeness(wanted: &str, words: &[String], used: &[bool]) -> Option<(usize, f64)> {
     let of = |word: &str| match word {
         same if english::is_same(same, wanted) => 2.0,

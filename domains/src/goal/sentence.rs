@@ -11,7 +11,7 @@ use crate::load::Domain;
 /// Words of a name at most; more are a clause.
 pub(super) const NAME_WORDS: usize = 4;
 
-/// How clauses are joined.
+/// Conjunction that joins clauses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Joint {
     And,
@@ -48,7 +48,7 @@ pub(super) struct Miss {
     pub(super) found: String,
 }
 
-/// What a name in a slot means, and where it is said to be.
+/// Meaning of a name in a slot, with the place it is restricted to.
 #[derive(Clone)]
 struct Noun {
     symbol: String,
@@ -72,7 +72,7 @@ pub(super) struct Reader<'a> {
     pub(super) lexicon: &'a Lexicon,
     /// Slots of phrases that fit otherwise.
     pub(super) misses: Vec<Miss>,
-    /// Whether "and" and "or" were found side by side.
+    /// True if "and" and "or" were found side by side.
     pub(super) is_mixed: bool,
     /// Every form of every phrase, in plain words.
     forms: Rc<Vec<(&'a GoalPhrase, Vec<String>)>>,
@@ -246,8 +246,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// What the words behind a joint mean beside the noun before it: another place ("in the kitchen or the study"), or a name behind a
-    /// preposition that is said again ("on the desk or on the counter").
+    /// Meaning of the words after a conjunction, beside the noun before it: another place ("in the kitchen or
+    /// the study"), or a name behind a repeated preposition ("on the desk or on the counter").
     fn elsewhere(&self, of_type: &str, words: &[String], before: &Noun) -> Option<Noun> {
         let (first, rest) = words.split_first()?;
         let is_again = ["in", "on", "to", "inside"].contains(&first.as_str());
@@ -292,7 +292,8 @@ fn fill(filled: &mut Vec<Filled>, slot: &str, noun: &Noun) {
     filled.push(Filled { slot: slot.into(), number, symbol: noun.symbol.clone(), name: noun.name.clone() });
 }
 
-/// What is called so: with or without determiners, whatever signs or spaces are between letters and digits.
+/// The object of a name: with or without determiners, whatever signs or spaces are between letters and
+/// digits.
 pub(super) fn named<'l>(all: &'l [Named], words: &[String]) -> Option<&'l Named> {
     let letters = |name: &str| -> String {
         name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
@@ -335,7 +336,7 @@ pub(super) fn restricted(means: &str, within: &[Restriction], domain: &Domain) -
     })
 }
 
-/// Where the bracket that was opened before a text is closed.
+/// Position of the bracket that closes the one opened before a text.
 fn closing(text: &str) -> Option<usize> {
     let mut open = 1;
     text.char_indices().find_map(|(at, c)| {
@@ -349,7 +350,7 @@ fn closing(text: &str) -> Option<usize> {
 }
 
 impl Sentence<'_> {
-    /// Whether the answer is yes or no.
+    /// True if the answer is yes or no.
     ///
     /// # Errors
     /// [`GoalError::Apart`] for a question beside a task: a question changes nothing.

@@ -1,4 +1,5 @@
-//! What objects are called: a name means one object, or one kind of them. Letters and digits alone tell names apart.
+//! Checks of object names: a name means one object, or one kind of them. Letters and digits alone distinguish
+//! names.
 
 use descry_perception::recognise::ObjectModel;
 use descry_planner::{Diagnostic, Findings, Source, Span};
@@ -10,7 +11,7 @@ use crate::lexicon::{plural, symbol};
 /// An object's file and what it says.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
 
-/// Whether every name means one thing.
+/// Checks that every name means one thing.
 ///
 /// # Errors
 /// [`LoadError::Findings`] points at a name that means another object, or a kind of several, too.
@@ -40,7 +41,7 @@ fn names(object: &ObjectModel) -> impl Iterator<Item = (Vec<String>, &String)> {
     std::iter::once((vec!["name".to_string()], &object.name)).chain(phrases)
 }
 
-/// That a name means another object.
+/// Fault of a name that means another object.
 fn another(others: &[Read<'_>], name: &str) -> Option<(String, String)> {
     let is_called = |(_, other): &&Read<'_>| names(other).any(|(_, called)| symbol(called) == symbol(name));
     let (file, other) = others.iter().find(is_called)?;
@@ -51,7 +52,7 @@ fn another(others: &[Read<'_>], name: &str) -> Option<(String, String)> {
     ))
 }
 
-/// That a name is that of a kind of which there are others.
+/// Fault of a name that is that of a kind with other members.
 fn several(objects: &[Read<'_>], own: usize, name: &str) -> Option<(String, String)> {
     let others = objects.iter().enumerate().filter(|(n, _)| *n != own).map(|(_, (_, other))| other);
     let other = others.into_iter().find(|other| symbol(&other.kind) == symbol(name))?;

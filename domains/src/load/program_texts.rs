@@ -1,4 +1,4 @@
-//! What programs are made of, as far as their command lines say.
+//! Files that programs consist of, as far as their command lines tell.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -6,8 +6,8 @@ use descry_perception::nalgebra::{Point3, Vector3};
 
 use crate::lexicon::symbol;
 
-/// What lies so near to a wall of the map, or beyond it, is the wall, metres: localisation along a surface errs by two or three
-/// centimetres.
+/// Distance from a wall of the map within which a point, or one beyond the wall, belongs to the wall, metres:
+/// localisation along a surface errs by two or three centimetres.
 const WALL_M: f64 = 0.03;
 
 /// Something to stand things on, as far as it is known.
@@ -25,11 +25,12 @@ pub struct KnownSurface {
     pub outline: Vec<Point3<f64>>,
     /// Unit normal, away from the floor.
     pub up: Vector3<f64>,
-    /// Whether the outline is all of it (from the map) or what has been seen so far.
+    /// True if the outline is complete (from the map), false if it is that of the seen part.
     pub whole: bool,
-    /// Why it may be nothing to stand things on, in words after its name, if it may.
+    /// The reason it may be no surface to stand things on, in words after its name, if it may.
     pub doubtful: Option<String>,
-    /// How well what was seen of it is laid on the outline of the map; none without such an outline, or while nothing was seen.
+    /// Certainty of its alignment with the outline of the map; none without such an outline, or while nothing
+    /// was seen.
     pub placed: Option<Certainty>,
 }
 
@@ -43,22 +44,24 @@ impl KnownSurface {
         Some(Point3::from(sum / self.outline.len() as f64))
     }
 
-    /// Whether it is in one of some rooms, by their symbols.
+    /// True if it is in one of some rooms, by their symbols.
     pub(crate) fn is_in(&self, rooms: &[String]) -> bool {
         self.room.as_deref().is_some_and(|own| rooms.contains(&symbol(own)))
     }
 
-    /// Whether a point lies over the outline widened by a margin in metres.
+    /// True if a point lies over the outline widened by a margin in metres.
     pub(crate) fn covers(&self, point: &Point3<f64>, margin_m: f64) -> bool {
         is_over(&self.outline, &self.up, point, margin_m)
     }
 
-    /// Whether a point is of a wall of its room, or beyond it; of one that is so much thicker, metres, where it is blurred.
+    /// True if a point belongs to a wall of its room, or lies beyond it; `blur_m` is the extra thickness of a
+    /// blurred wall, metres.
     pub(crate) fn is_of_wall(&self, point: &Point3<f64>, blur_m: f64) -> bool {
         self.floor.len() >= 3 && !is_over(&self.floor, &Vector3::z(), point, -WALL_M - blur_m)
     }
 
-    /// Whether a point lies over what was measured of an object that stands here, or over the circle around its size.
+    /// True if a point lies over the measured footprint of an object that stands here, or over the circle
+    /// around its size.
     pub(crate) fn is_of(&self, track: &Track, point: &Point3<f64>, margin_m: f64) -> bool {
         if track.footprint_m.len() >= 3 {
             return is_over(&track.footprint_m, &self.up, point, margin_m);
@@ -69,7 +72,7 @@ impl KnownSurface {
     }
 }
 
-/// Whether a point lies over a convex outline, anticlockwise seen from above, widened by a margin in metres.
+/// True if a point lies over a convex outline, anticlockwise seen from above, widened by a margin in metres.
 fn is_over(outline: &[Point3<f64>], up: &Vector3<f64>, point: &Point3<f64>, margin_m: f64) -> bool {
     let n = outline.len();
     n >= 3

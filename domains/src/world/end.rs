@@ -1,4 +1,4 @@
-//! How a run ends: when there is nothing left to do, what is remembered, what is answered.
+//! End of a run: the check that nothing is left to do, the persistent belief, the answer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,7 +17,8 @@ use crate::saying::Saying;
 use crate::situation::{Situation, Thing, thing};
 
 impl World<'_> {
-    /// Why the run cannot go on, if it cannot: a limit is reached, or what is done fails for good or changes nothing.
+    /// The reason the run cannot go on, if it cannot: a limit is reached, or steps fail for good or change
+    /// nothing.
     pub fn exhausted(&mut self, round: &Round) -> Option<Ended> {
         if let Some(why) = self.given_up.take() {
             return Some(Ended::Failed(why));
@@ -47,7 +48,7 @@ impl World<'_> {
         (*times > limits.repeats).then(|| Ended::Failed(why()))
     }
 
-    /// What is to be remembered after this run, if anything is.
+    /// Persistent belief after this run, if any.
     pub fn to_remember(&self) -> Option<Remembered> {
         let known = &self.mind.known;
         let past = known.past.as_ref()?;
@@ -67,7 +68,7 @@ impl World<'_> {
         Some(before.after(&known.belief, &looked_at, past.now_unix_s))
     }
 
-    /// What is answered in the end.
+    /// Final answer of a run.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
         let abilities = || abilities::used(&self.setting.domain.config.uses);
         let own = abilities().find_map(|a| a.answers);

@@ -1,9 +1,9 @@
-//! Why a world cannot go on.
+//! Errors for which a world cannot go on.
 
 use descry_planner::PlanError;
 use descry_skills::Outcome;
 
-/// Why a world cannot go on.
+/// An error for which a world cannot go on.
 #[derive(Debug, thiserror::Error)]
 pub enum WorldError {
     /// The store failed for good.

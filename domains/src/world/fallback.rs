@@ -1,4 +1,4 @@
-//! What is done where the planner has no plan.
+//! Fallback steps where the planner has no plan.
 
 use descry_planner::NoPlan;
 
@@ -10,7 +10,8 @@ use crate::culprit;
 use crate::judge::{Judge, Judgement};
 
 impl World<'_> {
-    /// What is surely no waste, for when the planner has run out of states: a step, or else a look behind what is shut.
+    /// Step that is surely useful, for when the planner has reached its limit of states; or else a look
+    /// behind a shut door.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
@@ -55,19 +56,19 @@ impl World<'_> {
         judge.map(|judge| judge.goal())
     }
 
-    /// Whether looks may decide whether the goal holds.
+    /// True if looks may decide the goal.
     fn is_open_to_looks(&self, round: &Round) -> bool {
         self.judgement(round).is_some_and(|judged| judged.is_open_to_looks())
     }
 
-    /// Whether the goal is a question that a word decides, or leaves open, of which no look tells.
+    /// True if the goal is a question that depends on a word of which no look tells.
     pub(super) fn is_beyond_looks(&self, round: &Round) -> bool {
         let of_no_look = |judged: Judgement| judged.word.is_some_and(|word| !word.is_seen);
         self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
     }
 
-    /// Where the goal holds since nothing speaks against it: the look that settles most of what may do so, or else one behind what is shut,
-    /// if it is not known.
+    /// Look to take before a goal that holds by absence of evidence is accepted: the one that settles most of
+    /// the contrary evidence, or else one behind a shut door, if the answer is not known.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
@@ -83,8 +84,8 @@ impl World<'_> {
         }
     }
 
-    /// What may still help where there is no plan since the time that was given is too short for any, or since what is asked is nothing that
-    /// a look promises: the look that settles most a second, if it ends in time.
+    /// Look that may still help where there is no plan, as the time is too short for any or no look promises
+    /// the goal: the one that settles most per second, if it ends in time.
     ///
     /// # Errors
     /// Never: it is chosen as [`World::fallback`] is.

@@ -1,4 +1,4 @@
-//! What a world and its rounds are made of: places, things, what is expected and what is recalled.
+//! Parts of a world and its rounds: places, things, prior expectations and recalled objects.
 
 use descry_memory::belief::Belief;
 use descry_robots::{PoseEstimate, Robot};
@@ -10,9 +10,9 @@ use crate::lexicon::{Lexicon, Named, SENSE, symbol};
 use crate::load::Domain;
 use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
 
-/// What is remembered is believed at most so much, as a share of the confidence that is asked for.
+/// Maximum probability of a remembered object, as a share of the required confidence.
 const RECALLED: f64 = 0.9;
-/// How far from a door the body stands to open it, metres.
+/// Distances from a door at which the body may stand to open it, metres.
 const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 
 /// The objects of the problem, by type.
@@ -66,7 +66,8 @@ fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldErr
     }
 }
 
-/// Of what is remembered of earlier runs, what may still stand where it was seen: less than sure, so that it is looked at again.
+/// Remembered objects of earlier runs that may still stand where they were seen: their probability is below
+/// certainty, so that they are looked at again.
 pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Belief {
     let mut belief = Belief::default();
     if let Some(past) = past {
@@ -120,7 +121,7 @@ pub(super) fn members(known: &Known) -> Vec<Thing> {
     known.kinds.iter().flat_map(of).collect()
 }
 
-/// How much more often each thing, then each kind, is expected on each surface than elsewhere.
+/// Prior weight of each thing, then each kind, on each surface, relative to elsewhere.
 pub(super) fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
     let weight = |what: &Thing, on: usize| -> f64 {
         let surface = &known.surfaces[on];

@@ -140,7 +140,7 @@ fn without(own: Condition, is_gone: &dyn Fn(descry_planner::task::ModuleId) -> b
     }
 }
 
-/// That an action may be taken with some arguments.
+/// Condition that an action may be taken with some arguments.
 fn startable(action: &Action, binding: &Binding) -> Scoped<Condition> {
     let bound = (0..).zip(&action.parameters).zip(&binding.objects).map(|((slot, parameter), object)| {
         let parameter = descry_planner::task::Parameter { objects: [*object].into(), ..parameter.clone() };

@@ -11,7 +11,8 @@ use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::Evidence;
 use descry_perception::visibility::DepthMap;
 
-/// What a camera two metres above a table has seen of a disc of 7 cm at a height: what is below it is unseen.
+/// Space that a camera two metres above a table has seen of a disc of 7 cm at a height: everything below the
+/// disc is unseen.
 fn seen_from_above(disc_m: f64) -> Space {
     let intrinsics = Intrinsics { width: 320, height: 240, fx: 500.0, fy: 500.0, cx: 160.0, cy: 120.0 };
     let depth_m = |n: usize| {
@@ -27,7 +28,8 @@ fn seen_from_above(disc_m: f64) -> Space {
     space
 }
 
-/// What a camera one metre before a cup has seen of it from the side: a piece of its middle, so high and so wide to either side.
+/// Space that a camera one metre before a cup has seen of it from the side: a piece of its middle, of these
+/// heights and half width.
 fn seen_from_the_side(low_m: f64, high_m: f64, aside_m: f64) -> Space {
     let intrinsics = Intrinsics { width: 320, height: 240, fx: 500.0, fy: 500.0, cx: 160.0, cy: 120.0 };
     let depth_m = |n: usize| {
@@ -160,7 +162,7 @@ fn strips_between_others_may_be_of_one_thing() {
     assert_eq!(likely(&[&Track { size_m: [0.12, 0.03, 0.1], ..piece(0.03) }]), None, "longer");
 }
 
-/// Whether a cup of 7 cm may stand unnoticed under what was seen.
+/// Checks if a cup of 7 cm may stand unnoticed under the seen disc.
 fn check(disc_m: f64, cup_m: f64, standing: &[&Track], expected: bool) {
     let hidden =
         unseen_volume(&table(), &seen_from_above(disc_m), standing, &Point3::origin(), (cup_m, 0.07));

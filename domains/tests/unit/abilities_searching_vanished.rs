@@ -39,8 +39,8 @@ fn track(id: u64, x: f64, cup: f64, side_m: f64) -> Track {
     }
 }
 
-/// Whether an object is still believed in that no merge found again: what it may be, what the newest view shows there, where another was found
-/// and how wide that is.
+/// Checks if an object that no merge found again is still believed in: given its probability, the depth that
+/// the newest view shows there, and the distance and width of another found object.
 fn check(cup: f64, newest_m: Option<f64>, other: Option<(f64, f64)>, kept: bool) {
     let table = KnownSurface {
         symbol: "table".into(),

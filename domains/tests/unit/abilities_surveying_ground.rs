@@ -20,7 +20,8 @@ fn corridor(width_m: f64) -> Occupancy {
     Occupancy { origin: Point2::origin(), cell_m: 0.1, width, cells: cells.collect() }
 }
 
-/// Where it was driven it is open, whatever looks show there, in the frame that the map has by now; where the body does not fit it is not.
+/// Driven floor is open, whatever looks show there, in the present frame of the map; floor where the body
+/// does not fit is not.
 #[test]
 fn ways_lead_over_what_was_driven_and_not_where_the_body_does_not_fit() {
     let at = |x: f64, y: f64| Point2::new(x, y);

@@ -5,7 +5,7 @@ use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
 use descry_domains::vocabulary::Vocabulary;
 
-/// What a condition over the words of a domain, and a few derived ones, asks about.
+/// Subjects of a condition over the words of a domain and a few derived ones.
 fn asked(domain: &Domain, condition: &str) -> Asked {
     let lexicon = Lexicon::new(domain, &Places::of_scene(domain));
     let task = parsed(condition, domain, &lexicon).unwrap_or_else(|e| panic!("{condition}: {e}"));

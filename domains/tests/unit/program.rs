@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// What a program written in the shell answers to two calls at once.
+/// Checks the answers of a shell program to two calls at once.
 fn check(script: &str, expected: &str) {
     let program =
         Program { program: vec!["sh".into(), "-c".into(), script.into()], time_limit_s: 0.5, reads: vec![] };
@@ -94,7 +94,7 @@ fn a_flood_is_an_error_and_waits_in_the_pipe() {
     check("yes ''", "no answer within 0.5 s | no answer within 0.5 s");
 }
 
-/// What a program has started ends with it, and it hears nothing of what is secret.
+/// Processes started by a program end with it, and it gets no secret from the environment.
 #[test]
 fn a_program_leaves_nothing_behind_and_sees_no_secret() {
     let folder = std::env::temp_dir().join(format!("descry-program-{}", std::process::id()));

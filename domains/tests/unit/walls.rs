@@ -4,7 +4,8 @@ use descry_domains::walls::*;
 use descry_robots::nalgebra::Point2;
 use descry_robots::{Door, Room};
 
-/// Whether two rooms beside each other, with a door in the wall of 10 cm between them, let one see from here to there.
+/// Checks the line of sight between two rooms beside each other, with a door in the wall of 10 cm between
+/// them.
 fn check(from: (f64, f64), to: (f64, f64), open: bool, hidden: bool) {
     let room = |name: &str, west: f64| Room {
         name: name.into(),

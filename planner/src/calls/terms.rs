@@ -28,7 +28,7 @@ pub(super) type Source = (Arc<str>, Arc<[Arc<str>]>, Origin);
 /// Everything that a call reads.
 #[derive(Debug, Default)]
 pub(super) struct Sources {
-    /// In the order of the declaration.
+    /// Sources in the order of the declaration.
     pub list: Vec<Source>,
     /// The variables among them, in order, each once.
     pub variables: Vec<VariableId>,

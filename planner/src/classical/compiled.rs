@@ -89,7 +89,7 @@ pub struct Achieve {
 /// The task.
 #[derive(Clone, Debug)]
 pub struct Compiled {
-    /// By variable; derived variables after the others, numeric conditions last.
+    /// Domain size of each variable; derived variables after the others, numeric conditions last.
     pub domains: Vec<u32>,
     /// Number of variables that are not derived.
     pub basic: usize,
@@ -137,7 +137,7 @@ pub struct Compiled {
     pub numbers: Arc<Numbers>,
 }
 
-/// Whether the search over instantaneous actions alone can plan for the task.
+/// True if the search over instantaneous actions alone can plan for the task.
 pub fn is_classical(task: &GroundTask) -> bool {
     let plain = |c: &Conjunction| c.calls.is_empty();
     let plain_effect = |e: &Effect| {
@@ -324,7 +324,7 @@ impl Compiled {
         reset(set.map(|effect| (effect.fact.variable, effect.fact.value))).is_none()
     }
 
-    /// Whether the goal holds.
+    /// True if the goal holds.
     pub fn is_goal(&self, state: &[u32]) -> bool {
         self.goal.iter().all(|f| state[f.variable as usize] == f.value)
     }

@@ -111,7 +111,7 @@ impl Solver {
         self.bytes + self.arena.capacity() * 4
     }
 
-    /// Whether a literal is known to be true, or not; `None` while it is open.
+    /// The value of a literal; `None` while it is unassigned.
     pub fn value(&self, literal: Literal) -> Option<bool> {
         match self.values[literal.at()] {
             0 => None,

@@ -19,7 +19,7 @@ pub(super) fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
     (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
 }
 
-/// Whether a finding points into a line that is too long to draw.
+/// True if a finding points into a line that is too long to draw.
 pub(super) fn is_needed(sources: &[Source], finding: &Diagnostic) -> bool {
     finding.labels.iter().any(|label| {
         let line = sources.get(label.span.source as usize).map(|source| line_of(&source.text, label.span));
@@ -59,7 +59,7 @@ pub(super) fn draw(sources: &[Source], finding: &Diagnostic) -> String {
     drawn
 }
 
-/// What is near a place, on one line, with where the place begins in it and how wide it is.
+/// Text around a span on one line, with the column at which the span begins in it and its width.
 fn excerpt(text: &str, span: Span) -> (String, usize, usize) {
     let line = line_of(text, span);
     let start = (span.start as usize).clamp(line.start, line.end);

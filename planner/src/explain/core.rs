@@ -1,4 +1,4 @@
-//! Which parts of a goal are to blame: a smallest set of them that cannot be had together.
+//! Minimal unsolvable subset of a goal: a smallest set of its parts that cannot be had together.
 
 use crate::task::{Condition, Task};
 
@@ -7,7 +7,7 @@ use super::{Explanation, OVERLAP, UNREACHED, together};
 /// Goals with more parts than this are not taken apart.
 const MOST_PARTS: usize = 24;
 
-/// Whether every state was seen and nothing more can be said about why none will do.
+/// True if the only reason is that every state was seen and none fulfils the goal.
 pub(crate) fn is_open(why: &Explanation) -> bool {
     let mut reasons = why.findings.list.iter().filter(|finding| finding.code != OVERLAP);
     reasons.next().is_some_and(|first| first.message == UNREACHED) && reasons.next().is_none()

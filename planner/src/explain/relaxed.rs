@@ -1,5 +1,5 @@
-//! Whether the goal could be had if nothing were ever taken away: a plan that ignores what is lost, and of which nothing is
-//! unsure. What it takes of numbers and attachments is not looked into: with those, the answer is no.
+//! Delete-relaxed reachability of the goal, counting sure effects only. Numeric and attachment conditions are
+//! not evaluated: a goal that needs them counts as unreachable.
 
 use crate::ground::{
     Action, Change, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact, GroundTask,
@@ -8,17 +8,17 @@ use crate::ground::{
 use crate::model::agreement::contradictions;
 use crate::model::relation::Relation;
 
-/// Whether it surely could. No where that is not known.
+/// True if the goal is surely reachable when nothing is deleted; false if that is not known.
 pub(super) fn could_be_had(ground: &GroundTask) -> bool {
     let mut had = Had::new(ground);
     while had.grow() {}
     ground.goal_reachable && had.holds(&ground.goal)
 }
 
-/// What has held so far.
+/// Facts and actions reached so far.
 struct Had<'g> {
     ground: &'g GroundTask,
-    /// By variable and value.
+    /// Reached facts, by variable and value.
     facts: Vec<Vec<bool>>,
     /// Actions that have been taken: instantaneous ones, durative ones.
     taken: [Vec<bool>; 2],
@@ -70,7 +70,7 @@ impl<'g> Had<'g> {
         self.holds_after(&[], condition)
     }
 
-    /// Whether a condition holds once these effects have happened.
+    /// True if a condition holds once these effects have happened.
     fn holds_after(&self, effects: &[Effect], condition: &Conjunction) -> bool {
         let given = |fact: &Fact| {
             let mut outcomes = self.happening(effects);
@@ -84,7 +84,7 @@ impl<'g> Had<'g> {
         self.holds(&action.condition) && self.can_happen(&action.effects)
     }
 
-    /// Whether a durative action can run, with what its own start gives.
+    /// True if a durative action can run, with the effects of its own start.
     fn can_run(&self, action: &DurativeAction) -> bool {
         let lists = [&action.start_effects, &action.flow_effects, &action.end_effects];
         let inside = [&action.over_all, &action.at_end];
@@ -94,8 +94,8 @@ impl<'g> Had<'g> {
             && lasts(&action.duration)
     }
 
-    /// Whether effects surely have a result: of numbers, where known amounts are added to known numbers; of objects, where each gets
-    /// one value.
+    /// True if effects surely have a result: of numbers, where known amounts are added to known numbers; of
+    /// objects, where each gets one value.
     fn can_happen(&self, effects: &[Effect]) -> bool {
         let kinds = effects.iter().filter_map(|effect| match effect.outcome {
             Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {
@@ -122,7 +122,7 @@ impl<'g> Had<'g> {
         }
     }
 
-    /// What effects do whose conditions hold.
+    /// Outcomes of the effects whose conditions hold.
     fn happening<'e>(&self, effects: &'e [Effect]) -> impl Iterator<Item = &'e Outcome> {
         let holds = |when: &When| {
             [&when.here, &when.at_start, &when.over_all].into_iter().all(|part| self.holds(part))
@@ -143,7 +143,7 @@ impl<'g> Had<'g> {
     }
 }
 
-/// Whether bounds surely leave a duration: they are the same in every state.
+/// True if bounds surely leave a duration: they are the same in every state.
 fn lasts(bounds: &[DurationBound]) -> bool {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {

@@ -1,4 +1,4 @@
-//! Where a task calls a module.
+//! Places in a task that call a module.
 
 use crate::diagnostic::Span;
 use crate::model::walk::{self, Part};

@@ -1,4 +1,4 @@
-//! What must come about within a time, and cannot.
+//! Explanation of deadlines in constraints that no plan can meet.
 
 use crate::diagnostic::Diagnostic;
 use crate::ground::{Earliest, GroundTask, WITNESS, compile, ground_with};
@@ -7,8 +7,8 @@ use crate::task::{Modal, Task, Trajectory};
 
 use super::Explanation;
 
-/// Why something does not come about within the time that a constraint gives it, whatever is done; `None` where that is not
-/// known. `free` is the task without preferences and constraints.
+/// Explanation of a condition that cannot come about within the time that a constraint gives it; `None` where
+/// that is not known. `free` is the task without preferences and constraints.
 pub(crate) fn too_slow(
     task: &Task,
     free: Task,
@@ -48,7 +48,7 @@ fn witnesses(compiled: &Task, constraint: &Trajectory) -> impl Iterator<Item = u
     (0..).zip(&compiled.actions).filter(move |(_, action)| own(action)).map(|(schema, _)| schema)
 }
 
-/// When an action can see what it must at the earliest.
+/// Earliest time at which an action can observe its condition, seconds.
 fn seen_s(grounded: &GroundTask, earliest: &Earliest, schema: u32) -> f64 {
     let own = grounded.actions.iter().filter(|action| action.origin.schema == schema);
     own.map(|action| earliest.of(&action.condition)).reduce(f64::min).unwrap_or_default()

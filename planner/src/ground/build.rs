@@ -1,4 +1,4 @@
-//! From the lifted task to the grounded one, step by step.
+//! Grounding of a lifted task, step by step.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use tracing::debug_span;

@@ -1,4 +1,5 @@
-//! When facts can hold at the earliest, where nothing is ever taken away but what is given until some time alone.
+//! Earliest times at which facts can hold in the delete relaxation, in which only facts that are given until
+//! some time end.
 //!
 //! Labels are times and spread from what holds at first (Dijkstra 1959): what an operator gives comes no earlier than all that
 //! it needs, and never where something that it needs is over by then.
@@ -12,7 +13,7 @@ use super::task::{
     Conjunction, DurationBound, Effect, Expression, Fact, GroundTask, Outcome, Place, Relation,
 };
 
-/// Times this near to each other are the same.
+/// Times that differ by less than this are equal, seconds.
 const ROUNDING_S: f64 = 1e-6;
 
 /// An operator of the relaxed task.
@@ -20,7 +21,7 @@ struct Operator {
     missing: u32,
     /// The latest label of what it needs, so far.
     base_s: f64,
-    /// When something that it needs is over, for good.
+    /// Time at which one of its preconditions ends for good, seconds.
     until_s: f64,
     gives: Vec<u32>,
 }
@@ -28,18 +29,18 @@ struct Operator {
 /// Earliest times, in seconds from the start of the plan.
 pub(crate) struct Earliest<'g> {
     ground: &'g GroundTask,
-    /// By variable, the proposition of its value 0; those of actions that have started follow after all.
+    /// Proposition of the value 0 of each variable; those of started actions follow after all facts.
     offsets: Vec<u32>,
-    /// By proposition, when it is over for good.
+    /// Time from which each proposition is false for good, seconds; infinite for never.
     until_s: Vec<f64>,
     operators: Vec<Operator>,
-    /// What operators need, with what lies between that and what they give.
+    /// Preconditions: a proposition, the operator that needs it, and the delay before its effects, seconds.
     waits: Vec<(u32, (u32, f64))>,
     labels_s: Vec<f64>,
 }
 
 impl<'g> Earliest<'g> {
-    /// Of a grounded task.
+    /// Computes the earliest times of a grounded task.
     pub(crate) fn new(ground: &'g GroundTask) -> Earliest<'g> {
         let mut offsets = Vec::with_capacity(ground.variables.len());
         let mut facts = 0;
@@ -61,13 +62,14 @@ impl<'g> Earliest<'g> {
         earliest
     }
 
-    /// When all of a condition's facts can hold at the earliest, each by itself; infinite for never.
+    /// Earliest time at which all of a condition's facts can hold, each by itself, seconds; infinite for
+    /// never.
     pub(crate) fn of(&self, condition: &Conjunction) -> f64 {
         let labels = condition.facts.iter().map(|&fact| self.labels_s[self.place(fact) as usize]);
         labels.fold(0.0, f64::max)
     }
 
-    /// Whether nothing that a condition needs is over for good by the last timed literal.
+    /// True if no fact that a condition needs is false for good by the last timed literal.
     pub(crate) fn lasts(&self, condition: &Conjunction) -> bool {
         condition.facts.iter().all(|&fact| self.until_s[self.place(fact) as usize].is_infinite())
     }
@@ -125,7 +127,8 @@ impl<'g> Earliest<'g> {
         }
     }
 
-    /// What effects give that happen where some facts hold, and so long after an action has started.
+    /// Adds operators for effects that happen where some facts hold, a given time after an action has
+    /// started.
     fn effects(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, effects: &[Effect]) {
         let plain = effects.iter().filter(|effect| effect.when.is_none());
         let gives: Vec<u32> = plain.flat_map(|effect| self.given(&effect.outcome)).collect();
@@ -241,7 +244,7 @@ fn set_by_a_call(place: &Place) -> Option<u32> {
     }
 }
 
-/// Whether an effect may change a variable.
+/// True if an effect may change a variable.
 fn writes(ground: &GroundTask, effect: &Effect, variable: u32) -> bool {
     match &effect.outcome {
         Outcome::Set(fact) => fact.variable == variable,

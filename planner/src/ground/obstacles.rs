@@ -121,8 +121,9 @@ impl Find<'_> {
 }
 
 impl Find<'_> {
-    /// Of an action whose conditions can each be had, but not all of them: some condition, and what is lacking wherever a reached
-    /// atom fulfils it. Facts that are there from the beginning and conditions that lead on to new atoms come first.
+    /// Missing atoms of an action whose conditions can each be had, but not all at once: for one condition,
+    /// the atoms that are missing wherever a reached atom fulfils it. Initial facts and conditions that lead
+    /// on to new atoms come first.
     fn missing_together(&self, action: &Action_, binding: &[u32]) -> Vec<MissingAtom> {
         let mut literals: Vec<&Pattern> = Vec::new();
         let condition = &action.condition;
@@ -135,8 +136,8 @@ impl Find<'_> {
         explaining.find(|missing| missing.iter().any(|atom| !self.queue.contains(atom))).unwrap_or_default()
     }
 
-    /// What an action lacks under every reached atom that fulfils one of its conditions; `None` if one of them leaves nothing
-    /// lacking, or if there are many.
+    /// Atoms that an action lacks under every reached atom that fulfils one of its conditions; `None` if one
+    /// of them leaves nothing lacking, or if there are many.
     fn lacking(&self, action: &Action_, pattern: &Pattern, binding: &[u32]) -> Option<Vec<MissingAtom>> {
         let mut lacking: Vec<MissingAtom> = Vec::new();
         let mut matches = 0;

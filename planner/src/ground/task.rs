@@ -209,7 +209,7 @@ pub enum Outcome {
     Call(CallId),
 }
 
-/// When a conditional effect happens.
+/// Condition of a conditional effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct When {
     /// Must hold where the effect happens.

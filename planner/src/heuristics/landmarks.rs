@@ -20,7 +20,7 @@ const EXPLORATION_WORK: usize = 40_000_000;
 #[derive(Clone, Debug)]
 pub struct Landmark {
     pub facts: Vec<u32>,
-    /// Asked for by the goal.
+    /// True if the goal requires it.
     pub goal: bool,
     /// Landmarks that are to be seen before this one: those that must be true right before it first becomes true, and
     /// those for which it would have to be given up again.
@@ -34,9 +34,9 @@ pub struct Landmark {
 /// The landmarks of a task.
 pub struct Landmarks {
     pub all: Vec<Landmark>,
-    /// By fact: landmarks that it makes true.
+    /// For each fact, the landmarks that it makes true.
     by_fact: Lists<u32>,
-    /// Those that the goal asks for.
+    /// Landmarks that the goal requires.
     goals: Vec<u32>,
     words: usize,
 }

@@ -62,13 +62,13 @@ fn reached(cost: u32, more: u32) -> u32 {
     cost.saturating_add(more).min(NONE - 1)
 }
 
-/// What an operator is there for that gives back what others of the relaxed plan use up.
+/// Marks an operator that refills a number which others of the relaxed plan use up, in place of a fact.
 pub const REFILL: u32 = u32::MAX - 1;
 
 /// The heuristic with its working memory.
 #[derive(Clone)]
 pub struct Relaxed {
-    /// By node (an operator's unconditional effects, one conditional effect, or an axiom).
+    /// Preconditions of each node (an operator's unconditional effects, one conditional effect, or an axiom).
     preconditions: Lists<u32>,
     effects: Lists<u32>,
     /// Index of the node's operator in `names`; `NONE` for an axiom.
@@ -98,21 +98,21 @@ pub struct Relaxed {
     intervals: Intervals,
     /// Operators of the last relaxed plan, by rising cost.
     pub plan: Vec<Relevant>,
-    /// Those of them that can be applied right away.
+    /// Operators of the relaxed plan that can be applied right away.
     pub preferred: Vec<u32>,
     /// Facts and nodes touched since the beginning: a measure of work that no clock is part of.
     pub work: u64,
 }
 
 impl Relaxed {
-    /// For a task, counting operators in this way, towards the task's goal.
+    /// The heuristic of a task, counting operators in this way, towards the task's goal.
     pub fn new(task: &Compiled, counting: Counting) -> Relaxed {
         let all: Vec<u32> = (0..task.operators() as u32).collect();
         let goal = task.goal.iter().map(|&f| task.id(f)).collect();
         Relaxed::with(task, counting, all, goal)
     }
 
-    /// With these operators only, towards these facts.
+    /// The heuristic with these operators only, towards these facts.
     pub(crate) fn with(task: &Compiled, counting: Counting, operators: Vec<u32>, goal: Vec<u32>) -> Relaxed {
         let mut needed = vec![false; task.facts];
         goal.iter().for_each(|&f| needed[f as usize] = true);

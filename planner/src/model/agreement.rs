@@ -32,7 +32,7 @@ fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f
     }
 }
 
-/// Of some changes those that contradict an earlier one, as pairs of places.
+/// Changes that contradict an earlier change of the same number, as pairs of indices.
 pub fn contradictions<N: Hash + Eq>(
     changes: impl Iterator<Item = (N, Assignment, f64)>,
 ) -> Vec<(usize, usize)> {
@@ -47,7 +47,7 @@ pub fn contradictions<N: Hash + Eq>(
     found
 }
 
-/// Of some values that are set at once the first that another value was given to before, as a pair of places.
+/// The first value that contradicts an earlier one given to the same name at once, as a pair of indices.
 pub fn reset<N: Hash + Eq, V: PartialEq + Copy>(
     values: impl Iterator<Item = (N, V)>,
 ) -> Option<(usize, usize)> {

@@ -2,9 +2,9 @@
 
 use crate::task::Comparison;
 
-/// Numbers this near to each other are equal.
+/// Numbers that differ by less than this are equal.
 const TOLERANCE: f64 = 1e-7;
-/// So are large ones that differ by no more than this part of the larger.
+/// Relative difference below which large numbers are equal, too.
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 
 /// Relation of two numbers.
@@ -56,8 +56,8 @@ impl Relation {
         }
     }
 
-    /// Whether a number of the first range stands in this relation to some number of the second; ranges go from the
-    /// lower to the higher number.
+    /// True if a number of the first range stands in this relation to some number of the second; ranges go
+    /// from the lower to the higher number.
     pub fn may_hold(self, left: (f64, f64), right: (f64, f64)) -> bool {
         match self {
             // The farther apart two numbers are, the less rounding explains it.
@@ -81,7 +81,7 @@ fn equal(left: f64, right: f64) -> bool {
         || apart.is_finite() && apart <= RELATIVE_TOLERANCE * left.abs().max(right.abs())
 }
 
-/// What division gives; undefined (NaN) where that is no finite number.
+/// The quotient; undefined (NaN) if it is not finite.
 pub fn quotient(left: f64, right: f64) -> f64 {
     let value = left / right;
     if value.is_finite() { value } else { f64::NAN }

@@ -12,7 +12,7 @@ pub struct Symbol(pub u32);
 pub struct Name {
     /// The case-folded name.
     pub symbol: Symbol,
-    /// Where it stands.
+    /// Its span in the source.
     pub span: Span,
 }
 
@@ -50,7 +50,7 @@ pub struct ModuleDeclaration {
     pub signature: Signature,
     /// The fluents that an effect module writes.
     pub writes: Vec<Term>,
-    /// What it is.
+    /// The kind of the module.
     pub kind: CallKind,
     /// The token `fn@lib.so`.
     pub function: Name,
@@ -143,7 +143,7 @@ pub enum Comparison {
     Greater,
 }
 
-/// When in a durative action a part holds.
+/// The time at which a part of a durative action holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum When {
     /// `at start`
@@ -258,7 +258,7 @@ pub enum Effect {
     When(Formula, Box<Effect>),
     /// `(p a b)` or `(not (p a b))`
     Literal {
-        /// Whether the atom becomes false.
+        /// True if the atom becomes false.
         negated: bool,
         /// The predicate.
         name: Name,
@@ -269,11 +269,11 @@ pub enum Effect {
     },
     /// `(increase (f a) e)`, …
     Assign {
-        /// How the value changes.
+        /// The kind of change.
         assignment: Assignment,
         /// The fluent that changes.
         fluent: Term,
-        /// By what.
+        /// The new value, or the amount of the change.
         value: Term,
         /// The whole effect.
         span: Span,
@@ -287,7 +287,7 @@ pub enum Effect {
 /// A bound on a duration, `(<= ?duration e)`, at start or end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DurationBound {
-    /// When the bound is evaluated.
+    /// The time at which the bound is evaluated.
     pub when: When,
     /// `?duration` stands on the left of it.
     pub comparison: Comparison,
@@ -302,7 +302,7 @@ pub struct DurationBound {
 pub struct Action {
     /// Its name.
     pub name: Name,
-    /// Whether it was declared `:durative-action`.
+    /// True if it was declared `:durative-action`.
     pub durative: bool,
     /// Its parameters.
     pub parameters: Vec<Typed>,
@@ -310,9 +310,9 @@ pub struct Action {
     pub grounding: Vec<Call>,
     /// Bounds on its duration.
     pub duration: Vec<DurationBound>,
-    /// When it may be taken.
+    /// Its precondition.
     pub condition: Option<Formula>,
-    /// What it does.
+    /// Its effect.
     pub effect: Option<Effect>,
     /// The whole declaration.
     pub span: Span,
@@ -323,7 +323,7 @@ pub struct Action {
 pub struct Derived {
     /// Its head.
     pub head: Signature,
-    /// When the head is true.
+    /// The condition under which the head is true.
     pub body: Formula,
     /// The whole rule.
     pub span: Span,
@@ -332,7 +332,7 @@ pub struct Derived {
 /// A domain file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Domain {
-    /// Whether a part of it could not be read at all.
+    /// True if a part of it could not be read at all.
     pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
@@ -358,12 +358,12 @@ pub struct Domain {
     pub actions: Vec<Action>,
 }
 
-/// What the initial state says.
+/// An element of the initial state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
     /// `(p a b)`, or `(not (p a b))`
     Literal {
-        /// Whether it is said to be false.
+        /// True if it is stated to be false.
         negated: bool,
         /// The predicate.
         name: Name,
@@ -399,9 +399,9 @@ pub enum InitialValue {
 /// The metric of a problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Metric {
-    /// Minimised, or else maximised.
+    /// True if it is minimised, false if it is maximised.
     pub minimise: bool,
-    /// What.
+    /// The expression that is optimised.
     pub value: Term,
     /// The whole section.
     pub span: Span,
@@ -410,7 +410,7 @@ pub struct Metric {
 /// A problem file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Problem {
-    /// Whether a part of it could not be read at all.
+    /// True if a part of it could not be read at all.
     pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
@@ -428,7 +428,7 @@ pub struct Problem {
     pub initial: Vec<Initial>,
     /// The goal.
     pub goal: Option<Formula>,
-    /// Where the goal stands, the whole section.
+    /// Span of the whole goal section.
     pub goal_span: Span,
     /// Trajectory constraints.
     pub constraints: Vec<Formula>,

@@ -1,4 +1,4 @@
-//! From characters to a tree of lists and words, with mended parentheses.
+//! Lexer: turns characters into a tree of lists and words, with mended parentheses.
 //!
 //! The tree is flat: nodes in the order of the text, each with the index just after its last descendant. Unbalanced
 //! parentheses are found here, where the layout of the text still shows which one is meant, and mended so that the rest
@@ -63,23 +63,23 @@ impl Symbols {
         self.predicates.extend(declared);
     }
 
-    /// Whether the domain declares a predicate of this name.
+    /// True if the domain declares a predicate of this name.
     pub fn is_predicate(&self, name: &str) -> bool {
         self.find(name).is_some_and(|symbol| self.predicates.contains(&symbol))
     }
 
-    /// How many there are.
+    /// The number of symbols.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether there are none.
+    /// True if there are no symbols.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 }
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// `( … )`
@@ -93,7 +93,7 @@ pub enum Kind {
 /// A list or word.
 #[derive(Debug, Clone, Copy)]
 pub struct Node {
-    /// What it is.
+    /// Its kind.
     pub kind: Kind,
     /// First byte.
     pub start: u32,
@@ -215,18 +215,19 @@ struct Builder<'a> {
     line_start: usize,
     fresh_line: bool,
     too_deep: bool,
-    /// Whether it was said that blanks, and that hyphens, are not those of PDDL.
+    /// True for each kind of sign unknown to PDDL, such as a blank or a hyphen, that was already reported.
     odd: [bool; 3],
     findings: &'a mut Vec<Diagnostic>,
 }
 
-/// What texts that were copied from elsewhere have for a blank or for nothing: no-break, thin and ideographic ones, and what has no width.
+/// True for blanks that PDDL does not know, as in copied texts: no-break, thin, ideographic and zero-width
+/// ones.
 fn is_odd_blank(sign: char) -> bool {
     !sign.is_ascii() && sign.is_whitespace()
         || matches!(sign, '\u{200b}'..='\u{200d}' | '\u{2060}' | '\u{feff}')
 }
 
-/// Whether a word is what word processors make of a hyphen: a dash or a minus sign.
+/// True if a word is a dash or a minus sign, into which word processors turn a hyphen.
 fn is_odd_hyphen(word: &str) -> bool {
     matches!(word, "\u{2010}" | "\u{2011}" | "\u{2012}" | "\u{2013}" | "\u{2014}" | "\u{2212}")
 }
@@ -443,7 +444,7 @@ impl Builder<'_> {
             .fold(0, |column, &byte| if byte == b'\t' { column / 8 * 8 + 8 } else { column + 1 })
     }
 
-    /// Whether the list that opens at `at` begins with one of these words.
+    /// True if the list that opens at `at` begins with one of these words.
     fn begins(&self, at: usize, words: &[&str]) -> bool {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();

@@ -1,4 +1,4 @@
-//! From a grounded classical task to an outcome.
+//! Solving of a grounded classical task.
 
 use crate::explain::{Refusals, explain};
 use crate::ground::GroundTask;

@@ -32,9 +32,9 @@ pub(crate) struct Strategy {
     pub landmarks: bool,
     /// True to prefer also operators that achieve landmarks.
     pub towards_landmarks: bool,
-    /// Only plans cheaper than this (in the search's costs) are of interest.
+    /// Cost bound: only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
-    /// Only plans that end in a state of which the metric makes less than this are of interest.
+    /// Metric bound: only plans that end in a state with a smaller metric are of interest.
     pub better_than: Option<f64>,
     /// Give up after this much work (see [`Relaxed::work`]).
     pub work_limit: u64,
@@ -65,7 +65,7 @@ pub struct Counts {
     pub work: u64,
 }
 
-/// What is shared between searches of one task.
+/// Data shared between searches of one task.
 pub struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
@@ -76,7 +76,7 @@ pub struct Shared<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// How far a search may go, all its runs together.
+/// Limits of a search, over all its runs together.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowed<'c> {
     /// See [`Relaxed::work`].
@@ -85,7 +85,7 @@ pub struct Allowed<'c> {
     pub evaluations: u64,
     /// Memory taken.
     pub memory: MemoryLimit,
-    /// Set once nobody waits for what it comes to.
+    /// Set once the result of the search is no longer needed.
     pub cancelled: &'c AtomicBool,
 }
 

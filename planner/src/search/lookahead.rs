@@ -8,7 +8,7 @@ use super::steer::movers;
 
 /// Working memory of the lookahead.
 pub struct Lookahead {
-    /// By fact: operators that bring it about.
+    /// Operators that achieve each fact.
     achievers: Lists<u32>,
     /// Number of remaining operators (and goals) that need a fact, by fact.
     pub(super) needed: Vec<i32>,

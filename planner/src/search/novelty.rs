@@ -38,7 +38,8 @@ struct Memory {
 pub struct Novelty {
     pub facts: usize,
     pub pairs: bool,
-    /// By landmarks left and facts of the relaxed plan made true: facts and pairs of facts seen.
+    /// Facts and pairs of facts seen, by the number of landmarks left and of facts of the relaxed plan made
+    /// true.
     pub seen: FxHashMap<(u32, u32), (Vec<u64>, Vec<u64>)>,
     pub bytes: usize,
 }

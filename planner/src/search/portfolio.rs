@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// How a search of the portfolio works.
+/// The algorithm of a search of the portfolio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "engine")]
 pub enum Engine {
@@ -26,7 +26,7 @@ pub enum Engine {
     Satisfiability,
 }
 
-/// What the end of an exhausted search shows.
+/// The conclusion from the end of an exhausted search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Proof {
@@ -43,12 +43,13 @@ pub enum Proof {
 pub struct Configuration {
     /// Name.
     pub name: &'static str,
-    /// How it works.
+    /// Its algorithm.
     #[serde(flatten)]
     pub engine: Engine,
-    /// What its end shows.
+    /// The conclusion from its end.
     pub proof: Proof,
-    /// Whether a turn takes no more work than one of the first full round: found soon, or hardly at all.
+    /// True if a turn takes no more work than one of the first full round: it finds a plan soon, or hardly at
+    /// all.
     pub is_capped: bool,
 }
 
@@ -93,9 +94,9 @@ pub const PORTFOLIO: [Configuration; 7] = [
 /// Turns of the rounds, by place in the portfolio: the first round is a short one, then the others follow in turn. Within a round
 /// every search may do the same work.
 pub const ROUNDS: [&[usize]; 3] = [&[0, 6], &[0, 5, 2, 3, 6], &[1, 5, 2, 4, 6]];
-/// How much less work a search of the short round may do.
+/// Divisor of the work of a search in the short round.
 pub const SHORT_SHARE: u64 = 6;
-/// How much more work each later round gets.
+/// Factor on the work of each later round.
 pub const ROUND_FACTOR: u64 = 3;
 /// Place of the first search.
 pub const FIRST: usize = 0;

@@ -20,18 +20,19 @@ use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
 use super::portfolio::{Engine, FIRST, PORTFOLIO, Proof, ROUND_FACTOR, ROUNDS, SHORT_SHARE, turns};
 
-/// How a classical task is to be solved.
+/// Options of a classical search.
 #[derive(Clone, Debug)]
 pub struct ClassicalOptions {
     /// Keep improving until stopped or nothing cheaper is left.
     pub anytime: bool,
     /// End with the first plan, as the search has found it.
     pub only_first: bool,
-    /// A first plan leaves undone what nobody must do: search on for as long as improving it may take.
+    /// True if the task has soft goals: after the first plan, the search goes on as long as improvement is
+    /// allowed to.
     pub soft: bool,
-    /// Only plans whose cost is below this.
+    /// Cost bound: only plans whose cost is below this.
     pub bound: Option<f64>,
-    /// What the search may take.
+    /// Memory that the search may take.
     pub memory: MemoryLimit,
     /// States to evaluate at most.
     pub evaluation_limit: Option<u64>,
@@ -41,10 +42,10 @@ pub struct ClassicalOptions {
     pub first_work: u64,
 }
 
-/// How it ended.
+/// Result of a classical search.
 #[derive(Clone, Debug)]
 pub struct ClassicalOutcome {
-    /// Why it ended.
+    /// The reason it ended.
     pub end: ClassicalEnd,
     /// States evaluated.
     pub evaluated: u64,
@@ -54,10 +55,10 @@ pub struct ClassicalOutcome {
     pub work: u64,
 }
 
-/// Why a classical search ended.
+/// The reason a classical search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClassicalEnd {
-    /// With what was asked for.
+    /// The search found what was asked for.
     Done,
     /// The search space is exhausted: there is no plan, or none that is cheaper.
     Exhausted,
@@ -118,7 +119,7 @@ pub fn solve(
 const LEAST_WORK: u64 = 5_000_000;
 /// Further work for each operator.
 const WORK_PER_OPERATOR: u64 = 1500;
-/// How much more than that the search for plans that keep more preferences may take.
+/// Factor on this work for the search for plans that keep more preferences.
 const SOFT_SHARE: u64 = 20;
 /// Work of the first search before another is tried where nobody asks for less.
 pub const FIRST_WORK: u64 = 60_000_000;
@@ -192,7 +193,7 @@ impl<'a, 's> Kept<'a, 's> {
     }
 }
 
-/// What came of a turn.
+/// Result of a turn.
 struct Taken<'a, 's> {
     place: usize,
     search: Kept<'a, 's>,
@@ -289,8 +290,8 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// Whether there is no plan once a search is exhausted: with a bound, only one that follows cheaper ways to known states proves
-    /// anything.
+    /// True if an exhausted search proves that there is no plan: with a bound, only a search that follows
+    /// cheaper ways to known states does.
     fn proves(&self, place: usize) -> bool {
         match PORTFOLIO[place].proof {
             Proof::Nothing => false,
@@ -432,7 +433,7 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// Whether what the search counts of plans within the bound is what they cost.
+    /// True if the search counts the exact cost of plans within the bound.
     fn counts_exactly(&self) -> bool {
         self.task.has_exact_costs() && self.bound < MOST_COUNTED
     }
@@ -472,7 +473,7 @@ impl<'a, 's> Run<'a, 's> {
     }
 }
 
-/// How a better plan is looked for at a turn.
+/// Strategy of the search for a better plan at a turn.
 fn for_better(turn: usize) -> Strategy {
     let counting = match (turn / WEIGHTS.len()).is_multiple_of(2) {
         true => Counting::CostAndSteps,

@@ -33,7 +33,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// What a grounding module proposes.
+    /// Parameters that a grounding module proposes.
     pub(crate) fn proposals(
         &self,
         state: &State,

@@ -20,7 +20,7 @@ pub struct Why {
     pub compared: Option<Compared>,
     /// Values that it depends on, such as `(fuel r)` and `3`.
     pub values: Vec<(String, String)>,
-    /// Where it stands.
+    /// Its span in the task.
     pub span: Span,
 }
 
@@ -31,7 +31,7 @@ pub struct Compared {
     pub left: String,
     /// Its value; `None` if it is undefined.
     pub left_value: Option<f64>,
-    /// How the left side should stand to the right one.
+    /// The relation that is required between the left and the right side.
     pub comparison: Comparison,
     /// Expression on the right, in PDDL.
     pub right: String,
@@ -40,7 +40,7 @@ pub struct Compared {
 }
 
 impl Semantics<'_> {
-    /// Whether a condition holds.
+    /// True if a condition holds.
     pub fn holds(
         &self,
         state: &State,
@@ -96,7 +96,7 @@ impl Semantics<'_> {
         })
     }
 
-    /// Whether `test` is true of some objects for the variables.
+    /// True if `test` holds for some objects in place of the variables.
     pub(crate) fn some_binding(
         &self,
         variables: &[Quantified],

@@ -283,7 +283,7 @@ fn expression_slots(expression: &Expression, found: &mut dyn FnMut(Slot)) {
     }
 }
 
-/// Whether a body uses its own rule's predicate.
+/// True if a body uses its own rule's predicate.
 fn mentions(condition: &Condition, rule: &Rule) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, rule)),

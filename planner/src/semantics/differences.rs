@@ -1,4 +1,4 @@
-//! How far apart both sides of each comparison are.
+//! Differences between both sides of each comparison.
 
 use super::{Binding, CallFailure, Semantics};
 use crate::model::walk::{self, Part};

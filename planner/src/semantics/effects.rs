@@ -9,7 +9,7 @@ use crate::task::{
     ActionId, Assignment, Call, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
 };
 
-/// What a happening changes.
+/// Changes made by a happening.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Changes {
     /// Facts that become false, unless they are added too.
@@ -46,7 +46,7 @@ impl Changes {
 /// An effect that cannot happen: it needs a number that has no value, or two effects contradict each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
-    /// What is wrong.
+    /// The contradiction, in a sentence.
     pub reason: String,
     /// The effect.
     pub span: Span,
@@ -185,7 +185,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// What an effect module writes.
+    /// Adds the changes of an effect module.
     fn written(
         &self,
         state: &State,
@@ -314,7 +314,7 @@ impl Semantics<'_> {
     }
 }
 
-/// Whether the conditions of an effect at end speak of earlier times.
+/// True if the condition of an effect at end also refers to times before the end.
 fn is_remembered(effect: &Effect) -> bool {
     let Timed { start, over_all, .. } = &effect.when;
     !start.is_true() || !over_all.is_true()

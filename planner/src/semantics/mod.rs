@@ -1,4 +1,4 @@
-//! What conditions, expressions and effects mean: the one implementation of applying an action.
+//! Semantics of conditions, expressions and effects: the one implementation of applying an action.
 //!
 //! The validator, the monitor and the executive use it directly. PDDL 2.1 (Fox and Long 2003), section 8, says what the
 //! temporal parts mean.
@@ -35,7 +35,7 @@ pub struct Binding {
     pub objects: Vec<ObjectId>,
     /// `?duration`, in seconds.
     pub duration_s: Option<f64>,
-    /// What grounding modules proposed; every call of the action gets them as further arguments.
+    /// Parameters that grounding modules proposed; every call of the action gets them as further arguments.
     pub proposals: Vec<Arc<str>>,
 }
 
@@ -62,7 +62,7 @@ impl Binding {
 pub struct CallFailure {
     /// The failed call.
     pub error: AttachmentError,
-    /// Where the call stands in the domain.
+    /// Span of the call in the domain.
     pub span: Span,
 }
 
@@ -78,9 +78,9 @@ impl CallFailure {
 /// A step that does not fit the task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
-    /// What is wrong with it.
+    /// The mismatch, in a sentence.
     pub reason: String,
-    /// Where in the task what it should fit is declared.
+    /// Span in the task of the declaration that it should fit.
     pub span: Option<Span>,
 }
 
@@ -88,13 +88,13 @@ pub struct Misfit {
 pub struct Semantics<'a> {
     /// The task.
     pub task: &'a Task,
-    /// What its modules mean.
+    /// Attachments that implement its modules.
     pub attachments: &'a Attachments,
     /// The name under which each module's attachment is registered.
     bound: Vec<String>,
     object_names: Vec<Arc<str>>,
     module_names: Vec<Arc<str>>,
-    /// By predicate, whether something may change it.
+    /// For each predicate, true if something may change it.
     changing: Vec<bool>,
     stop: &'a (dyn Fn() -> bool + Sync),
     /// Objects that were tried for quantified variables.
@@ -134,7 +134,7 @@ impl<'a> Semantics<'a> {
         }
     }
 
-    /// Whether it was asked to stop, and something may have been left out.
+    /// True if it was asked to stop, and something may have been left out.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }

@@ -1,4 +1,4 @@
-//! What a happening reads and writes, to tell which happenings disturb each other.
+//! Read and write sets of happenings, to find out which happenings disturb each other.
 //!
 //! PDDL 2.1, section 8.1: two actions may happen at the same time only if neither touches what the other reads, and
 //! neither undoes what the other does ("no moving targets").
@@ -14,19 +14,19 @@ use crate::task::{
     PredicateId, Task, Term, Written,
 };
 
-/// What one participant of a happening reads and writes.
+/// Read and write set of one participant of a happening.
 #[derive(Debug, Clone, Default)]
 pub struct Touched {
     facts: FxHashSet<Fact>,
     fluents: FxHashSet<GroundFluent>,
     /// Predicates of which any instance may matter: those that a derived fact depends on.
     predicates: FxHashSet<PredicateId>,
-    /// What it writes.
+    /// Its write set.
     pub changes: Changes,
 }
 
 impl Touched {
-    /// Something that one of the two writes and the other reads or writes otherwise.
+    /// Resource that one of the two writes and the other reads, or writes in a conflicting way.
     pub fn conflict(&self, other: &Touched, semantics: &Semantics<'_>) -> Option<String> {
         self.disturbs(other, semantics).or_else(|| other.disturbs(self, semantics))
     }
@@ -59,7 +59,8 @@ impl Touched {
     }
 }
 
-/// What several participants of a happening read and write: whether one more disturbs any of them is seen without looking at each.
+/// Joint read and write set of several participants of a happening: one lookup finds whether another disturbs
+/// any of them.
 #[derive(Debug, Default)]
 pub struct Together {
     facts: FxHashSet<Fact>,
@@ -89,7 +90,8 @@ impl Together {
         self.set.extend(cleared.iter().chain(objects.iter().map(|(fluent, ..)| fluent)).cloned());
     }
 
-    /// Whether one disturbs, or is disturbed by, any of those taken in ([`Touched::conflict`]); it may say yes too often.
+    /// True if one disturbs, or is disturbed by, any of those taken in ([`Touched::conflict`]); may be true
+    /// too often.
     pub fn may_conflict(&self, touched: &Touched) -> bool {
         let Changes { added, deleted, numbers, cleared, objects } = &touched.changes;
         let mut written = added.iter().chain(deleted);
@@ -305,7 +307,7 @@ fn predicates_in(task: &Task, condition: &Condition, into: &mut FxHashSet<Predic
     }
 }
 
-/// By predicate, whether an action, a rule, a module or a timed literal may change it.
+/// For each predicate, true if an action, a rule, a module or a timed literal may change it.
 pub(super) fn changing(task: &Task) -> Vec<bool> {
     let mut changing: Vec<bool> =
         task.predicates.iter().map(|predicate| predicate.stratum.is_some()).collect();

@@ -1,4 +1,4 @@
-//! From one situation of the search to the next: an action done in one go, started, ended, or a timed effect.
+//! State transitions of the temporal search: a compressed action, a start, an end, or a timed effect.
 
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -20,9 +20,9 @@ pub struct Open {
     pub act: u32,
     /// The parameter that its grounding module proposed.
     pub proposal: Option<Arc<str>>,
-    /// How long it may take.
+    /// Duration that it may take, seconds.
     pub span: Span,
-    /// Which of its end effects can still happen.
+    /// End effects that can still happen.
     pub gates: Gates,
 }
 
@@ -34,8 +34,8 @@ impl Open {
     }
 }
 
-/// Of the end effects of an action in progress, a bit for each whose conditions at the start or over all failed; no words
-/// where no effect has any.
+/// Conditional end effects of an action in progress: a bit for each whose conditions at the start or over all
+/// failed; no words where no effect has any.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Gates(Vec<u64>);
 
@@ -56,12 +56,13 @@ impl Gates {
     }
 }
 
-/// Whether a condition of an effect at the end speaks of earlier times.
+/// True if the condition of an effect at the end also refers to times before the end.
 fn is_remembered(when: &When) -> bool {
     !when.at_start.is_empty() || !when.over_all.is_empty()
 }
 
-/// Where the search stands: a state, the actions in progress, and how many timed effects have happened.
+/// State of the temporal search: facts and numbers, the actions in progress, and the number of timed effects
+/// that have happened.
 #[derive(Debug, Clone)]
 pub struct Situation {
     /// Facts and numbers.
@@ -77,13 +78,13 @@ pub struct Situation {
 pub struct Step {
     /// The action; meaningless for timed effects.
     pub act: u32,
-    /// Which part of it; [`Part::Free`] is the next timed effect.
+    /// Its part; [`Part::Free`] is the next timed effect.
     pub part: Part,
     /// The parameter that its grounding module proposed.
     pub proposal: Option<Arc<str>>,
-    /// How long it is to take, where the schedule stretches it.
+    /// Duration chosen by the schedule, seconds, where it stretches the action.
     pub taken_s: Option<f64>,
-    /// How long the action may take; filled in by [`World::advance`].
+    /// Duration that the action may take; filled in by [`World::advance`].
     pub span: Span,
 }
 
@@ -269,7 +270,7 @@ impl World<'_> {
         Ok(Some(last))
     }
 
-    /// Whether all that is in progress can go on in a state; notes which end effects cannot happen any more.
+    /// True if everything in progress can go on in a state; notes which end effects cannot happen any more.
     fn goes_on(&self, situation: &mut Situation) -> Result<bool, Failure> {
         for open in &mut situation.open {
             let moment = Moment {
@@ -305,7 +306,8 @@ impl World<'_> {
         Ok(ended.open.is_empty().then_some(ended))
     }
 
-    /// Whether a plan may end in a situation: the goal holds after the last timed effect (PDDL 2.2; Edelkamp and Hoffmann 2004).
+    /// True if a plan may end in a situation: the goal holds after the last timed effect (PDDL 2.2; Edelkamp
+    /// and Hoffmann 2004).
     pub fn is_goal(&self, situation: &Situation) -> Result<bool, Failure> {
         if !situation.open.is_empty() || !self.keeps_goal(situation) {
             return Ok(false);
@@ -316,13 +318,14 @@ impl World<'_> {
         self.ended(situation)?.map_or(Ok(false), |ended| self.holds_at_end(&ended.state))
     }
 
-    /// Whether the goal holds in a last state.
+    /// True if the goal holds in a last state.
     pub fn holds_at_end(&self, state: &Values) -> Result<bool, Failure> {
         let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
         self.holds(&self.ground.goal, &moment)
     }
 
-    /// Whether the plain facts of the goal hold after the last timed effect, each by what sets it last.
+    /// True if the plain facts of the goal hold after the last timed effect, each by the effect that sets it
+    /// last.
     fn keeps_goal(&self, situation: &Situation) -> bool {
         let at_end = |variable: u32| match self.last_given.get(&variable) {
             Some(&(timed, value)) if timed >= situation.timed => value,
@@ -334,22 +337,23 @@ impl World<'_> {
     }
 }
 
-/// What an action touches at its start; and if it takes time at its end.
+/// Resources that an action accesses at its start and, if it is durative, at its end.
 pub(crate) type Touches = (Access, Option<Access>);
 
-/// What the happenings of every action touch, derived variables traced back to what they are derived from.
+/// Resources accessed by the happenings of every action, derived variables traced back to the variables they
+/// are derived from.
 pub struct Accesses<'w, 'a> {
-    /// By action, once it was asked for: most actions of a large task never happen.
+    /// Resources accessed by each action, computed on demand: most actions of a large task never happen.
     acts: Vec<OnceCell<Touches>>,
     watch: RefCell<Watch<'w, 'a>>,
-    /// Of timed effects.
+    /// Resources accessed by timed effects.
     pub timed: Vec<Access>,
     /// Number of resources.
     pub resources: usize,
 }
 
 impl<'w, 'a> Accesses<'w, 'a> {
-    /// Of all actions and timed effects.
+    /// Accesses of all timed effects, and on demand of actions.
     pub fn new(world: &'w World<'a>) -> Accesses<'w, 'a> {
         let resources = world.ground.variables.len() + world.ground.numerics.len();
         let mut watch = Watch::new(world);
@@ -362,7 +366,7 @@ impl<'w, 'a> Accesses<'w, 'a> {
         Accesses { acts, watch: RefCell::new(watch), timed, resources }
     }
 
-    /// Of one action.
+    /// Resources accessed by one action.
     pub fn of(&self, act: u32) -> &Touches {
         self.acts[act as usize].get_or_init(|| self.watch.borrow_mut().both(act))
     }
@@ -371,7 +375,7 @@ impl<'w, 'a> Accesses<'w, 'a> {
 /// Notes what happenings touch, one after the other.
 struct Watch<'w, 'a> {
     world: &'w World<'a>,
-    /// By derived variable, what it is derived from.
+    /// Resources that each derived variable is derived from.
     roots: Vec<Vec<u32>>,
     read: Touched,
     held: Touched,
@@ -413,7 +417,7 @@ impl<'w, 'a> Watch<'w, 'a> {
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
 
-    /// What has been noted as read, and what these effects touch.
+    /// Access of the conditions noted as read, together with these effects.
     fn access<'e>(&mut self, effects: impl Iterator<Item = &'e Effect>) -> Access {
         let (world, read) = (self.world, &mut self.read);
         for effect in effects {
@@ -472,7 +476,7 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 }
 
-/// By derived variable, the resources that its axioms read in the end; empty for others.
+/// Resources that the axioms of each derived variable read in the end; empty for other variables.
 pub(super) fn derived_roots(world: &World) -> Vec<Vec<u32>> {
     let variables = world.ground.variables.len();
     let mut direct: Vec<Vec<u32>> = vec![Vec::new(); variables];

@@ -39,7 +39,7 @@ pub(super) fn shuffled(number: u64, seed: u64) -> u64 {
     mixed ^ (mixed >> 31)
 }
 
-/// What is still asked for while a plan is walked backwards.
+/// Facts and numbers still required while a plan is walked backwards.
 struct Asked<'w, 'a> {
     world: &'w World<'a>,
     facts: Vec<Option<u32>>,
@@ -177,7 +177,7 @@ fn ask_but_for(asked: &mut Asked, condition: &Conjunction, start: &[crate::groun
     asked.ask(&Conjunction { facts, ..condition.clone() });
 }
 
-/// By variable, whether it is derived, and from which resources.
+/// Resources that each derived variable is derived from; `None` for other variables.
 fn derived_supports(world: &World) -> Vec<Option<Touched>> {
     let mut supports: Vec<Option<Touched>> =
         world.ground.variables.iter().map(|v| v.stratum.map(|_| Touched::default())).collect();

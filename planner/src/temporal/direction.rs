@@ -1,12 +1,12 @@
-//! Which way effects move numeric conditions.
+//! Directions in which effects move numeric conditions.
 
 use crate::ground::{Change, ComparisonId, Expression, Outcome, Relation};
 
 use super::touch::Touched;
 use super::world::World;
 
-/// Whether effects that happen together may bring a numeric condition nearer to being true: not if they move a sum away
-/// from its bound by a fixed length.
+/// True if effects that happen together may bring a numeric condition nearer to being true: not if they move
+/// a sum away from its bound by a fixed length.
 pub(super) fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) -> bool {
     let mut touched = Touched::default();
     touched.comparison(world, comparison);

@@ -1,4 +1,4 @@
-//! Which actions must have their start and end apart in the search.
+//! Actions whose start and end must be separate in the search: those with required concurrency.
 
 use std::collections::BTreeSet;
 
@@ -9,8 +9,9 @@ use crate::ground::{Change, Conjunction, Effect, Expression, Fact, NumericId, Ou
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// By action, whether it makes something true (or larger) only while it runs that others ask for. All other actions
-/// can be done in one go in the search: what happens inside them is of use to nobody.
+/// For each action, true if it makes something true (or larger) only while it runs that others need: a
+/// required-concurrency envelope. All other actions can be compressed in the search, as nothing needs what
+/// happens inside them.
 pub fn envelopes(world: &World) -> Vec<bool> {
     let wanted = Wanted::new(world);
     world
@@ -21,15 +22,16 @@ pub fn envelopes(world: &World) -> Vec<bool> {
         .collect()
 }
 
-/// By action, whether it takes time: with all of them apart, the search sees every interleaving.
+/// For each action, true if it is durative: with all starts and ends separate, the search sees every
+/// interleaving.
 pub fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
-/// Whether every plan can be rearranged into one whose actions are done in one go, one after the other: with nothing
-/// given from outside, and every action such that its start can wait until its end, or its end follow its start at
-/// once, whatever happens in between (compare the compression-safe actions of Coles et al. 2009). If so, the actions that must
-/// not overlap themselves for that.
+/// Actions that must not overlap themselves, if every plan can be rearranged into a sequence of compressed
+/// actions; else `None`. The condition: nothing is given from outside, and for every action, its start can
+/// wait until its end, or its end can follow its start at once, whatever happens in between (compare the
+/// compression-safe actions of Coles et al. 2009).
 pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     if !world.ground.timed.is_empty() {
         return None;
@@ -71,7 +73,8 @@ pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     Some(alone_with_itself)
 }
 
-/// Whether an action that can start can also start right before its end; `kept` says which variables nobody else changes.
+/// True if an action that can start can also start right before its end; `kept` tells the variables that no
+/// other action changes.
 fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
     let kept = |fact: &Fact| act.over_all.facts.contains(fact) || kept(fact.variable);
     act.start_effects.is_empty()
@@ -87,7 +90,7 @@ fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
             .all(|when| when.at_start.is_empty() && when.over_all.is_empty())
 }
 
-/// Whether the end of an action may as well follow its start at once: it only moves locked variables on.
+/// True if the end of an action may as well follow its start at once: it only moves locked variables on.
 fn ends_early(locked: &[bool], act: &Act) -> bool {
     act.at_end.comparisons.is_empty()
         && act.at_end.calls.is_empty()
@@ -106,8 +109,8 @@ fn plain(effect: &Effect) -> Option<Fact> {
     }
 }
 
-/// Of a variable, whether every action that changes it gives it the same value at its start, which nobody asks for and
-/// from which no such action can start: then one at a time changes it.
+/// True if one action at a time changes a variable: every action that changes it gives it the same value at
+/// its start, which nothing needs and from which no such action can start.
 fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> bool {
     let between = |writer: &u32| {
         let act = &world.acts[*writer as usize];
@@ -121,7 +124,7 @@ fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> 
         && writers.iter().all(|writer| between(writer) == first)
 }
 
-/// Whether an expression is the same in every state.
+/// True if an expression is the same in every state.
 pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
     match expression {
         Expression::Constant(_) => true,
@@ -140,7 +143,7 @@ pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
 struct Wanted {
     facts: FxHashSet<Fact>,
     numbers: FxHashSet<NumericId>,
-    /// By variable, whether a call reads it.
+    /// For each variable, true if a call reads it.
     read: Vec<bool>,
 }
 

@@ -17,12 +17,12 @@ use crate::ground::{Change, Effect, Expression, Outcome, Values};
 use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test, Waiter};
 use super::world::{Moment, World};
 
-/// What the heuristic says of a state.
+/// Estimate of the heuristic for a state.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Estimate {
     /// Sum of the costs of the relaxed plan's operators.
     pub cost: f64,
-    /// With times: the earliest that the goal could hold, in seconds from the beginning of the plan.
+    /// Earliest time at which the goal could hold, in seconds from the beginning of the plan, if times count.
     pub finish_s: f64,
     /// Operators of the relaxed plan that could be applied at once.
     pub preferred: Vec<(u32, Part)>,
@@ -36,7 +36,7 @@ pub(crate) struct From<'f> {
     pub state: &'f Values,
     /// Actions in progress.
     pub open: &'f [u32],
-    /// By resource, when it is free; `None` to add costs up instead of counting time.
+    /// Time at which each resource is free, seconds; `None` to add costs up instead of counting time.
     pub ready_s: Option<&'f [f64]>,
 }
 
@@ -46,9 +46,9 @@ pub(super) struct Work {
     labels: Vec<f64>,
     supporters: Vec<(u32, f32)>,
     wanted: Vec<bool>,
-    /// By operator that needs more than one thing.
+    /// State of each operator that needs more than one proposition.
     waiting: Vec<Waiting>,
-    /// By operator: the label of what it needs, and what it costs itself; of operators that were of use.
+    /// For each operator that was of use: the label of its preconditions, and its own cost.
     fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
     evaluation: u32,
@@ -56,7 +56,7 @@ pub(super) struct Work {
     /// The greatest label of the goal; to be computed again once one of them is `nearer`.
     latest: f64,
     nearer: bool,
-    /// By proposition, what is left at least to the goal: in costs, and in time; empty until it is asked for.
+    /// Lower bound from each proposition to the goal: in costs, and in time; empty until it is asked for.
     remaining: [Vec<f64>; 2],
     /// The most seconds that any operator was found to take.
     dearest_s: f64,
@@ -64,7 +64,7 @@ pub(super) struct Work {
     pub(super) spent: u64,
 }
 
-/// How far what an operator needs is reached.
+/// Progress of an operator's preconditions.
 #[derive(Debug, Clone, Copy, Default)]
 struct Waiting {
     /// The evaluation that this is about.
@@ -325,7 +325,7 @@ impl Relaxed {
         Ok(Some(seconds.map_or((0.0, later_s), |seconds| (seconds, seconds))))
     }
 
-    /// What an operator adds to the measure of plans beside time, in seconds that count as much.
+    /// Contribution of an operator to the measure of plans beside time, in equivalent seconds.
     fn counted_s(&self, world: &World, state: &Values, index: u32) -> Result<f64, Failure> {
         let operator = &self.operators[index as usize];
         match self.counted.get(operator.act as usize) {
@@ -337,7 +337,7 @@ impl Relaxed {
         }
     }
 
-    /// How often the operator must be repeated from the state to make a test true, from what it does alone; `None` if it
+    /// Repetitions of the operator from the state that make a test true by its own effects; `None` if it
     /// cannot help.
     fn repetitions(
         &self,
@@ -453,7 +453,7 @@ impl Relaxed {
     }
 }
 
-/// Whether the operator's action does to numbers the same in every state.
+/// True if the operator's action changes numbers by the same amounts in every state.
 fn changes_by_constants(world: &World, operator: &Operator) -> bool {
     let Some(act) = world.acts.get(operator.act as usize) else { return false };
     let mut effects = act.start_effects.iter().chain(act.end_effects);

@@ -1,4 +1,4 @@
-//! From no plan to a first one, and from there to better ones.
+//! Anytime search: a first plan, and from there better ones.
 //!
 //! The first search is greedy. Then come searches from the start that weigh what a plan costs ever more against how far
 //! the goal seems (restarting weighted A*, Richter, Thayer and Ruml 2010), and then a large neighbourhood search: a part
@@ -27,7 +27,7 @@ use super::timed::{Timed, schedule};
 use super::tours::Tours;
 use super::world::World;
 
-/// How far to go.
+/// Limits of the search for plans.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     /// Improve until stopped or proven best.
@@ -44,20 +44,20 @@ pub(crate) struct Limits {
     pub seed: u64,
 }
 
-/// How the search for plans ended.
+/// Progress of the search for plans, and the reason it ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
-    /// What stopped it.
+    /// The reason it ended.
     pub reason: Reason,
-    /// What it took.
+    /// Effort of the search.
     pub counts: Counts,
-    /// How many plans were found.
+    /// The number of plans found.
     pub plans: u64,
-    /// Where every possibility was seen but one: the actions that it might help to start while they run.
+    /// Actions that it might help to start while they run, where every other possibility was seen.
     pub overlapping: Vec<u32>,
 }
 
-/// Why a search for plans ended.
+/// The reason a search for plans ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
     /// Every possibility was seen: without a plan, there is none, unless actions overlap themselves that might.
@@ -179,13 +179,13 @@ fn overlapped(
 
 /// One round of searching for plans and improving them.
 struct Pass {
-    /// By action, whether its start and end are apart.
+    /// For each action, true if its start and end are separate.
     apart: Vec<bool>,
-    /// Whether nothing may be left out.
+    /// True if nothing may be left out.
     exact: bool,
-    /// How many times one action may run at once.
+    /// The number of times one action may run at once.
     at_once: usize,
-    /// Whether the search for a first plan ends after [`SHORT`] states.
+    /// True if the search for a first plan ends after [`SHORT`] states.
     is_short: bool,
 }
 
@@ -243,8 +243,8 @@ impl Pass {
         Ok(progress.reason != Reason::Unproven)
     }
 
-    /// Whether plans of actions done in one go stand for all; rearranged into one, a plan is still a plan, but it may end later.
-    /// Notes the actions of which that is known only where they do not overlap themselves.
+    /// True if plans of compressed actions stand for all; rearranged into one, a plan is still a plan, but it
+    /// may end later. Notes the actions for which that is known only where they do not overlap themselves.
     fn all_in_one_go(&self, space: &Space, progress: &Progress, overlapping: &mut BTreeSet<u32>) -> bool {
         if self.apart.contains(&true) || progress.plans > 0 && space.timed_measure() {
             return false;
@@ -347,7 +347,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Whether the end of a search is the end of searching for a first plan.
+    /// Records the end of a search; true if it also ends the search for a first plan.
     fn took(&mut self, end: End) -> Result<bool, Failure> {
         let (reason, over) = match end {
             End::Found(steps) => (Reason::Unproven, self.take(steps)?),
@@ -543,7 +543,7 @@ impl Run<'_, '_, '_> {
     }
 }
 
-/// What counts as better: above the rounding of sums of times.
+/// Least difference that counts as better: above the rounding of sums of times.
 fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
 }

@@ -34,12 +34,13 @@ const MOST_WORK: u64 = 10_000_000;
 const MOST_BYTES: u64 = 100 << 20;
 /// States that are evaluated for better plans, besides as many as the first one took.
 const MORE: u64 = 100;
-/// What counts as better.
+/// Least difference that counts as better.
 const TOLERANCE: f64 = 1e-6;
 /// Weight of the makespan beside a metric that does not count it.
 const TIME_WEIGHT: f64 = 1e-4;
 
-/// Whether numbers of this task are as linear programs have them: no attachment is asked, and no rule compares numbers.
+/// True if the numbers of this task fit linear programs: no attachment is asked, and no rule compares
+/// numbers.
 pub(super) fn is_linear(world: &World) -> bool {
     world.ground.calls.is_empty()
         && !world.proposes
@@ -98,7 +99,7 @@ struct Node {
     steps: Vec<(u32, u32, Option<u32>)>,
 }
 
-/// What happens next.
+/// The next happening of a node.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Start(u32),
@@ -106,7 +107,7 @@ enum Next {
     Given,
 }
 
-/// What identifies a node: facts, actions in progress, timed effects, and the ranges of the numbers and of time.
+/// Key of a node: facts, actions in progress, timed effects, and the ranges of the numbers and of time.
 type Seen = (Vec<u32>, Vec<u32>, usize, Vec<[i64; 2]>);
 
 struct Search<'s, 'w, 'a> {
@@ -247,7 +248,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok((verdict.valid && better).then_some((measured, timed)))
     }
 
-    /// What plans are measured by, with a little of the makespan.
+    /// Measure of plans, with a little of the makespan added.
     fn objective(&self, node: &Node, makespan: &Linear) -> Option<Linear> {
         match &self.space.measure {
             Measure::Makespan => Some(makespan.clone()),
@@ -409,7 +410,7 @@ impl Node {
         Some(())
     }
 
-    /// Whether the condition of an effect holds; `None` where that depends on times, or on what was before.
+    /// True if the condition of an effect holds; `None` where that depends on times, or on earlier states.
     fn decides(&self, world: &World, when: &When, duration: Option<&Linear>) -> Option<bool> {
         if !when.at_start.is_empty() || !when.over_all.is_empty() {
             return None;
@@ -419,7 +420,7 @@ impl Node {
         (!holds || trial.program.rows() == self.program.rows()).then_some(holds)
     }
 
-    /// Whether what is in progress can go on in the present state, and changes numbers at rates that are known.
+    /// True if all actions in progress can go on in the present state, and change numbers at known rates.
     fn goes_on(&mut self, world: &World) -> bool {
         let facts = |open: &Running| {
             let mut facts = world.acts[open.act as usize].over_all.facts.iter();

@@ -1,4 +1,4 @@
-//! How a search goes about it, how it ends, and what it has counted.
+//! Options, end and counts of a search.
 
 use std::collections::BTreeSet;
 
@@ -6,14 +6,15 @@ use crate::memory::MemoryLimit;
 
 use super::advance::Step;
 
-/// How to search.
+/// Options of a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Manner {
     /// Weight of the heuristic against what the plan costs so far; `None` for the heuristic alone.
     pub weight: Option<f64>,
-    /// Whether the heuristic counts time from when resources are free, instead of adding costs up.
+    /// True if the heuristic counts time from when resources are free, instead of adding costs up.
     pub timed: bool,
-    /// Whether to follow the relaxed plan of every state, instead of those alone that are nearer to the goal than any before.
+    /// True to follow the relaxed plan of every state, instead of only those nearer to the goal than any
+    /// before.
     pub eager: bool,
     /// Only plans that cost less than this.
     pub bound: f64,
@@ -25,22 +26,22 @@ pub(crate) struct Manner {
     pub memory: MemoryLimit,
     /// Decides between entries that rank the same; 0 for the order of their making.
     pub shuffle: u64,
-    /// Whether equal states are told apart wherever their times leave different possibilities: then nothing is lost,
-    /// and a search that comes to its end proves something.
+    /// True to distinguish equal states wherever their times leave different possibilities: then nothing is
+    /// lost, and an exhausted search proves something.
     pub exact: bool,
-    /// How many times one action may be in progress at once.
+    /// The number of times one action may be in progress at once.
     pub at_once: usize,
 }
 
-/// How a search ended.
+/// The end of a search.
 #[derive(Debug, Clone)]
 pub(crate) enum End {
     /// Steps from the base to the goal.
     Found(Vec<Step>),
     /// Nothing within the bound is left to look at.
     Exhausted {
-        /// Whether that proves that there is no plan within the bound: nothing was left out on the way, but the starts of
-        /// actions in progress.
+        /// True if there is surely no plan within the bound: nothing was left out on the way, except starts
+        /// of actions in progress.
         proven: bool,
         /// Actions that could have started while they were in progress.
         overlapping: BTreeSet<u32>,
@@ -53,7 +54,7 @@ pub(crate) enum End {
     Memory,
 }
 
-/// What a search has counted.
+/// Counts of the work of a search.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Counts {
     /// States evaluated.

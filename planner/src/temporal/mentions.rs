@@ -1,4 +1,5 @@
-//! What conditions mention though it can never matter to them.
+//! Read set of a lifted condition, including facts that cannot change its value (no-moving-targets rule, PDDL
+//! 2.1).
 //!
 //! Where a static fact decides a part of a quantified or disjunctive condition, grounding leaves the rest of that part
 //! out. PDDL 2.1 (section 8.1) takes all that a condition mentions for what it reads, and so do strict validators: what
@@ -37,7 +38,7 @@ const SOME: u32 = u32::MAX - 1;
 /// In place of a step: a timed literal.
 const GIVEN: usize = usize::MAX;
 
-/// What a happening does with an atom or a number.
+/// A use of an atom or a number by a happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Use {
     Mentions,
@@ -49,7 +50,7 @@ enum Use {
     Writes,
 }
 
-/// What a happening does with which atoms.
+/// Uses of atoms and numbers by a happening.
 type Uses = FxHashSet<(Name, Use)>;
 
 /// A happening of a plan that mentions or changes an atom.
@@ -99,7 +100,7 @@ pub fn keep_apart(
     Ok(true)
 }
 
-/// Whether start and end of an action mention or change what the other changes.
+/// True if the start or the end of an action mentions or changes what the other changes.
 pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
     let [at_start, at_end] = Named::new(world.task).uses(world, act);
     at_start.iter().any(|(name, does)| {
@@ -113,7 +114,7 @@ fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
     if key(one) < key(other) { (one.happening, other.happening) } else { (other.happening, one.happening) }
 }
 
-/// By atom, the happenings that mention or change it, where they do different things with it.
+/// For each atom, the happenings that mention or change it, where they use it in different ways.
 fn touches(
     space: &Space,
     steps: &[Step],
@@ -159,9 +160,9 @@ fn touches(
 
 /// Names things that are mentioned and changed.
 struct Named {
-    /// By derived predicate, the predicates that it depends on; by any other, none.
+    /// For each derived predicate, the predicates that it depends on; empty for others.
     roots: Vec<Vec<u32>>,
-    /// Whether objects may be named by what is their function's value: which, a state decides.
+    /// True if functions may have objects as values: the state then decides which object a term names.
     is_loose: bool,
 }
 
@@ -181,7 +182,7 @@ impl Named {
         Named { roots: (0..task.predicates.len()).map(roots).collect(), is_loose }
     }
 
-    /// What the start and the end of an action mention and change.
+    /// Uses of atoms and numbers by the start and the end of an action.
     fn uses(&self, world: &World, act: &Act) -> [Uses; 2] {
         let origin = act.origin;
         let action = &world.task.actions[origin.schema as usize];

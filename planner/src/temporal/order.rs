@@ -13,7 +13,7 @@ use super::world::Span;
 /// A shift below this is rounding.
 const ROUNDING_S: f64 = 1e-9;
 
-/// What one happening touches; indices of resources.
+/// Resources that one happening accesses, by index.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
     /// Must not change between the happening before and this one.
@@ -46,7 +46,7 @@ struct Tie {
 #[derive(Debug, Clone)]
 pub struct Order {
     earliest_s: Vec<f64>,
-    /// By happening: earlier ones that it must follow, by how much.
+    /// For each happening, the earlier ones that it must follow, with the least distance in seconds.
     after: Vec<Vec<(u32, f64)>>,
     fixed: Vec<(u32, f64)>,
     ties: Vec<Tie>,
@@ -74,13 +74,13 @@ impl Order {
         self.earliest_s[happening as usize]
     }
 
-    /// How many happenings there are.
+    /// The number of happenings.
     pub fn len(&self) -> usize {
         self.earliest_s.len()
     }
 
-    /// By resource, the latest of what was done to it last, by a value of happenings: write, read since, addition
-    /// since, hold since; -1 for none.
+    /// For each resource, the latest of its last accesses by a value of happenings: write, read since,
+    /// addition since, hold since; -1 for none.
     pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 4]> {
         let latest =
             move |nodes: &[u32]| nodes.iter().fold(NEVER, |latest: f64, &node| latest.max(value(node)));
@@ -90,7 +90,8 @@ impl Order {
         })
     }
 
-    /// How long after one happening each from `first` on comes at least; minus infinity where it is free to come before.
+    /// Least time after one happening of each from `first` on, seconds; minus infinity where it is free to
+    /// come before.
     pub fn after_s(&self, start: u32, first: usize) -> Vec<f64> {
         let mut after_s = vec![f64::NEG_INFINITY; self.len() - first];
         after_s[start as usize - first] = 0.0;
@@ -121,7 +122,7 @@ impl Order {
         after_s
     }
 
-    /// When the happening of which these are the distances can be at the latest, for what is given from outside.
+    /// Latest time of the happening with these distances, by the happenings whose times are fixed, seconds.
     pub fn latest_s(&self, after_s: &[f64], first: usize) -> f64 {
         let bound =
             |&(node, time_s): &(u32, f64)| Some(time_s - after_s[(node as usize).checked_sub(first)?]);
@@ -146,7 +147,7 @@ impl Order {
         }
     }
 
-    /// Whether a happening is given from outside.
+    /// True if a happening is a timed effect, given from outside.
     pub fn is_given(&self, happening: usize) -> bool {
         self.fixed.iter().any(|&(node, _)| node as usize == happening)
     }
@@ -157,7 +158,8 @@ impl Order {
         own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))
     }
 
-    /// By resource, when what was done to it last is over: 0 for one that nothing has touched.
+    /// For each resource, the time at which its last write or addition is over, seconds; 0 if nothing has
+    /// accessed it.
     pub fn ready_s(&self) -> Vec<f64> {
         let last = |resource: &Resource| {
             let done = resource.writer.iter().chain(&resource.adders);
@@ -311,12 +313,13 @@ impl Clock {
         Clock { last_s: vec![[NEVER; 4]; resources], latest_s: 0.0 }
     }
 
-    /// When the last action ends.
+    /// Earliest end of the last action, seconds.
     pub fn makespan_s(&self) -> f64 {
         self.latest_s
     }
 
-    /// By resource, when what was done to it last is over: 0 for one that nothing has touched.
+    /// For each resource, the time at which its last write or addition is over, seconds; 0 if nothing has
+    /// accessed it.
     pub fn ready_s(&self) -> Vec<f64> {
         self.last_s.iter().map(|&[write_s, _, add_s, _]| write_s.max(add_s).max(0.0)).collect()
     }

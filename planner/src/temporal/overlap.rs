@@ -18,14 +18,14 @@ use super::relaxed::Part;
 use super::touch::Touched;
 use super::world::{Act, Span, World};
 
-/// Whether an action can start where it is in progress. What a module would propose for it is not asked.
+/// True if an action can start while it is in progress; grounding modules are not asked for its parameters.
 pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
     let nothing = Span { least_s: 0.0, most_s: 0.0 };
     let mut step = Step { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
     Ok(!world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some())
 }
 
-/// Which of these actions it might help to run twice at once.
+/// Actions among these that may be worth running twice at once.
 ///
 /// Of one that does nothing but bring about at its end, once and for all, what nobody ever changes again, the run that ends
 /// first is enough: a plan without the others is still a plan. Not where actions `earn` something.
@@ -46,7 +46,7 @@ pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32
     acts.into_iter().filter(|&act| !once(&world.acts[act as usize])).collect()
 }
 
-/// By variable that anything changes, the value that it always gets; none where there are several.
+/// The only value that each changed variable is ever given; `None` if there are several.
 fn kept(world: &World) -> FxHashMap<u32, Option<u32>> {
     let acts = world.acts.iter().flat_map(|act| act.start_effects.iter().chain(act.end_effects));
     let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);

@@ -119,7 +119,7 @@ impl Program {
         self.bounds.len() as u32 - 1
     }
 
-    /// How many comparisons are asked that depend on variables.
+    /// The number of comparisons that depend on variables.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }

@@ -18,7 +18,7 @@ use super::space::Space;
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// Which part of an action a relaxed operator stands for.
+/// The part of an action that a relaxed operator stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
     /// All of it in one go.
@@ -52,30 +52,30 @@ pub(super) struct Operator {
     pub(super) seconds: Seconds,
 }
 
-/// What an evaluation looks at first in an operator, side by side in memory.
+/// Data of an operator that every evaluation reads, side by side in memory.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hot {
-    /// What it gives begins here in [`Relaxed::given`], then what it moves, up to the end.
+    /// Index in [`Relaxed::given`] of its first effect; its moved tests follow, up to the end.
     pub(super) gives: u32,
     pub(super) moves: u32,
     pub(super) end: u32,
-    /// How much it needs.
+    /// The number of propositions that it needs.
     pub(super) needs: u32,
-    /// Whether nobody else need be asked whether it can be applied.
+    /// True if its applicability needs no attachment.
     pub(super) plain: bool,
     /// Seconds that it takes, infinite where it can never be applied; NaN where that must be asked.
     pub(super) seconds: f64,
-    /// What being a step counts.
+    /// Cost of being a step at all.
     pub(super) step: f64,
 }
 
 impl Hot {
-    /// Whether nobody need be asked whether it can be applied, and how long it takes.
+    /// True if its applicability needs no attachment and its duration is known.
     pub(super) fn is_known(&self) -> bool {
         self.plain && !self.seconds.is_nan()
     }
 
-    /// What it costs in any case, in time or in costs; nothing where that is not known yet.
+    /// Lower bound on its cost, in time or in costs; zero while that is not known.
     pub(super) fn least(&self, timed: bool) -> f64 {
         self.seconds.max(0.0) + if timed { 0.0 } else { self.step }
     }
@@ -89,11 +89,11 @@ pub(super) struct Waiter {
     pub(super) target: u32,
     /// Seconds that it takes, as far as known by now.
     pub(super) seconds: f64,
-    /// What being a step counts.
+    /// Cost of being a step at all.
     pub(super) step: f64,
 }
 
-/// How long an operator takes at least.
+/// Least duration of an operator, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Seconds {
     /// The same in every state; infinite where it can never be applied.
@@ -117,28 +117,29 @@ pub(crate) struct Relaxed {
     pub(super) tests: Vec<Test>,
     /// Number of a test's proposition.
     test_index: FxHashMap<Test, u32>,
-    /// By test, whether an operator or the goal needs it.
+    /// For each test, true if an operator or the goal needs it.
     pub(super) asked: Vec<bool>,
-    /// By test, the resources that it reads.
+    /// The resources that each test reads.
     pub(super) test_reads: Vec<Vec<u32>>,
-    /// By resource, the tests that read it.
+    /// The tests that read each resource.
     tests_on: Vec<Vec<u32>>,
     pub(super) test_base: u32,
-    /// By action whose start and end are apart: the propositions that say that it is open, and that it is closed.
+    /// For each action whose start and end are separate: the propositions that it is open, and that it is
+    /// closed.
     pub(super) tokens: FxHashMap<u32, (u32, u32)>,
     /// First of those.
     pub(super) token_base: u32,
     pub(super) operators: Vec<Operator>,
     pub(super) hot: Vec<Hot>,
-    /// What operators give and move, one after the other.
+    /// Effects and moved tests of all operators, one operator after the other.
     pub(super) given: Vec<u32>,
-    /// By proposition, the operators that need it.
+    /// The operators that need each proposition.
     pub(super) needed_by: Grouped<Waiter>,
     pub(super) goal: Vec<u32>,
     pub(super) goal_gates: Vec<(CallId, bool)>,
     /// Mean duration: what being a step at all counts.
     pub(super) unit: f64,
-    /// By action, what it adds to the measure beside time, in seconds that count as much.
+    /// Contribution of each action to the measure beside time, in equivalent seconds.
     pub(super) counted: Vec<Option<Expression>>,
     /// Operators that need nothing.
     pub(super) free: Vec<u32>,
@@ -258,7 +259,7 @@ impl Relaxed {
         self.test_index.get(&wanted).copied()
     }
 
-    /// Whether a test reads the number.
+    /// True if a test reads the number.
     pub(super) fn is_tested(&self, number: NumericId) -> bool {
         !self.tests_on[self.offsets.len() + number as usize].is_empty()
     }
@@ -501,7 +502,7 @@ impl Relaxed {
     }
 }
 
-/// By call, whether a condition asks for it that gets no proposed parameter.
+/// For each call, true if a condition uses it without a proposed parameter.
 fn plain_calls(world: &World) -> Vec<bool> {
     let mut plain = vec![false; world.ground.calls.len()];
     let mut note = |condition: &Conjunction| {
@@ -541,14 +542,14 @@ impl Merged {
     }
 }
 
-/// Whether the start of an action may itself bring a fact about that is asked for after it.
+/// True if the start of an action may itself bring about a fact that is needed after it.
 fn may_give(world: &World, act: &Act, fact: &Fact) -> bool {
     let derived = world.ground.variables[fact.variable as usize].stratum.is_some();
     let gives = |effect: &Effect| effect.outcome == Outcome::Set(*fact);
     derived && !act.start_effects.is_empty() || act.start_effects.iter().any(gives)
 }
 
-/// Whether the start of an action changes something that a call reads.
+/// True if the start of an action changes something that a call reads.
 fn may_turn(world: &World, act: &Act, call: CallId) -> bool {
     let (mut read, mut written) = (Touched::default(), Touched::default());
     read.call(world, call);

@@ -1,5 +1,5 @@
-//! What is left at least from a proposition to the goal: what comes too late for a goal that is within reach already
-//! need not spread any further.
+//! Lower bounds from propositions to the goal: a proposition that comes too late for a goal already within
+//! reach need not spread any further.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -10,8 +10,8 @@ use super::estimate::Key;
 use super::relaxed::Relaxed;
 
 impl Relaxed {
-    /// By proposition, what a relaxed plan through it adds at least between it and the last goal, infinite where it
-    /// is of no use; in time, or in costs added up.
+    /// For each proposition, a lower bound on the relaxed plan between it and the last goal, infinite where
+    /// it is of no use; in time, or in costs added up.
     ///
     /// Durations that are not known without a state count as nothing, and so does what else an operator needs.
     pub(super) fn remaining(&self, timed: bool) -> Vec<f64> {

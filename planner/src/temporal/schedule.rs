@@ -98,7 +98,7 @@ pub fn longest_path(order: &Order) -> Vec<usize> {
     path
 }
 
-/// By happening, the step that it belongs to; `None` for what is given from outside.
+/// The step that each happening belongs to; `None` for timed effects.
 fn steps_of(steps: &[Step], track: &Track) -> Vec<Option<usize>> {
     let mut step_of = vec![None; track.order.len()];
     let mut open: Vec<usize> = Vec::new();

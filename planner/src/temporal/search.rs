@@ -64,13 +64,13 @@ const WORK_A_STATE: u64 = 50;
 /// Memory is looked at after so many entries, of which a state counts for some.
 const MOST_UNSEEN: usize = 4096;
 const UNSEEN_A_STATE: usize = 64;
-/// How much more often the preferred queue is served after progress (Richter and Westphal 2010).
+/// Priority of the preferred queue after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
 /// An action in progress as a key: action, proposal, bits of its duration, gates of its end.
 type OpenKey = (u32, Option<Arc<str>>, u64, Gates);
 
-/// What is in progress, and how many timed effects have happened.
+/// The actions in progress, and the number of timed effects that have happened.
 type Phase = (Vec<Open>, usize);
 
 /// One search from a base.
@@ -96,22 +96,22 @@ pub(crate) struct Search<'s, 'w, 'a> {
     counts: Counts,
     /// Entries made since memory was looked at.
     unseen: usize,
-    /// Whether something was left out that might have led to a plan.
+    /// True if something was left out that might have led to a plan.
     lossy: bool,
     /// Actions that could have started while they were in progress as often as they may be.
     overlapping: BTreeSet<u32>,
-    /// What the relaxed plan of the state evaluated last leads to, to be looked at next.
+    /// Relaxed plan of the state evaluated last, to be followed next.
     ahead: Option<Ahead>,
 }
 
-/// When things happen on a path.
+/// Times of the happenings on a path.
 #[derive(Debug, Default)]
 struct Times {
     makespan_s: f64,
-    /// What tells equal states apart: in exact searches everything that future times depend on, else the time from the
-    /// start of the action in progress that started last to the end of everything.
+    /// Mark that distinguishes equal states: in exact searches everything that future times depend on, else
+    /// the time from the start of the action in progress that started last to the end of everything.
     mark: u64,
-    /// By resource, when it is free.
+    /// Time at which each resource is free, seconds.
     ready_s: Option<Vec<f64>>,
 }
 
@@ -258,7 +258,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.manner.bound.is_finite() || self.manner.weight.is_some()
     }
 
-    /// When things happen up to a new step; `Err` if the times do not fit.
+    /// Times of the happenings up to a new step; `Err` if they are inconsistent.
     fn times(&mut self, parent: u32, step: &Step, open: bool) -> Result<Times, Inconsistent> {
         let wanted = self.manner.timed || self.bounded() && self.space.timed_measure();
         if !self.space.tight && !wanted {
@@ -373,7 +373,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
     }
 
-    /// Whether a plan is one still with its times. Of what goes on from a base, its beginning is not known here.
+    /// True if a plan is still valid with its times. From a base, the beginning of the plan is not known
+    /// here, and it counts as valid.
     fn works_out(&self, node: u32) -> Result<bool, Failure> {
         let settled = !self.space.is_open && self.space.world.ground.timed.is_empty();
         if settled || !self.base.track.actions.is_empty() {
@@ -409,8 +410,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         false
     }
 
-    /// Whether what can still be done from a state depends on when things happened on the way to it, beyond what tells
-    /// the states of this search apart.
+    /// True if the possible continuations of a state depend on the times of the path to it, beyond what
+    /// distinguishes the states of this search.
     fn depends_on_times(&self, situation: &Situation) -> bool {
         let fits =
             !self.manner.exact && (!situation.open.is_empty() || !self.space.world.ground.timed.is_empty());
@@ -479,7 +480,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.enqueue(node, situation, &estimate, key)
     }
 
-    /// Whether an action is in progress as often as it may be.
+    /// True if an action is in progress as often as it may be.
     fn is_full(&self, situation: &Situation, act: u32) -> bool {
         situation.open.iter().filter(|open| open.act == act).count() >= self.manner.at_once
     }

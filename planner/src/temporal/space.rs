@@ -1,4 +1,5 @@
-//! What several searches on one task share: the steps that are possible, what they touch, what plans are measured by.
+//! Search space shared by several searches on one task: the possible steps, the resources they access, the
+//! measure of plans.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -15,17 +16,17 @@ use super::relaxed::Part;
 use super::timed::is_valid;
 use super::world::{Act, Moment, Span, World};
 
-/// How often a plan is replayed whose actions are stretched in turn by those that were stretched before.
+/// The maximum number of replays of a plan whose actions are stretched in turn by those stretched before.
 const MOST_STRETCHED: usize = 8;
 /// Differences of times that rounding makes are no stretch.
 const LEAST_STRETCH_S: f64 = 1e-7;
 /// After so many steps of a replay, it asks whether to stop.
 const STEPS_A_LOOK: usize = 256;
 
-/// What plans are measured by.
+/// Measure of plans.
 #[derive(Debug, Clone)]
 pub enum Measure {
-    /// When the last action ends.
+    /// End of the last action.
     Makespan,
     /// Costs of the actions times a sign, plus a weight times the makespan.
     Additive {
@@ -39,7 +40,7 @@ pub enum Measure {
 }
 
 impl Measure {
-    /// Whether actions make it better.
+    /// Possibility that actions improve the measure.
     fn earns(&self, world: &World) -> Earns {
         let expression = match self {
             Measure::Makespan => return Earns::Never,
@@ -66,8 +67,8 @@ impl Measure {
         effects.map(|effect| &effect.outcome).chain(given).map(earns).max().unwrap_or(Earns::Never)
     }
 
-    /// By action: what it adds to the measure beside time, in seconds that count as much. Nothing where not both count, or where
-    /// the measure is not linear in them.
+    /// For each action, its contribution to the measure beside time, in equivalent seconds. `None` where not
+    /// both count, or where the measure is not linear in them.
     pub fn counted(&self, world: &World) -> Vec<Option<Expression>> {
         let times = |factor: f64, of: &Expression| {
             Expression::Product(vec![Expression::Constant(factor), of.clone()])
@@ -107,24 +108,24 @@ impl Measure {
 pub struct Space<'w, 'a> {
     /// The task.
     pub world: &'w World<'a>,
-    /// By action, whether its start and end are apart.
+    /// For each action, true if its start and end are separate.
     pub open_act: Vec<bool>,
-    /// What plans are measured by.
+    /// Measure of plans.
     pub measure: Measure,
-    /// What happenings touch.
+    /// Resources accessed by happenings.
     pub accesses: Accesses<'w, 'a>,
-    /// By variable and value, the actions that are looked at where the fact holds.
+    /// For each variable and value, the actions that are tried where the fact holds.
     pivots: Vec<Vec<Vec<u32>>>,
     /// Actions that are looked at everywhere.
     everywhere: Vec<u32>,
-    /// Whether times can make a sequence impossible.
+    /// True if times can make a sequence impossible.
     pub tight: bool,
-    /// Whether actions make what plans are measured by better: unless they surely do, a beginning of a plan that is as dear as
-    /// another plan is taken to lead to no better one.
+    /// Possibility that actions improve the measure: unless they surely do, a beginning of a plan that costs
+    /// as much as another plan is taken to lead to no better one.
     pub earns: Earns,
-    /// Whether effects or costs of some action depend on how long it is stretched.
+    /// True if effects or costs of some action depend on its chosen duration.
     stretches: bool,
-    /// Whether that is so or numbers flow: what a plan does is then known once it has its times.
+    /// True if that is so or numbers flow: the effects of a plan are then known only once it has its times.
     pub is_open: bool,
 }
 
@@ -173,12 +174,12 @@ impl<'w, 'a> Space<'w, 'a> {
         found
     }
 
-    /// Whether a shorter makespan makes a plan better, whatever else counts.
+    /// True if a shorter makespan makes a plan better, other things being equal.
     pub fn counts_time(&self) -> bool {
         self.time_weight() > 0.0
     }
 
-    /// What a second of the makespan adds to the measure; nothing where that is not known.
+    /// Weight of a second of the makespan in the measure; zero where that is not known.
     pub fn time_weight(&self) -> f64 {
         match self.measure {
             Measure::Makespan => 1.0,
@@ -205,7 +206,7 @@ impl<'w, 'a> Space<'w, 'a> {
         Track::new(self.accesses.resources)
     }
 
-    /// Whether the measure of a partial plan needs its times.
+    /// True if the measure of a partial plan needs its times.
     pub fn timed_measure(&self) -> bool {
         match &self.measure {
             Measure::Makespan => true,
@@ -221,7 +222,7 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(track)
     }
 
-    /// What an action adds to an additive metric.
+    /// Contribution of an action to an additive metric.
     pub fn step_cost(&self, before: &Values, step: &Step) -> Result<f64, Failure> {
         let Measure::Additive { sign, .. } = self.measure else { return Ok(0.0) };
         if matches!(step.part, Part::End | Part::Free) {
@@ -249,8 +250,8 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// Where a sequence of steps from the first state leads, and its measure; `None` if it does not work out, or is long and has been
-    /// asked to stop.
+    /// Replays a sequence of steps from the first state. Returns its measure and the base it leads to; `None`
+    /// if a step is impossible, or if the sequence is long and the search has been asked to stop.
     pub fn replay(
         &self,
         steps: &mut [Step],
@@ -323,7 +324,7 @@ impl<'w, 'a> Space<'w, 'a> {
     }
 }
 
-/// Where a search begins: after some steps.
+/// Start of a search: the situation after some steps.
 #[derive(Debug, Clone)]
 pub struct Base {
     /// The situation.
@@ -341,7 +342,7 @@ pub struct Base {
 pub struct Track {
     /// The order.
     pub order: Order,
-    /// By step, its start, and its end if it has one by now; `None` for ends and timed effects.
+    /// For each step, its start, and its end if it has one by now; `None` for ends and timed effects.
     pub actions: Vec<Option<(u32, Option<u32>)>>,
     /// The first happening since something was in progress without interruption.
     epoch: usize,
@@ -457,7 +458,7 @@ impl Track {
         Ok(())
     }
 
-    /// When the action in progress that started last did so.
+    /// Start of the action in progress that started last, seconds.
     pub fn latest_open_s(&self) -> Option<f64> {
         self.open.iter().map(|open| self.order.earliest_s(open.start)).max_by(f64::total_cmp)
     }

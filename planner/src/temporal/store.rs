@@ -7,7 +7,7 @@ use rustc_hash::FxHasher;
 use crate::ground::{GroundTask, Values};
 use crate::memory::{Rows, soon};
 
-/// Where a variable's value stands in the words of a packed state.
+/// Position of a variable's value in the words of a packed state.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: u32,

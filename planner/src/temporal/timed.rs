@@ -14,9 +14,9 @@ use super::world::World;
 pub(crate) struct Timed {
     /// The step of the search.
     pub step: Step,
-    /// When it starts.
+    /// Start time, seconds.
     pub start_s: f64,
-    /// How long it takes.
+    /// Duration, seconds.
     pub duration_s: f64,
 }
 
@@ -64,8 +64,8 @@ fn timed(steps: &[Step], track: &Track) -> Vec<Timed> {
     plan
 }
 
-/// Whether a plan is one in time: where numbers flow, or effects depend on how long an action is stretched, the search knows too
-/// little of what happens when.
+/// True if the validator accepts a plan with its times: where numbers flow, or effects depend on a chosen
+/// duration, the search knows too little about the order of happenings.
 pub(super) fn is_valid(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> bool {
     let Some(timed) = schedule(space, steps, stop) else { return false };
     let world = space.world;

@@ -1,4 +1,4 @@
-//! Whether actions may have to start, or to end, at the very same time.
+//! Detection of actions that may have to start, or to end, at the very same time.
 //!
 //! What holds over all of an action holds strictly between its start and its end. So two actions may start at one time
 //! of which each gives what the other holds, and two may end at one time of which each takes that away. The search lets
@@ -14,10 +14,11 @@ use super::advance::derived_roots;
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// What is held or set: a value of a variable; or a variable or number whatever its value.
+/// A resource that is held or set: a value of a variable; or a variable or number whatever its value.
 type Place = (u32, Option<u32>);
 
-/// Whether some actions can, as far as can be told without a search, only start or only end together.
+/// True if some actions may be able only to start or only to end together, as far as can be told without a
+/// search.
 pub(super) fn some_only_together(world: &World) -> bool {
     let roots = derived_roots(world);
     let held: Vec<Vec<Place>> = world.acts.iter().map(|act| held(world, &roots, act)).collect();
@@ -37,7 +38,7 @@ pub(super) fn some_only_together(world: &World) -> bool {
         || in_a_circle(world, &taken, |act| act.end_effects, takes)
 }
 
-/// Whether actions hold in a circle what effects of the next one meet.
+/// True if actions form a circle in which each holds a resource that an effect of the next one meets.
 fn in_a_circle<'w>(
     world: &World<'w>,
     held: &[Vec<Place>],
@@ -72,8 +73,8 @@ fn in_a_circle<'w>(
     circles.iter().any(|circle| circle.iter().filter(|node| node.index() < acts as usize).count() > 1)
 }
 
-/// What must hold over all of an action. A bound on a number is left out: of changes that come together, those that
-/// keep it can come first.
+/// Resources that must hold over all of an action. A bound on a number is left out: of simultaneous changes,
+/// those that keep it can come first.
 fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
     let mut places = Vec::new();
     for fact in &act.over_all.facts {
@@ -93,7 +94,7 @@ fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
     places
 }
 
-/// What an effect sets.
+/// Resources that an effect sets.
 fn set(world: &World, effect: &Effect) -> Vec<Place> {
     if let Outcome::Set(fact) = &effect.outcome {
         return vec![(fact.variable, Some(fact.value))];

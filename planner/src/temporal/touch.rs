@@ -1,4 +1,4 @@
-//! Which variables and numbers conditions, expressions and effects read or change.
+//! Variables and numbers that conditions, expressions and effects read or change.
 
 use crate::ground::{CallId, ComparisonId, Conjunction, Expression, NumericId, Outcome, Place, VariableId};
 
@@ -23,7 +23,7 @@ impl Touched {
         resources
     }
 
-    /// Whether both hold a variable or a number.
+    /// True if both contain the same variable or number.
     pub fn meets(&self, other: &Touched) -> bool {
         self.variables.iter().any(|variable| other.variables.contains(variable))
             || self.numbers.iter().any(|number| other.numbers.contains(number))
@@ -35,28 +35,28 @@ impl Touched {
         self.numbers.clear();
     }
 
-    /// What the answer of a call depends on.
+    /// Adds the resources that the answer of a call depends on.
     pub fn call(&mut self, world: &World, call: CallId) {
         let (variables, numbers) = world.calls.reads(call);
         self.variables.extend(variables);
         self.numbers.extend(numbers);
     }
 
-    /// What a numeric condition reads.
+    /// Adds the resources that a numeric condition reads.
     pub fn comparison(&mut self, world: &World, comparison: ComparisonId) {
         let comparison = &world.ground.comparisons[comparison as usize];
         expression_touches(world, &comparison.left, self);
         expression_touches(world, &comparison.right, self);
     }
 
-    /// What a condition reads.
+    /// Adds the resources that a condition reads.
     pub fn condition(&mut self, world: &World, condition: &Conjunction) {
         self.variables.extend(condition.facts.iter().map(|fact| fact.variable));
         condition.comparisons.iter().for_each(|&comparison| self.comparison(world, comparison));
         condition.calls.iter().for_each(|&(call, _)| self.call(world, call));
     }
 
-    /// What an outcome changes.
+    /// Adds the resources that an outcome changes.
     pub fn outcome(&mut self, world: &World, outcome: &Outcome) {
         match outcome {
             Outcome::Set(fact) => self.variables.push(fact.variable),

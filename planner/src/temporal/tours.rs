@@ -16,7 +16,7 @@ use super::world::World;
 const MOST_REPLAYED: usize = 20_000;
 /// In tasks with more actions than this, none is looked up by its arguments.
 const MOST_ACTS: usize = 200_000;
-/// What is better by less than this is as good.
+/// Differences below this do not count as better.
 const BETTER: f64 = 1e-6;
 
 /// The actions of a task by what they are about.
@@ -35,7 +35,7 @@ struct Tour {
     arguments: Vec<u32>,
     /// Steps before the first of them.
     before: Vec<Step>,
-    /// What is done where they lead.
+    /// The places along the tour, with the steps done there.
     stops: Vec<Stop>,
 }
 
@@ -47,7 +47,7 @@ struct Stop {
 }
 
 impl<'w, 'a> Tours<'w, 'a> {
-    /// Of a world; none where it has too many actions.
+    /// Index of the actions of a world; `None` if it has too many.
     pub fn new(world: &'w World<'a>) -> Option<Self> {
         if world.acts.len() > MOST_ACTS {
             return None;
@@ -169,7 +169,7 @@ impl Tour {
     }
 }
 
-/// Which argument of an action is where it begins, and which where it ends, told from such as follow each other.
+/// Indices of the arguments where an action begins and where it ends, judged by successive actions.
 fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     let width = all.first()?.len();
     let pairs =
@@ -181,7 +181,7 @@ fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     (most > 0).then_some(best)
 }
 
-/// Whether an action begins where one of its kind has ended, and is about the same otherwise.
+/// True if an action begins where one of its kind has ended, and their other arguments are equal.
 fn follows(first: &[u32], second: &[u32], from: usize, to: usize) -> bool {
     let is_same = |n: usize| n == from || n == to || first[n] == second[n];
     first[to] == second[from] && (0..first.len()).all(is_same)

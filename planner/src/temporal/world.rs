@@ -1,4 +1,4 @@
-//! What happens when an action starts, runs and ends: conditions and effects on packed-free states.
+//! Starts, runs and ends of actions: evaluates conditions and applies effects on unpacked states.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -25,12 +25,12 @@ use super::touch::{Touched, expression_touches};
 pub struct Act<'a> {
     /// The lifted action and its arguments.
     pub origin: &'a Origin,
-    /// Whether it takes time.
+    /// True if it is durative.
     pub durative: bool,
     /// Bounds on the duration.
     pub bounds: &'a [DurationBound],
-    /// How much of what the bounds leave it takes: nothing for the least, and for as long as it has to; more where that alone would
-    /// not give what its effects can do.
+    /// Fraction of the slack between its duration bounds that it takes: 0 for the shortest duration, or for
+    /// as long as it has to; more where the shortest alone would not give all that its effects can do.
     pub share: f64,
     /// Holds right before the start.
     pub at_start: &'a Conjunction,
@@ -44,15 +44,16 @@ pub struct Act<'a> {
     pub flow_effects: &'a [Effect],
     /// Happens at the end.
     pub end_effects: &'a [Effect],
-    /// What it adds to an additive metric.
+    /// Contribution to an additive metric.
     pub cost: &'a Expression,
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
-    /// Whether its end may happen together with its start, once it was asked for.
+    /// True if its end may happen together with its start; computed on demand.
     pub(super) ends_freely: OnceCell<bool>,
 }
 
-/// Of what bounds on a duration leave, what is tried besides the least where effects depend on it: half of it, and all.
+/// Fractions of the slack between duration bounds that are tried besides the least where effects depend on
+/// the duration: half of it, and all.
 const SHARES: [f64; 2] = [0.5, 1.0];
 
 pub static NOTHING: Conjunction =
@@ -67,28 +68,29 @@ pub struct Moment<'s> {
     pub duration_s: f64,
     /// The parameter that a grounding module proposed.
     pub proposal: Option<&'s Arc<str>>,
-    /// How carefully attachments answer.
+    /// Level of accuracy at which attachments answer.
     pub level: Level,
 }
 
 /// The duration that an action may take, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
-    /// At least.
+    /// Shortest duration.
     pub least_s: f64,
-    /// At most; may be infinite.
+    /// Longest duration; may be infinite.
     pub most_s: f64,
 }
 
 impl Span {
-    /// What is left where so much is to be taken; `None` if that is not allowed.
+    /// The span reduced to a chosen duration, if any; `None` if that is not allowed.
     pub fn taking(self, taken_s: Option<f64>) -> Option<Span> {
         let Some(taken_s) = taken_s else { return Some(self) };
         (self.least_s <= taken_s && taken_s <= self.most_s)
             .then_some(Span { least_s: taken_s, most_s: taken_s })
     }
 
-    /// What is left an [`EPSILON_S`] inside bounds that are not part of it; the middle, where there is less room than that.
+    /// The span reduced to an [`EPSILON_S`] inside bounds that are excluded; the middle, where there is less
+    /// room than that.
     fn strictly_inside(self, bounds: Span) -> Span {
         let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
         let most_s = self.most_s.min(bounds.most_s - EPSILON_S);
@@ -114,17 +116,17 @@ pub struct World<'a> {
     pub calls: Calls<'a>,
     /// Durative actions first, in the ground task's order, then instantaneous ones, then durative ones again that take longer.
     pub acts: Vec<Act<'a>>,
-    /// Whether the steps of the search can make every plan, once it was asked for.
+    /// True if the steps of the search can make every plan; computed on demand.
     complete: OnceCell<bool>,
-    /// Whether grounding modules propose parameters.
+    /// True if grounding modules propose parameters.
     pub proposes: bool,
     /// Axioms by stratum.
     strata: Vec<Vec<&'a Axiom>>,
     /// Variables that axioms set.
     derived: Vec<usize>,
-    /// By variable, whether it is an object; empty where none is.
+    /// For each variable, true if it is an object; empty where none is.
     objects: Vec<bool>,
-    /// By variable that timed effects set, the number of the last one that does, and its value.
+    /// For each variable that timed effects set, the index of the last one that does, and its value.
     pub(super) last_given: FxHashMap<u32, (usize, u32)>,
 }
 
@@ -197,18 +199,19 @@ impl<'a> World<'a> {
         World { task, ground, calls, acts, complete, proposes, strata, derived, objects, last_given }
     }
 
-    /// Whether the steps of the search can make every plan: no action needs a duration that is chosen for its effects, or
-    /// looks at a number while it flows, and none need start or end at the very same time.
+    /// True if the steps of the search can make every plan: no action needs a duration that is chosen for its
+    /// effects, or a number while it flows, and none need start or end at the very same time.
     pub fn is_complete(&self) -> bool {
         *self.complete.get_or_init(|| !self.chooses_numbers() && !some_only_together(self))
     }
 
-    /// Whether numbers depend on times: on how long an action is chosen to take, or on how long one has been running.
+    /// True if numbers depend on times: on the chosen duration of an action, or on how long one has been
+    /// running.
     pub fn chooses_numbers(&self) -> bool {
         self.acts.iter().any(|act| !act.flow_effects.is_empty() || chooses_effects(act))
     }
 
-    /// Whether what an action adds to the metric depends on how long it is chosen to take.
+    /// True if the contribution of an action to the metric depends on its chosen duration.
     pub fn chooses_costs(&self) -> bool {
         self.acts.iter().any(chooses_cost)
     }
@@ -252,7 +255,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// Whether a numeric condition holds.
+    /// True if a numeric condition holds.
     pub fn compare(&self, comparison: ComparisonId, moment: &Moment) -> Result<bool, Failure> {
         let comparison = &self.ground.comparisons[comparison as usize];
         let left = self.evaluate(&comparison.left, moment)?;
@@ -260,7 +263,7 @@ impl<'a> World<'a> {
         Ok(comparison.relation.holds(left, right))
     }
 
-    /// Whether a conjunction holds; calls are asked last.
+    /// True if a conjunction holds; calls are evaluated last.
     pub fn holds(&self, condition: &Conjunction, moment: &Moment) -> Result<bool, Failure> {
         let facts =
             condition.facts.iter().all(|fact| moment.state.values[fact.variable as usize] == fact.value);
@@ -323,7 +326,8 @@ impl<'a> World<'a> {
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
     }
 
-    /// Whether the end of an action may happen together with its start: neither changes what the other touches.
+    /// True if the end of an action may happen together with its start: neither changes what the other
+    /// accesses.
     fn ends_freely(&self, act: &Act) -> bool {
         let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());
         read.condition(self, act.at_start);
@@ -345,7 +349,7 @@ impl<'a> World<'a> {
             && !disturbs_itself(self, act)
     }
 
-    /// Whether the bounds that are evaluated at the end allow this duration.
+    /// True if the bounds that are evaluated at the end allow this duration.
     pub fn end_allows(&self, act: &Act, moment: &Moment) -> Result<bool, Failure> {
         for bound in act.bounds.iter().filter(|bound| bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
@@ -462,13 +466,13 @@ impl<'a> World<'a> {
 }
 
 impl Act<'_> {
-    /// Whether its effects, its bounds or what it costs depend on how long it takes, and the schedule may choose that.
+    /// True if its effects, its bounds or its cost depend on its duration, and the schedule may choose that.
     pub fn is_read_off(&self) -> bool {
         self.share == 0.0 && (chooses_effects(self) || chooses_cost(self))
     }
 }
 
-/// Whether what an action costs depends on how long it is chosen to take.
+/// True if the cost of an action depends on its chosen duration.
 fn chooses_cost(act: &Act) -> bool {
     !is_fixed(act) && mentions_duration(act.cost)
 }
@@ -477,7 +481,7 @@ fn is_fixed(act: &Act) -> bool {
     act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end)
 }
 
-/// Whether an action has effects or bounds at its end that depend on how long it is chosen to take.
+/// True if an action has effects, or bounds at its end, that depend on its chosen duration.
 fn chooses_effects(act: &Act) -> bool {
     let timed = |effect: &Effect| match &effect.outcome {
         Outcome::Change { amount, .. } => mentions_duration(amount),

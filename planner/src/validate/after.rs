@@ -1,4 +1,4 @@
-//! What holds after a few steps: the effects of what was carried out, by the same rules as everything else.
+//! State after the first steps of a plan, by the same semantics as everything else.
 
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::semantics::{Compared, Why};
 
-/// Why a plan does not do.
+/// The cause of a plan's failure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Cause {
@@ -12,7 +12,7 @@ pub enum Cause {
     Goal(Unmet),
     /// A condition of a step does not hold when it must.
     Condition {
-        /// When it must hold.
+        /// The time at which it must hold.
         when: Moment,
         /// The part that does not hold.
         #[serde(flatten)]
@@ -32,7 +32,7 @@ pub enum Cause {
     },
 }
 
-/// When a condition of a step must hold.
+/// The time at which a condition of a step must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {

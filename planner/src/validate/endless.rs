@@ -49,7 +49,7 @@ fn counted(task: &Task) -> (Vec<FunctionId>, bool) {
     (counted, adds)
 }
 
-/// Whether a step may make the metric better.
+/// True if a step may improve the metric.
 fn may_help(task: &Task, step: &Step, (counted, adds): &(Vec<FunctionId>, bool)) -> bool {
     let worse = match task.metric.as_ref().is_some_and(|metric| metric.minimise) {
         true => Assignment::Increase,

@@ -31,18 +31,18 @@ pub use monitor::{Broken, monitor};
 /// their happenings as little as this apart.
 pub const SEPARATION_S: f64 = 1e-4;
 
-/// What the validator says of a plan.
+/// The validator's verdict on a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Whether the plan reaches the goal as it stands.
+    /// True if the plan reaches the goal as it stands.
     pub valid: bool,
-    /// Why not, in one sentence.
+    /// The reason it is invalid, in one sentence.
     pub reason: Option<String>,
     /// The step at fault, counted from 0.
     pub step: Option<usize>,
     /// Value of the metric, or the number of steps where there is none.
     pub cost: Option<f64>,
-    /// When the last step ends, in seconds; `None` for a plan without times.
+    /// End of the last step, in seconds; `None` for a plan without times.
     pub makespan: Option<f64>,
     /// Value of the metric.
     pub metric: Option<f64>,
@@ -51,7 +51,7 @@ pub struct Verdict {
     pub findings: Findings,
 }
 
-/// Why a replay stopped.
+/// The reason a replay stopped.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub reason: String,
@@ -65,7 +65,7 @@ pub(crate) struct Replayed {
     pub state: State,
     /// States with the times at which they begin, for constraints on the trajectory.
     pub trace: Vec<(f64, State)>,
-    /// How often conditions of actions were violated that were only preferred, by preference.
+    /// For each preference, the number of violations by preferred conditions of actions.
     pub violations: Vec<f64>,
     /// End of the plan: a time, or the number of steps.
     pub end: f64,

@@ -1,4 +1,4 @@
-//! Is the rest of a plan still good from here?
+//! Plan monitor: checks if the rest of a plan is still valid from the current state.
 
 use std::fmt;
 
@@ -12,16 +12,16 @@ use crate::plan::Plan;
 use crate::semantics::{CallFailure, Semantics};
 use crate::task::Task;
 
-/// Why the rest of a plan no longer reaches the goal.
+/// The reason the rest of a plan no longer reaches the goal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Broken {
     /// The step at fault, counted from 0 in the rest; `None` if the goal itself is missed.
     pub step: Option<usize>,
-    /// Why, in one sentence.
+    /// The reason, in one sentence.
     pub reason: String,
     /// The same with the values that decide it.
     pub cause: Cause,
-    /// Where it stands in the task's texts.
+    /// Its span in the task's texts.
     pub span: Span,
     /// The same, to be drawn under the text of the task.
     #[serde(skip)]
@@ -36,7 +36,7 @@ impl fmt::Display for Broken {
 
 impl std::error::Error for Broken {}
 
-/// Whether the rest of a plan, from the initial state of `task`, still reaches the goal.
+/// Checks that the rest of a plan, from the initial state of `task`, still reaches the goal.
 ///
 /// Give the task the current state with [`Task::with_state`]. Times of the rest count from now.
 ///

@@ -1,4 +1,4 @@
-//! One happening after the other, from the initial state to the end of a plan.
+//! Replay of a plan, one happening after the other, from the initial state.
 
 use super::timeline::{Event, Happening, happenings, makespan_s};
 use super::{Cause, Fault, Moment, Replayed, SEPARATION_S, Unmet};
@@ -23,7 +23,7 @@ struct Running {
     since_s: f64,
 }
 
-/// Who takes part in a happening, and what it does there.
+/// A participant of a happening, with its reads and writes.
 struct Part {
     step: Option<usize>,
     touched: Touched,
@@ -185,7 +185,7 @@ impl Replay<'_, '_> {
         self.after_happening()
     }
 
-    /// What an event does, if it can happen now.
+    /// Changes made by an event, if it can happen now.
     fn part(&mut self, event: Event, alone: bool) -> Outcome<Part> {
         let mut touched = Touched::default();
         let (step, at_end) = match event {
@@ -367,7 +367,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// What a step that starts in the present state knows of it at its end.
+    /// Conditional end effects of a step that starts in the present state, as far as decided at its start.
     fn remembered(&self, step: usize) -> Result<Pending, CallFailure> {
         let (action, mut binding) = self.bound[step].clone();
         let effects = &self.semantics.task.action(action).effects.end;
@@ -447,7 +447,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// What changes at a rate, and by how much in a time.
+    /// Changes of numbers at rates over an elapsed time, seconds.
     fn flowing(&self, elapsed_s: f64) -> Outcome<Changes> {
         let mut changes = Changes::default();
         for running in &self.running {
@@ -476,7 +476,7 @@ impl Replay<'_, '_> {
         })
     }
 
-    /// How far apart the sides of all comparisons are that matter to what is running.
+    /// Differences between the sides of all comparisons that matter to the actions in progress.
     fn differences(&self, state: &State) -> Result<Vec<f64>, CallFailure> {
         let mut found = Vec::new();
         self.semantics.rule_differences(state, &mut found)?;

@@ -1,10 +1,10 @@
-//! From the steps of a plan to what happens when.
+//! Timeline of a plan: its happenings in order of time.
 
 use super::SEPARATION_S;
 use crate::plan::{Plan, Step};
 use crate::task::Task;
 
-/// Something that happens at one time.
+/// An event at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Event {
     /// A timed initial literal or fluent, by number.
@@ -62,7 +62,8 @@ pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool], until_s
     all
 }
 
-/// When the last step ends; what takes no time takes none, whatever the plan says. `None` for a plan without times.
+/// End of the last step, seconds; an instantaneous step takes no time, whatever the plan says. `None` for a
+/// plan without times.
 pub(super) fn makespan_s(plan: &Plan, is_durative: &[bool]) -> Option<f64> {
     let end_s = |(step, is_durative): (&Step, &bool)| {
         Some(step.start_s? + if *is_durative { step.duration_s } else { 0.0 })
@@ -71,7 +72,8 @@ pub(super) fn makespan_s(plan: &Plan, is_durative: &[bool]) -> Option<f64> {
     ends_s.try_fold(0.0, |last: f64, end_s| Some(last.max(end_s?)))
 }
 
-/// Whether `event` ends a step that starts among `events`: a step without duration still starts before it ends.
+/// True if `event` ends a step that starts among `events`: a step without duration still starts before it
+/// ends.
 fn starts(events: &[Event], event: Event) -> bool {
     matches!(event, Event::End(step) if events.contains(&Event::Start(step)))
 }

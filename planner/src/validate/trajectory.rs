@@ -31,7 +31,7 @@ pub(super) fn broken_constraint(
     Ok(None)
 }
 
-/// How often each preference is violated, by preference.
+/// The number of violations of each preference.
 pub(super) fn violations(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Vec<f64>, CallFailure> {
     let mut counts = replayed.violations.clone();
     for (index, preference) in semantics.task.preferences.iter().enumerate() {

@@ -23,7 +23,7 @@ impl Chance {
     }
 }
 
-/// What a task is made of.
+/// Language features of a task.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     Classical,
@@ -41,7 +41,7 @@ struct Maker<'c> {
     scope: Vec<usize>,
     /// Predicates from here on may not be mentioned.
     limit: usize,
-    /// By function, how the action at hand changes it.
+    /// For each function, the kinds of changes by the action at hand.
     families: [&'static [&'static str]; 2],
 }
 

@@ -1,4 +1,5 @@
-//! What the trees mean, written down a second time as plainly as possible, and searches that try everything.
+//! Reference implementation of the semantics, written a second time as plainly as possible, with exhaustive
+//! searches.
 
 use std::collections::{HashMap, VecDeque};
 
@@ -45,7 +46,7 @@ enum Event<'s> {
     Start(usize, &'s Step),
 }
 
-/// What a search found.
+/// Result of a search.
 #[derive(Debug)]
 pub enum Found {
     Plan(Vec<Step>),
@@ -70,7 +71,7 @@ const TOLERANCE: f64 = 1e-7;
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 /// Events nearer than this are at one time.
 const TOGETHER_S: f64 = 1e-4;
-/// How far apart the search keeps what it starts.
+/// Spacing of the starts that the search tries, seconds.
 const GAP_S: f64 = 0.01;
 
 impl<'t> Oracle<'t> {
@@ -135,7 +136,7 @@ impl<'t> Oracle<'t> {
         named.terms.iter().map(|&term| object(term, binding)).collect()
     }
 
-    /// Whether a formula, or its negation, holds; neither where a number that it compares is undefined.
+    /// True if a formula, or its negation, holds; neither does where a number that it compares is undefined.
     fn holds(&self, formula: &Formula, wanted: bool, state: &State, binding: &mut Vec<usize>) -> bool {
         let mut part = |part: &Formula, wanted: bool| self.holds(part, wanted, state, binding);
         match formula {
@@ -213,7 +214,7 @@ impl<'t> Oracle<'t> {
         self.number(self.task.metric.as_ref()?, state, &[], 0.0)
     }
 
-    /// Whether an optional condition of an effect holds for an object of its own variable.
+    /// True if an optional condition of an effect holds for an object of its own variable.
     fn met(
         &self,
         effect: &Effect,
@@ -303,7 +304,8 @@ impl<'t> Oracle<'t> {
         self.goes_on(&mut next).then_some(next)
     }
 
-    /// Whether what runs may go on in a state; takes from each its effects at the end whose condition has failed on the way.
+    /// True if the actions in progress may go on in a state; removes their end effects whose condition has
+    /// failed on the way.
     fn goes_on(&self, next: &mut World) -> bool {
         let World { state, running } = next;
         for own in running {
@@ -418,7 +420,7 @@ impl<'t> Oracle<'t> {
         Found::Unknown
     }
 
-    /// Whether the goal holds after the last of what is given at a time, if nothing more is done.
+    /// True if the goal holds after the last timed literal, if nothing more is done.
     fn ends_well(&self, epoch: &Epoch, given: &[usize]) -> bool {
         let mut left = given[epoch.given..].iter();
         let last =
@@ -473,7 +475,7 @@ impl<'t> Oracle<'t> {
     }
 }
 
-/// Where the search for plans with times stands.
+/// State of the search for temporal plans.
 struct Epoch {
     world: World,
     plan: Vec<Step>,

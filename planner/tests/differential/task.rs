@@ -46,7 +46,7 @@ pub enum Formula {
     Compare(&'static str, Number, Number),
 }
 
-/// What an effect changes.
+/// A change made by an effect.
 #[derive(Debug, Clone)]
 pub enum Change {
     Add(Named),

@@ -24,7 +24,7 @@ impl Chance {
 #[derive(Debug, Clone)]
 enum Formula {
     P(usize, bool),
-    /// Of the action's or constraint's own variable.
+    /// Atom of the action's or constraint's own variable.
     Own(bool),
     Q(bool),
     And(Vec<Formula>),
@@ -81,7 +81,7 @@ impl Formula {
 #[derive(Debug)]
 struct Action {
     condition: Formula,
-    /// Where it does not hold, the preference of the action is violated.
+    /// Condition of the action's preference, which is violated where it does not hold.
     preferred: Option<Formula>,
     /// Literals that become true, each under a condition.
     effects: Vec<(Formula, Formula)>,
@@ -91,7 +91,7 @@ struct Action {
 struct Constraint {
     operator: &'static str,
     conditions: Vec<Formula>,
-    /// Which preference, if it is one.
+    /// The index of its preference, if it is one.
     preference: Option<usize>,
     forall: bool,
 }
@@ -106,7 +106,7 @@ struct Made {
     actions: Vec<Action>,
     goal: Formula,
     constraints: Vec<Constraint>,
-    /// Of each preference, the last of them that of actions; and of the number of steps.
+    /// Weight of each preference, the last being that of actions.
     weights: [usize; PREFERENCES + 1],
     per_step: usize,
 }
@@ -262,7 +262,7 @@ impl Constraint {
         if self.forall { format!("(forall (?x - thing) {inner})") } else { inner }
     }
 
-    /// What the words say of the states.
+    /// True if the constraint holds on a sequence of states.
     fn kept(&self, states: &[u8], own: usize) -> bool {
         let first = |at: usize| self.conditions[0].holds(states[at], own);
         let second = |at: usize| self.conditions[1].holds(states[at], own);
@@ -278,7 +278,7 @@ impl Constraint {
     }
 }
 
-/// What came of the tasks that were compared.
+/// Counts of the results of the tasks that were compared.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub tasks: u64,

@@ -10,7 +10,7 @@ pub fn read(domain: &str, problem: &str) -> Task {
     task.unwrap_or_else(|findings| panic!("{}", findings.render(false)))
 }
 
-/// How planning ends, and what the validator says of the plan if there is one: it must be valid.
+/// Result of planning, with the verdict of the validator on the plan if there is one: it must be valid.
 pub fn solve(task: &Task, options: &Options) -> (Outcome, Option<Verdict>) {
     let attachments = Attachments::default();
     let outcome =

@@ -5,7 +5,7 @@ use descry_planner::search::horizon::*;
 use descry_planner::search::lazy::{Allowed, End, Shared};
 use std::sync::atomic::AtomicBool;
 
-/// What comes of a search for plans cheaper than a bound: how many operators, if there is a plan.
+/// Checks the number of operators of a plan cheaper than a bound, or that there is none.
 fn check(domain: &str, problem: &str, bound: u32, expected: Option<usize>) {
     let (_, ground) = small::read(domain, problem);
     small::lend(&ground, |shared| check_shared(shared, bound, expected));

@@ -6,7 +6,7 @@ use descry_planner::search::novelty::*;
 use rustc_hash::FxHashMap;
 use std::sync::atomic::AtomicBool;
 
-/// How a search ends, and whether with a plan.
+/// Checks that a search ends, with a plan or without.
 fn check(problem: &str, narrow: bool, solvable: bool) {
     let (_, ground) = small::read(small::SHUTTLE, problem);
     small::lend(&ground, |shared| check_shared(shared, problem, narrow, solvable));

@@ -6,7 +6,7 @@ use descry_planner::calls::Calls;
 use descry_planner::temporal::envelope::{all_apart, envelopes, in_one_go_suffices};
 use descry_planner::temporal::world::World;
 
-/// By schema, whether its start and end are apart; and whether done in one go, everything can be reached.
+/// Checks for each schema whether its start and end are apart, and whether compressed actions suffice.
 fn check(domain: &str, expected: &[(&str, bool)], suffices: bool) {
     let (task, grounded) = small::read(domain, small::FUSES);
     let nobody = Attachments::default();

@@ -21,9 +21,10 @@ use crate::world::WorldError;
 
 /// A hand may touch what stands so near to what it takes, metres.
 const TOUCHED_M: f64 = 0.03;
-/// What slipped out of the hand may lie so far from where it stood, metres.
+/// Distance from its place within which an object that slipped out of the hand may lie, metres.
 const SLIPPED_M: f64 = 0.15;
-/// How many standard deviations localisation may be off, and from how far away things are looked at, metres.
+/// Standard deviations of localisation to allow for, and the distance from which things are looked at,
+/// metres.
 const ASTRAY: f64 = 2.0;
 const FROM_M: f64 = 1.2;
 
@@ -127,7 +128,7 @@ fn holding(s: &Situation) -> Vec<String> {
     held.map(|thing| format!("(holding {})", thing.symbol)).collect()
 }
 
-/// Whether what is in the hand is that thing.
+/// True if the object in the hand is that thing.
 fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     match thing.track {
         Some(id) => id == track.id,
@@ -135,7 +136,7 @@ fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     }
 }
 
-/// What a thing is called.
+/// Name of a thing.
 fn thing_name<'a>(s: &'a Situation, symbol: &'a str) -> &'a str {
     s.thing(symbol).map_or(symbol, |n| &s.things[n].name)
 }
@@ -145,7 +146,7 @@ fn hand_free(s: &Situation) -> Vec<String> {
     if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
 
-/// What is in the hand.
+/// The object in the hand.
 fn held(s: &Situation) -> Option<&Track> {
     let held = s.held.as_ref()?;
     s.belief.tracks.iter().find(|t| t.id == held.track)
@@ -166,19 +167,19 @@ fn middle(s: &Situation, track: &Track) -> Point3<f64> {
     track.position_m + up * (0.5 * track.size_m[2])
 }
 
-/// How far a point is from the body at a candidate, along the floor; none if a wall is between.
+/// Distance of a point from the body at a candidate, along the floor, metres; none if a wall is between.
 fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
     let Place::Pose(base) = &s.candidates[from].place else { return None };
     (!s.is_walled_off(&base.point(), &p.xy())).then(|| (p.xy() - base.point()).norm())
 }
 
-/// How far localisation may be off where something is looked at, metres.
+/// Localisation error to allow for at an object that is looked at, metres.
 fn astray_m(body: &Description) -> f64 {
     ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M)
 }
 
-/// Whether the hand reaches a point from a candidate, past every wall and however far localisation may be off; where it is too far
-/// from every one for that, the nearest is tried.
+/// True if the hand reaches a point from a candidate, past every wall and at any allowed localisation error;
+/// where the point is too far from every candidate for that, the nearest one counts.
 fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
     let body = s.robot.description();
     let Some((d_m, reach_m)) = distance_m(s, from, p).zip(body.reach_m()) else { return false };
@@ -213,7 +214,7 @@ fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
 }
 
-/// Where the thing in the hand is put down.
+/// Position at which the thing in the hand is put down.
 fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
@@ -300,7 +301,7 @@ fn put_down(
     ))
 }
 
-/// What was to be put down may have been lost on the way.
+/// Handles a failed put-down: the object may have been lost on the way.
 fn put_down_failed(
     mind: &mut Mind,
     _: Eyes<'_>,

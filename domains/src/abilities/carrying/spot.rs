@@ -1,4 +1,4 @@
-//! Where on a surface there is room for something.
+//! Free spots on a surface for an object.
 
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};

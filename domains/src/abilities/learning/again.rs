@@ -15,7 +15,7 @@ use crate::situation::KnownSurface;
 
 /// Returns farther than this tell nothing, metres.
 const RANGE_M: f64 = 3.0;
-/// So many of the newest cameras look at what all views show together.
+/// The number of newest cameras from which the merged views are examined.
 const TOGETHER: usize = 3;
 /// Guesses of all views together that are looked at, the surest first.
 const GUESSES: usize = 12;
@@ -27,11 +27,12 @@ const LEAST: f64 = 0.05;
 const OF_IT_M: f32 = 0.015;
 /// An object of which this share of the points is of a thing is that thing.
 const SHARE: f64 = 0.6;
-/// How far beside a surface a thing on it may have its middle, and how far above, metres.
+/// Margins within which the centre of a thing on a surface may lie beside the surface, and above it, metres.
 const BESIDE_M: f64 = 0.03;
 const ABOVE_M: (f64, f64) = (-0.02, 0.6);
-/// That some object is the thing that is sought, before it was looked at, and that a look at its surface does not tell it: 8 of 20 did not, in twelve
-/// searches of `tests/learning.py`, which is 1 of 2.5.
+/// Prior probability that some object is the sought thing before it was looked at; and probability that a
+/// look at its surface does not recognise it: 8 of 20 did not, in twelve searches of `tests/learning.py`,
+/// which is 1 of 2.5.
 const PRIOR: f64 = 0.3;
 const MISSED: f64 = 0.4;
 /// A thing of which less of its sides was seen may be larger than its model.
@@ -43,14 +44,14 @@ const SHORTER: f64 = 0.6;
 const BESIDE_IT_M: f64 = 0.04;
 pub const NOT_IT: f64 = 0.002;
 
-/// What was made of views so far, by their times.
+/// Recognition results of views, by their times.
 pub type Glances = BTreeMap<i64, Arc<Glance>>;
 
 /// A learned thing somewhere.
 pub struct Found {
     /// Its number among [`News::things`].
     pub thing: usize,
-    /// Where, and how sure that is.
+    /// Its pose, with the confidence of the match.
     pub judged: Judged,
     /// Its surface there.
     pub cloud: Cloud,
@@ -71,8 +72,8 @@ type Shown<'a> = (&'a [(&'a View, Isometry3<f64>)], Option<Vector3<f64>>);
 /// A guess, and where in the world that is.
 type Placed = (Guess, Isometry3<f64>);
 
-/// Which learned things views show, each with where its camera stood, the surest first; no place holds two. Beside what each view suggests there is what is
-/// `suggested` by all of them; `holds` says where things may be.
+/// Learned things that views show, each with the pose of its camera, the surest first; no place holds two.
+/// Candidates are those of each view and those `suggested` by all of them; `holds` tells where things may be.
 pub(super) fn find(
     news: &News,
     glances: &mut Glances,
@@ -121,7 +122,8 @@ pub(super) fn find(
     apart
 }
 
-/// How things are known again where up is so in the world. They were learned with z up: in a world with another up they may stand any way.
+/// Options of recognition for a world with this upward direction. Things were learned with z up: in a world
+/// with another up they may stand any way.
 fn options(up: Option<Vector3<f64>>) -> KnowOptions {
     /// Farther from z is another up, radians.
     const LEVEL_RAD: f64 = 0.1;
@@ -133,7 +135,8 @@ fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
     glance.guesses.iter().map(|guess| (*guess, world_from_camera * guess.camera_from_model)).collect()
 }
 
-/// What all views of a surface together suggest, as the newest of their cameras would see it: less noise than in any view alone.
+/// Candidates from the merged views of a surface, as the newest of their cameras would see them: with less
+/// noise than in any single view.
 fn together(
     models: &Models,
     surface: &KnownSurface,
@@ -174,7 +177,7 @@ fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
 }
 
-/// Whether the middle of something may be that of a thing on a surface.
+/// True if the centre of something may be that of a thing on a surface.
 pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
     let above_m = surface.outline.first().map_or(0.0, |p| surface.up.dot(&(middle - p)));
     surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
@@ -230,7 +233,7 @@ pub(crate) fn explain(
     explained
 }
 
-/// How long an object is at most with those that stand so near to it that they may be parts of one thing, metres.
+/// Greatest extent of an object together with its near neighbours, which may be parts of one thing, metres.
 fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);
     let near = |p: &&Percept| {
@@ -242,7 +245,7 @@ fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     wide_m.hypot(high_m)
 }
 
-/// Where a thing is that was known again: its middle over what it stands on, and its sides.
+/// Sets the place of a thing that was recognised: its centre above its support, and its sides.
 fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     let middle = Point3::from(found.judged.world_from_model.translation.vector);
     let up_m = surface.up.dot(&(middle - percept.position_m));

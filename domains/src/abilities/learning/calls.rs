@@ -37,7 +37,7 @@ fn gain(s: &Situation, novelty: &Novelty, from: &str, before: &[&str]) -> f64 {
     fresh.len() as f64 / DIRECTIONS as f64
 }
 
-/// Why it is looked at from there.
+/// The reason for a look from there.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     let Some(novelty) = s.news.novelty(arguments[1]) else { return String::new() };
     format!(

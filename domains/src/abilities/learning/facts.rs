@@ -62,7 +62,7 @@ fn waypoint(s: &Situation) -> Vec<String> {
     s.news.places.iter().map(|p| format!("(waypoint {})", p.waypoint)).collect()
 }
 
-/// What is still to be learned.
+/// Novel objects that are still to be learned.
 fn open(s: &Situation) -> impl Iterator<Item = &Novelty> {
     s.news.novelties.iter().filter(|n| n.fate == Fate::Open)
 }

@@ -140,7 +140,7 @@ const PATROLLED: &str = "patrolled";
 /// A waypoint that is farther off than this from where it was is another, metres.
 const SAME_PLACE_M: f64 = 0.02;
 
-/// What is modelled of something new: the look first that noticed it.
+/// Modelling task for a novel object; its first look is the one that noticed it.
 fn modelling(s: &Situation, what: &str) -> Result<Model, String> {
     let novelty = s.news.novelty(what).ok_or_else(|| format!("`{what}` is nothing new"))?;
     Ok(Model {

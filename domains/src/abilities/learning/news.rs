@@ -1,4 +1,4 @@
-//! What is known of places that were visited, of what is new there, and of the things that were learned.
+//! Visited places, novel objects found there, and learned things.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -19,18 +19,18 @@ pub(super) const DIRECTIONS: usize = 36;
 /// A look shows what lies so far to either side of where it comes from, directions: 15 degrees.
 const TO_EITHER_SIDE: usize = 1;
 
-/// See the module.
+/// Visited places, novel objects and learned things.
 #[derive(Clone, Default)]
 pub struct News {
     /// Places to visit, by the symbols of their poses.
     pub places: Vec<Place>,
-    /// What is new and nothing that was learned.
+    /// Novel objects that are no learned things.
     pub novelties: Vec<Novelty>,
     /// Changes in which there is nothing to be learned.
     pub changes: Vec<Change>,
     /// Things that were learned, the oldest first: those of earlier runs, then those of this one.
     pub things: Vec<LearnedThing>,
-    /// How many of them this run has learned.
+    /// The number of things that this run has learned.
     pub learned: usize,
     /// The same made ready to be known again; none if nothing was learned.
     pub models: Option<Arc<Models>>,
@@ -47,9 +47,9 @@ pub struct Place {
     pub on: String,
     /// Its static structure, by earlier visits and this one; none before the first.
     pub room: Option<Arc<MetaRoom>>,
-    /// Whether it has been visited in this run.
+    /// True if it has been visited in this run.
     pub is_visited: bool,
-    /// Why a visit could not be compared with those before it.
+    /// The reason a visit could not be compared with earlier ones.
     pub strange: Option<String>,
 }
 
@@ -70,11 +70,12 @@ pub struct Novelty {
     pub mask: Arc<Vec<bool>>,
     /// On each line around it where to stand, by the symbol of the pose; none where the body does not fit.
     pub stands: Vec<Option<String>>,
-    /// Whether the way from each to the next is no detour.
+    /// For each of them, true if the route to the next one is no detour.
     pub joined: Vec<bool>,
-    /// What was learned that it was taken for, though too few of the sides of that are known: its number among [`News::things`].
+    /// The learned thing that it was taken for, though too few of the sides of that are known: its index in
+    /// [`News::things`].
     pub taken_for: Option<usize>,
-    /// What has become of it.
+    /// Its fate.
     pub fate: Fate,
 }
 
@@ -83,18 +84,18 @@ pub struct Novelty {
 pub struct Look {
     /// The symbol of the pose that it was taken from.
     pub from: String,
-    /// What it shows.
+    /// The view that shows it.
     pub view: Arc<View>,
 }
 
-/// What has become of something new.
+/// The fate of a novel object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fate {
     /// It is still to be learned.
     Open,
     /// It was learned.
     Learned {
-        /// By this name.
+        /// Its name.
         name: String,
         /// Looks that fit, and of how many.
         looks: (usize, usize),
@@ -103,11 +104,11 @@ pub enum Fate {
     },
     /// It is something that was learned before.
     Known {
-        /// By this name.
+        /// Its name.
         name: String,
         /// Probability of that.
         confidence: f64,
-        /// What became of its model, in words, if it was looked at from around.
+        /// Result of modelling it, in words, if it was looked at from around.
         model: Option<String>,
     },
     /// It cannot be learned.
@@ -121,16 +122,16 @@ pub enum Change {
     Came {
         /// Its name.
         name: String,
-        /// Where it stands.
+        /// Its present position.
         at: Point3<f64>,
-        /// Where it was seen before.
+        /// Its position before.
         before: Point3<f64>,
     },
     /// Something that was learned is not where it was seen.
     Left {
         /// Its name.
         name: String,
-        /// Where it stood.
+        /// Its former position.
         at: Point3<f64>,
     },
     /// Something of the static structure is gone.
@@ -150,7 +151,7 @@ pub enum Change {
 }
 
 impl News {
-    /// What is known when a run begins.
+    /// Knowledge at the beginning of a run.
     pub(crate) fn of_past(past: Option<&Past>) -> Self {
         let things = past.map(|p| p.remembered.things.clone()).unwrap_or_default();
         News { models: Models::of(&things), things, ..News::default() }
@@ -173,7 +174,8 @@ impl News {
         format!("thing {number}")
     }
 
-    /// What a later run is to remember of the places: those that this one has visited as they are now, the others as they were.
+    /// Visits for a later run to remember: places visited in this run as they are now, the others as they
+    /// were.
     pub(crate) fn visited(
         &self,
         before: Vec<Visited>,
@@ -197,7 +199,7 @@ impl News {
 }
 
 impl Novelty {
-    /// How far it reaches from its middle, metres.
+    /// Radius of its footprint around its centre, metres.
     pub(super) fn radius_m(&self) -> f64 {
         0.5 * self.size_m[0].hypot(self.size_m[1])
     }
@@ -256,7 +258,7 @@ impl Novelty {
 pub struct Models {
     /// Their surfaces and features.
     pub(super) known: Library,
-    /// Which thing each is, in the order of [`News::things`]; of some too little was seen to know them again.
+    /// Index in [`News::things`] of each model; things of which too little was seen have none.
     pub(super) things: Vec<usize>,
 }
 
@@ -273,7 +275,7 @@ impl Models {
     }
 }
 
-/// What a thing that was learned is like, for who asks where it may be hidden: a body of its size.
+/// Object model of a learned thing for visibility questions: a body of its size.
 pub(crate) fn model(thing: &LearnedThing) -> ObjectModel {
     /// A thing may stand on another side, and its edges were measured to so much.
     const OFF: f64 = 0.1;

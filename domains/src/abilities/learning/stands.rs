@@ -1,4 +1,4 @@
-//! Where to stand around something new, and how to get from one stand to the next (section IV-A of the paper).
+//! Viewpoints around a novel object, and routes from one to the next (section IV-A of the paper).
 
 use std::collections::BTreeMap;
 
@@ -14,8 +14,8 @@ use crate::situation::{Candidate, Situation};
 const LINES: usize = 12;
 /// Least and greatest height of what the body could run into, metres: where it is told by two degrees wrongly, the floor two metres off seems so high.
 const BAND_M: (f64, f64) = (0.15, 1.5);
-/// What was seen is something if so many returns of one look fall into one cell of its floor plan, of such a side, metres: beside depth edges some hang in
-/// the air, each by itself.
+/// The number of returns of one look in a cell of the floor plan, and the side of the cell in metres, from
+/// which the cell counts as occupied: beside depth edges some returns hang in the air, each by itself.
 const RETURNS: usize = 8;
 const CELL_M: f32 = 0.05;
 /// Kept between the footprint and what was seen, metres: about two standard deviations of localisation.
@@ -65,7 +65,7 @@ pub(super) fn make(
     (poses.into_iter().map(|pose| pose.map(|p| p.symbol)).collect(), joined)
 }
 
-/// Where a place is on the floor, if it is a pose.
+/// Position of a place on the floor, if it is a pose.
 fn at(place: &Place) -> Option<Point2<f64>> {
     match place {
         Place::Pose(pose) => Some(pose.point()),
@@ -73,7 +73,7 @@ fn at(place: &Place) -> Option<Point2<f64>> {
     }
 }
 
-/// What the body could run into near a place: what was seen, and what its map shows.
+/// Obstacles for the body near a place: seen points, and those of its map.
 fn obstacles(
     robot: &dyn Robot,
     centre: &Point3<f64>,
@@ -102,7 +102,7 @@ fn obstacles(
     all
 }
 
-/// Where a pose is on the floor.
+/// Position of a pose on the floor.
 fn point(s: &Situation, pose: &str) -> Option<Point2<f64>> {
     at(&s.candidates[s.candidate(pose).ok()?].place)
 }

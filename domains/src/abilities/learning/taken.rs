@@ -1,4 +1,4 @@
-//! What happens with a visit, with a look at something new, and with a model of it.
+//! Updates from a visit, from a look at a novel object, and from its model.
 
 use std::sync::Arc;
 
@@ -22,19 +22,21 @@ use crate::note::Note;
 use crate::situation::KnownSurface;
 use crate::world::WorldError;
 
-/// How far localisation may be off between two visits, metres: it errs by centimetres and by degrees, which two metres off are centimetres, too.
+/// Search radius for the localisation error between two visits, metres: localisation errs by centimetres and
+/// by degrees, which at a distance of two metres are centimetres, too.
 const SEARCH_M: f32 = 0.15;
 /// A visit of which so large a share differs from what was there before does not fit it: the body is not where it believes to be.
 const STRANGE: f64 = 0.3;
-/// How far over a surface the lowest of something on it may be, and how far beside it its middle, metres.
+/// Limits for an object on a surface: the height of its lowest point above the surface, and the distance of
+/// its centre beside the surface, metres.
 const ON_M: f64 = 0.06;
 const BESIDE_M: f64 = 0.05;
-/// What came or went with a second side shorter than this is an edge that was measured otherwise, metres.
+/// Second-longest side below which a change counts as an edge that was measured differently, metres.
 const SLIVER_M: f64 = 0.04;
 /// So is what is this wide and this many times as long: the edge of a table, a leg.
 const EDGE_M: f64 = 0.08;
 const LONG: f64 = 6.0;
-/// What came so near to something new, beside how far that reaches, is of it, metres.
+/// Distance from a novel object, beyond its radius, within which an appeared part belongs to it, metres.
 const OF_IT_M: f64 = 0.1;
 /// A piece that hangs over something new by no more than this is of it, metres: what is between them is hidden from above.
 const OVER_IT_M: f32 = 0.1;
@@ -113,9 +115,10 @@ pub(super) fn visit(
     Ok(told.note(&off))
 }
 
-/// Why a visit cannot be compared with those before it, if it cannot. One that was laid onto what was there farther off than localisation errs lies wrong,
-/// or the body is not where it believes to be: either way all that always stood there would be new a few centimetres beside, and where localisation alone
-/// has the visit it is not known to what is compared.
+/// The reason a visit cannot be compared with earlier ones, if any. If aligning it moved it farther than
+/// localisation errs, the alignment is wrong or the body is lost: either way, everything that always stood
+/// there would look new a few centimetres beside. If it has no alignment, its place relative to the earlier
+/// visits is unknown.
 pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
     /// However exact a body is, no visit is laid more exactly than this, metres and radians: half of what is compared.
     const LAID: (f64, f64) = (0.005, 0.005);
@@ -135,12 +138,12 @@ fn differing(visit: &Visit, view: &View) -> f64 {
     came as f64 / view.cloud.count_finite().max(1) as f64
 }
 
-/// What is said of a visit.
+/// Report of a visit.
 #[derive(Default)]
 struct Told {
     waypoint: String,
     visits: usize,
-    /// Where the camera stood, by what was there before.
+    /// Camera pose, aligned with earlier visits.
     pose: Option<Isometry3<f64>>,
     strange: Option<String>,
     came: Vec<String>,
@@ -219,8 +222,8 @@ fn take_in(
     }
 }
 
-/// What came, things that stand before those that do not. A thing whose top hides its middle, as the shade of a lamp does, comes in pieces: what stands
-/// on no surface belongs to what stands beneath it.
+/// Appeared objects, those that stand on a surface first. A thing whose top hides its middle, as the shade of
+/// a lamp does, appears in pieces: a piece on no surface belongs to the object beneath it.
 fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
     let came = appeared.into_iter().filter(|a| !is_sliver(&a.cloud));
     let (mut all, aloft): (Vec<Appeared>, Vec<Appeared>) =
@@ -239,7 +242,8 @@ fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
     all
 }
 
-/// Whether a piece hangs over another one: the middle of either is above or below the other, and the gap between them is small.
+/// True if a piece hangs over another one: the middle of either is above or below the other, and the gap
+/// between them is small.
 pub fn is_over(piece: &Cloud, below: &Cloud) -> bool {
     let (Some(above), Some(under)) = (piece.bounds(), below.bounds()) else { return false };
     let holds = |(low, high): (Point3<f32>, Point3<f32>), (l, h): (Point3<f32>, Point3<f32>)| {
@@ -266,7 +270,7 @@ pub(super) fn size([w, d, h]: &[f64; 3], at: &Point3<f64>) -> String {
     format!("{w:.0} x {d:.0} x {h:.0} cm at ({:.2}, {:.2}, {:.2}) m", at.x, at.y, at.z)
 }
 
-/// Whether what came stands on a surface.
+/// True if an appeared object stands on a surface.
 fn is_on(surface: &KnownSurface, cloud: &Cloud) -> bool {
     let Some(corner) = surface.outline.first() else { return false };
     let (middle, _) = extent(cloud);
@@ -293,7 +297,7 @@ fn change(mind: &mut Mind, change: Change) {
     }
 }
 
-/// Whether something that was learned was known there in this run, from another waypoint.
+/// True if a learned thing was already known there in this run, from another waypoint.
 fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let (at, size_m) = extent(cloud);
@@ -408,7 +412,8 @@ fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldE
     found.ok_or_else(|| WorldError::Bug(format!("`{what}` is gone")))
 }
 
-/// What looks from around show of a thing that is known becomes part of its model, where both are one surface. Says what has become of it.
+/// Improves the model of a known thing by looks from around it, where both match in one surface. Returns a
+/// sentence about the result.
 fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -> String {
     let news = Arc::make_mut(&mut mind.known.news);
     let thing = &mut news.things[f.thing];

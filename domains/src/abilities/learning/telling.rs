@@ -1,4 +1,4 @@
-//! What is answered in the end where it was asked what is new or what has changed.
+//! Final answers to the questions "what is new" and "what has changed".
 
 use super::news::{Change, Fate, Novelty, Place};
 use super::taken::size;
@@ -72,7 +72,7 @@ fn told(mind: &Mind, s: &Situation, ended: &Ended, is_to_learn: bool) -> (Verdic
     (verdict, format!("{}; {looks}", said.join("; ")))
 }
 
-/// What keeps one from saying that all is said.
+/// The reasons the answer may be incomplete.
 fn open<'a>(
     s: &Situation,
     places: impl Iterator<Item = &'a Place>,

@@ -1,5 +1,5 @@
-//! How well it is known where things stand along a surface of the map: what was seen of it is laid on its outline by its ends, and
-//! where none was seen, localisation's error is left.
+//! Localisation uncertainty of objects along a surface of the map: seen ends of the surface are aligned with
+//! its outline, and where none was seen, localisation's error remains.
 
 use descry_memory::belief::Track;
 use descry_memory::space::Cell;
@@ -47,7 +47,8 @@ pub(super) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize,
     fresh / ends.len().max(1) as f64
 }
 
-/// What a look must show for it to be known where an object stands along its surface, each with its part of what hangs on the object.
+/// Hypotheses about unseen ends of a surface that must be seen to locate an object along it, each with its
+/// share of the object's weight.
 pub(super) fn ends_of(s: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let weight = weight * chance_off(s, track);
     match s.surface_of(track) {

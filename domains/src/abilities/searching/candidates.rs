@@ -41,7 +41,7 @@ pub fn candidates(
     (all, 0)
 }
 
-/// Whether two poses are one and the same to look from.
+/// True if two poses are the same viewpoint.
 pub fn is_same(one: &Place, other: &Place) -> bool {
     const SAME_M: f64 = 0.01;
     const SAME_RAD: f64 = 0.02;

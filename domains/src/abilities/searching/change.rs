@@ -1,4 +1,4 @@
-//! What somebody or something has moved voids what was seen of the place.
+//! Invalidation of observed space where an object was moved, by the body or by someone else.
 
 use descry_perception::View;
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -13,9 +13,9 @@ pub struct Change {
     pub foot: Point3<f64>,
     /// Its axis, a unit vector.
     pub up: Vector3<f64>,
-    /// Of the cylinder, metres.
+    /// Radius of the cylinder, metres.
     pub radius_m: f64,
-    /// Of the cylinder, metres.
+    /// Height of the cylinder, metres.
     pub height_m: f64,
 }
 
@@ -30,7 +30,7 @@ impl Change {
         }
     }
 
-    /// Whether the way from one point to another leads through the cylinder.
+    /// True if the straight line from one point to another leads through the cylinder.
     pub fn is_crossed(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let split = |v: Vector3<f64>| (v.dot(&self.up), v - self.up * v.dot(&self.up));
         let (low, aside) = split(from - self.foot);

@@ -16,9 +16,9 @@ use crate::situation::KnownSurface;
 
 /// Least area of a surface that is taken up beside the one that is looked at, square metres.
 const LEAST_M2: f64 = 0.1;
-/// What lies over or under another by less than this is level with it, metres.
+/// Height difference below which two surfaces are level with each other, metres.
 const LEVEL_M: f64 = 0.08;
-/// How far beside an outline the middle of another part of the same surface may lie, metres.
+/// Distance beside an outline within which the middle of another part of the same surface may lie, metres.
 const BESIDE_M: f64 = 0.05;
 /// Names of the further ones.
 const ORDINALS: [&str; 9] =
@@ -109,7 +109,7 @@ pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
     mind.attend();
 }
 
-/// Whether a surface that was found is one that is known: level with it, and over it.
+/// True if a found surface is a known one: level with it, and overlapping it.
 fn is_one(found: &Surface, known: &KnownSurface) -> bool {
     let Some(centre) = known.centre() else { return false };
     let middle = found.surface_from_world.inverse() * Point3::origin();

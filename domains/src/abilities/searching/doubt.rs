@@ -1,4 +1,4 @@
-//! What is not yet known, as hypotheses that a look could settle.
+//! Remaining uncertainty, as hypotheses that a look could settle.
 //!
 //! A thing may stand where nothing has been seen yet, or be one of the objects that were seen from too few sides. Each
 //! such possibility is a [`Hypothesis`] with the probability that hangs on it; a look settles those that it shows.
@@ -14,8 +14,8 @@ use super::adrift;
 use super::unnoticed::{Unseen, across, around, grid, unseen_volume};
 use crate::situation::{Situation, Thing};
 
-/// How many times more likely an object stands where something was measured that none explains than at a place of which nothing is
-/// known: what was measured is something, if not what is asked about.
+/// Likelihood ratio of an object where something unexplained was measured, against a place of which nothing
+/// is known: the measurement is of something, if not of the requested object.
 const MEASURED_WEIGHT: f64 = 50.0;
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
@@ -31,17 +31,17 @@ pub struct Hypothesis {
     pub weight: f64,
     /// The surface on which it stands.
     pub on: usize,
-    /// Where it is.
+    /// Its position.
     pub centre: Point3<f64>,
-    /// What must be seen to settle it.
+    /// Points that must be seen to settle it.
     pub points: Vec<Point3<f64>>,
     /// The side from which it must be seen, as a unit vector away from it; none if any will do.
     pub facing: Option<Vector3<f64>>,
-    /// What makes it possible.
+    /// The reason it is possible.
     pub ground: Ground,
 }
 
-/// What makes a hypothesis possible.
+/// The reason a hypothesis is possible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ground {
     /// Nothing is known of the place.
@@ -63,15 +63,16 @@ pub struct Doubt {
     pub anywhere: bool,
     /// Places where something can stand at all, by surface.
     places: BTreeMap<usize, usize>,
-    /// How far a look settles each hypothesis, 0 to 1, by obstacle moved (0: none), candidate and surface.
+    /// Share of each hypothesis that a look settles, 0 to 1, by obstacle moved (0: none), candidate and
+    /// surface.
     told: Vec<OnceLock<Vec<f64>>>,
-    /// What all looks together can settle, by obstacle moved (0: none).
+    /// Total that all looks together can settle, by obstacle moved (0: none).
     within_reach: Vec<OnceLock<Reach>>,
     looks: usize,
     surfaces: usize,
 }
 
-/// What a plan does before a look.
+/// Actions of a plan before a look.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Taken<'a> {
     /// Looks: candidate and surface.
@@ -89,7 +90,7 @@ struct Reach {
 }
 
 impl Doubt {
-    /// What is in doubt about a thing: where it may be hidden, and which objects may be it.
+    /// Uncertainty about a thing: where it may be hidden, and which objects may be it.
     pub(crate) fn about(situation: &Situation, what: usize) -> Self {
         let thing = &situation.things[what];
         let p = |track: &Track| thing.probability(track, &situation.surfaces);
@@ -106,7 +107,7 @@ impl Doubt {
         doubt
     }
 
-    /// What is in doubt about a thing on one surface.
+    /// Uncertainty about a thing on one surface.
     pub(crate) fn about_on(situation: &Situation, what: usize, on: usize) -> Self {
         let thing = Thing { on: Some(vec![on]), ..situation.things[what].clone() };
         let mut doubt = Self::hidden(situation, &thing, &situation.expected[what]);
@@ -120,7 +121,8 @@ impl Doubt {
         doubt
     }
 
-    /// What is in doubt about which objects are of a kind: where more of it may be hidden, and which objects may be of it.
+    /// Uncertainty about which objects are of a kind: where more of it may be hidden, and which objects may
+    /// be of it.
     pub(crate) fn of(situation: &Situation, of: usize) -> Self {
         let kind = &situation.kinds[of];
         let mut doubt = Self::hidden(situation, kind, &situation.expected[situation.things.len() + of]);
@@ -131,7 +133,7 @@ impl Doubt {
         doubt
     }
 
-    /// What is in doubt on a surface: what may be hidden there, and what the objects on it are.
+    /// Uncertainty about a surface: what may be hidden there, and what the objects on it are.
     pub(crate) fn on(situation: &Situation, on: usize) -> Self {
         let mut doubt = Self::hidden_on(situation, &[(on, 1.0)], SMALL_M);
         for track in situation.on_surface(on) {
@@ -140,7 +142,7 @@ impl Doubt {
         doubt
     }
 
-    /// Where a thing may be hidden, on the surfaces that it is asked about.
+    /// Hypotheses of places where a thing may be hidden, on the surfaces that it is asked about.
     fn hidden(situation: &Situation, thing: &Thing, expected: &[f64]) -> Self {
         // Of a kind the smallest may be where the largest has no room.
         let sizes = thing.models.iter().map(size_m);
@@ -152,8 +154,9 @@ impl Doubt {
         doubt
     }
 
-    /// What was touched stands near where it stood, until that has been seen: with the probability that it was the thing, and with the rest
-    /// all is as if there were no such object. What was lost out of the hand lies where no look at a surface shows it.
+    /// Shifts the hypotheses of a thing that was touched to the surroundings of its old place, until these
+    /// have been seen: with the probability that the touched object was the thing; with the rest all is as if
+    /// there were no such object. A thing lost out of the hand lies where no look at a surface shows it.
     fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
         for track in &situation.belief.mislaid {
             let p = thing.probability(track, &situation.surfaces);
@@ -200,7 +203,8 @@ impl Doubt {
         self.share_settled(situation, look, before) * all.min(1.0)
     }
 
-    /// What hangs on all that some look could settle that can be taken and, as long as nothing is moved, has not been taken.
+    /// Total weight that possible looks could settle; as long as nothing is moved, only looks not yet taken
+    /// count.
     fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
@@ -216,19 +220,20 @@ impl Doubt {
         })
     }
 
-    /// Whether looking alone can settle anything that matters.
+    /// True if looking alone can settle anything that matters.
     pub fn can_be_settled(&self, situation: &Situation) -> bool {
         self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
     }
 
-    /// Whether looks that settle so much matter: by themselves, or because with them it could be said that nothing is hidden.
+    /// True if looks that settle so much matter: by themselves, or because with them it could be said that
+    /// nothing is hidden.
     fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
         let t = &situation.thresholds;
         let most = t.remaining + t.out_of_sight;
         weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
     }
 
-    /// Whether looks would settle enough once an obstacle is moved, of what no look shows now.
+    /// True if looks would settle enough once an obstacle is moved, of all that no look shows now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
         let [before, after] = [None, Some(what)].map(|moved| self.all_looks(situation, |_| true, moved));
         let only_after = |n: &usize| {
@@ -285,7 +290,7 @@ impl Doubt {
         (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
     }
 
-    /// What each look tells that is open, can be reached and sees the surface.
+    /// Settled shares of every look that is open, can be reached and sees the surface.
     fn all_looks(
         &self,
         situation: &Situation,
@@ -299,7 +304,7 @@ impl Doubt {
             .collect()
     }
 
-    /// How far a look, a candidate and a surface, settles each hypothesis.
+    /// Share of each hypothesis that a look (a candidate and a surface) settles.
     fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> &[f64] {
         let at = moved.map_or(0, |o| o + 1) * self.looks + from * self.surfaces + on;
         self.told[at].get_or_init(|| {
@@ -311,8 +316,8 @@ impl Doubt {
         })
     }
 
-    /// Where a body of a size may be hidden on some surfaces, each with how much more often it is expected there than on another,
-    /// however large they are; on each, everywhere alike.
+    /// Hypotheses of a hidden body of a size on some surfaces, each surface with the factor by which it is
+    /// more likely than another, however large they are; uniform on each surface.
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;

@@ -1,4 +1,4 @@
-//! How views are merged and looked through.
+//! Options for merging views and segmenting the merged cloud.
 
 use descry_perception::View;
 use descry_perception::merge::{MergeError, MergeOptions, Merged};
@@ -11,18 +11,21 @@ use crate::lexicon::symbol;
 use crate::mind::Mind;
 use crate::situation::KnownSurface;
 
-/// How far from the height at which the map has a surface points are merged that may be of it.
+/// Height band around a surface of the map in which points are merged, metres.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
-/// How far a level surface may be from there to be that one: farther, it is another, or the body is not where it believes to be.
+/// Height difference within which a level surface is that of the map, metres: beyond it, the surface is
+/// another, or the body is lost.
 const SAME_HEIGHT_M: f64 = 0.08;
 /// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
 /// steeper plane cuts through the wall behind a board and through what stands on it.
 const LEVEL_RAD: f64 = 0.045;
-/// How far beside the outline on the map points of a surface may lie: localisation errs by centimetres and degrees.
+/// Margin around the outline on the map in which points of a surface may lie, metres: localisation errs by
+/// centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
 
-/// How a body's views of a surface (a symbol; none: of any) are merged and looked through. It is looked for where the map has it,
-/// if it has it; what can stand on it, and it itself, is merged; without any map, all that is in range.
+/// Options for merging and segmenting a body's views of a surface (a symbol; none: of any). The search is
+/// limited to the height of the surface on the map, if known, and to objects that can stand on it; without
+/// any map, everything in range is merged.
 pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
     let up = robot.description().up.map(Unit::new_normalize);
     let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
@@ -52,7 +55,7 @@ pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptio
     (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
 }
 
-/// What was merged last of a surface without an outline on the map.
+/// Last merge of views of a surface without an outline on the map.
 pub struct LastMerged {
     options: MergeOptions,
     /// When its views were taken, and from where.

@@ -7,11 +7,11 @@ use descry_robots::{Place, Push};
 
 use crate::situation::Situation;
 
-/// How far an object is pushed, metres.
+/// Distance of a push, metres.
 const DISTANCE_M: f64 = 0.25;
-/// How far inside its outline an object is touched, metres.
+/// Depth inside its outline at which an object is touched, metres.
 const GRIP_M: f64 = 0.02;
-/// What is longer than this across, or higher, is not pushed, metres.
+/// Width or height beyond which an object is not pushed, metres.
 const MOST_M: f64 = 0.5;
 /// Margin around an object within which voxels may be its own, metres.
 const MARGIN_M: f64 = 0.03;
@@ -29,7 +29,7 @@ pub struct Obstacle {
     pub track: u64,
     /// The surface that it stands on.
     pub on: usize,
-    /// Where it stands: the middle of its footprint.
+    /// Centre of its footprint.
     pub at: Point3<f64>,
     /// Unit normal of what it stands on.
     pub up: Vector3<f64>,
@@ -40,7 +40,7 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
-    /// Whether a point lies within the upright cylinder around it.
+    /// True if a point lies within the upright cylinder around it.
     pub(crate) fn covers(&self, p: &Point3<f64>) -> bool {
         let d = p - self.at;
         let above = d.dot(&self.up);
@@ -100,7 +100,7 @@ pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<P
     Some(Push { object, direction: way.xy(), distance_m: DISTANCE_M })
 }
 
-/// How many places along a way are not known to be free, or beyond the surface.
+/// The number of places along a push that are beyond the surface or not known to be free.
 fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, way: &Vector3<f64>) -> usize {
     let (surface, space) = (&situation.surfaces[obstacle.on], &situation.spaces[obstacle.on]);
     let steps = ((DISTANCE_M + obstacle.radius_m) / STEP_M) as usize;

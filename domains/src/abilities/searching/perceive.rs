@@ -1,4 +1,5 @@
-//! What happens with a view: recorded, read back with the others of its surface by timestamp, merged, recognised, believed.
+//! Perception of a view: recorded, read back with the others of its surface by timestamp, merged, recognised,
+//! believed.
 
 use std::sync::Arc;
 
@@ -36,14 +37,14 @@ use crate::world::WorldError;
 
 /// A side counts as seen if a surface was measured this near to where it should be.
 pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
-/// What is remembered of an object that was seen again nearer than this is that one, metres.
+/// Distance within which a remembered object is the one seen again, metres.
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 pub(super) const ON_SURFACE_M: f64 = 0.012;
 /// A view may be moved by so many standard deviations of localisation; more is an error of what moved it.
 const ASTRAY: f64 = 4.0;
 
-/// What perceiving needs besides what is known.
+/// Perception context: all that perceiving needs besides the world model.
 #[derive(Clone, Copy)]
 pub struct Eyes<'a> {
     /// Everything that is sensed and believed.
@@ -54,7 +55,7 @@ pub struct Eyes<'a> {
     pub objects: &'a [ObjectModel],
     /// The body, which is only asked.
     pub robot: &'a dyn Robot,
-    /// What counts as sure.
+    /// Thresholds of confidence.
     pub thresholds: Thresholds,
 }
 
@@ -261,7 +262,8 @@ fn keep_placed(looks: &mut Vec<Look>) -> bool {
     looks.last().map(|look| look.stamp_ns) == newest
 }
 
-/// What stands on a surface has its middle over it, give or take so much, metres: what stands farther out stands beside it.
+/// Margin around a surface within which the centre of an object on it must lie, metres; an object farther out
+/// stands beside it.
 const OVER_M: f64 = 0.06;
 /// A view whose noise is so many times that of another blurs it.
 const BLURRED: f64 = 2.0;
@@ -280,7 +282,7 @@ pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
     }
 }
 
-/// Whether a camera is moved farther from where localisation has it than that errs.
+/// True if a camera is registered farther from its localised pose than localisation errs.
 pub(crate) fn is_astray(body: &Description, localised: &Isometry3<f64>, moved: &Isometry3<f64>) -> bool {
     let shift = moved.translation.vector - localised.translation.vector;
     let turn = moved.rotation.rotation_to(&localised.rotation);
@@ -312,7 +314,7 @@ fn without_astray(
     true
 }
 
-/// Where localisation has the camera of a view that may have been laid on the outline of its surface.
+/// Localised camera pose of a view that may have been aligned with the outline of its surface.
 fn localised(look: &Look, view: &View) -> Isometry3<f64> {
     match look.laid {
         Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
@@ -320,8 +322,8 @@ fn localised(look: &Look, view: &View) -> Isometry3<f64> {
     }
 }
 
-/// How localisation errs, by where the newest view lies among the others: `map_from_localised`; none if it lies nowhere, or was taken
-/// before the body came to stand where it does.
+/// Localisation error `map_from_localised`, from the registration of the newest view; none if the view is not
+/// registered, or was taken before the body came to its present place.
 fn errs_by(region: &Region, views: &[View], merged: &Merged, since_ns: i64) -> Option<Isometry3<f64>> {
     let (look, view) = region.looks.last().zip(views.last()).filter(|(look, _)| look.stamp_ns >= since_ns)?;
     let fit = merged.fits.last().filter(|fit| fit.used)?;
@@ -381,7 +383,8 @@ pub fn pushed(
     something_moved(mind, eyes.record, obstacle.on, change)
 }
 
-/// What the surface turned out to be: its height and tilt, and where the map knows none its outline, and whether it may be none.
+/// Updates a surface from the scene: its height and tilt, its outline if the map has none, and the doubt that
+/// it is a surface at all.
 fn note_surface(known: &mut KnownSurface, scene: &Scene) {
     let seen = &scene.surface;
     known.doubtful = if known.whole { None } else { seen.doubt() };
@@ -549,13 +552,13 @@ fn take_in(mind: &mut Mind, on: usize, views: &[View], merged: &Merged) {
     }
 }
 
-/// Whether what a camera sees two metres off lies in the same voxel from two poses.
+/// True if a point two metres before the camera falls into the same voxel from two poses.
 fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
     let turn_rad = a.rotation.angle_to(&b.rotation);
     (a.translation.vector - b.translation.vector).norm() + 2.0 * turn_rad < voxel_m
 }
 
-/// What the newest view measured, from where it was placed; none if it could not be aligned.
+/// Depth map of the newest view at its registered pose; none if it could not be aligned.
 fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
     DepthMap::from_view(view, &fit.world_from_camera)
@@ -573,7 +576,7 @@ fn extent(sensed: &Sensed) -> Option<Bounds> {
     })
 }
 
-/// By which names percepts are found again: what each may be, and how sure that is.
+/// Names and probabilities under which percepts are recorded as sightings.
 fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
     let of = |p: &Percept| p.label.clone().map(|label| (p.probability_of(&label), label));
     let named = percepts.iter().filter_map(of);

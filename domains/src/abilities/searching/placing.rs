@@ -1,4 +1,4 @@
-//! Where what was seen of a surface lies on the map: its outline there mends localisation's error.
+//! Alignment of a surface's views with its outline on the map, which corrects localisation's error.
 
 use descry_perception::View;
 use descry_perception::locate::{Certainty, Located, endings, locate};
@@ -25,7 +25,8 @@ pub(super) fn lay_on_map(
     (merged.moved(&map_from_world), surface.moved(&map_from_world), located.certainty)
 }
 
-/// How a view lies on the outline of a surface that the map has; nowhere, if that were farther off than localisation errs.
+/// Alignment of a view with the outline of a surface on the map; nowhere, if it would be farther off than
+/// localisation errs.
 pub(super) fn of_view(
     body: &Description,
     known: &KnownSurface,

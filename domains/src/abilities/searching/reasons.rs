@@ -1,4 +1,4 @@
-//! Why looks are taken, which one settles most, and what is left in doubt, in words.
+//! Reasons for looks, and remaining doubts, in words.
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{self, Point3, Vector3};
@@ -12,7 +12,7 @@ use crate::situation::{KnownSurface, Situation, Thing};
 
 /// A probability that is said with an answer.
 pub const WORTH_SAYING: f64 = 0.01;
-/// What a look takes, as in the domain.
+/// Duration of a look, seconds, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
 /// Looks that settle what matters in the time that is left, by how much they settle a second, the most first.
@@ -53,7 +53,7 @@ pub fn one_then(mut first: Plan, second: Plan) -> Plan {
     Plan { cost: None, ..first }
 }
 
-/// What a look is expected to settle.
+/// Expected gain of a look, in words.
 pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
     let own = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
     let own = own.map(|(what, t)| (t.name.as_str(), s.doubt_about(what)));
@@ -74,7 +74,7 @@ pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
     doubts.into_iter().map(said).collect::<Vec<_>>().join(", ")
 }
 
-/// What keeps one from saying that a thing is not there; none if nothing does.
+/// The reason the absence of a thing cannot be claimed; none if it can.
 pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     if let Some(late) = out_of_time(s) {
         return Some(late);
@@ -118,7 +118,8 @@ fn floored(p: f64) -> f64 {
     (p * 100.0).floor() / 100.0
 }
 
-/// What an object that is a thing with so much is more likely, and how likely; empty if it is no other known object.
+/// The known object that a track is likelier to be than the thing, with its probability; empty if there is
+/// none.
 pub fn rather(track: &Track, thing: &Thing) -> String {
     let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
     likelier(&track.probabilities, track.probability_of(&thing.name), is_it)
@@ -131,7 +132,7 @@ pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str)
     most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {:.2}", floored(*p)))
 }
 
-/// What was looked at for a thing and may be no surface to stand things on at all.
+/// Sentence about a surface that was searched for a thing and may not be a surface at all.
 pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
     asked.into_iter().find_map(|(_, k)| {
@@ -140,7 +141,7 @@ pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     })
 }
 
-/// What keeps one from saying what everything is; none if nothing is known that does.
+/// The reason the answer about every object is incomplete; none if no reason is known.
 pub fn left_in_all(s: &Situation) -> Option<String> {
     if let Some(late) = out_of_time(s) {
         return Some(late);
@@ -173,7 +174,8 @@ fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
     least.filter(|(_, p)| sure(*p) < s.threshold)
 }
 
-/// What keeps one from saying that all of a kind are found: the least sure object, and what may stand where nothing was seen.
+/// The reason the list of a kind is incomplete: the least sure object, and the chance of more where nothing
+/// was seen.
 fn left_of_kinds(s: &Situation) -> Option<String> {
     let open = open_kind(s)?;
     let kind = &s.kinds[open];
@@ -189,8 +191,9 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
 }
 
-/// What the doubt about all of a kind is about: the least sure object, or all of them where each is sure enough by itself and they leave
-/// more open than what may stand where nothing was seen; and that, if it alone is more than is allowed or there is no such object.
+/// Subject of the doubt about a kind: the least sure object, or all of them where each is sure enough by
+/// itself and together they leave more open than the unseen places do; and these places, if they alone exceed
+/// the allowed doubt or there is no such object.
 pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
@@ -225,9 +228,9 @@ fn out_of_time(s: &Situation) -> Option<String> {
 /// A chance below this is not told from none.
 const LEAST_SAID: f64 = 0.001;
 
-/// What was seen of where a thing could be: which share of which surfaces, from how many places, and how much is left; `looks` were
-/// taken at each.
-/// The latter is the probability that it is there after all.
+/// Coverage of the places where a thing could be: the seen share of each surface, the number of places it was
+/// seen from, and the remaining probability `left` that the thing is there after all; `looks` gives the
+/// number of looks at each.
 pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
     let of = |on: usize, surface: &KnownSurface| -> Option<String> {
         let share = doubt.share_seen(on)?;
@@ -244,7 +247,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
     format!("{}; a chance of {left} is left", parts.join(", "))
 }
 
-/// Where there is room for something that no look can show; none if too little hangs on it.
+/// Sentence about space for a thing that no look can show; none if its probability is negligible.
 fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     let (hidden, places) = doubt.out_of_sight(s);
     let middle =

@@ -1,4 +1,4 @@
-//! Where an object could stand that no view has shown.
+//! Places where an object could stand unnoticed, as no view has shown them.
 
 use descry_memory::belief::Track;
 use descry_memory::space::{Cell, Space};
@@ -8,28 +8,30 @@ use crate::situation::KnownSurface;
 
 /// Distance between places where a hidden object may stand.
 const GRID_M: f64 = 0.05;
-/// How far beyond the seen part of a surface it may go on.
+/// Extent of a surface that is assumed beyond its seen part, metres.
 const BEYOND_M: f64 = 0.3;
 /// Share of an object's volume that must be unseen for it to stand there unnoticed.
 const UNSEEN_SHARE: f64 = 0.6;
 /// Share of an object's volume that may have been seen free, for noise, if it stands there.
 const FREE_SHARE: f64 = 0.15;
-/// So many of the five columns of an object may seem to lie within a solid body where it only stands close to it.
+/// The number of the five columns of an object that may seem to lie within a solid body where the object only
+/// stands close to it.
 const GRAZED: usize = 2;
 /// Share of an object's volume in which something was measured that no object explains, for it to be likely that one stands there.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;
 /// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
 /// what is left.
 const FRAYED_SHARE: f64 = 0.5;
-/// What goes on so high above an object's foot, in its heights, is not of it; and so near to a wall, in voxels, is the wall. Within
-/// a voxel of where walls are taken out of the clouds, everything is.
+/// Height above an object's foot, in heights of the object, from which a measured column is too high to be of
+/// the object; and the distance from a wall, in voxels, within which it belongs to the wall. Within a voxel
+/// of where walls are removed from the clouds, everything is wall.
 const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
-/// What is known so well is not taken for two things that blur into each other.
+/// Probability above which an object is not mistaken for two that blur into each other.
 const SURE: f64 = 0.8;
 /// An object that is longer than so many diameters of a thing may be more than one where it is not known what it is.
 const LARGE: f64 = 2.0;
-/// How far above an unseen place the top of a body that fills it is looked for, metres.
+/// Height above an unseen place in which the top of a body that fills it is searched for, metres.
 const ROOF_M: f64 = 0.5;
 /// The columns of an object's volume that are asked for, in diameters from its middle, and the levels, in heights from its foot.
 const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
@@ -70,7 +72,7 @@ pub(super) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterat
 pub struct Unseen {
     /// Its points that no view settled.
     pub points: Vec<Point3<f64>>,
-    /// Whether so much was measured there, apart from all objects that are believed in, that something does stand there.
+    /// True if enough was measured there, beyond all believed objects, that something surely stands there.
     pub likely: bool,
 }
 
@@ -153,13 +155,14 @@ pub fn unseen_volume(
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unseen { points: unseen, likely })
 }
 
-/// Whether a point lies aside of the round body that was found in what was measured of an object.
+/// True if a point lies outside the round body that was fitted to an object.
 fn is_beyond_body(track: &Track, point: &Point3<f64>, up: &Vector3<f64>, margin_m: f64) -> bool {
     let radius_m = track.evidence.radius_m;
     radius_m > 0.0 && (point - track.position_m).cross(up).norm() > radius_m + margin_m
 }
 
-/// Whether a measured surface lies over an unseen point, with nothing seen free between: it is within a solid body.
+/// True if a measured surface lies over an unseen point, with no free space seen between: the point is within
+/// a solid body.
 fn is_roofed(space: &Space, point: &Point3<f64>, up: &Vector3<f64>) -> bool {
     let step_m = space.voxel_m();
     let above = (0..(ROOF_M / step_m) as usize).map(|k| space.cell(&(point + up * (k as f64 * step_m))));

@@ -1,4 +1,5 @@
-//! What was believed to stand on a surface and is not found there: gone, moved, or only rubbed out by views that do not fit.
+//! Objects that were believed to stand on a surface and are not found there: gone, moved, or erased by views
+//! that do not fit.
 
 use descry_memory::belief::{Belief, Track};
 use descry_perception::nalgebra::Vector3;
@@ -8,12 +9,13 @@ use super::perceive::{ON_SURFACE_M, SIDE_TOLERANCE_M};
 use crate::mind::Mind;
 use crate::situation::KnownSurface;
 
-/// What is sought and was at least so probable is missed when it is gone.
+/// Probability from which a requested object is missed when it is gone.
 const PERHAPS: f64 = 0.2;
 /// An object that is less probable to be what is asked about is not missed when a merge does not find it again.
 const UNLIKELY: f64 = 0.02;
 
-/// What was sought and believed to stand where the newest view looks through: somebody has moved it. In words; none if nothing.
+/// Sentence about a requested object whose place the newest view looks through: somebody has moved it; none
+/// if there is no such object.
 pub(super) fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &DepthMap) -> Option<String> {
     let known = &mind.known;
     let up = known.surfaces[on].up;
@@ -73,7 +75,7 @@ pub fn keep_unrefuted(
     belief.tracks.sort_by_key(|track| track.id);
 }
 
-/// Whether a camera saw through the middle of an object's place, low and high.
+/// True if a camera saw through the middle of an object's place at several heights.
 fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
     let free = |share: f64| {
         let place = track.position_m + up * (track.size_m[2] * share);

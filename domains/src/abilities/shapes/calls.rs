@@ -101,7 +101,7 @@ fn expected_sureness(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(hope(s, call, thing)))
 }
 
-/// How much surer one may be of a thing after the scans that a plan takes.
+/// Expected gain in confidence about a thing from the scans of a plan.
 fn hope(s: &Situation, call: &Call, thing: &Thing) -> f64 {
     let (known, scans) = (s.floor.known.len(), planned(s, call, thing));
     if scans.is_empty() && thing.taken_for.is_some() {
@@ -178,7 +178,7 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     quickest_first(scans.chain(surveys).map(deeds).collect())
 }
 
-/// Why a scan is taken from there.
+/// The reason for a scan from there.
 pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {
     let Ok(Some(thing)) = thing(s, arguments[1]) else {
         return format!("nothing is known yet of what {THIS} is");

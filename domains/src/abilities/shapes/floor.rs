@@ -1,4 +1,4 @@
-//! What the laser has found on the floor that the map does not show, and the shapes that have a name.
+//! Objects on the floor that the laser found and the map does not show, and the named shapes.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use crate::situation::Situation;
 
 /// The symbol of what stands nearest before the body when it first scans.
 pub const THIS: &str = "this";
-/// How loose a shape counts of which no scan says anything, metres.
+/// Looseness of a shape without any scans, metres.
 pub const NOTHING_KNOWN_M: f64 = 1.0;
-/// That a thing is none of those known, before the first scan.
+/// Prior probability that a thing is none of the known ones.
 const STRANGER: f64 = 0.5;
 /// Known shapes that scans fit to none, up to so loose a shape (metres): measured one of 210 where the outline is closed, see
 /// `experiments/measure/src/shapes`. Scans of an open one hold each other in place too loosely: it is not called unknown before it was scanned once more.
@@ -23,17 +23,17 @@ const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
 /// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
 /// as long as several shapes were left.
 const TAKEN_FOR_KNOWN: [(f64, f64); 4] = [(0.01, 0.07), (0.02, 0.10), (0.16, 0.16), (f64::INFINITY, 0.60)];
-/// How many were known where that was measured.
+/// The number of known shapes in that measurement.
 const MEASURED_WITH: f64 = 5.0;
 
-/// See the module.
+/// The floor as the laser has found it: objects that the map does not show, and named shapes.
 #[derive(Clone, Default)]
 pub struct Floor {
     /// Shapes that have a name: those of the domain, then those that were learned.
     pub known: Vec<KnownShape>,
     /// Those that were learned in this run.
     pub learned: Vec<KnownShape>,
-    /// What was found.
+    /// Objects that were found.
     pub things: Vec<Thing>,
     /// When each sweep was taken, and the pose.
     pub sweeps: Vec<(i64, String)>,
@@ -43,7 +43,7 @@ pub struct Floor {
     pub unseen: Unseen,
     /// The shape whose place is asked for, by its symbol; none: it is about [`THIS`].
     pub sought: Option<String>,
-    /// What shapes are called, by their symbols.
+    /// Names of shapes, by their symbols.
     pub names: Vec<(String, String)>,
     /// Middles of places where something of the sought shape may stand unseen.
     pub room: Vec<Point2<f64>>,
@@ -66,17 +66,17 @@ pub struct Thing {
     pub ignored: Vec<(String, Ignored)>,
     /// Poses around it.
     pub ring: Vec<String>,
-    /// What its scans say together, as soon as there is one.
+    /// Joint outline of its scans, once there is one.
     pub outline: Option<Arc<Outline>>,
-    /// What it was taken for when its scans were last aligned; none since a new one came.
+    /// Recognition result when its scans were last aligned; none since a new one was taken.
     pub taken_for: Option<Arc<Recognition>>,
 }
 
-/// What the scans of a thing say together.
+/// Joint outline from the scans of a thing.
 pub struct Outline {
     /// The scans brought together, in the map.
     pub alignment: Alignment,
-    /// What scans from the poses around it would settle, in their order.
+    /// Expected gain of scans from the poses around it, in their order.
     pub outlook: Outlook,
 }
 
@@ -86,12 +86,12 @@ impl Floor {
         self.things.iter().find(|t| t.symbol == name)
     }
 
-    /// Whether a shape of that name is known.
+    /// True if a shape of that name is known.
     pub fn knows(&self, shape: &str) -> bool {
         self.known.iter().any(|k| symbol(&k.name) == shape)
     }
 
-    /// How sure it is of the surest of the things that fit one name alone, 0 if none does.
+    /// Highest confidence of the things that fit only one name, this one; 0 if none does.
     pub fn surest(&self, shape: &str) -> f64 {
         let of_name = self.things.iter().filter(|t| t.is().is_some_and(|is| symbol(is) == shape));
         of_name.map(|t| t.sureness(self.known.len())).fold(0.0, f64::max)
@@ -99,7 +99,7 @@ impl Floor {
 }
 
 impl Thing {
-    /// How far on average it may reach beyond what was met of it, metres.
+    /// Mean distance that it may reach beyond its measured outline, metres.
     pub fn looseness_m(&self) -> f64 {
         let known = |outline: &Arc<Outline>| outline.outlook.looseness_m(&[]).min(0.9 * NOTHING_KNOWN_M);
         self.outline.as_ref().map_or(NOTHING_KNOWN_M, known)
@@ -127,7 +127,8 @@ impl Thing {
         Some(&self.taken_for.as_ref()?.may_be)
     }
 
-    /// Whether it may be of a shape, as far as its scans tell: not where it is surely another or none, nor where the shape is ruled out beside others.
+    /// True if it may be of a shape, as far as its scans tell: false if it is surely another or none, or if
+    /// the shape is ruled out beside others.
     pub fn may_have(&self, shape: &str, known: usize, threshold: f64) -> bool {
         let is_sure = self.sureness(known) >= threshold;
         match self.taken_for.as_deref() {
@@ -138,7 +139,7 @@ impl Thing {
         }
     }
 
-    /// How sure it is what it is taken for, 0 to 1.
+    /// Confidence in the shape that it is taken for, 0 to 1.
     pub fn sureness(&self, known: usize) -> f64 {
         match self.taken_for.as_ref().map(|r| &r.verdict) {
             None | Some(Verdict::OneOf(_)) => 0.0,
@@ -150,7 +151,7 @@ impl Thing {
         }
     }
 
-    /// How sure one may hope to be of it after scans from more poses around it.
+    /// Confidence that scans from more poses around it may give at best.
     pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
         self.hoped_of_name(more, known).max(self.sureness(known))
     }
@@ -185,8 +186,8 @@ pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a Thing
     }
 }
 
-/// Where the middle of a thing is believed to be, and its greatest width, in the map, metres: by the shape that it is if it has a name, else by what was
-/// met of it.
+/// Centre of a thing in the map, and its greatest width, metres: from the fitted shape if it has a name, else
+/// from its measured outline.
 pub(super) fn place(floor: &Floor, thing: &Thing) -> (Point2<f64>, f64) {
     let fitted = thing.taken_for.as_ref().filter(|_| thing.is().is_some()).and_then(|r| r.candidates.first());
     if let Some(candidate) = fitted {

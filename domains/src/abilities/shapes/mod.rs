@@ -98,7 +98,7 @@ pub const ABILITY: Ability = Ability {
 /// The type of names of shapes.
 const SHAPE: &str = "shape";
 
-/// What is known when a run begins: the shapes with a name, and what is asked.
+/// Knowledge at the beginning of a run: the named shapes, and those that are asked about.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     let remembered = mind.known.past.as_ref().map(|p| p.remembered.shapes.clone()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Where to scan from: poses around a thing, and over the floor.
+//! Poses to scan from: around a thing, and over the floor.
 
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_robots::{Place, Pose2, Robot};
@@ -83,7 +83,7 @@ pub(super) fn way(s: &Situation, from: usize, to: usize, thing: &Thing) -> Optio
         .min_by(|a, b| seconds(s, from, a).total_cmp(&seconds(s, from, b)))
 }
 
-/// What a way takes, seconds.
+/// Travel time of a route, seconds.
 pub(super) fn seconds(s: &Situation, from: usize, way: &[usize]) -> f64 {
     let mut at = from;
     way.iter().map(|&next| s.travel_s(std::mem::replace(&mut at, next), next)).sum()
@@ -92,7 +92,7 @@ pub(super) fn seconds(s: &Situation, from: usize, way: &[usize]) -> f64 {
 /// A straight drive keeps so far from the middle of what it goes around, metres.
 const CLEAR_M: f64 = 0.9;
 
-/// Whether the straight line between two poses keeps clear of a place.
+/// True if the straight line between two poses keeps clear of a place.
 fn beside(s: &Situation, a: usize, b: usize, middle: &Point2<f64>) -> bool {
     let Some((a, b)) = point(s, a).zip(point(s, b)) else { return false };
     let along = b - a;
@@ -100,7 +100,7 @@ fn beside(s: &Situation, a: usize, b: usize, middle: &Point2<f64>) -> bool {
     (middle - (a + along * t.clamp(0.0, 1.0))).norm() >= CLEAR_M
 }
 
-/// Where a candidate is on the floor.
+/// Position of a candidate on the floor.
 pub(super) fn point(s: &Situation, candidate: usize) -> Option<Point2<f64>> {
     match &s.candidates[candidate].place {
         Place::Pose(pose) => Some(pose.point()),

@@ -1,4 +1,5 @@
-//! What happens with a sweep of the laser: recorded, read back by its timestamp, told from the map, each thing's readings brought together with its others.
+//! Perception of a laser sweep: recorded, read back by its timestamp, separated from the map, and aligned
+//! with earlier readings of each thing.
 
 use std::sync::Arc;
 
@@ -33,7 +34,7 @@ const USUAL_RADIUS_M: f64 = 0.2;
 /// Beyond an error so long scans contradict each other: twice the laser's precision, metres.
 pub(super) const LONGEST_M: f64 = 0.02;
 
-/// How scans are brought together, by how well the body knows where it is.
+/// Options for aligning scans, from the body's localisation accuracy.
 pub(super) fn solver(body: &Description) -> SolverOptions {
     let objective =
         Objective::Centred { pose_sigma_m: body.pose_sigma_m, pose_sigma_rad: body.pose_sigma_rad };
@@ -188,7 +189,7 @@ fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
     thing.outline = Some(Arc::new(Outline { alignment, outlook }));
 }
 
-/// What a shape is taken for.
+/// Recognition of a shape.
 pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> Recognition {
     let options = RecogniseOptions {
         fit: FitOptions { solver: solver(s.robot.description()), ..FitOptions::default() },
@@ -203,7 +204,7 @@ pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> R
     recognise_scans(&alignment.model, loose_m, &s.floor.known, &options)
 }
 
-/// What of the scans contradicts the others, to be said after something else.
+/// Sentence part about scans that contradict the others.
 pub(super) fn contradict(alignment: &Alignment) -> String {
     let scans = match alignment.left_out.len() {
         0 => String::new(),
@@ -216,7 +217,7 @@ pub(super) fn contradict(alignment: &Alignment) -> String {
     scans + &ends
 }
 
-/// What of the floor is still to be looked at, and from where.
+/// Updates the floor that is still unseen, and the poses to look at it from.
 fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
     let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);
     let known = &mut mind.known;

@@ -1,4 +1,4 @@
-//! What is answered in the end: what a thing is and where, and what could not be scanned.
+//! Final answers about shapes: the shape of a thing, its place, and the poses that could not be scanned from.
 
 use descry_perception::laser::Verdict as Taken;
 
@@ -54,7 +54,7 @@ impl<'a> Teller<'a> {
         known.unwrap_or_else(|| shape.into())
     }
 
-    /// Why the run ended before it was sure.
+    /// The reason the run ended before the shape was sure.
     fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
         match ended {
             Ended::Limit(why) => Some((Verdict::CannotTell, why.clone())),
@@ -180,7 +180,7 @@ impl<'a> Teller<'a> {
         format!("at ({:.2}, {:.2}) m", middle.x, middle.y)
     }
 
-    /// What a shape rests on, and what could not be scanned.
+    /// The scans that a shape rests on, and those that failed.
     fn scans(&self, thing: &Thing) -> String {
         let used = thing.outline.as_ref().map_or(0, |o| o.alignment.model.scans().len());
         let mut parts = vec![format!("from {used} scans")];

@@ -6,10 +6,10 @@ use descry_robots::OccupancyGrid;
 
 /// A sweep is believed up to so far before it ended: its reading is of something, metres.
 const BEFORE_M: f64 = 0.05;
-/// Of many places that may hold something, so many are asked whether they can be seen.
+/// The maximum number of possible places whose visibility is checked.
 const ASKED: usize = 200;
 
-/// See the module.
+/// Floor that no sweep has passed over.
 #[derive(Clone, Default)]
 pub struct Unseen {
     grid: Option<OccupancyGrid>,
@@ -72,8 +72,8 @@ impl Unseen {
             .collect()
     }
 
-    /// Whether a sweep from a place towards a heading, half a turn wide, would pass over any of these middles, as far as the map and discs on the floor
-    /// tell.
+    /// True if a sweep from a place towards a heading, half a turn wide, would pass over any of these
+    /// middles, as far as the map and discs on the floor tell.
     pub fn would_pass(
         &self,
         from: &Point2<f64>,

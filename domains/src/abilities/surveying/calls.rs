@@ -68,7 +68,7 @@ fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
     Ok(unseen.gain_m2(look))
 }
 
-/// Why a look is taken from there.
+/// The reason for a look from there.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     match s.chart.outlook(arguments[0]) {
         Some(look) => format!(

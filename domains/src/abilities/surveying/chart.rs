@@ -40,22 +40,23 @@ pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
 /// A level surface is one that was there before if it is level with it and holds its middle.
 const SAME_HEIGHT_M: f64 = 0.08;
 
-/// See the module.
+/// The map that the body makes itself.
 #[derive(Clone, Default)]
 pub struct Chart {
     survey: Option<Survey>,
-    /// Where it was looked from, in this run and those before it, by what was seen: in the frame of what was seen first.
+    /// Poses of the looks of this run and earlier ones, aligned with the map: in the frame of the first look.
     pub(super) stood: Vec<Isometry2<f64>>,
-    /// Where the body believed to stand then, in its own map.
+    /// Poses in which the body believed to stand at these looks, in its own map.
     pub(super) believed: Vec<Isometry2<f64>>,
-    /// Where what was seen first lies in the body's map: the body erred by some degrees when it looked first.
+    /// Transform from the chart to the body's own map: the body's heading was some degrees off at the first
+    /// look.
     pub(super) map_from_chart: Isometry2<f64>,
     /// Walls, surfaces and open floor, once something was seen.
     pub(super) map: Option<Arc<RoomMap>>,
     /// Ways on which the body keeps a margin; and those without one, which are taken where no other leads on.
     router: Option<Arc<Router>>,
     narrow: Option<Arc<Router>>,
-    /// What drives have taught of the floor.
+    /// Floor that drives have shown to be passable or not.
     pub(super) ground: Ground,
     /// Poses from which more would be seen, by their symbols.
     pub(super) open: Vec<(String, Outlook)>,
@@ -65,7 +66,7 @@ pub struct Chart {
     pub(super) surfaces: Vec<(String, Level)>,
     /// Symbols that were given to poses so far.
     given: usize,
-    /// Where to look at a surface from.
+    /// Viewpoints of surfaces.
     pub(super) poses: Candidates,
     /// Records of what it rests on.
     pub(super) records: Vec<RecordId>,
@@ -88,7 +89,7 @@ impl Chart {
         chart
     }
 
-    /// What a later run begins with; none if nothing was seen.
+    /// The survey for a later run; none if nothing was seen.
     pub(crate) fn kept(&self) -> Option<Surveyed> {
         let survey = self.survey.clone()?;
         let (stood, believed) = (self.stood.clone(), self.believed.clone());
@@ -99,7 +100,7 @@ impl Chart {
         Some(kept)
     }
 
-    /// What was seen so far.
+    /// The survey so far.
     pub(super) fn survey(&mut self) -> Result<&mut Survey, String> {
         if self.survey.is_none() {
             self.survey = Some(Survey::new(CELL_M).map_err(|e| e.to_string())?);
@@ -145,7 +146,7 @@ impl Chart {
         (self.router, self.narrow) = (over(&footing.stand), over(&footing.pass));
     }
 
-    /// Where the middle of the body may be by all that is known, in the body's own map.
+    /// Positions that the middle of the body may take by all that is known, in the body's own map.
     pub(super) fn passable(&self) -> Vec<Point2<f64>> {
         let Some(router) = &self.narrow else { return Vec::new() };
         let free = router.map();
@@ -253,7 +254,8 @@ impl Chart {
         self.open.iter().map(gain).sum::<f64>() + self.cut_off_m2
     }
 
-    /// Where the map ends without a wall, in words: floor goes on there that was not seen. None if it ends nowhere so, or nothing was mapped.
+    /// Sentence about frontiers of the map, where unseen floor begins without a wall; none if there is no
+    /// frontier, or nothing was mapped.
     pub(crate) fn goes_on(&self, body: &Description) -> Option<String> {
         let floor = self.floor(body)?;
         let ends = frontiers(&floor, &explore(body)?);
@@ -273,7 +275,7 @@ impl Chart {
         })
     }
 
-    /// What going from one place to each of the others takes: on this map if there is one, else on the body's own.
+    /// Travel from one place to each of the others: on this map if there is one, else on the body's own.
     ///
     /// # Errors
     /// Each entry by itself, as [`Robot::travel`].
@@ -328,17 +330,17 @@ impl Chart {
         Some(way)
     }
 
-    /// Whether ways are taken over the floor of this map.
+    /// True if routes are planned on the floor of this map.
     pub(crate) fn has_ways(&self) -> bool {
         self.router.is_some()
     }
 
-    /// Whether a surface is one of this map.
+    /// True if a surface is one of this map.
     pub(crate) fn has(&self, surface: &str) -> bool {
         self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
     }
 
-    /// Whether a wall or a pillar of this map stands between two places.
+    /// True if a wall or a pillar of this map stands between two places.
     pub(crate) fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
         let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
@@ -407,7 +409,7 @@ fn grid(floor: &Occupancy, stand: &[bool]) -> OccupancyGrid {
     }
 }
 
-/// What the camera sees of the floor plan.
+/// Field of view of the camera on the floor plan.
 fn field(camera: &Camera) -> FieldOfView {
     let c = &camera.intrinsics;
     FieldOfView {
@@ -423,7 +425,7 @@ pub(super) fn far_m(camera: &Camera) -> f64 {
     camera.range_m.1.min(FAR_M)
 }
 
-/// How the body explores; none if it does not drive or does not see.
+/// Options of exploration; none if the body does not drive or does not see.
 fn explore(body: &Description) -> Option<ExploreOptions> {
     let (base, camera) = (body.base.as_ref()?, body.camera.as_ref()?);
     let seconds = (1.0 / base.speeds.linear_m_s, 1.0 / base.speeds.angular_rad_s, LOOK_S);
@@ -435,7 +437,8 @@ fn explore(body: &Description) -> Option<ExploreOptions> {
     })
 }
 
-/// How poses are rectified against what was seen before: from where the body believes to be, give or take what it says.
+/// Options for correcting poses against the map so far: from the believed pose, within the stated
+/// localisation error.
 pub(super) fn rectify(body: &Description, camera: &Camera) -> RectifyOptions {
     RectifyOptions {
         band_m: BODY_M,

@@ -1,4 +1,5 @@
-//! What drives teach of the floor: where the body has been it may be again, and where it could not go it does not try again.
+//! Floor knowledge from drives: a place where the body has been is passable, and one where it could not go is
+//! not tried again.
 //!
 //! Both are in the body's own map. It errs there by centimetres, as the map that is read from looks does: at corners that are passed closely no
 //! margin is enough.
@@ -21,7 +22,7 @@ const ASKED_M: f64 = 0.8;
 /// Squares whose middle lies this near to a line that was driven are those that it passes, in squares.
 const PASSED: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// See the module.
+/// Floor knowledge from drives.
 #[derive(Clone, Debug, Default)]
 pub struct Ground {
     /// Straight lines that were driven.
@@ -32,16 +33,16 @@ pub struct Ground {
 
 /// Squares on which the middle of the body may be, in the order of a grid's cells.
 pub struct Footing {
-    /// By all that is known, with a margin.
+    /// Passable by all that is known, with a margin.
     pub stand: Vec<bool>,
     /// The same without a margin: where it may go if no other way leads on.
     pub pass: Vec<bool>,
-    /// By looks and what was driven alone, without a margin.
+    /// Passable by looks and drives alone, without a margin.
     pub shown: Vec<bool>,
 }
 
 impl Footing {
-    /// What a body can get to: with a margin as far as ways with one lead, and from there on without.
+    /// Reach of a body: with a margin as far as routes with one lead, and from there on without.
     pub(super) fn reach(&self, floor: &Occupancy, from: &Isometry2<f64>, options: &ExploreOptions) -> Reach {
         let mut reach = Reach::over(floor, from, &self.stand, options);
         let narrow = self.reach_through(&self.pass, floor, from, options);
@@ -50,7 +51,7 @@ impl Footing {
         reach
     }
 
-    /// What it could get to if it went by looks and by what was driven alone.
+    /// Reach of a body by looks and drives alone.
     pub(super) fn reach_as_shown(
         &self,
         floor: &Occupancy,
@@ -115,7 +116,7 @@ impl Ground {
         Footing { stand, pass, shown }
     }
 
-    /// Whether drives have told of floor that only seems to be open.
+    /// True if drives have found floor that only seems to be passable.
     pub(super) fn is_barred(&self) -> bool {
         !self.barred.is_empty()
     }

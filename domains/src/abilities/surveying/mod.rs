@@ -59,7 +59,7 @@ fn begins(mind: &mut Mind, _: &Domain, _: &Goal) {
     taken::look_out(mind, &*robot, "");
 }
 
-/// What a look that maps goes to.
+/// Target point of a mapping look.
 fn ahead(s: &Situation) -> Option<Point3<f64>> {
     let Place::Pose(pose) = &s.candidates[s.at].place else { return None };
     let (ahead_m, height_m) = AHEAD_M;

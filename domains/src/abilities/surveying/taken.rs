@@ -1,4 +1,5 @@
-//! What happens with a look that maps: recorded, read back by its timestamp, put where it fits what was seen before, and taken into the map.
+//! Perception of a mapping look: recorded, read back by its timestamp, registered against earlier looks, and
+//! merged into the map.
 
 use std::sync::Arc;
 

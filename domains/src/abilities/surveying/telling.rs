@@ -1,4 +1,4 @@
-//! What is answered in the end where only the map was asked for.
+//! Final answer where only the map was asked for.
 
 use crate::answer::{Conclusion, Ended, Verdict};
 use crate::goal::Goal;

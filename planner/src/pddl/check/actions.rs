@@ -12,7 +12,7 @@ use crate::task::{
     Term, Timed,
 };
 
-/// What stands around an effect.
+/// Quantifiers and conditions around an effect.
 #[derive(Clone, Default)]
 struct Around {
     forall: Vec<Quantified>,
@@ -494,7 +494,7 @@ impl Checker<'_> {
     }
 }
 
-/// What two effects change in ways that contradict each other: a number or an object.
+/// The kind of change in which two effects contradict each other: of a number or of an object.
 fn contradict(one: &Effect, other: &Effect) -> Option<&'static str> {
     if let (Change::Object(fluent, value), Change::Object(other_fluent, other_value)) =
         (&one.change, &other.change)

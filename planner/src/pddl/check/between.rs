@@ -1,4 +1,5 @@
-//! What is asked of numbers that change at rates, between two happenings: only what can be told exactly.
+//! Checks of conditions on numbers that change at rates, between two happenings: allowed is only what can be
+//! evaluated exactly.
 
 use rustc_hash::FxHashSet;
 
@@ -87,7 +88,7 @@ fn closed<'t>(task: &'t Task, conditions: &[&'t Condition]) -> Vec<&'t Condition
     all
 }
 
-/// How many numbers that change at rates are multiplied at most; `None` where something is divided by one.
+/// Degree of an expression in the numbers that change at rates; `None` where something is divided by one.
 fn degree(expression: &Expression, flowing: &FxHashSet<FunctionId>) -> Option<u32> {
     let all = |parts: &[Expression]| -> Option<Vec<u32>> {
         parts.iter().map(|part| degree(part, flowing)).collect()

@@ -384,7 +384,7 @@ impl Checker<'_> {
         known
     }
 
-    /// What an effect module writes: a number, an object function or the truth of an atom.
+    /// Target of an effect module: a number, an object function or the truth of an atom.
     fn written_place(&mut self, term: &ast::Term, scope: &Scope) -> Option<Written> {
         let ast::Term::Apply { name, arguments, span } = term else { return None };
         if !self.functions.contains_key(&name.symbol)

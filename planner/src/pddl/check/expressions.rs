@@ -17,7 +17,7 @@ pub(super) enum Value {
     Undefined,
 }
 
-/// What an expression may speak of besides fluents.
+/// Context of an expression: it determines which names besides fluents have values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
     /// Conditions and goals.

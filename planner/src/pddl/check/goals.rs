@@ -138,7 +138,7 @@ impl Checker<'_> {
     }
 }
 
-/// Whether a formula holds a preference or constraint rather than a plain condition.
+/// True if a formula holds a preference or constraint rather than a plain condition.
 fn is_soft(formula: &Formula) -> bool {
     match formula {
         Formula::Preference(..) | Formula::Modal { .. } => true,

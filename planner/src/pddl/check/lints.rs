@@ -149,7 +149,7 @@ fn nothing_adds(task: &Task, goal: &Atom, finding: Diagnostic) -> Diagnostic {
     ))
 }
 
-/// What an argument of an effect can be.
+/// Objects that an argument of an effect can be.
 enum Achiever<'t> {
     Constant(ObjectId),
     Of(&'t Parameter),

@@ -1,4 +1,5 @@
-//! From trees of names to a [`Task`]: every name looked up, every argument counted and typed, all findings at once.
+//! Checks that turn trees of names into a [`Task`]: every name looked up, every argument counted and typed,
+//! all findings at once.
 
 mod actions;
 mod between;
@@ -82,25 +83,25 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     (task, Findings { sources, list: findings })
 }
 
-/// Whether a text could not be read as the lists that were meant.
+/// True if a finding is about a text whose parentheses could not be read as intended.
 fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
 }
 
-/// Whether something was not found that may stand in what was not read.
+/// True if a finding misses something that may be declared in the part that was not read.
 fn is_missed(finding: &Diagnostic) -> bool {
     let names = ["undeclared-type", "undeclared-predicate", "undeclared-function", "undeclared-object"];
     let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
     matches!(finding.code, "no-goal" | "no-domain") || names.contains(&finding.code) && !is_near
 }
 
-/// Whether a name is meant to be another that is declared.
+/// True if a finding suggests a declared name for a misspelt one.
 fn is_misspelt(finding: &Diagnostic) -> bool {
     let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
     matches!(finding.code, "undeclared-predicate" | "undeclared-function") && is_near
 }
 
-/// Whether two places are in one section, which begins with `(:` at the start of a line.
+/// True if two places are in one section, which begins with `(:` at the start of a line.
 fn same_section(sources: &[Source], one: Span, other: Span) -> bool {
     if one.source != other.source {
         return false;
@@ -323,7 +324,7 @@ impl<'a> Checker<'a> {
         types.iter().map(|&id| self.task.type_of(id).name.as_str()).collect::<Vec<_>>().join(" or ")
     }
 
-    /// Whether an object could be of one of the first and of one of the second types at once.
+    /// True if an object could be of one of the first and of one of the second types at once.
     fn overlap(&self, one: &[TypeId], other: &[TypeId]) -> bool {
         let is = |own: &Type, types: &[TypeId]| own.ancestors.iter().any(|ancestor| types.contains(ancestor));
         self.task.types.iter().any(|own| is(own, one) && is(own, other))

@@ -94,7 +94,7 @@ impl Checker<'_> {
         Some(meant)
     }
 
-    /// What helps where nothing that is declared has nearly this name.
+    /// Help for a name that is not declared and resembles none that is.
     fn help_for(&self, kind: &str, section: &str, name: Name) -> String {
         let written = self.name(name.symbol);
         match kind {
@@ -149,7 +149,7 @@ impl Checker<'_> {
         near
     }
 
-    /// Where a name is declared that is offered instead.
+    /// Span of the declaration of a name that is suggested instead.
     fn declaration(&self, kind: &str, name: &str) -> Option<Span> {
         let task = &self.task;
         match kind {

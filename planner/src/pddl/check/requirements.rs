@@ -5,7 +5,7 @@ use super::conditions::span_of_formula;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{Action, Domain, Effect, Formula, Problem};
 
-/// What a requirement allows, with all requirements that allow it, the narrowest first.
+/// A language feature, with all requirements that allow it, the narrowest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Feature {
     Typing,

@@ -1,4 +1,4 @@
-//! What is declared and never spoken of, and what is spoken of and never has a value.
+//! Warnings about declarations that are never used, and about fluents that are used and never get a value.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

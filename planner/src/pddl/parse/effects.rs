@@ -81,7 +81,7 @@ impl Parser<'_> {
         }
     }
 
-    /// Whether these may be a fluent and its new value.
+    /// True if these nodes may be a fluent and its new value.
     fn gives_value(&self, rest: &[usize]) -> bool {
         rest.len() == 2 && self.word(rest[0]).is_none_or(|word| !word.starts_with('?'))
     }

@@ -1,4 +1,4 @@
-//! From the tree of lists to the tree of a domain or problem.
+//! Parser: turns the tree of lists into the tree of a domain or problem.
 //!
 //! Every fault becomes a finding and reading goes on behind it, so that all findings of a file come at once.
 
@@ -311,7 +311,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Whether it was said just now that something may have been meant that is not known: of what is known, nobody asks for more.
+    /// True if the last finding was an unknown section: it may have declared names that are missing later.
     fn leaves_unread(&self) -> bool {
         self.findings.last().is_some_and(|finding| finding.code == "unknown-section")
     }

@@ -230,7 +230,7 @@ fn is(fact: u32, later: bool) -> Said {
     Said { literal: Literal::new(fact, true), later }
 }
 
-/// When facts can hold, and operators be applied, at first if nothing is ever taken away.
+/// Earliest steps at which facts can hold, and operators be applied, if nothing is ever deleted.
 fn first_moments(task: &Compiled) -> (Vec<u32>, Vec<u32>) {
     let mut facts = vec![u32::MAX; task.facts];
     let mut operators = vec![u32::MAX; task.operators()];

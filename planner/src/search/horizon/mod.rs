@@ -56,7 +56,7 @@ impl<'a, 's> Search<'a, 's> {
         Search { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
     }
 
-    /// What the search took so far.
+    /// Effort of the search so far.
     pub fn counts(&self) -> Counts {
         self.counts
     }

@@ -56,7 +56,7 @@ pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
     order
 }
 
-/// By node: the number of its strong component; those that it leads to have lower ones (Tarjan 1972).
+/// Strongly connected component of each node; components reachable from it have lower numbers (Tarjan 1972).
 pub fn components(edges: &[Vec<u32>]) -> Vec<u32> {
     const OPEN: u32 = u32::MAX;
     let mut found = vec![OPEN; edges.len()];

@@ -12,17 +12,17 @@ use crate::situation::Situation;
 /// No look costs more than so many seconds for being in vain: where next to nothing is left, one look is as vain as another.
 const MOST_S: f64 = 10_000.0;
 
-/// What counts for a first look at a surface.
+/// Evidence for a first look at a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FirstLook {
     /// The probability that it finds what is asked for, 0 to 1.
     pub finds: f64,
-    /// What going there and looking takes, seconds.
+    /// Duration of going there and looking, seconds.
     pub takes_s: f64,
 }
 
 impl Situation {
-    /// What counts for a first look at a surface; none where looks in vain are not counted.
+    /// Evidence for a first look at a surface; none where looks in vain are not counted.
     pub fn first_look(&self, on: usize) -> Option<FirstLook> {
         let is_open = |n: &usize| self.confidence(*n) < self.threshold;
         let mut open: Vec<usize> = (0..self.things.len()).filter(is_open).collect();

@@ -9,7 +9,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.surfaces.len()).map(fluent).collect()
 }
 
-/// How sure it may become: nothing is sure of what nobody has looked at.
+/// Bounds on the certainty: unknown for a surface that was not looked at.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of {
         [Referent::Named(on)] => match s.surface(on) {

@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.kinds.len()).map(fluent).collect()
 }
 
-/// How sure it may become: nothing is sure of what nobody has looked at.
+/// Bounds on the certainty: unknown for a kind that was not looked for.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of.first() {
         Some(Referent::Named(kind)) => match s.kind(kind) {
@@ -21,7 +21,7 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     }
 }
 
-/// Whether a view of a surface was taken on which it could stand.
+/// True if a view of a surface was taken on which it could stand.
 fn is_looked_for(s: &Situation, of: usize) -> bool {
     (0..s.surfaces.len()).any(|on| s.kinds[of].may_be_on(on) && s.is_looked_at(on))
 }

@@ -21,7 +21,8 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     lines
 }
 
-/// How sure it may become: of a room that is asked about as of all of the kind.
+/// Bounds on the certainty: those of the whole kind if the kind is asked about in all of the room, else
+/// unknown.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(kind), Referent::Named(room)] = of else { return Range::UNKNOWN };
     let is_there = |n: &usize| s.surfaces[*n].is_in(&[(*room).to_string()]);

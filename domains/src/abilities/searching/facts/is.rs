@@ -18,7 +18,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     atoms
 }
 
-/// Whether it is, for all that was looked at.
+/// Bounds on the truth, from all looks so far.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [what, Referent::Named(kind)] = of else { return Range::UNKNOWN };
     let Ok(of) = s.kind(kind) else { return Range::UNKNOWN };

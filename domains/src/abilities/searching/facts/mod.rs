@@ -1,4 +1,4 @@
-//! What the belief says in the words of a domain: one file per fact, and the list of them.
+//! Facts of the belief in the words of a domain: one file per fact, and the list of them.
 
 mod clarity;
 mod completeness;

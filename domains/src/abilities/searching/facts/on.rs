@@ -17,7 +17,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     atoms
 }
 
-/// Whether it stands there, for all that was looked at.
+/// Bounds on the truth, from all looks so far.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let there = match of {
         [Referent::Seen(track), Referent::Named(on)] => Range::exactly(f64::from(u8::from(track.on == **on))),

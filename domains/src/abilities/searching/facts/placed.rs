@@ -9,7 +9,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).map(fluent).collect()
 }
 
-/// How sure it may become: nothing is known of the place of what was not seen.
+/// Bounds on the certainty: unknown for the place of a thing that was not seen.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(what)] = of else { return Range::UNKNOWN };
     let Ok(what) = s.thing(what) else { return Range::UNKNOWN };

@@ -45,21 +45,21 @@ pub trait Policy: Send {
     /// [`Policy::looks_at_all`].
     fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look>;
 
-    /// Whether it takes looks that promise nothing, too.
+    /// True if it also takes looks with no expected gain.
     fn looks_at_all(&self) -> bool {
         false
     }
 }
 
-/// What a look from a place at a surface, by its name, would truly show of what is sought, 0 to 1. Only experiments in simulation
-/// have it.
+/// True visibility of the requested object in a look from a place at a named surface, 0 to 1; in experiments
+/// in simulation only.
 pub type Foresight = Box<dyn Fn(&Place, &str) -> f64 + Send>;
 
 /// Who chooses in a run.
 pub struct Chooser {
     /// Who it is.
     pub by: By,
-    /// Whether the first look is nobody's choice: it is taken from where the body stands.
+    /// True if the first look is taken from where the body stands, without a choice.
     pub first_look_here: bool,
 }
 
@@ -106,13 +106,13 @@ const ALL: [(&str, &str, Make); 8] = [
     }),
 ];
 
-/// Why there is no such policy.
+/// The reason there is no such policy.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum PolicyError {
     /// No policy has that name.
     #[error("no policy is called \"{name}\"\n  expected one of: {known}")]
     Unknown {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// The names that there are.
         known: String,
@@ -122,7 +122,7 @@ pub enum PolicyError {
         "the policy \"{name}\" knows in advance what each look shows and is for experiments in simulation only\n  take another, such as plan"
     )]
     NeedsForesight {
-        /// What was asked for.
+        /// The requested name.
         name: String,
     },
 }
@@ -132,7 +132,7 @@ pub fn names() -> Vec<&'static str> {
     std::iter::once(PLAN).chain(ALL.iter().map(|(name, ..)| *name)).collect()
 }
 
-/// What a policy does, said after its name; none if there is none of that name.
+/// Description of a policy, said after its name; none if there is none of that name.
 pub fn about(name: &str) -> Option<&'static str> {
     ALL.iter().find(|(known, ..)| *known == name).map(|(_, about, _)| *about)
 }
@@ -153,8 +153,8 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// Whether it is a policy's turn: something that is asked for is looked for still, and the hands are free for it. All else is the
-/// planner's.
+/// True if the policy chooses the next step: something requested is still being searched for, and the hands
+/// are free. All else is left to the planner.
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
     let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)

@@ -7,7 +7,7 @@ use descry_perception::nalgebra::{Point3, Vector3};
 
 use super::{Look, Policy, best, unseen};
 
-/// How far from something seen the rear side reaches.
+/// Depth of the rear side behind a seen object, metres.
 const BEHIND_M: f64 = 0.04;
 
 pub(super) struct RearSide;

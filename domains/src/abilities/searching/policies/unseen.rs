@@ -11,8 +11,8 @@ const GRID_M: f64 = 0.05;
 /// Height up to which space counts: that of the tallest of the published objects.
 const HEIGHT_M: f64 = 0.28;
 
-/// How many unseen points of a kind a look would show, as far as is known of what stands in the way. While nothing is known
-/// of the surface all looks are the same.
+/// The number of unseen points of a kind that a look would show, as far as occluders are known. While nothing
+/// is known of the surface, all looks are equal.
 pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
     let Some(map_from_camera) = situation.camera(look.from, look.on) else { return 0.0 };
     let eye = Point3::from(map_from_camera.translation.vector);

@@ -39,7 +39,7 @@ pub enum CameraError {
     Focal {
         /// `fx` or `fy`.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
     },
 }

@@ -18,7 +18,8 @@ const FARTHEST_TYPICAL_M: f64 = 100.0;
 const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
 /// A place whose points lie within this of their middle is in metres if it is far away, metres. From: chosen.
 const WIDEST_PLACE_M: f64 = 20.0;
-/// What is narrower than this share of its distance is far away, and not in other units. From: chosen.
+/// Extent as a share of the distance from the origin below which a cloud counts as far away rather than given
+/// in other units. From: chosen.
 const NARROW: f64 = 0.01;
 /// Nearer is too near for a depth camera that gives millimetres; farther is too far for one that gives centimetres. From: chosen.
 const LEAST_MILLIMETRES: f64 = 300.0;
@@ -47,7 +48,7 @@ pub enum CloudError {
     /// An attribute has another length than the points.
     #[error("{attribute} has {found} entries where the cloud has {points} points: give one entry a point")]
     Length {
-        /// Which attribute.
+        /// The name of the attribute.
         attribute: &'static str,
         /// Its entries.
         found: usize,
@@ -115,7 +116,7 @@ impl Cloud {
         }
     }
 
-    /// How many points are finite in all three coordinates.
+    /// The number of points that are finite in all three coordinates.
     pub fn count_finite(&self) -> usize {
         self.points.iter().filter(|p| is_finite(p)).count()
     }
@@ -241,7 +242,7 @@ impl Cloud {
         }
     }
 
-    /// How far a typical point lies from the middle of all, metres; `None` if none is finite.
+    /// The median distance of the finite points from their median, metres; `None` if no point is finite.
     fn within_of_middle_m(&self) -> Option<f64> {
         let finite = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>());
         finite().next()?;
@@ -249,7 +250,8 @@ impl Cloud {
         Some(median(finite().map(|p| (p - middle).norm()).collect()))
     }
 
-    /// What to say of coordinates that lie so far from the origin that single precision blurs them.
+    /// The note on coordinates so far from the origin that single precision blurs them; `None` if they are
+    /// near enough.
     fn far_from_origin(&self, far_m: f64) -> Option<String> {
         let (low, high) = self.bounds()?;
         let greatest = low.coords.amax().max(high.coords.amax());

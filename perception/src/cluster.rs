@@ -9,7 +9,7 @@ pub enum ClusterError {
     /// The step is no positive length.
     #[error("a step of {step_m} m: give a positive length, such as 0.02")]
     Step {
-        /// What was asked for.
+        /// The value that was given.
         step_m: f32,
     },
     /// A point lies farther out than cells can be counted.
@@ -44,7 +44,7 @@ pub fn euclidean(points: &[Point3<f32>], step_m: f32, least: usize) -> Result<Ve
 struct Cells {
     /// Cell coordinates, ascending by (z, y, x).
     key: Vec<[i32; 3]>,
-    /// Where each cell's points begin in `items`; one more at the end.
+    /// The start of each cell's points in `items`; one more entry at the end.
     begin: Vec<u32>,
     items: Vec<(Point3<f32>, u32)>,
 }

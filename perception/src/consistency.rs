@@ -61,7 +61,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// How many numbers say how large it is.
+    /// The number of parameters that give the size of the fault.
     fn numbers(&self) -> usize {
         match self {
             Fault::DepthScale(_) | Fault::FocalLength(_) => 1,
@@ -112,14 +112,14 @@ impl fmt::Display for Fault {
 pub struct Inconsistency {
     /// The likeliest fault.
     pub fault: Fault,
-    /// How likely it is.
+    /// The probability of the fault.
     pub probability: f64,
     /// Distance by which it misplaces what stands on the surface, metres.
     pub spread_m: f64,
 }
 
 impl Inconsistency {
-    /// Whether the fault is likelier than the statement.
+    /// True if the fault is likelier than the statement.
     pub fn is_likely(&self) -> bool {
         self.probability > 0.5
     }
@@ -237,7 +237,8 @@ impl Model {
         Model { fault, poses: None }
     }
 
-    /// Whether the outline of the surface mends it: a displacement within what localisation may err.
+    /// True if aligning the outline of the surface corrects the fault: a displacement within the stated
+    /// localisation error.
     fn is_mended(&self, sights: &[Sight]) -> bool {
         let Fault::Displaced(shift, turn) = self.fault else { return false };
         sights.iter().all(|s| shift.norm() < MENDED * s.sigma_m && turn.abs() < MENDED * s.sigma_rad)
@@ -303,7 +304,7 @@ impl Family {
     fn search(self, before: f64, misfit: &mut impl FnMut(Fault) -> f64) {
         /// Steps taken at most, in all. From: work.
         const EVALUATIONS: usize = 60;
-        /// What a first step must leave at most. From: chosen.
+        /// Maximum share of the misfit that a first step may leave for the search to go on. From: chosen.
         const PROMISING: f64 = 0.8;
         let mut at = [0.0; 3];
         let numbers = self.fault(&at).numbers();

@@ -9,7 +9,7 @@ pub mod ply;
 use crate::cloud::{Cloud, CloudError, Grid};
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// Where in a file something is wrong.
+/// The place of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A line of text, counted from 1.
@@ -31,13 +31,13 @@ impl std::fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: expected {expected}, found {found}; {mend}")]
 pub struct FileError {
-    /// Where.
+    /// The place of the error.
     pub place: Place,
-    /// What would have been right.
+    /// The expected content.
     pub expected: String,
-    /// What is there.
+    /// The content that was found.
     pub found: String,
-    /// What to do about it.
+    /// The way to correct the error.
     pub mend: String,
 }
 
@@ -59,7 +59,7 @@ pub struct Loaded {
     pub cloud: Cloud,
     /// The sensor's pose as the file states it (`VIEWPOINT` of PCD); identity if it states none. The points are not moved by it.
     pub viewpoint: Isometry3<f64>,
-    /// What a person should know: points left out, suspicious units, attributes ignored.
+    /// Notes for a person: points left out, suspicious units, attributes ignored.
     pub notes: Vec<String>,
 }
 

@@ -8,7 +8,7 @@ pub struct Lattice {
     pub per_m: f64,
     /// Lowest voxel, with a layer of margin.
     low: [f64; 3],
-    /// How far x and y are shifted in a key.
+    /// The bit shifts of x and y in a key.
     shift: [u32; 2],
     pub bits: u32,
 }
@@ -37,7 +37,8 @@ impl Lattice {
         i << self.shift[0] | j << self.shift[1] | k
     }
 
-    /// What the nine columns of voxels around one differ in from its key: add, and three voxels in a row are meant.
+    /// Key offsets of the nine columns of voxels around a voxel: added to its key, each gives the first of
+    /// three voxels in a row.
     fn columns(&self) -> [i64; 9] {
         let (x, y) = (1_i64 << self.shift[0], 1_i64 << self.shift[1]);
         std::array::from_fn(|c| (c as i64 / 3 - 1) * x + (c as i64 % 3 - 1) * y - 1)

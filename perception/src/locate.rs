@@ -1,4 +1,4 @@
-//! Where a seen surface lies on the map: localisation against the outline of a known table.
+//! Localisation of a seen surface on the map: alignment against the outline of a known table.
 //!
 //! Localisation errs by centimetres and degrees, and so does a merged cloud as a whole. A table whose outline the map
 //! knows tells by how much: the ends that were seen are laid on the edges of the outline.
@@ -17,34 +17,36 @@ use nalgebra::{
 const BIN_M: f64 = 0.02;
 /// A sample wants this many endings.
 const FEWEST: usize = 2;
-/// How far a sample may be off, round by round: what a view cuts off or an object hides lies farther in than the edge.
+/// Maximum distance of a sample from its edge, iteration by iteration: where the view cuts the surface off or
+/// an object hides its end, samples lie farther in than the edge.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
 const SAMPLE_SIGMA_M: f64 = 0.03;
-/// Where fewer samples than this tell where it ends on either side, a surface is laid by how far it was seen to reach.
+/// Fewest samples of an end on either side; with fewer, the surface is aligned by the extent that was seen.
 const FEW: usize = 5;
 /// Standard deviation of how far it was seen to reach, where that is from side to side, and most that it may fall short of it, metres.
 const REACH_SIGMA_M: f64 = 0.01;
 const SHORT_M: f64 = 0.10;
 
-/// How a surface was laid on its outline.
+/// The alignment of a surface with its outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
-    /// What takes points of the cloud's frame to the map.
+    /// The transform from the cloud's frame to the map.
     pub map_from_world: Isometry3<f64>,
     /// Samples of seen edges that found an edge of the outline.
     pub matched: usize,
     /// Root mean square distance of those from the outline afterwards, metres; 0 without any.
     pub residual_m: f64,
-    /// How well that is known; none without an outline.
+    /// The certainty of that transform; none without an outline.
     pub certainty: Option<Certainty>,
 }
 
-/// How well it is known where a surface lies on the map.
+/// The certainty of a surface's place on the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty {
     frame: Frame,
-    /// Of a shift along the two axes of the frame, square metres, and of a turn about its origin, square radians.
+    /// Covariance of a shift along the two axes of the frame, square metres, and of a turn about its origin,
+    /// square radians.
     covariance: Matrix3<f64>,
 }
 
@@ -120,7 +122,8 @@ impl End {
         End { on: frame.flat(&ending.on), past: frame.flat(&ending.past), side, eye: frame.flat(&ending.eye) }
     }
 
-    /// How far out it is from an edge, and half of how far it may be off, metres; none where it is no end on that edge's side.
+    /// The distance of the end outside an edge, and half of its uncertainty, metres; none if the surface does
+    /// not end on that edge's side.
     fn beyond(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
         let out = |p: &Point2<f64>| edge.outward.dot(&(moved * p - edge.from));
         let (on, past) = (out(&self.on), out(&self.past));
@@ -186,7 +189,8 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
     (0..outline.len()).filter_map(edge).collect()
 }
 
-/// Where the surface ends along the edges, a sample every [`BIN_M`]: the mean of the endings there that lie nearest to that edge.
+/// The ends of the surface along the edges, a sample every [`BIN_M`]: the mean of the endings there that lie
+/// nearest to that edge.
 fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
     let mut bins: Vec<Vec<Bin>> =
         edges.iter().map(|edge| vec![Bin::default(); (edge.length_m / BIN_M) as usize]).collect();
@@ -211,7 +215,8 @@ fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) ->
     each.collect()
 }
 
-/// What lies between two opposite sides of the outline of which none shows where it ends, and reaches nearly from one to the other: in the middle.
+/// Matches of spans between two opposite sides of the outline, neither of which shows an end: a span that
+/// reaches nearly from one side to the other is put in the middle.
 fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2<f64>) -> Vec<Match> {
     let is_open = |edge: &&Edge| ends.iter().filter(|m| m.normal == edge.outward).count() < FEW;
     let open: Vec<&Edge> = edges.iter().filter(is_open).collect();

@@ -29,7 +29,7 @@ use prepare::Prepared;
 use search::{Oriented, PERHAPS_SHARE, SURE_SHARE};
 use serde::{Deserialize, Serialize};
 
-/// How to merge.
+/// The options of a merge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MergeOptions {
@@ -63,14 +63,14 @@ impl Default for MergeOptions {
     }
 }
 
-/// How one view was brought into the common frame.
+/// The alignment of one view with the common frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewFit {
     /// The corrected pose.
     pub world_from_camera: Isometry3<f64>,
-    /// How far the camera moved from where localisation had it, metres.
+    /// The shift of the camera from its localised pose, metres.
     pub moved_m: f64,
-    /// How far it turned, radians.
+    /// The turn of the camera from its localised pose, radians.
     pub moved_rad: f64,
     /// Downsampled points with a partner in another view.
     pub matched: usize,
@@ -80,18 +80,18 @@ pub struct ViewFit {
     pub converged: bool,
     /// False if the view was left out of the merged cloud.
     pub used: bool,
-    /// Why it converged, or was left out, in words.
+    /// The reason the view converged, or was left out, in words.
     pub why: String,
 }
 
-/// What one of the five steps did.
+/// The report of one of the five steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Its name.
     pub name: String,
     /// Points after it.
     pub points: usize,
-    /// What it found, in words.
+    /// The result of the step, in words.
     pub result: String,
 }
 
@@ -102,7 +102,7 @@ pub struct Merged {
     pub cloud: Cloud,
     /// A point's number of views that measured it.
     pub views_per_point: Vec<u16>,
-    /// What the used views saw, with corrected poses.
+    /// The visibility of the used views, with corrected poses.
     pub visibility: Visibility,
     /// One fit a view, in the order given.
     pub fits: Vec<ViewFit>,
@@ -136,9 +136,9 @@ pub enum MergeError {
     Option {
         /// The option.
         field: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
-        /// What was expected.
+        /// The expected values, in words.
         expected: &'static str,
     },
     /// A pose that is not finite.
@@ -203,7 +203,7 @@ fn fits(prepared: &[Prepared], aligned: &mut Aligned) -> Vec<ViewFit> {
     (0..prepared.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect()
 }
 
-/// What is known of each view by itself.
+/// The data of each view that depend on no other view.
 struct Ready {
     prepared: Vec<Prepared>,
     maps: Vec<Option<DepthMap>>,
@@ -220,7 +220,7 @@ impl Ready {
     }
 }
 
-/// Where the views belong, without a merged cloud: steps 1 to 4 alone. One fit a view, in the order given.
+/// Aligns the views without a merged cloud: steps 1 to 4 alone. Returns one fit per view, in the order given.
 ///
 /// # Errors
 /// As [`merge`].
@@ -257,12 +257,12 @@ fn place(
 struct Aligned {
     poses: Vec<Isometry3<f64>>,
     used: Vec<bool>,
-    /// Why a view is not used.
+    /// The reason each unused view is left out.
     whys: Vec<Option<String>>,
     found: Vec<Found>,
     /// The dominant planes that are level, world frame.
     planes: Vec<Plane>,
-    /// What the points belong to.
+    /// The part that each point belongs to.
     parts: Parts,
     steps: Vec<Step>,
 }
@@ -317,7 +317,8 @@ fn check(views: &[View], options: &MergeOptions) -> Result<(), MergeError> {
     }
 }
 
-/// What steps 1 and 2 of the paper did: views by their poses into the world, filtered by height and range, thinned.
+/// Carries out steps 1 and 2 of the paper: transforms the views by their poses into the world, filters them
+/// by height and range, and thins them.
 fn filter_and_thin(
     views: &[View],
     prepared: &[Prepared],
@@ -435,7 +436,7 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-/// What stands on the surface in some views.
+/// The objects that stand on the surface in some views.
 struct Objects<'a> {
     prepared: &'a [Prepared],
     parts: &'a [Vec<Part>],
@@ -480,7 +481,8 @@ impl Objects<'_> {
         levelled: &Isometry3<f64>,
         pose: &mut Isometry3<f64>,
     ) {
-        /// What stays as it lies fits by so much more of the points than what is searched for. From: chosen.
+        /// Margin in the share of fitting points by which the present pose is preferred to one that was
+        /// searched for. From: chosen.
         const STAYS: f64 = 0.05;
         let (up, view, parts) = (&self.up, &self.prepared[view], &self.parts[view]);
         let own = objects(view, parts, levelled);
@@ -499,7 +501,8 @@ fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Orient
     standing.map(|k| (pose * view.points[k].at(), pose.rotation * view.points[k].normal())).collect()
 }
 
-/// How far off two views may be from each other at the distance of the objects: three spreads, at least the 10 cm and 6° of a poor localisation.
+/// The search window of two views, by how far off they may be from each other at the distance of the objects:
+/// three spreads, at least the 10 cm and 6° of a poor localisation.
 fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
     /// Least and greatest turn, radians, and shift, metres; the greatest shift with what a turn adds. From: chosen, 6° to 8°.
     const TURNS_RAD: (f64, f64) = (0.105, 0.14);
@@ -516,7 +519,7 @@ fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f6
     search::Window { shift_m: shift_m.min(WIDEST_M), turn_rad: WIDER * turn_rad }
 }
 
-/// What the used views saw from their corrected poses.
+/// The visibility of the used views from their corrected poses.
 fn visibility(maps: Vec<Option<DepthMap>>, used: &[bool], poses: &[Isometry3<f64>]) -> Visibility {
     let placed = |((map, used), pose): ((Option<DepthMap>, &bool), &Isometry3<f64>)| {
         map.filter(|_| *used).map(|map| DepthMap { camera_from_world: pose.inverse(), ..map })

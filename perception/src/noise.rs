@@ -1,4 +1,4 @@
-//! How a depth camera errs: what is said of one, and fitted to what one showed.
+//! Noise model of a depth camera: as stated, and as fitted to recordings.
 
 mod fit;
 
@@ -10,20 +10,20 @@ pub use fit::Residuals;
 /// Steepest angle between ray and normal that still returns, degrees. From: chosen.
 pub const STEEPEST_DEG: f64 = 85.0;
 
-/// What is added as a surface steepens, metres at a depth of one. From: sensor, Nguyen et al. 2012, the term for
-/// steep angles.
+/// Additional axial noise as a surface steepens, metres at a depth of one. From: sensor, Nguyen et al. 2012,
+/// the term for steep angles.
 const STEEP_M: f64 = 0.0001;
-/// What is added across the ray as it steepens, pixels. From: sensor, Nguyen et al. 2012, eq. 1.
+/// Additional noise across the ray as a surface steepens, pixels. From: sensor, Nguyen et al. 2012, eq. 1.
 const STEEP_PX: f64 = 0.034;
 /// A quarter turn, degrees. From: derived, a surface seen edge on.
 const EDGE_ON_DEG: f64 = 90.0;
 
-/// What a depth camera measures, and how well.
+/// The range and the noise of a depth camera.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensor {
     /// Standard deviation along the ray of a return from a face that looks at the camera, at the nearest depth, metres.
     pub axial_m: f64,
-    /// What that grows by with the square of the depth beyond the nearest, metres a square metre.
+    /// Growth of the axial noise with the square of the depth beyond the nearest, metres a square metre.
     pub growth_per_m: f64,
     /// Nearest and farthest depth that is measured, metres.
     pub range_m: (f64, f64),

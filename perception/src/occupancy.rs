@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// What a cell of a map holds.
+/// The content of a cell of a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Space {
@@ -30,7 +30,7 @@ pub struct Occupancy {
 }
 
 impl Occupancy {
-    /// What lies at a place of the map.
+    /// The content of the map at a place.
     pub fn at(&self, place: &Point2<f64>) -> Space {
         let cell = (place - self.origin) / self.cell_m;
         self.cell(cell.x.floor(), cell.y.floor())

@@ -2,7 +2,7 @@
 
 use crate::neighbours::Neighbours;
 
-/// What [`statistical`] found.
+/// The result of [`statistical`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
     /// Indices of the points that stay, ascending. Points without a return do not.

@@ -19,7 +19,7 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// Of no points. From: mark.
+    /// The rectangle of no points. From: mark.
     pub const NONE: Rectangle =
         Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
 }
@@ -108,22 +108,23 @@ fn best_turn(
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
 struct Turner {
-    /// How many points there are, and the first of them, metres. All that follows is as seen from there, where a tenth of a micrometre is
-    /// more than they know, and filled up to whole blocks with what lies outside of no side.
+    /// The number of points, and the first point, metres. All that follows is relative to that point, where
+    /// single precision is finer than the measurement, and padded to whole blocks with points that lie
+    /// outside of no side.
     len: usize,
     origin: [f64; 2],
     xs: Vec<f32>,
     ys: Vec<f32>,
     us: Vec<f32>,
     vs: Vec<f32>,
-    /// How far out each block of the points lies across each side: less is farther.
+    /// The outward reach of each block of points across each side: a lesser value is farther out.
     reaches: Vec<[f32; 4]>,
     /// Across the ends of `us`, then of `vs`.
     sides: [Side; 4],
 }
 
 impl Turner {
-    /// So many of the points at the most.
+    /// Prepares at most `most` of the points.
     fn of(points: &[Point3<f64>], most: usize) -> Turner {
         let stride = points.len().div_ceil(most).max(1);
         let origin = points.first().map_or([0.0; 2], |p| [p.x, p.y]);
@@ -227,12 +228,13 @@ fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32;
 struct Side {
     /// Those and the one on the side: they were the farthest at the last turn.
     outermost: Vec<usize>,
-    /// What lies so far out, [`ranked`].
+    /// The outermost values, [`ranked`].
     found: Vec<u64>,
 }
 
 impl Side {
-    /// Where the side lies when turned, from where the points lie across it and how far out each block of them does: less is farther out.
+    /// The position of the side when turned, from the points' positions across the side and the outward reach
+    /// of each block: less is farther out.
     fn turn(&mut self, places: &[f32], reaches: impl Iterator<Item = f32>, way: impl Fn(f32) -> f32) -> f32 {
         // The side lies no farther in than the points that were outermost before.
         let before = self.outermost.iter().map(|&i| way(places[i]));
@@ -310,7 +312,7 @@ impl Turned {
         [self.u, self.v].map(|[low, high]| high - low)
     }
 
-    /// Of points that were looked at as seen from a place.
+    /// The rectangle of points that were relative to an origin.
     fn rectangle(&self, origin: [f64; 2], residual_m: f64) -> Rectangle {
         let ([u0, u1], [v0, v1]) = (self.u, self.v);
         let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));

@@ -14,7 +14,7 @@ pub struct PictureOptions {
     pub height: u32,
     /// Position of the eye, metres.
     pub eye: Point3<f64>,
-    /// What it looks at, metres.
+    /// The target of the camera, metres.
     pub target: Point3<f64>,
     /// Up in the picture.
     pub up: Vector3<f64>,

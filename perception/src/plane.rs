@@ -39,7 +39,7 @@ impl Plane {
     }
 }
 
-/// What plane to look for, and how hard.
+/// The plane to look for, and the effort of the search.
 #[derive(Clone, Debug)]
 pub struct PlaneOptions {
     /// Points no farther from the plane belong to it, metres.
@@ -75,13 +75,13 @@ pub struct PlaneFit {
     pub rounds_used: usize,
 }
 
-/// Why there is no plane.
+/// The reason there is no plane.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneError {
     /// Fewer than three finite points.
     #[error("{found} finite points: a plane needs three")]
     TooFew {
-        /// How many there are.
+        /// The number that was found.
         found: usize,
     },
     /// Not one sample gave a plane that was asked for.
@@ -95,7 +95,7 @@ pub enum PlaneError {
     /// The tolerance is no positive length.
     #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
     Tolerance {
-        /// What was asked for.
+        /// The value that was given.
         tolerance_m: f32,
     },
 }

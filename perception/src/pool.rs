@@ -41,7 +41,8 @@ fn length(count: usize, least: usize) -> usize {
     count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
 }
 
-/// What comes of each number below `count`, if anything; a share has `least` of them or more. `state` is a share's own.
+/// Collects the results, if any, of each number below `count`; a share has `least` of them or more. `state`
+/// is a share's own.
 pub(crate) fn filter_with<S, R: Send>(
     count: usize,
     least: usize,
@@ -61,7 +62,7 @@ pub(crate) fn filter_with<S, R: Send>(
     all
 }
 
-/// What comes of each number below `count`, if anything.
+/// Collects the results, if any, of each number below `count`.
 pub(crate) fn filter<R: Send>(
     count: usize,
     least: usize,
@@ -70,12 +71,12 @@ pub(crate) fn filter<R: Send>(
     filter_with(count, least, || (), |(), n| result(n))
 }
 
-/// What comes of each number below `count`.
+/// Collects the result of each number below `count`.
 pub(crate) fn each<R: Send>(count: usize, least: usize, result: impl Fn(usize) -> R + Sync) -> Vec<R> {
     filter(count, least, |n| Some(result(n)))
 }
 
-/// What comes of each of a slice.
+/// Collects the result of each item of a slice.
 pub(crate) fn map<T: Sync, R: Send>(all: &[T], least: usize, result: impl Fn(&T) -> R + Sync) -> Vec<R> {
     each(all.len(), least, |n| result(&all[n]))
 }
@@ -99,7 +100,7 @@ pub(crate) fn for_each<T: Send, S>(
     slices.clear();
 }
 
-/// What comes of the first of the numbers that anything comes of.
+/// The result of the first number in the range that has any.
 pub(crate) fn find_first<R: Send>(
     range: Range<usize>,
     result: impl Fn(usize) -> Option<R> + Sync,
@@ -121,7 +122,8 @@ pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R 
     rayon::scope(|_| span.in_scope(work))
 }
 
-/// What comes of each, in their order. The heaviest are begun first, so that none is left to one thread in the end.
+/// Collects the result of each item, in the given order. The heaviest are begun first, so that none is left
+/// to one thread in the end.
 pub fn heaviest_first<T: Sync, R: Send>(
     all: &[T],
     weight: impl Fn(&T) -> usize,

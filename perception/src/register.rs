@@ -64,7 +64,7 @@ impl Prepared {
     }
 }
 
-/// What is made small.
+/// The quantity that is minimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Distances between partners (Besl and McKay 1992).
@@ -75,12 +75,12 @@ pub enum Method {
     Generalised,
 }
 
-/// How to register.
+/// The options of a registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegisterOptions {
-    /// What is made small.
+    /// The quantity that is minimised.
     pub method: Method,
-    /// Where to start.
+    /// The initial pose of the source in the target.
     pub start_target_from_source: Isometry3<f64>,
     /// Partners are no farther apart, metres.
     pub within_m: f32,
@@ -111,7 +111,7 @@ impl Default for RegisterOptions {
     }
 }
 
-/// Why registration ended.
+/// The reason registration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// The last round moved less than asked.
@@ -132,7 +132,7 @@ impl std::fmt::Display for Ending {
     }
 }
 
-/// Where the source belongs, and how far to trust it.
+/// The pose of the source, and its trustworthiness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// The pose found.
@@ -145,11 +145,11 @@ pub struct Fit {
     pub residual_m: f64,
     /// Rounds used.
     pub rounds: usize,
-    /// Why it ended.
+    /// The reason registration ended.
     pub ending: Ending,
-    /// How far the middle of the matched points moved from where it started, metres.
+    /// The distance of the middle of the matched points from its start, metres.
     pub moved_m: f64,
-    /// How far the source turned from where it started, radians.
+    /// The angle of the source from its start, radians.
     pub moved_rad: f64,
     /// Directions of motion (of six) that the partners leave free: 3 for two planes, 1 for two cylinders without ends … Nothing was moved along them.
     pub free: usize,
@@ -186,9 +186,9 @@ pub enum RegisterError {
     /// An option that is no positive length.
     #[error("{name} is {value_m} m: give a positive length")]
     Length {
-        /// Which option.
+        /// The name of the option.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value_m: f64,
     },
     /// The start is not finite.

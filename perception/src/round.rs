@@ -64,7 +64,8 @@ pub struct Round {
     pub inliers: f64,
 }
 
-/// Where the silhouette of the body ended against free space: its side reaches `reach_m` from the origin along `direction` at a height.
+/// An end of the body's silhouette against free space: the side of the body reaches `reach_m` from the origin
+/// along `direction` at a height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
     /// Horizontal unit vector.
@@ -101,7 +102,7 @@ impl Round {
 /// In which of the [`SECTORS`] directions around an axis a place lies that is `x` and `y` from it.
 #[inline]
 pub fn sector(x: f64, y: f64) -> usize {
-    /// Where the sectors of a quarter end but for the last, as tangents. From: derived, every ten degrees.
+    /// Tangents of the ends of a quarter's sectors, without the last. From: derived, every ten degrees.
     const ENDS: [f64; SECTORS / 4 - 1] = [
         0.176_326_980_708_464_98,
         0.363_970_234_266_202_36,
@@ -223,7 +224,7 @@ impl Round {
     }
 }
 
-/// How far from the side a point of it may be measured, metres.
+/// Maximum distance of a measured point of the side from the side, metres.
 fn tolerance(sigma_m: f64) -> f64 {
     (2.0 * sigma_m).clamp(EDGE_M, PLACE_M)
 }

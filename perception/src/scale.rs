@@ -3,13 +3,15 @@
 /// Merged views show a thing up to this far beside itself: what is no farther apart is in one place, metres.
 /// From: chosen, what is left of poses that err by centimetres; most uses bear half of it and twice as much.
 pub(crate) const PLACE_M: f64 = 0.008;
-/// What is farther apart is in two places, whichever way both are off, metres. From: derived, two of them.
+/// Distance from which two positions are two places, whichever way both are off, metres. From: derived, two
+/// of them.
 pub const APART_M: f64 = 2.0 * PLACE_M;
-/// How exactly an edge or an end is known, metres. From: derived, half of a place.
+/// Accuracy of an edge or an end, metres. From: derived, half of a place.
 pub const EDGE_M: f64 = 0.5 * PLACE_M;
-/// How far real things differ from the straight forms that they are compared with, metres. From: derived, half of an edge.
+/// Deviation of real things from the straight forms that they are compared with, metres. From: derived, half
+/// of an edge.
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
-/// So many spreads of a measurement are more than noise. From: chosen.
+/// Number of spreads of a measurement beyond which a deviation is more than noise. From: chosen.
 pub(crate) const SPREADS: f64 = 3.0;
 /// Least and greatest reach of a handle out of the body, and its greatest width across, metres. From: chosen.
 pub(crate) const HANDLE_M: (f64, f64) = (0.014, 0.06);

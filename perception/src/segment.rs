@@ -28,11 +28,11 @@ pub use quantile::{end, quantile};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// How to part a scene into objects.
+/// The options of the segmentation of a scene into objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneOptions {
-    /// How to find the surface.
+    /// The options of the search for the surface.
     pub surface: SurfaceOptions,
     /// Least height above the surface of a point that belongs to an object, metres. The surface's own roughness may raise it. From: chosen.
     pub clearance_m: f64,
@@ -44,7 +44,7 @@ pub struct SceneOptions {
     pub fewest_points: usize,
     /// Least height of an object's top above what it stands on, metres. From: chosen.
     pub least_height_m: f64,
-    /// Whether touching objects are parted at concave creases.
+    /// True if touching objects are separated at concave creases.
     pub part_touching: bool,
 }
 
@@ -80,7 +80,7 @@ pub struct Segment {
 /// A surface with the objects on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// What they stand on.
+    /// The surface that the objects stand on.
     pub surface: Surface,
     /// The objects, most points first.
     pub segments: Vec<Segment>,
@@ -124,7 +124,7 @@ pub const POINT_ENDS: (f64, f64) = (0.01, 0.99);
 pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
 /// Fewest voxels that tell an upright side. From: chosen.
 const SIDE_VOXELS: usize = 25;
-/// Of the second number of places, the first may lie outside of what holds most of them. From: chosen.
+/// Share of places, as a fraction, that may lie outside an outline that holds most of them. From: chosen.
 pub const OUTSIDE: (usize, usize) = (3, 10);
 
 /// The points of each part, in order of its first point.

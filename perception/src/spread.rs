@@ -1,4 +1,4 @@
-//! How points spread: running second moments and the direction in which they spread least.
+//! Spread of points: running second moments and the direction in which they spread least.
 
 use nalgebra::{Point3, Vector3};
 
@@ -66,7 +66,8 @@ const COLLINEAR: f64 = 1e-9;
 
 /// Newton's steps towards the least eigenvalue; from a few on they change nothing, but where two of them are nearly the same.
 const MOST_STEPS: usize = 40;
-/// What is left after so small a step is its square: nothing.
+/// Least step of the iteration: the error that remains after a step is about its square, which is negligible
+/// here.
 const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.

@@ -30,7 +30,7 @@ use planes::{FEWEST, Plane, ROUNDS, SAMPLE, SAMPLE_OF_ONE, Sample, large_planes}
 pub use role::{Role, Sign};
 use upright::Doubt;
 
-/// How to look for the surface.
+/// The options of the search for the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceOptions {
@@ -40,7 +40,7 @@ pub struct SurfaceOptions {
     pub tilt_rad: f64,
     /// Least and greatest height of the surface along `up`, metres, if known.
     pub height_band_m: Option<(f64, f64)>,
-    /// Where the surface is as seen from above, if known: of what lies outside nothing is wanted.
+    /// The region of the surface as seen from above, if known: surfaces outside are not wanted.
     pub region: Option<Region>,
     /// Least area of the surface, square metres. From: chosen.
     pub least_area_m2: f64,
@@ -61,13 +61,13 @@ impl Default for SurfaceOptions {
     }
 }
 
-/// Where a surface is expected, seen from above.
+/// The region where a surface is expected, seen from above.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
     /// Corners of its outline in the world, convex, in either direction, metres.
     pub corners: Vec<Point3<f64>>,
-    /// How far the surface may lie outside, metres.
+    /// The maximum distance of the surface outside the region, metres.
     pub margin_m: f64,
 }
 
@@ -76,7 +76,7 @@ const FARTHEST_M: f32 = 1000.0;
 /// Area of the largest surface, square metres. From: derived, that of all that is in reach.
 const MOST_AREA_M2: f64 = 4.0 * (FARTHEST_M as f64) * (FARTHEST_M as f64);
 
-/// Why no surface was found.
+/// The reason no surface was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Too few points to speak of a surface.
@@ -102,7 +102,7 @@ pub enum SurfaceError {
     NotFound {
         /// Planes that were looked at.
         tried: usize,
-        /// What was wanted, in words.
+        /// The wanted surface, in words.
         wanted: String,
     },
     /// More than one way may be up, or nothing level is in view.
@@ -110,28 +110,28 @@ pub enum SurfaceError {
         "which way is up cannot be told from what is in view: say which way is up, or look at the table with what stands on it"
     )]
     UpUntold,
-    /// What is as wanted is the floor.
+    /// Every surface that is as wanted is the floor.
     #[error(
         "all that is level here is the floor ({because}): look at the table, or give the height band that it is in"
     )]
     OnlyFloor {
-        /// What tells that it is the floor.
+        /// The sign of the floor.
         because: Sign,
     },
-    /// What is as wanted may be the floor as well as a table.
+    /// A surface that is as wanted may be the floor as well as a table.
     #[error(
         "a level surface of {area_m2:.2} m² may be a table or the floor ({because}): look where its edge is in view, or give the height band that it is in"
     )]
     Untold {
         /// Area of the largest, square metres.
         area_m2: f64,
-        /// What does not tell.
+        /// The sign that leaves the role undecided.
         because: Sign,
     },
-    /// What is as wanted is nothing to stand things on.
+    /// No surface that is as wanted is one to stand things on.
     #[error("what is level here is nothing to stand things on ({because}): look at the table")]
     OnlyOther {
-        /// What tells so.
+        /// The sign of that role.
         because: Sign,
     },
 }
@@ -162,13 +162,14 @@ pub struct Surface {
     pub share: f64,
     /// World to the surface's frame: z up with 0 on the surface, origin at the middle of the hull.
     pub surface_from_world: Isometry3<f64>,
-    /// What it is for.
+    /// The role of the surface.
     pub role: Role,
-    /// What tells its role.
+    /// The sign of its role.
     pub because: Sign,
     /// Height above the floor, metres, where the floor is in view.
     pub above_floor_m: Option<f64>,
-    /// How likely up is what it was taken to be when the surface was found: one where it was said, or no camera is known.
+    /// The probability of the up direction that was assumed when the surface was found: one if the direction
+    /// was given, or no camera is known.
     #[serde(default = "said")]
     pub up_chance: f64,
     /// Outlines of the other surfaces to stand things on that lie above this one, metres in the world.
@@ -179,10 +180,10 @@ fn said() -> f64 {
     1.0
 }
 
-/// Where another surface is.
+/// The outline and height of another surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Level {
-    /// How far above, metres.
+    /// The height above, metres.
     pub above_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
@@ -222,7 +223,8 @@ impl Surface {
 
     /// Tells what lies on a board above, or is the board itself, of a height above the surface: it does not stand on this one.
     pub(crate) fn overhung(&self) -> impl Fn(f64, &Point3<f64>) -> bool + use<> {
-        /// How thick a board is with what hides its edge, and how far beyond its hull things on it reach, metres. From: chosen.
+        /// Thickness of a board with the things that hide its edge, and distance that things on the board
+        /// reach beyond its hull, metres. From: chosen.
         const BOARD_M: f64 = 0.05;
         const MARGIN_M: f64 = 0.03;
         let boards: Vec<(f64, Outline)> =
@@ -274,11 +276,11 @@ const THINGS_M: (f64, f64) = (0.025, 0.35);
 /// Surfaces that share so much of the lesser one, seen from above, are in two places. From: chosen.
 const COMMON: f64 = 0.2;
 
-/// So many returns of things, so far within the outline, metres, are no accident. From: chosen, a board that a cupboard stands against is
-/// laid 2 cm aside with 4 mm less.
+/// Fewest returns of things, at least `WITHIN_M` within the outline, metres, that are no accident.
+/// From: chosen, a board that a cupboard stands against is laid 2 cm aside with 4 mm less.
 const THINGS: usize = 20;
 const WITHIN_M: f64 = 0.02;
-/// What is seven of ten or more is most of it: the first number of the second. From: chosen.
+/// Fraction that counts as most: the first number of the second, seven of ten. From: chosen.
 const MOST: (usize, usize) = (7, 10);
 
 /// Finds the surface to stand things on: the best of [`find_surfaces`] that is as wanted.
@@ -454,7 +456,7 @@ impl Region {
     }
 }
 
-/// How much speaks for a surface among others like it: something on it doubles the claim of its returns.
+/// The claim of a surface among others like it: something on the surface doubles the claim of its returns.
 fn claim(surface: &Surface, samples: &[Sample]) -> f64 {
     let hull = surface.outline();
     let is_on = |s: &&Sample| {

@@ -5,16 +5,16 @@ use crate::cloud::Cloud;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// What a camera saw from one pose.
+/// The view of a camera from one pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
     /// When, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
-    /// What, in the camera's optical frame (x right, y down, z forward), metres.
+    /// The cloud in the camera's optical frame (x right, y down, z forward), metres.
     pub cloud: Cloud,
     /// The camera, if known: lets later steps tell free space from space that was not seen.
     pub intrinsics: Option<Intrinsics>,
-    /// Where the camera stood, as localisation says.
+    /// The pose of the camera as stated by localisation.
     pub world_from_camera: Isometry3<f64>,
     /// Standard deviation of that position along each axis, metres.
     pub pose_sigma_m: f64,

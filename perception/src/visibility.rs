@@ -1,4 +1,4 @@
-//! What the cameras could see: free, surface, hidden or never looked at.
+//! Visibility of places to the cameras: free, surface, hidden or never looked at.
 //!
 //! A recogniser may only count something as absent (a handle, a lid) where a camera looked *through* the place.
 
@@ -10,7 +10,7 @@ use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// What one camera, or the best of several, knows of a place.
+/// The state of a place in one camera's view, or in the best of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
     /// No camera had it in view, or the pixel gave no return.
@@ -86,7 +86,8 @@ impl DepthMap {
         Point3::from(self.camera_from_world.inverse().translation.vector)
     }
 
-    /// What this camera knows of a point of the world. `tolerance_m` is how near to the measured surface still counts as surface.
+    /// The state of a point of the world in this camera's view. A point within `tolerance_m` of the measured
+    /// surface counts as surface.
     ///
     /// Free needs every return in the 3×3 pixels around to lie beyond the point: a depth edge is no proof.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
@@ -181,14 +182,14 @@ impl Gaze<'_> {
 }
 
 impl Visibility {
-    /// What the views saw from the poses they state; views without a camera or grid are left out.
+    /// The visibility of the views from the poses they state; views without a camera or grid are left out.
     pub fn from_views(views: &[View]) -> Visibility {
         let map = |v: &View| DepthMap::from_view(v, &v.world_from_camera);
         Visibility { maps: views.iter().filter_map(map).collect(), held: true }
     }
 
-    /// What a bare cloud (world frame) lets one say if it was seen from `viewpoints`: it is projected onto a virtual camera at each. How a
-    /// camera was held there is not known.
+    /// The visibility of a bare cloud (world frame) that was seen from `viewpoints`: the cloud is projected
+    /// onto a virtual camera at each. How a camera was held there is not known.
     pub fn from_viewpoints(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Visibility {
         Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect(), held: false }
     }

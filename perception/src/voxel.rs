@@ -9,7 +9,7 @@ pub enum VoxelError {
     /// The edge is no positive length.
     #[error("a voxel edge of {edge_m} m: give a positive length, such as 0.01")]
     Edge {
-        /// What was asked for.
+        /// The value that was given.
         edge_m: f32,
     },
     /// A point lies outside of the two million voxels that an axis can count.
@@ -18,7 +18,7 @@ pub enum VoxelError {
          are these millimetres (scale by 0.001), or a stray return?"
     )]
     TooFar {
-        /// Which point.
+        /// The index of the point.
         index: usize,
         /// Its farthest coordinate.
         distance_m: f32,
@@ -83,12 +83,12 @@ pub fn downsample(cloud: &Cloud, edge_m: f32) -> Result<Cloud, VoxelError> {
 /// The voxel of a point that has none.
 pub const NONE: u32 = u32::MAX;
 
-/// Which voxel each point lies in.
+/// The voxel of each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assigned {
     /// Per point the number of its voxel, counted in order of first occurrence; [`NONE`] for points without a return.
     pub voxel: Vec<u32>,
-    /// How many voxels there are.
+    /// The number of voxels.
     pub voxels: usize,
 }
 

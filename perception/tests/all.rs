@@ -1,4 +1,5 @@
-//! What perception promises, from outside: one program, so that what all tests share is built and linked once.
+//! Tests of the public interface of perception: one program, so that what all tests share is built and linked
+//! once.
 
 mod boxes;
 mod composed;

@@ -22,7 +22,7 @@ fn known_box([width_m, depth_m, height_m]: [f64; 3]) -> ObjectModel {
     }
 }
 
-/// What a view from so far takes a box for that stands alone, turned: the probability that it is a known one.
+/// The probability that a view from a distance takes a turned box, standing alone, for a known one.
 fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad: f64, away_m: f64) -> f64 {
     let half = [0.5 * width_m, 0.5 * depth_m];
     let thing = Thing::Block { x: 0.05, y: 0.02, half, height: height_m, turn_rad };
@@ -34,7 +34,7 @@ fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad
     found[0].probability_of("box")
 }
 
-/// Of a low box most of what is seen is its top: that says nothing against its sides.
+/// Most of the visible part of a low box is its top, which says nothing against its sides.
 #[test]
 fn a_known_box_is_known_however_low() {
     for size_m in [[0.12, 0.08, 0.16], [0.25, 0.18, 0.06], [0.18, 0.11, 0.045]] {

@@ -55,7 +55,7 @@ fn cup_at(base: f64) -> Thing {
     Thing::Raised { x: 0.052, y: 0.016, radius: 0.035, height: 0.104, base }
 }
 
-/// What several views of some things are taken for.
+/// The percepts of several views of some things.
 fn percepts(things: &[Thing], views: usize, seed: u64) -> Vec<Percept> {
     let mut draws = Draws(seed);
     let views: Vec<_> = (0..views)

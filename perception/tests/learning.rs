@@ -305,7 +305,7 @@ fn a_model_grows_over_looks_without_the_table() {
     }
 }
 
-/// What some directions show of a body that stands somewhere, as a model; and where it stands.
+/// The model of a body seen from some directions, and the pose of the body.
 fn met(name: &str, place: Isometry3<f64>, turns_rad: &[f64], seed: u64) -> (Cloud, Isometry3<f64>) {
     let room = room(&[(name, place)]);
     let foot = Point3::from(place.translation.vector);

@@ -1,4 +1,4 @@
-//! How many pieces things on a table are seen in, from one view.
+//! Number of pieces that things on a table are seen in, from one view.
 
 use crate::tabletop::{Draws, Thing, look, on_ring};
 use descry_perception::Visibility;

@@ -237,7 +237,8 @@ fn views_that_lie_beside_each_other_show_one_thing_with_its_handle() {
     }
 }
 
-/// What is recognised in views of a cup, each from an angle, laid so far beside its place, and with the cup gone or there.
+/// The percepts of views of a cup, each from an angle, displaced by an offset, and with the cup gone or
+/// there.
 fn cup_in(views: &[(f64, [f64; 2], bool)]) -> Vec<Percept> {
     let mut draws = Draws(5);
     let look_from = |&(angle, [x, y], there): &(f64, [f64; 2], bool)| {
@@ -337,7 +338,7 @@ fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder_however_it_is_turned() {
     check_cartons(1);
 }
 
-/// Of 24 turns of cartons every so manieth.
+/// Checks every `every`th of 24 turns of cartons.
 fn check_cartons(every: usize) {
     let exactly = |x: f64| Range { low: x, high: x };
     let cylinder = ObjectModel {
@@ -389,7 +390,7 @@ fn what_stands_level_with_a_box_is_parted_from_it_whatever_the_noise() {
     check_beside_a_box(8, 28);
 }
 
-/// Of so many draws of each of five cases at least so many go well.
+/// Checks that at least `least` of `draws` draws go well, in each of five cases.
 fn check_beside_a_box(draws: u64, least: usize) {
     // The side of the box that faces -y lies at y = 0.07; what is beside it has a side there, too.
     let carton = |gap_m: f64| Thing::Block {

@@ -47,7 +47,7 @@ fn root_mean_square(values: impl Iterator<Item = f64> + Clone) -> f64 {
     (values.clone().map(|v| v * v).sum::<f64>() / values.count() as f64).sqrt()
 }
 
-/// How far the turns of steps are off, root mean square, radians.
+/// The error of the turns of steps, root mean square, radians.
 fn turns_off_rad(stations: &[Station], matcher: Matcher) -> f64 {
     let truths = &drive().truths;
     let off: Vec<f64> = (1..stations.len())
@@ -246,7 +246,8 @@ fn a_survey_is_saved_loaded_and_extended() {
     assert_eq!(Cells::new(0.0).unwrap_err(), CellsError::Edge { edge_m: 0.0 });
 }
 
-/// What comes out where there are not two orientations: (corners, walls found at least, whether most are square to each other).
+/// The results where there are not two orientations: (corners, walls found at least, whether most are square
+/// to each other).
 #[test]
 fn rooms_that_are_not_square() {
     let ring = |n: usize, r: f64| -> Vec<Point2<f64>> {
@@ -385,7 +386,8 @@ fn a_few_outlooks_show_what_can_be_seen() {
     }));
 }
 
-/// What a station shows of what was seen before says where it stands; where it shows nothing of it, the body is believed.
+/// A station is located by the part of the survey that it shows; where it shows none, the believed pose is
+/// kept.
 #[test]
 fn a_station_is_located_in_a_survey() {
     let Drive { stations, truths, .. } = drive();
@@ -406,7 +408,7 @@ fn a_station_is_located_in_a_survey() {
     assert!(seen().locate(&stations[0], &nowhere, &rectify).is_err());
 }
 
-/// What cannot be used is told, and nothing of it gets into a map.
+/// Unusable options and poses are reported, and do not affect a map.
 #[test]
 fn bad_options_and_poses_are_told() {
     let stations = &drive().stations[..2];

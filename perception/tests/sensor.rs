@@ -1,4 +1,4 @@
-//! What a few views of a table tell of the camera that took them.
+//! Sensor noise from a few views of a table.
 
 use crate::tabletop::device::{Device, KINECT};
 use crate::tabletop::{Draws, Thing, on_ring};

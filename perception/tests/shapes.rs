@@ -227,7 +227,8 @@ fn what_is_known_is_named_and_what_is_not_is_not() {
     check(instance(2, 3), &twice, &both);
 }
 
-/// What is two centimetres wider or narrower than a known thing may be it, as far as the laser tells, and is not named.
+/// A thing two centimetres wider or narrower than a known one may be the known one, as far as the laser
+/// tells, and is not named.
 #[test]
 fn what_is_like_a_known_thing_is_not_named() {
     let map = map_of_the_lab(&mut Draws(EXPERIMENT));

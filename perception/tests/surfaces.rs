@@ -62,7 +62,7 @@ fn pose(eye: [f64; 3], target: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(eye.coords), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
-/// What a camera sees; a share of the pixels that hit the floor shows what is mirrored in it.
+/// The view of a camera; a share of the pixels that hit the floor shows mirror images.
 fn look(room: &[Block], world_from_camera: Isometry3<f64>, mirrored: f64, draws: &mut Draws) -> View {
     let eye = Point3::from(world_from_camera.translation.vector);
     let depth = |u: f64, v: f64| {
@@ -113,7 +113,7 @@ impl Looks<'_> {
 
 const AROUND: [[f64; 3]; 3] = [[1.9, -0.9, 1.35], [-1.7, -1.2, 1.3], [0.2, -2.2, 1.4]];
 
-/// What the best surface is expected to be.
+/// The expected best surface.
 #[derive(Debug)]
 enum Best {
     Table { height_m: f64, above_floor: bool },
@@ -179,7 +179,7 @@ fn the_floor_is_never_a_table() {
     assert_eq!((told.role, told.because), (Role::Support, Sign::Asked));
 }
 
-/// How many things apart from each other: a sparse one may come in pieces.
+/// The number of things apart from each other: a sparse one may come in pieces.
 fn things(scene: &Scene) -> usize {
     let mut apart: Vec<Point3<f64>> = Vec::new();
     for segment in &scene.segments {

@@ -1,4 +1,4 @@
-//! What is seen does not depend on how it is told: in rows or as bare points, in any frame and order.
+//! Invariance of perception to the form of its input: in rows or as bare points, in any frame and order.
 
 use crate::tabletop::{Draws, Thing, look, on_ring};
 use descry_perception::cloud::is_finite;

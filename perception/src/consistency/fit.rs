@@ -14,7 +14,7 @@ const EDGES: f64 = 40.0;
 const HEIGHTS: f64 = 6.0;
 /// Distances from an edge beyond which more distance tells no more, metres. From: chosen.
 const GROSS_M: f64 = 0.10;
-/// How far beside the outline what is level may be another surface, metres. From: chosen.
+/// Distance beside the outline from which level points may belong to another surface, metres. From: chosen.
 const OTHER_M: f64 = 0.4;
 /// Surfaces of the map whose heights differ by less are level with each other, metres. From: chosen.
 const LEVEL_M: f64 = 0.05;

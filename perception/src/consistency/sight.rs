@@ -1,4 +1,4 @@
-//! What one look shows of a level surface: rays that met it, and rays that went past it.
+//! The view of a level surface from one look: rays that met the surface, and rays that went past it.
 
 use super::MapSurface;
 use crate::camera::Intrinsics;
@@ -9,13 +9,15 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 /// Rays of a look that are asked. From: chosen.
 const ASKED: usize = 1200;
-/// How far from the stated height the surface is looked for, metres. From: derived, depth 10 % off at 1.2 m, and a little.
+/// Maximum distance from the stated height at which the surface is looked for, metres. From: derived, depth
+/// 10 % off at 1.2 m, and a little.
 const BAND_M: f64 = 0.15;
-/// How far beside the outline points of the surface may lie, metres. From: chosen.
+/// Maximum distance beside the outline at which points of the surface may lie, metres. From: chosen.
 const BESIDE_M: f64 = 0.4;
-/// How near to the fitted plane its points lie, pass by pass, metres. From: chosen.
+/// Maximum distance of the plane's points from the fitted plane, pass by pass, metres. From: chosen.
 const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
-/// What lies so far below the plane was seen past the surface, metres. From: chosen, thicker than a board is rough.
+/// Depth below the plane from which a return was seen past the surface, metres. From: chosen, thicker than a
+/// board is rough.
 const PAST_M: f64 = 0.04;
 /// Fewest points that tell a plane. From: chosen.
 const FEWEST: usize = 40;
@@ -30,7 +32,7 @@ pub(super) struct Ray {
     pub met: bool,
 }
 
-/// What one look shows of a surface.
+/// The view of a surface from one look.
 #[derive(Clone, Debug)]
 pub(super) struct Sight {
     pub rays: Vec<Ray>,

@@ -8,7 +8,7 @@ use header::{Encoding as Stored, Field, Header};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 
-/// How [`write()`] stores the points.
+/// The encoding in which [`write()`] stores the points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Text, one point a line.

@@ -4,7 +4,7 @@ use super::{FileError, Loaded, Place, finish, is_padding};
 use crate::cloud::Cloud;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// How [`write()`] stores the vertices.
+/// The encoding in which [`write()`] stores the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// Text, one vertex a line.
@@ -123,7 +123,7 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     finish(cloud, Isometry3::identity(), notes, Place::Line(element.line))
 }
 
-/// Where reading stands.
+/// The reading position.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,

@@ -1,6 +1,6 @@
 //! The downhill simplex method (Nelder and Mead 1965) with coefficients that suit many dimensions (Gao and Han 2012).
 
-/// Where the simplex ended.
+/// The end point of the simplex search.
 pub struct Found {
     /// The best place.
     pub at: Vec<f64>,

@@ -96,8 +96,8 @@ pub struct Visit {
 
 /// Half the side of a square that a point of the static structure covers when it is looked at, in voxels.
 const COVER: f64 = 0.75;
-/// What is looked through by so many times what is tolerated is so by far: two measurements of one surface are not, nor if the camera errs by
-/// twice as much as is known of it.
+/// Multiple of the tolerance from which a point is looked through by far: two measurements of one surface are
+/// not, nor if the camera errs by twice as much as is known of it.
 const FAR: f64 = 2.5;
 /// A camera may be turned by so many times as much as localisation errs by.
 const TURNED: f64 = 2.0;
@@ -146,8 +146,8 @@ impl MetaRoom {
     /// of a wall behind the room, which the camera measures to decimetres, two looks are two clouds that fit each other anywhere, and so many of its
     /// points outvote those that are known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        /// What is seen is thinned by pixels: points of a grid of voxels are drawn onto those of another grid, and centimetres off the truth where only
-        /// edges hold what is seen along a plane.
+        /// Pixel stride that thins the seen points: points of a grid of voxels are drawn onto those of
+        /// another grid, and centimetres off the truth where only edges hold what is seen along a plane.
         const EVERY: usize = 6;
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;

@@ -1,4 +1,5 @@
-//! Where a camera saw a surface end: between two neighbouring rays, one that met it and one that went past it.
+//! Ends of a surface in a camera's view: between two neighbouring rays, one that met it and one that went
+//! past it.
 //!
 //! Noise of depth moves a point along its ray. Where the ray meets the plane of the surface is free of it.
 
@@ -12,9 +13,9 @@ const ON_M: f64 = 0.012;
 const BELOW_M: f64 = 0.004;
 /// Points below this are something else, seen past the surface.
 const PAST_M: f64 = 0.02;
-/// How far beside the hull of what was seen of it the surface may go on.
+/// Maximum distance beyond the hull of the seen surface at which the surface may go on.
 const HULL_MARGIN_M: f64 = 0.04;
-/// Of this many pixels to either side of an end [`CERTAIN`] agree: single pixels are noise.
+/// Number of pixels to either side of an end, of which [`CERTAIN`] must agree: single pixels are noise.
 const AROUND: usize = 4;
 const CERTAIN: usize = 3;
 /// A surface reaches so far back from its end, metres: where something upright goes through its plane, less is near that.
@@ -24,15 +25,15 @@ const SIDE: usize = 2;
 /// A surface ends within so many pixels of the last that shows it: an edge loses one or two. What else is lost there lies behind, in the
 /// shadow of the projector.
 const LOST: usize = 3;
-/// Where nothing returns for so far behind the last point on it, nothing is there, metres.
+/// Distance without a return behind the surface's last point from which nothing is there, metres.
 const NOTHING_M: f64 = 0.09;
 
-/// Where a surface ends on a line of pixels.
+/// The end of a surface on a line of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ending {
-    /// Where the last ray meets the surface, world, metres.
+    /// The point where the last ray meets the surface, world frame, metres.
     pub on: Point3<f64>,
-    /// Where the first ray that went past it goes through its plane.
+    /// The point where the first ray past the surface crosses the surface's plane.
     pub past: Point3<f64>,
     /// The middle of what was seen of the side of a board between them.
     pub side: Option<Point3<f64>>,
@@ -47,16 +48,16 @@ pub fn endings(visibility: &Visibility, surface: &Surface) -> Vec<Ending> {
     visibility.maps.iter().flat_map(|map| Rays::of(map, surface).endings()).filter(is_near).collect()
 }
 
-/// What a pixel shows.
+/// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
     /// No return.
     Nothing,
     /// The surface.
     On,
-    /// What is just below its plane.
+    /// A return just below the surface's plane.
     Low,
-    /// What lies behind its plane.
+    /// A return from behind the surface's plane.
     Past,
     /// Anything else.
     Other,
@@ -67,7 +68,7 @@ struct Rays<'a> {
     map: &'a DepthMap,
     world_from_camera: nalgebra::Isometry3<f64>,
     up: Vector3<f64>,
-    /// How high above the plane the camera is.
+    /// The height of the camera above the plane, metres.
     eye_m: f64,
     shown: Vec<Shown>,
 }
@@ -105,7 +106,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Where the ray of a pixel goes through the plane, world; none if it rises.
+    /// The point where the ray of a pixel crosses the plane, world frame; none if the ray rises.
     fn through(&self, pixel: usize) -> Option<Point3<f64>> {
         let ray = self.ray(pixel);
         let fall = self.up.dot(&ray);
@@ -163,7 +164,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Whether the last pixels show the surface for as far as [`DEEP_M`].
+    /// True if the last pixels show the surface for as far as [`DEEP_M`].
     fn is_deep(&self, line: &[usize]) -> bool {
         let Some(end) = line.last().and_then(|&pixel| self.through(pixel)) else { return false };
         let is_far = |&&pixel: &&usize| self.through(pixel).is_none_or(|p| (p - end).norm() > DEEP_M);
@@ -173,7 +174,7 @@ impl<'a> Rays<'a> {
         near.is_some_and(|near| AROUND * on(near) >= CERTAIN * near)
     }
 
-    /// Whether some pixels of a line up to its end show nothing, for long enough.
+    /// True if the pixels of a line up to its end show nothing, over a long enough gap.
     fn is_nothing(&self, gap: &[usize]) -> bool {
         let ends =
             || Some((self.through(*gap.first()?)?, gap.iter().rev().find_map(|&pixel| self.through(pixel))?));

@@ -32,7 +32,7 @@ impl Grid {
     }
 }
 
-/// Where a brick lies, in bricks: by axis, 20 bits each.
+/// The position of a brick, in bricks: 20 bits per axis.
 type Place = u64;
 /// Bits of a place along an axis. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
@@ -54,9 +54,9 @@ pub(super) struct Bricks<C> {
     /// Those of columns are there, and `empty`, before they are occupied.
     pub cells: Vec<C>,
     empty: C,
-    /// How many cells are occupied.
+    /// The number of occupied cells.
     pub occupied: usize,
-    /// Which voxels of each brick were asked for.
+    /// The voxels of each brick that were asked for.
     pub touched: Vec<Mask>,
     /// Bricks that were asked for of late, by the last bits of their place.
     recent: [(Place, u32); RECENT * RECENT * RECENT],
@@ -259,7 +259,8 @@ impl<C: Copy> Bricks<C> {
     }
 }
 
-/// Which of three bricks along an axis holds a voxel of the wide brick, and where.
+/// The index of the brick, of three along an axis, that holds a voxel of the wide brick, and the voxel's
+/// index in that brick.
 #[inline(always)]
 fn in_brick(wide: usize) -> (usize, usize) {
     (wide.div_ceil(SIDE), (wide + SIDE - 1) % SIDE)

@@ -1,4 +1,4 @@
-//! Which views belong together, and which contradict the others.
+//! Consistency of views: groups of views that belong together, and views that contradict the others.
 
 use super::joint::Found;
 use super::parts::Part;
@@ -9,7 +9,8 @@ use nalgebra::Isometry3;
 
 /// Fewest matched points for a view to count as overlapping. From: chosen.
 const FEWEST_MATCHED: usize = 80;
-/// How far a surface may lie from where another camera looked through before it contradicts, metres ... From: chosen.
+/// Maximum distance between a surface and a place that another camera looked through before the two
+/// contradict, metres ... From: chosen.
 pub(super) const CLEAR_M: f64 = 0.03;
 /// ... and in spreads of both measurements: far off, depth is vague.
 /// From: chosen, so that five views of a room with poses 5 cm and 3° off come back together.
@@ -50,7 +51,8 @@ pub(super) fn misfit(
     })
 }
 
-/// Whether a further view, so loose, belongs with those that are used as they lie: itself among them.
+/// Tests whether a further view of a given looseness belongs with the used views as they lie, itself
+/// included.
 pub(super) fn belongs(
     (view, loose, used): (usize, f64, &[bool]),
     views: &[Prepared],
@@ -85,7 +87,8 @@ fn contradicted(
     sum / f64::from(n.max(1))
 }
 
-/// How far beyond belief the camera was moved, with words.
+/// The correction of a camera pose as a multiple of the largest plausible one, with words; `None` if
+/// plausible.
 fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, String)> {
     /// Localisation errs by more than it states now and then, and 10 cm and 6° must be mended: so many spreads are believed, and so much,
     /// metres and radians, in any case. From: chosen.

@@ -35,26 +35,28 @@ const TOGETHER: usize = 2;
 const FEW: usize = 6;
 /// Up to so many views the earlier ones may move once a further one is laid on them. From: chosen, fewer false names at twice the assumed noise.
 const MOVABLE: usize = 4;
-/// What a further view moves the earlier ones by among each other, metres, from which they are gathered anew.
-/// From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and four views, as with none.
+/// Least motion of the earlier views among each other by a further view from which they are gathered anew,
+/// metres. From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and
+/// four views, as with none.
 const MOVED_M: f64 = 0.001;
 
 /// Merges the views of one place again and again, as they become more.
 #[derive(Default)]
 pub struct Merger {
     kept: Kept,
-    /// What is done ahead of the next look.
+    /// The computation that is done ahead of the next view.
     ahead: Option<JoinHandle<Kept>>,
 }
 
-/// What is known of the views that were merged last.
+/// The state of the views that were merged last.
 #[derive(Default)]
 struct Kept {
     options: Option<MergeOptions>,
     digests: Vec<u64>,
     prepared: Vec<Prepared>,
     maps: Vec<Option<DepthMap>>,
-    /// What a further view is laid on; none if the views are to be merged together for that.
+    /// The base on which a further view is aligned; none if the views are to be merged together for a new
+    /// base.
     base: Option<Base>,
 }
 
@@ -64,7 +66,7 @@ struct Base {
     aligned: Aligned,
     seen: Visibility,
     gathered: Vec<Gathered>,
-    /// What was gathered of each view, if they are so few that they may still move.
+    /// The returns gathered from each view, while the views are few enough that they may still move.
     looked: Option<Vec<Arc<Looked>>>,
     fits: Vec<ViewFit>,
     steps: Vec<Step>,
@@ -110,7 +112,7 @@ impl Merger {
         self.kept();
     }
 
-    /// What is known, once all of it is.
+    /// The kept state, after waiting for the computation that is done ahead.
     fn kept(&mut self) -> &mut Kept {
         if let Some(ahead) = self.ahead.take() {
             self.kept = ahead.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -151,7 +153,7 @@ impl Kept {
         }
     }
 
-    /// What is known of each view by itself: of those that were here before it is kept.
+    /// Prepares each view; views that were already prepared are kept.
     fn prepare(&mut self, views: &[View], options: &MergeOptions) {
         let digests = pool::map(views, 1, digest);
         let kept = self.prepared.drain(..).zip(self.maps.drain(..));
@@ -170,7 +172,7 @@ impl Kept {
         self.digests = digests;
     }
 
-    /// What a view after the first ones, which were prepared, is laid on, from what is kept.
+    /// The base on which a view after the first prepared ones is aligned, from the kept state.
     fn base_of(&mut self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
         let anew = together(views.len());
         let is_begun = |base: &Base| {
@@ -253,7 +255,8 @@ impl Kept {
     }
 }
 
-/// Where the views belong once a further one is laid on the others, with what that found, and what its points belong to.
+/// The poses of the views after a further one is aligned with the others, with what the alignment found and
+/// the parts of the new view's points.
 struct Laid {
     poses: Vec<Isometry3<f64>>,
     found: Vec<Found>,
@@ -266,15 +269,15 @@ impl Base {
     }
 }
 
-/// How many of the first views of so many are merged together: few, or with half as many more each time.
+/// The number of first views that are merged together: few, or half as many more each time.
 fn together(views: usize) -> usize {
     let more = std::iter::successors(Some(FEW), |n| Some((3 * n).div_ceil(2)));
     more.take_while(|n| *n <= views).last().unwrap_or(views)
 }
 
 impl Aligned {
-    /// Where the last of the views belongs, its first alignment as asked: if the others stay, or all together if they are few. `None` if that
-    /// contradicts them.
+    /// Aligns the last of the views, its first alignment as asked: alone if the others stay, or all together
+    /// if they are few. `None` if that contradicts them.
     fn lay_further(&self, prepared: &[Prepared], maps: &[Option<DepthMap>], first: &Round) -> Option<Laid> {
         let last = prepared.len() - 1;
         let view = &prepared[last];
@@ -318,7 +321,8 @@ impl Aligned {
         Some(Laid { poses, found, parts: parts.pop()? })
     }
 
-    /// How far what stands on the surface in a view lies from where it lay among the views but the last, metres: that of the view that moved most.
+    /// The displacement of the objects of a view since the alignment without the last view, metres: the
+    /// maximum over the views.
     fn moved_m(&self, prepared: &[Prepared], poses: &[Isometry3<f64>]) -> f64 {
         let last = poses.len() - 1;
         let moved = |i: usize| poses[i] * self.poses[i].inverse();

@@ -16,7 +16,7 @@ use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// What is known of a voxel: running sums, weighted, while it is gathered; then means.
+/// The state of a voxel: running weighted sums while it is gathered; then means.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
     pub weight: f32,
@@ -166,7 +166,7 @@ pub(super) fn gather_further(
     true
 }
 
-/// What is fused of a view, and from where.
+/// The fused returns of a view, and their pose.
 struct Taken<'a> {
     number: u16,
     looked: Arc<Looked>,

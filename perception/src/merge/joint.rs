@@ -13,7 +13,7 @@ use nalgebra::{
     Vector6,
 };
 
-/// How one round of alignment looks for partners.
+/// The parameters of one round of alignment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Round {
     /// Partners lie within this, metres, at the first pass ...
@@ -28,7 +28,7 @@ pub(super) struct Round {
     pub rest_weight: f32,
 }
 
-/// What a round found of one view.
+/// The result of a round for one view.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     pub matched: usize,
@@ -48,7 +48,7 @@ struct Link {
 
 /// Spread that all partners have at least: they are seldom the same place, metres. From: derived, as far as forms differ.
 const LEAST_SIGMA_M: f32 = SHAPE_M as f32;
-/// So many views, the nearest, hold one where it belongs. From: chosen.
+/// Number of nearest views that hold a view in its place. From: chosen.
 pub(super) const PARTNERS: usize = 5;
 /// Smallest cosine between the normals of partners. From: chosen, about 41°.
 const SAME_SIDE: f32 = 0.75;
@@ -132,13 +132,13 @@ impl Askers {
     }
 }
 
-/// What one view asks of another in the passes of a round.
+/// The matches of one view with another in the passes of a round.
 struct Asked {
     from: usize,
     to: usize,
     /// Points of the first view with their weights.
     points: Vec<(Surfel, f32)>,
-    /// What is known of the partner of each.
+    /// The state of each point's partner.
     partners: Vec<Partner>,
 }
 
@@ -158,7 +158,7 @@ impl Asked {
 
 /// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
 fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
-    /// So many views and more are not all matched with all. From: chosen.
+    /// Number of views from which not all pairs of views are matched. From: chosen.
     const ALL_BELOW: usize = 7;
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && !views[i].points.is_empty()).collect();
     let mut pairs = Vec::new();
@@ -183,7 +183,8 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
 
 /// Partners of the points that one view asks for in the other, and what they ask of both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
-    /// What is missed by half of the radius, or by two spreads, has a quarter of its say: their squares. From: chosen.
+    /// Squared distances (half of the radius, and two spreads) at which a match has a quarter of its weight.
+    /// From: chosen.
     const HALF_SQ: f32 = 0.25;
     const SPREADS_SQ: f32 = 4.0;
     let (i, j) = (asked.from, asked.to);
@@ -312,7 +313,7 @@ fn step(
     most
 }
 
-/// What moves views that lie as they do among each other onto the robust average of where localisation had them.
+/// The transform that moves views, fixed among each other, onto the robust average of their localised poses.
 pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Isometry3<f64> {
     /// Gauss-Newton steps: the first all but ends it. From: chosen.
     const PASSES: usize = 4;

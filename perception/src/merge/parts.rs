@@ -23,13 +23,13 @@ pub(super) const PLANE_FACING: f64 = 0.8;
 /// Fewest points of what stands on the surface in a view, or else off the planes, that tell where it belongs. From: chosen.
 pub(super) const FEWEST: usize = 60;
 
-/// What a point of a view belongs to.
+/// The part of the scene that a point of a view belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// A dominant plane.
     Plane,
-    /// What stands on the surface that was measured best. These decide: they are what is looked at, and near. In a view that shows none
-    /// of it all that is off the planes.
+    /// An object on the surface that was measured best. These points decide the alignment: they are near and
+    /// are what is looked at. In a view that shows none of them, all points off the planes.
     Standing,
     /// Other things: farther off as a rule, where depth cameras bend the world.
     Around,
@@ -38,10 +38,10 @@ pub(super) enum Part {
 /// A dominant plane: `normal · p = offset_m`.
 pub(super) type Plane = (Vector3<f64>, f64);
 
-/// What the points of all views belong to.
+/// The parts of the points of all views.
 #[derive(Debug)]
 pub(super) struct Parts {
-    /// By view and point.
+    /// The part, by view and point.
     pub of: Vec<Vec<Part>>,
     /// The dominant planes, world frame.
     pub planes: Vec<Plane>,
@@ -51,7 +51,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    /// What the points of a further view belong to.
+    /// The parts of the points of a further view.
     pub fn of_view(&self, view: &Prepared, pose: &Isometry3<f64>) -> Vec<Part> {
         let seen: Vec<PlaneOfView> = self.planes.iter().map(|plane| PlaneOfView::of(plane, pose)).collect();
         let on_plane = |k: usize| seen.iter().any(|plane| plane.holds(view, k));

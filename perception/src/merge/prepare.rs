@@ -24,9 +24,10 @@ pub(super) struct Prepared {
     pub points: Vec<Surfel>,
     /// The points as a search tree; none, and no points, if there are more than it can hold.
     pub tree: Option<Neighbours>,
-    /// What is to be merged of an organised cloud, coarser, with normals in the camera frame.
+    /// The points of an organised cloud to be merged, at a coarser resolution, with normals in the camera
+    /// frame.
     pub coarse: Option<Cloud>,
-    /// Where localisation has the camera.
+    /// The localised pose of the camera.
     pub prior: Isometry3<f64>,
     /// Spread of that position, metres.
     pub sigma_m: f64,
@@ -55,7 +56,7 @@ impl Surfel {
     }
 }
 
-/// What of a camera's returns is merged, told in its own frame.
+/// The bounds of the returns that are merged, in the camera frame.
 pub(super) struct Within {
     /// Height is this along the point, and between these, metres.
     up: Vector3<f32>,
@@ -106,7 +107,8 @@ impl Within {
 
 /// Filters and thins one view. A view without usable points gives an empty one.
 pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
-    /// What localisation does not state: a few centimetres and degrees. From: chosen, as for the paper's robot.
+    /// Localisation error where none is stated: a few centimetres and degrees. From: chosen, as for the
+    /// paper's robot.
     const SIGMA_M: f64 = 0.03;
     const SIGMA_RAD: f64 = 0.035;
     /// Beyond the height band, spreads of localisation and a distance, metres. From: chosen.
@@ -159,7 +161,7 @@ fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
     cloud.select(&firsts)
 }
 
-/// What is to be merged of a cloud, thinned, with normals from the nearest points.
+/// The points of a cloud to be merged, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
     /// Points that a normal is taken from. From: chosen.
     const NEAREST: usize = 15;

@@ -1,4 +1,4 @@
-//! Which returns of a view are fused, how they face, and which of them lie on a level plane.
+//! Selection of the returns of a view that are fused, their normals, and the level planes that they lie on.
 
 use super::MergeOptions;
 use super::parts::{self, Plane};
@@ -32,7 +32,7 @@ const ROW: usize = 512;
 /// Pixels that are judged together. From: work.
 const LANES: usize = 16;
 
-/// What a return is instead of the number of the plane that it lies on: not fused, or off the planes. From: mark.
+/// Mark of a return in place of the number of its plane: not fused, or off the planes. From: mark.
 const DROPPED: u32 = u32::MAX;
 const THING: u32 = u32::MAX - 1;
 
@@ -48,7 +48,7 @@ pub(super) struct Return {
     pub pixel: u32,
 }
 
-/// What of a view is fused: of some rows after others, those off the planes, then those on each.
+/// The returns of a view that are fused, by groups of rows: those off the planes, then those on each plane.
 pub(super) struct Looked(Vec<Vec<Vec<Return>>>);
 
 impl Looked {
@@ -121,7 +121,7 @@ struct Facing<'a> {
 }
 
 impl<'a> Facing<'a> {
-    /// Of a copy of the view's cloud, every nth row and column.
+    /// The normals from a copy of the view's cloud with every nth row and column.
     fn of(view: &View, copy: Option<Grid>, normals: Cow<'a, [Vector3<f32>]>) -> Facing<'a> {
         let width = view.cloud.grid.map_or(ROW, |g| g.width).max(1);
         let size = copy.map_or(width, |g| g.width).max(1);
@@ -208,7 +208,8 @@ impl<'a> Returns<'a> {
         }
     }
 
-    /// What some pixels in the middle one of three rows, that of the number, are; `None` if none of them is fused.
+    /// The block of some pixels in the middle of three rows, given by the row's number; `None` if none of the
+    /// pixels is fused.
     fn block(&self, lines: &[Line; 3], row: usize, column: usize) -> Option<Block> {
         let [x, y, z] = [0, 1, 2].map(|axis| some(&lines[1].0[axis], column + 1));
         let mut block = Block { at: [*x, *y, *z], weight: [0.0; LANES], on: [DROPPED; LANES] };
@@ -251,7 +252,7 @@ impl<'a> Returns<'a> {
         Some(block)
     }
 
-    /// Which planes some pixels may lie on.
+    /// The planes that some pixels may lie on.
     fn around(&self, row: usize, column: usize) -> [u32; LANES] {
         let mut around = [THING; LANES];
         for (on, column) in around.iter_mut().zip(&self.coarse.columns[column..]) {
@@ -302,7 +303,7 @@ fn sigma_m(depth: f32, range_sq: f32) -> f32 {
     frontal_sigma_m(if depth_sq > half_sq { depth_sq } else { half_sq }.sqrt())
 }
 
-/// What each point of the coarser copy lies on.
+/// The plane that each point of the coarser copy lies on.
 fn lying_on(cloud: &Cloud, normals: &[Vector3<f32>], within: &Within, planes: &[InCamera]) -> Vec<u32> {
     let on = |(p, normal): (&Point3<f32>, &Vector3<f32>)| {
         let at = [p.x, p.y, p.z];

@@ -24,10 +24,12 @@ pub(super) const SURE_SHARE: f64 = 0.25;
 /// From: chosen, so that of 40 pairs of views from opposite sides none is left out, in place of 16.
 pub(super) const PERHAPS_SHARE: f64 = 0.0;
 
-/// What a correction at the edge of the window (three spreads of localisation) costs, as a share of the points. From: chosen.
+/// Cost of a correction at the edge of the window (three spreads of localisation), as a share of the points.
+/// From: chosen.
 const PRIOR: f64 = 0.15;
 
-/// What a point in a cell of a surface that faces its way is worth, and what one beside such a cell is: units of the score. From: chosen.
+/// Score of a point in a cell of a surface that faces the same way, and of a point beside such a cell, units
+/// of the score. From: chosen.
 const HIT: u8 = 20;
 const BESIDE: u8 = 7;
 
@@ -127,14 +129,14 @@ impl Cells {
     }
 }
 
-/// How far off a view may be along the table and about the vertical.
+/// The maximum error of a view along the table and about the vertical.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     pub shift_m: f64,
     pub turn_rad: f64,
 }
 
-/// Where a view falls best.
+/// The best placement of a view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     /// World from world.
@@ -165,7 +167,7 @@ fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Ori
 struct Levelled {
     /// At most about `TRIED` of the view's points.
     tried: Vec<Oriented>,
-    /// What is near enough to be fallen onto.
+    /// The points near enough to be matched.
     placed: Vec<Oriented>,
     middle: Vector3<f64>,
 }

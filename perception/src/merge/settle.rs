@@ -15,7 +15,7 @@ use nalgebra::{Point3, Vector3};
 use std::iter::Peekable;
 use std::slice::Iter;
 
-/// How far along its normal a voxel may be moved by its neighbours, in spreads of its own. From: chosen.
+/// Maximum shift of a voxel along its normal by its neighbours, in spreads of its own. From: chosen.
 const TUBE_SPREADS: f32 = 2.5;
 /// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
 /// From: chosen, the sensor at .3 to 1.4 m has .0012 to .0031.
@@ -40,12 +40,12 @@ struct Settled {
     anew: bool,
 }
 
-/// What was settled of voxels or columns: what no view has touched since stays as it is.
+/// The settled state of voxels or columns: cells that no view has touched since stay as they are.
 #[derive(Default)]
 pub(super) struct Before {
-    /// Of the voxels; none of columns.
+    /// Means of the voxels; empty for columns.
     means: Vec<Cell>,
-    /// What is settled of some bricks in a row, cell by cell.
+    /// The settled cells of some bricks in a row, cell by cell.
     rows: Vec<Vec<Settled>>,
     /// Views that it was held against.
     gazes: usize,
@@ -71,7 +71,7 @@ pub(super) fn fused(all: &[Gathered]) -> Fused {
     }
 }
 
-/// What is asked of all that is settled, row by row.
+/// Collects a value of every settled cell, row by row.
 fn of_all<T: Zeroable + Send>(rows: &[&[Settled]], of: impl Fn(&Settled) -> T + Sync) -> Vec<T> {
     let mut all = bytemuck::zeroed_vec(rows.iter().map(|row| row.len()).sum());
     let mut rest = &mut all[..];
@@ -176,7 +176,7 @@ impl Gathered {
     }
 }
 
-/// What was settled of a cell before, the cells before it taken already.
+/// The earlier settled state of a cell, after those of the cells before it were taken.
 fn stays(before: &mut Peekable<Iter<Settled>>, cell: usize) -> Option<Settled> {
     before.next_if(|settled| settled.cell as usize == cell).map(|settled| Settled { anew: false, ..*settled })
 }

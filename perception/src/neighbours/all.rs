@@ -4,7 +4,7 @@ use super::nearby::Nearby;
 use super::{Bounds, LEAF, Neighbours, Span};
 use crate::pool;
 
-/// What one walk needs; kept between leaves.
+/// The buffers of one walk; kept between leaves.
 #[derive(Default)]
 struct Scratch {
     open: Vec<Span>,

@@ -152,7 +152,7 @@ impl Nearby {
         self.len = kept;
     }
 
-    /// By distance, equals by slot.
+    /// Sorts by distance; equal distances by slot.
     #[cold]
     fn sort(&mut self, k: usize) {
         self.order.clear();

@@ -13,7 +13,8 @@ pub(crate) const CELL_PX: usize = 8;
 const BLOCKS: usize = 24;
 /// A block counts if this share of its pixels lies on the face. From: chosen.
 const COVERED: f64 = 0.8;
-/// What lies this near to the face may be of it, as a share of the depth, metres a metre. From: chosen.
+/// Maximum distance from the face of a return that may belong to it, as a share of the depth, metres a metre.
+/// From: chosen.
 const NEAR_SHARE: f64 = 0.012;
 /// A block is so far within the face, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
@@ -29,7 +30,7 @@ const LEAST: f64 = 0.2;
 /// Numbers that a plane takes. From: derived, two slopes and a height.
 const PLANE: f64 = 3.0;
 
-/// How far the returns of views lie from the level faces that they show.
+/// The residuals of views' returns from the level faces that they show.
 #[derive(Clone, Debug, Default)]
 pub struct Residuals {
     blocks: Vec<Block>,
@@ -92,7 +93,7 @@ impl Residuals {
     }
 }
 
-/// Whether a pixel shows a place of the surface, camera frame.
+/// True if a pixel shows a place of the surface, camera frame.
 fn is_on(
     map: &DepthMap,
     outline: &Outline,
@@ -147,7 +148,8 @@ fn line(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>>
     normal.cholesky().map(|c| c.solve(&right))
 }
 
-/// How many returns of a cell err by themselves: the variance of one over that of the mean of a cell.
+/// The number of independent errors among the returns of a cell: the variance of one return over that of the
+/// mean of a cell.
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
     /// Cells of a block. From: derived, its side has so many.
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);

@@ -5,7 +5,7 @@ use crate::cloud::{Cloud, Grid};
 use crate::pool;
 use nalgebra::{Point3, Vector3};
 
-/// How far to look around a pixel.
+/// The size of the neighbourhood of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrganisedOptions {
     /// Pixels to each side: 2 looks at 5 x 5.
@@ -78,7 +78,7 @@ struct Image {
     reach: usize,
 }
 
-/// Which coordinates each product is of: xx xy xz yy yz zz.
+/// The coordinates of each product: xx xy xz yy yz zz.
 const FACTORS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// Sums over the windows of some pixels beside each other, about the pixels themselves.

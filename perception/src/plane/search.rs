@@ -10,7 +10,8 @@ use nalgebra::{Point3, Vector3};
 const FIRST: usize = 1024;
 /// Points scored between two looks at whether the best can still be reached.
 const BLOCK: usize = 4096;
-/// How many standard deviations below the best a first score may lie and still be looked at in full: one in 30,000 would be lost.
+/// Number of standard deviations below the best within which a first score is still evaluated in full: one in
+/// 30,000 would be lost.
 const DEVIATIONS: f64 = 4.0;
 /// Rounds of least squares and collecting anew.
 const REFITS: usize = 3;

@@ -1,4 +1,4 @@
-//! What the cameras know of places around one body, each camera as it lies there.
+//! Visibility of the places around one body, per camera, each camera aligned with the body.
 
 use crate::round::Round;
 use crate::scale::APART_M;
@@ -8,14 +8,14 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 
 /// Cosine of the angle within which cameras see the same side of a thing. From: chosen.
 const SAME_SIDE: f64 = 0.9;
-/// Of so many of a body's points the cameras are asked whether it stands where they have it. From: chosen.
+/// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;
 /// A camera that looks through this share of what others see of a body, of what it has in view, is placed wrongly there.
 /// From: chosen.
 const ASTRAY: f64 = 0.5;
 
-/// How far from where a camera measured a place may be and still be what it saw, if only whether it has a body in view is asked, metres.
-/// From: chosen.
+/// Maximum distance of a place from a measured surface to count as seen, where only whether a body is in view
+/// is asked, metres. From: chosen.
 pub(super) const IN_VIEW_M: f64 = 0.06;
 
 /// A place above the surface, asked of the cameras.

@@ -22,7 +22,7 @@ pub struct Frustum {
 /// An upright box; metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
-    /// What its sides are told from, surface frame.
+    /// The centre of the body, from which its sides are measured, surface frame.
     pub x: f64,
     pub y: f64,
     /// Sine and cosine of the angle by which it is turned.
@@ -39,7 +39,7 @@ pub struct Ray {
     pub along: [f64; 3],
 }
 
-/// What a ray can meet.
+/// A body that a ray can meet.
 pub trait Body {
     /// The least depth at which a ray meets it, infinite if it passes by, metres.
     fn depth_m(&self, ray: &Ray) -> f64;
@@ -128,7 +128,7 @@ impl Cuboid {
         longer
     }
 
-    /// How long the side with an end is, metres.
+    /// The length of the side with this end, metres.
     pub fn length_m(&self, end: usize) -> f64 {
         self.high[end / 2] - self.low[end / 2]
     }

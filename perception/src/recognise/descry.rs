@@ -31,13 +31,14 @@ use serde::{Deserialize, Serialize};
 pub struct Descry {
     /// Probability before looking that an object on a table is one of the models. From: chosen.
     pub known: f64,
-    /// How many things made like a known object but for one feature (a handle, a lid, flat sides, a taper) there are for each of it:
-    /// what has not been seen of that feature stays in doubt. From: fitted, with the chance of standing upside down, on
-    /// 100 simulated arrangements: Brier score .0090, and .0098 with 1.5 and .03; no other values were compared.
+    /// The number of things that differ from a known object in one feature (a handle, a lid, flat sides, a
+    /// taper), for each such object: a feature that was not seen stays in doubt. From: fitted, with the
+    /// chance of standing upside down, on 100 simulated arrangements: Brier score .0090, and .0098 with 1.5
+    /// and .03; no other values were compared.
     pub look_alikes: f64,
     /// Probability that a known object stands upside down. From: fitted, with the look-alikes.
     pub upside_down: f64,
-    /// How probable it is that a round thing lies on its side, for each that stands; closed ones do five times as often.
+    /// The odds that a round thing lies on its side rather than stands; closed ones do five times as often.
     /// From: chosen, as upside down.
     pub lying: f64,
     /// Least probability with which a percept carries a model's name. From: chosen, likelier than not.
@@ -75,8 +76,8 @@ struct Family {
     width: (f64, f64),
 }
 
-/// What stands on tables besides the known objects: a census guess that only sets how sceptical we start.
-/// From: chosen, a guess; nothing was counted.
+/// Families of things on tables besides the known objects: a census guess that only sets how sceptical we
+/// start. From: chosen, a guess; nothing was counted.
 const FAMILIES: [Family; 5] = [
     Family {
         share: 0.35,
@@ -188,7 +189,8 @@ impl Descry {
         explained.into_iter().flatten().collect()
     }
 
-    /// What a body with a neck is: its sizes are those of all of it, its form is that of what is below its shoulder.
+    /// Judges a body with a neck: its sizes are those of the whole body, its form is that of the part below
+    /// the shoulder.
     fn judge_necked(
         &self,
         setting: &Setting,
@@ -213,7 +215,7 @@ fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
     residuals.fit(&KINECT)
 }
 
-/// How probable each model is, and its likelier stance.
+/// The probability of each model, and its likelier stance.
 struct Weighed {
     probabilities: Vec<f64>,
     stances: Vec<Stance>,
@@ -221,10 +223,12 @@ struct Weighed {
 
 /// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
 const DOUBT: f64 = 0.1;
-/// What is left of a segment is a thing of its own if it has so many points. From: derived, the fewest of a segment.
+/// Fewest points from which the remainder of a segment is a thing of its own. From: derived, the fewest of a
+/// segment.
 const FEWEST_LEFT: usize = 60;
 
-/// How many times as often tins, jars, rolls and boxes lie on their side as what can spill. From: chosen.
+/// Factor by which tins, jars, rolls and boxes lie on their side more often than things that can spill.
+/// From: chosen.
 const CLOSED_LIES: f64 = 5.0;
 
 impl Descry {
@@ -280,8 +284,8 @@ impl Descry {
         percept(setting.scene, segment, measured, models, named, stances, probabilities, unknown)
     }
 
-    /// How probable each model is, and how it stands; `against` is the log of what else speaks against each as it stands, and as it lies
-    /// either way.
+    /// Returns the probability of each model and its stance; `against` is the log of the further evidence
+    /// against each as it stands, and as it lies either way.
     fn weigh(
         &self,
         models: &[ObjectModel],
@@ -373,9 +377,11 @@ impl Descry {
     /// The things made like a model but for one feature; sizes are like the model's within a tenth. Those with a lid are so many times as
     /// many.
     fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured, lids: f64) -> f64 {
-        /// How alike: by so much of a size, or of a taper, things made like a known one differ. From: chosen.
+        /// Similarity: share of a size, or of a taper, by which things made like a known one differ.
+        /// From: chosen.
         const ALIKE: f64 = 0.1;
-        /// What a range is wider than its standard deviation by. From: derived, the root of 12, as of any uniform distribution.
+        /// Ratio of the width of a range to its standard deviation. From: derived, the root of 12, as of any
+        /// uniform distribution.
         const UNIFORM: f64 = 3.46;
         /// Shares of things alike: with a handle, with a lid, with flat sides, of another taper, of other sides. From: chosen, a guess.
         const HANDLED: f64 = 0.5;

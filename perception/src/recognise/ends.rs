@@ -1,4 +1,4 @@
-//! Where a thing ends, and whether that was seen: its top, and the sides of its footprint.
+//! Ends of a thing, seen or unseen: its top, and the sides of its footprint.
 
 use super::asker::Asker;
 use super::body::{Body, Cuboid};
@@ -24,7 +24,7 @@ pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool
     !asker.views.is_empty() && 2 * hidden > places.len()
 }
 
-/// How likely each length of one side of a box makes what the cameras saw, against the likeliest.
+/// The likelihood of each length of one side of a box given the views, relative to the likeliest length.
 #[derive(Clone, Debug)]
 pub struct Side {
     /// The least of the lengths that were tried, [`EDGE_M`] apart, metres, and the log of each.
@@ -43,7 +43,8 @@ impl Side {
         self.logs.iter().enumerate().map(|(n, log)| (self.least_m + EDGE_M * n as f64, *log))
     }
 
-    /// How likely a length is: ends are known no better than an edge, and beyond the longest that was tried nothing more is told.
+    /// The likelihood of a length: ends are known no better than an edge, and beyond the longest that was
+    /// tried nothing more is told.
     pub fn likelihood(&self, length_m: f64) -> f64 {
         let near = |(tried_m, log): (f64, f64)| log - 0.5 * ((length_m - tried_m) / EDGE_M).powi(2);
         let beyond = self.logs.last().copied().filter(|_| length_m > self.longest_m());
@@ -81,13 +82,13 @@ impl Side {
 
 /// Lengths are summed up in such steps, metres. From: work.
 const STEP_M: f64 = 0.5 * EDGE_M;
-/// Where an end lies is beyond doubt by this log. From: chosen.
+/// Log from which the position of an end is beyond doubt. From: chosen.
 const SURE: f64 = 40.0;
 /// Steps by which the sides of a box and its turn are sought, one after the other, metres and radians, and how often each at the most.
 /// From: work, a turn moves the ends of what is 15 cm long by as much.
 const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
 const TRIES: usize = 8;
-/// How often views are moved to where the box suits them, and it to where it suits them. From: work.
+/// Number of rounds in which the views are aligned with the box, and the box with the views. From: work.
 const ROUNDS: usize = 2;
 
 /// A box, and where it suits each view.
@@ -134,7 +135,8 @@ impl Boxed<'_> {
         }
     }
 
-    /// How long the side may be that has these ends: each length by the likelier end, with the views where they suit it best.
+    /// The likelihoods of the lengths of the side between two ends: each length by the likelier end, with the
+    /// views where they suit the side best.
     fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
         let length_m = self.body.length_m(ends[0]);
         let log = |placed: &[Placed]| placed.iter().map(|view| view.log).sum::<f64>();
@@ -162,13 +164,14 @@ impl Boxed<'_> {
         Side { least_m, logs }
     }
 
-    /// Where another box suits each view best, from near where this one does.
+    /// The best placement of another box in each view, starting near the placement of this box.
     fn suited(&self, body: &Cuboid, from: &[Placed]) -> Vec<Placed> {
         pool::each(self.rays.views.len(), 1, |n| placed(&self.rays.views[n], body, from[n].shift_m, MERGED))
     }
 }
 
-/// How long both sides of a box may be by what rays met around it, up to a length, if it stands about where one of two rectangles lies.
+/// The likelihoods of the lengths of both sides of a box from the rays around it, up to `longest_m`, if the
+/// box stands about where one of two rectangles lies.
 pub fn sides(rays: &Rays, about: [&Rectangle; 2], heights_m: (f64, f64), longest_m: f64) -> [Side; 2] {
     let [mut one, other] = about.map(|rectangle| Boxed::of(rays, rectangle, heights_m));
     if other.log > one.log {

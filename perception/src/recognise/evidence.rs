@@ -25,7 +25,8 @@ const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
 /// foot of a far side is often hidden by the near one. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
-/// Where a handle could hide in no more than this share of the directions there is none. From: chosen.
+/// Maximum share of directions in which a handle could be hidden for a body to count as having none.
+/// From: chosen.
 pub(super) const UNSEEN: f64 = 0.08;
 /// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
 const ROOT: f64 = 0.35;
@@ -51,21 +52,22 @@ const MOST_GROUPS: f64 = 60.0;
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub evidence: Evidence,
-    /// How thick the surface is in the same cloud, metres: noise and what merging left.
+    /// The thickness of the surface in the same cloud, metres: noise and the remaining error of merging.
     pub blur_m: f64,
     pub round: Option<Round>,
     pub rectangle: Option<Rectangle>,
-    /// How far the side is off the best round body about an axis that lies, of what stands, and about one that stands, of what lies;
-    /// infinite if there is none, metres.
+    /// The residual of the side from the best round body of the other stance (about a horizontal axis for a
+    /// standing thing, about a vertical axis for a lying one), metres; infinite if there is none.
     pub rival_m: f64,
     /// Height above what it stands on, metres.
     pub height_m: f64,
     pub height_sigma_m: f64,
     /// True if something in front may hide its true top.
     pub top_hidden: bool,
-    /// What bounds it seen from above, surface frame.
+    /// The bounding rectangle seen from above, surface frame.
     pub footprint: Rectangle,
-    /// How long its sides may be, were it a box; only of what may be one that is asked about.
+    /// The likelihoods of the lengths of its sides, were the thing a box; only if it may be a box that is
+    /// asked about.
     pub sides: Option<[Side; 2]>,
     /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
     pub looked_through: f64,
@@ -75,18 +77,18 @@ pub(super) struct Measured {
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
-    /// What rays tell of the upper end.
+    /// The evidence of rays on the upper end.
     pub upper: Upper,
 }
 
 impl Measured {
-    /// How far merged views of one surface lie apart, metres: nothing is measured more sharply.
+    /// The distance between merged views of one surface, metres: no measurement is more exact.
     pub fn apart_m(&self) -> f64 {
         if self.evidence.views > 1 { self.blur_m } else { 0.0 }
     }
 }
 
-/// What was measured, and the pixels around the thing.
+/// The measures of a thing, and the pixels around it.
 pub(super) struct Looked {
     pub measured: Measured,
     pub rays: Rays,
@@ -98,7 +100,7 @@ pub(super) struct Setting<'a> {
     pub sensor: Sensor,
     /// The sides of the boxes that are asked about, heights too.
     box_sides_m: Vec<Range>,
-    /// Of each segment.
+    /// The reach of each segment.
     reaches: Vec<Reach>,
 }
 
@@ -108,12 +110,13 @@ impl<'a> Setting<'a> {
         Setting { scene, sensor, box_sides_m, reaches: scene.segments.iter().map(Reach::of).collect() }
     }
 
-    /// How long a thing may be to be a box that is asked about, or be told from one by its length; none if it is too high or too low,
-    /// metres.
+    /// The maximum length of a thing that may be a box that is asked about, or is told from one by its
+    /// length, metres; none if the thing is too high or too low.
     fn longest_box_m(&self, m: &Measured) -> Option<f64> {
-        /// What may be so many times as long as a known box is told from it. From: chosen.
+        /// Multiple of a known box's length up to which lengths are tried to tell a thing from that box.
+        /// From: chosen.
         const LONGER: f64 = 1.3;
-        /// So many spreads of a height are beyond doubt. From: chosen.
+        /// Number of spreads of a height from which a difference is beyond doubt. From: chosen.
         const SURE: f64 = 6.0;
         let out_m = SURE * m.height_sigma_m;
         let may_be = |range: &&Range| {
@@ -155,7 +158,7 @@ fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, sett
     rays_around(([x, y], half_m, PIXELS), segment, own, asker, setting)
 }
 
-/// So many of the pixels of each view around a thing that reaches so far from a place.
+/// The rays around a thing of a given half width at a place, at most `pixels` of each view.
 pub(super) fn rays_around(
     ([x, y], half_m, pixels): ([f64; 2], f64, f64),
     segment: &Segment,
@@ -179,7 +182,7 @@ pub(super) fn rays_around(
     Rays::of(asker, sensor, &around, own, others.flat_map(|(other, _)| &other.points))
 }
 
-/// How far from what a camera measured a place may be and still be what it saw, metres.
+/// The maximum distance of a place from a measured surface to count as that surface, metres.
 pub(super) fn tolerance_m(sigma_m: f64) -> f64 {
     (SPREADS * sigma_m).clamp(PLACE_M, APART_M)
 }
@@ -259,7 +262,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
 /// Heights at which silhouettes are looked at, as shares of the body's height. From: chosen.
 const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 
-/// Where the outline of the body, seen from each camera, ends against free space: left and right, at three heights.
+/// The ends of the body's outline in each view against free space: left and right, at three heights.
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
     /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres. From: chosen.
     const LOST_M: f64 = 0.001;
@@ -311,7 +314,7 @@ fn measure_round(
     (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
-    /// What the sides count for in what was seen of a body; the top has the rest. From: chosen.
+    /// Weight of the sides in the share of a body that was seen; the top has the rest. From: chosen.
     const SIDES: f64 = 0.75;
     let height = top - base_m;
     let evidence = &mut measured.evidence;
@@ -366,7 +369,7 @@ fn measure_round(
     }
 }
 
-/// What is known around the body, direction by direction.
+/// The visibility around the body, direction by direction.
 struct Sectors {
     measured: [bool; SECTORS],
     looked_through: [bool; SECTORS],
@@ -450,7 +453,7 @@ fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
 /// The largest thing that sticks out of the body in one direction.
 pub(super) struct Protrusion {
     pub reach_m: f64,
-    /// Where it sticks out to: sine and cosine.
+    /// The direction of the protrusion: sine and cosine.
     direction: (f64, f64),
     width_m: f64,
     points: usize,
@@ -523,13 +526,14 @@ impl Protrusion {
         })
     }
 
-    /// Whether a point lies where it sticks out.
+    /// True if a point lies in the protrusion.
     fn has(&self, round: &Round, p: &Point3<f64>) -> bool {
         let (along, across) = along_and_across(round, p, self.direction);
         round.outside_m(p) > PLACE_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
-    /// Whether it is a handle, and not what is left of misaligned views of a side that spreads so much about its form, metres.
+    /// True if the protrusion is a handle, and not the trace of misaligned views of a side whose spread about
+    /// its form is `spread_m`, metres.
     fn is_handle(&self, spread_m: f64) -> bool {
         self.points >= self.least
             && (HANDLE_M.0.max(SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)

@@ -1,4 +1,4 @@
-//! How likely what was measured is of sizes, a form, an upper end and a handle.
+//! Likelihood of the measures given sizes, a form, an upper end and a handle.
 
 use super::ends::Side;
 use super::evidence::Measured;
@@ -19,13 +19,13 @@ pub(super) fn inside(value: f64, sigma: f64, r: Range) -> f64 {
     normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
 }
 
-/// How often a measurement goes wrong altogether: flat tails.
-/// From: chosen, a tenth of it was tried, and with it a real mug that narrows was no mug.
+/// Chance that a measurement is an outlier: flat tails. From: chosen, a tenth of it was tried, and with it a
+/// real mug that narrows was no mug.
 const ASTRAY: f64 = 0.002;
 
 /// Density of a measure under a range: a uniform, blurred by the measurement.
 fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
-    /// Of the spread of a measurement: a range that is no wider is a single value. From: chosen.
+    /// Width below which a range is a single value, as a share of the measurement's spread. From: chosen.
     const NARROW: f64 = 0.2;
     let width = r.high - r.low;
     if width > NARROW * sigma {
@@ -52,7 +52,7 @@ pub(super) const HEIGHTS: (f64, f64) = (0.11, 0.6);
 pub(super) const WIDTHS: (f64, f64) = (0.10, 0.6);
 /// The same of their tapers, which have no unit. From: chosen, a guess; nothing was measured.
 const TAPERS: (f64, f64) = (0.95, 0.25);
-/// What is left of the error of a taper however well the side is measured. From: chosen.
+/// Least error of a taper, however well the side is measured. From: chosen.
 const RATIO_SIGMA: f64 = 0.05;
 
 pub(super) fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
@@ -87,7 +87,7 @@ pub(super) fn round_log(range: Option<Range>, m: &Measured) -> f64 {
 }
 
 pub(super) fn diameter_sigma_m(m: &Measured) -> f64 {
-    /// What is left of the error however good the camera, metres. From: chosen.
+    /// Least error, however good the camera, metres. From: chosen.
     const LEAST_M: f64 = 0.003;
     (2.0 * m.evidence.radius_sigma_m).hypot(LEAST_M)
 }
@@ -107,7 +107,7 @@ pub(super) fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
 
 /// The taper and its standard deviation.
 fn taper(m: &Measured) -> (f64, f64) {
-    /// Of what no circle fits. From: chosen.
+    /// Taper and its spread where no circle fits. From: chosen.
     const UNKNOWN: (f64, f64) = (1.0, 0.2);
     let Some(round) = m.round else { return UNKNOWN };
     let sigma = m.height_m * round.slope_sigma / round.radius_m.max(EDGE_M);
@@ -151,7 +151,7 @@ pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
     )
 }
 
-/// What the likelihood of a length is divided by to be a density as of a measurement, metres.
+/// Divisor that turns the likelihood of a length into a density like that of a measurement, metres.
 /// From: derived, the integral of one whose spread is that of an edge.
 const SIDE_UNIT_M: f64 = EDGE_M * BELL;
 
@@ -165,8 +165,8 @@ fn both_sides_log(m: &Measured, [one, other]: [impl Fn(&Side) -> f64; 2]) -> f64
 /// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell. From: chosen.
 const LEAST_FORM: f64 = -12.0;
 
-/// How well the side keeps to the form, against the form it keeps to best, and whether it is there at all. `None` is a form that is
-/// neither round nor a box.
+/// The log likelihood of a form of the side, relative to the best form, with the evidence that the side is
+/// there at all. `None` is a form that is neither round nor a box.
 pub(super) fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     /// Log by which each share of the side that was looked through, beyond what may be an accident, speaks against it. From: chosen.
     const THROUGH: (f64, f64) = (-60.0, 0.15);
@@ -220,14 +220,15 @@ pub(super) fn top_log(top: Top, m: &Measured) -> f64 {
 }
 
 pub(super) fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    /// What sticks out no farther than the first is what views that lie beside each other leave of a side; as far as the second it is a
-    /// handle, metres. From: chosen, the first is the least reach of a handle.
+    /// Reaches of a protrusion, metres: up to the first it may be the trace of misaligned views of a side;
+    /// from the second it is a handle. From: chosen, the first is the least reach of a handle.
     const REACHES_M: (f64, f64) = (HANDLE_M.0, 0.022);
-    /// How often a handle in view is missed and found, and one out of view is found all the same. From: chosen.
+    /// Chances that a handle in view is missed and found, and that one out of view is found all the same.
+    /// From: chosen.
     const MISSED: f64 = 0.04;
     const FOUND: f64 = 0.9;
     const STRAY: f64 = 0.02;
-    /// How often none is found where there is none, and one is. From: chosen.
+    /// Chances that no handle is found where there is none, and that one is. From: chosen.
     const NEITHER: (f64, f64) = (0.99, 0.01);
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
     let sure = match m.evidence.handle {

@@ -85,7 +85,7 @@ pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: 
     Some(Necked { body, height_m, taper: foot_radius_m / neck_m, pieces, whole })
 }
 
-/// How far a body reaches from an axis between two heights; none where too little of it is seen.
+/// The radius of a body about an axis between two heights, metres; none where too little of the body is seen.
 fn radius_m(of: &Segment, axis: &Round, between_m: std::ops::Range<f64>) -> Option<f64> {
     /// Fewest points. From: chosen.
     const FEWEST: usize = 8;

@@ -1,9 +1,9 @@
-//! What recognition gives: percepts with their evidence. No identity: that begins in memory.
+//! Results of recognition: percepts with their evidence. No identity: that begins in memory.
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// How the object stands.
+/// The stance of the object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stance {
@@ -13,12 +13,12 @@ pub enum Stance {
     UpsideDown,
     /// Its axis lies in the plane of the surface.
     Lying,
-    /// What was seen does not tell.
+    /// The views do not tell.
     #[default]
     Unknown,
 }
 
-/// Whether something is there, and whether one could have seen it.
+/// The sighting of a feature: seen, absent, or not looked for everywhere it could be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sighting {
@@ -31,7 +31,7 @@ pub enum Sighting {
     Unseen,
 }
 
-/// What speaks for and against each model. Fractions are between 0 and 1.
+/// The evidence for and against each model. Fractions are between 0 and 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Radius of the best upright round body at its widest, metres; 0 if none was fitted.
@@ -58,9 +58,9 @@ pub struct Evidence {
     pub handle: Sighting,
     /// Share of the directions in which a handle could still hide.
     pub handle_unseen: f64,
-    /// How far the protrusion reaches out of the body, metres.
+    /// The reach of the protrusion out of the body, metres.
     pub protrusion_m: f64,
-    /// How many views looked at the object.
+    /// The number of views that looked at the object.
     pub views: usize,
 }
 
@@ -78,19 +78,19 @@ pub struct Percept {
     pub kinds: Vec<(String, f64)>,
     /// Probability that it is none of the models.
     pub unknown: f64,
-    /// Where it stands: world frame, metres, the centre of its body's footprint on what it stands on.
+    /// The position of the object, world frame, metres: the centre of its body's footprint on its support.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate of the position within the cloud, metres (errors of localisation not included).
     pub position_sigma_m: f64,
     /// Longer and shorter side of its footprint, height; metres, what the plane cut off added again.
     pub size_m: [f64; 3],
-    /// How it stands.
+    /// The stance of the object.
     pub stance: Stance,
     /// Points of the cloud that belong to it.
     pub points: usize,
     /// Share of its visible hull (sides and top) that some view saw or looked past.
     pub seen_fraction: f64,
-    /// What speaks for and against.
+    /// The evidence for and against each model.
     pub evidence: Evidence,
     /// Those points: indices into the cloud that was segmented.
     #[serde(skip)]

@@ -1,4 +1,4 @@
-//! How likely a body makes the depths that cameras measured around it.
+//! Likelihood of the depths that cameras measured around a body, given the body.
 //!
 //! Each pixel met the body, something nearer, what lies behind it, or nothing that is there; a body is as likely as all pixels together
 //! make it, against there being none. Neighbouring pixels err together, so that each counts for a part of a look only, and no view says
@@ -29,8 +29,8 @@ pub(super) const BAD_VIEW: f64 = 0.05;
 /// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
 /// in common. From: chosen.
 const MOST_LOOKS: f64 = 2.3;
-/// Where rays wander to, in spreads across them: columns and rows. From: derived, three
-/// directions that balance each other.
+/// Offsets of a wandering ray, in spreads across the ray: columns and rows. From: derived, three directions
+/// that balance each other.
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 
 /// The pixels of all views that may tell of one body.
@@ -41,7 +41,7 @@ pub struct Rays {
 /// The pixels of one view.
 pub struct ViewRays {
     pub from: [f64; 3],
-    /// What is added to where a ray goes that wanders by the noise across it, to either side and up.
+    /// Offsets added to a ray that wanders by the noise across it, to either side and up.
     pub wander: [[f64; 3]; 3],
     pub pixels: Vec<Pixel>,
     /// Looks that each of them counts for.
@@ -61,11 +61,11 @@ pub struct Pixel {
     pub other: bool,
 }
 
-/// What stands around the body that is asked about.
+/// The region around the body that is asked about.
 pub struct Around {
     pub x: f64,
     pub y: f64,
-    /// How far pixels tell of it.
+    /// The radius around the body within which pixels are used, metres.
     pub reach_m: f64,
     pub base_m: f64,
     pub top_m: f64,
@@ -174,8 +174,8 @@ impl ViewRays {
         self.looks * log_product(ratios) - 0.5 * (shared_m / EDGE_M).powi(2)
     }
 
-    /// How much likelier a pixel's depth is where it meets a body at a depth than without the body. What speaks against it may
-    /// have passed by the body's edge.
+    /// The likelihood ratio of a pixel's depth with a body met at a depth against no body. A ray that speaks
+    /// against the body may have passed by its edge.
     #[inline(always)]
     fn ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
         let mut with = pixel.with_body(at_m + shared_m);
@@ -216,7 +216,7 @@ impl Pixel {
     pub fn with_body(&self, at_m: f64) -> f64 {
         /// Chance of a return that has to do with nothing there. From: derived, the sensor's.
         const STRAY: f64 = KINECT.stray;
-        /// How far off it may be, metres. From: chosen.
+        /// Range of the error of a stray depth, metres. From: chosen.
         const RANGE_M: f64 = 5.0;
         let off_m = self.depth_m - at_m;
         let nearer = if off_m < 0.0 { NEARER / ANYWHERE_M } else { 0.0 };
@@ -232,7 +232,7 @@ pub(super) const BELL: f64 = 2.506_628_274_631_000_2;
 
 #[inline(always)]
 pub fn normal(off: f64, sigma: f64) -> f64 {
-    /// So many spreads off there is nothing left. From: rounding.
+    /// Number of spreads beyond which the density is zero. From: rounding.
     const NONE: f64 = 6.0;
     let spreads = off / sigma;
     if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * BELL) }

@@ -21,11 +21,13 @@ const CIRCLE: f64 = 0.5;
 const RADII_M: f64 = EDGE_M;
 /// Circles of one segment that are followed up. From: work.
 const MOST: usize = 3;
-/// What surrounds a body is asked for so far out, metres. From: chosen, no nearer than an edge is known.
+/// Least and greatest distance from a body at which its surroundings are searched, metres. From: chosen, no
+/// nearer than an edge is known.
 const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
 /// Something may bear a body if it is seen around it in so many directions. From: chosen, a single view shows half of what is around a foot.
 const BEARS: usize = 9;
-/// That is as high as the highest level that is seen in this share of the most directions in which any is. From: chosen, nearly all.
+/// Share of the greatest number of directions in which any level is seen that a level must reach; the support
+/// is the highest such level. From: chosen, nearly all.
 const NEARLY: f64 = 0.8;
 /// Spread of the height that it is found to have, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
@@ -130,7 +132,8 @@ impl HeightMap {
 
     /// Cells beside which heights drop: column, row and height.
     fn edges(&self) -> Vec<(usize, usize, f64)> {
-        /// So many cells away. From: derived, an edge may lie on the border between two.
+        /// Number of cells to either side that are searched. From: derived, an edge may lie on the border
+        /// between two.
         const BESIDE: i64 = 2;
         let [width, height] = self.size;
         let at = |i: i64, j: i64| match (0..width as i64).contains(&i) && (0..height as i64).contains(&j) {
@@ -200,7 +203,8 @@ impl HeightMap {
 
 /// The cells that a circle goes through, from its middle.
 fn ring(radius_m: f64) -> Vec<(i32, i32)> {
-    /// So many cells from its middle a circle goes through a cell. From: derived, between half a side and half a diagonal.
+    /// Maximum distance of a cell's middle from a circle that goes through the cell, cells. From: derived,
+    /// between half a side and half a diagonal.
     const THROUGH: f64 = 0.6;
     let reach = floor(radius_m / CELL_M) + 1;
     let cells = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j)));
@@ -244,7 +248,8 @@ struct Bearing {
 
 impl Bearing {
     fn of<'s>(others: impl Iterator<Item = &'s Segment>, axis: &Round, foot_m: f64) -> Bearing {
-        /// How far off that height is. From: derived, an edge, and how far things differ from their forms.
+        /// Maximum distance of a level from the foot's height, metres. From: derived, an edge, and how far
+        /// things differ from their forms.
         const OFF_M: f64 = EDGE_M + SHAPE_M;
         let [mut around, mut level] = [[false; SECTORS]; 2];
         for p in others.flat_map(|other| &other.points).filter(|p| (p.z - foot_m).abs() < REACH_M) {

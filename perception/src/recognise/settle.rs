@@ -73,7 +73,7 @@ pub(super) fn settle<'a>(
     Some(Settled { segment, asker: Asker { views, ..asker.clone() }, round: settled })
 }
 
-/// What one view shows of the side.
+/// The part of the side that one view shows.
 struct Side {
     points: Vec<Point3<f64>>,
     /// Spread of a measurement, metres.
@@ -157,7 +157,8 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
 }
 
 impl Side {
-    /// Whether what is shown, moved back by a shift, is the side of a body, as smooth as the camera measures.
+    /// True if the points, moved back by a shift, lie on the side of a body, as smooth as the camera
+    /// measures.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
         /// Farther from the side than this, and than two spreads, a point is not asked whether it lies on it, metres.
         /// From: derived, the last of the gates.
@@ -176,7 +177,8 @@ struct Cells {
     /// The first cell of a rectangle of them, and how many it has along both axes.
     first: [i32; 2],
     sizes: [i32; 2],
-    /// Of each cell of the rectangle: whether points lie in it, and whether any lie in or beside it.
+    /// For each cell of the rectangle: true if points lie in the cell, and true if any lie in or beside the
+    /// cell.
     own: Vec<bool>,
     beside: Vec<bool>,
     low: Point3<f64>,
@@ -216,7 +218,7 @@ impl Cells {
         [p.x, p.y].map(|m| floor(m / PLACE_M))
     }
 
-    /// Where a point's cell is in the rectangle.
+    /// The index of a point's cell in the rectangle.
     fn place(&self, p: &Point3<f64>) -> Option<usize> {
         if !(p.x > self.low.x && p.x < self.high.x && p.y > self.low.y && p.y < self.high.y) {
             return None;
@@ -229,13 +231,13 @@ impl Cells {
         self.place(p).is_some_and(|place| self.own[place])
     }
 
-    /// Whether a point is in or beside the cells, no lower and no higher than the body.
+    /// True if a point is in or beside the cells, no lower and no higher than the body.
     fn reaches(&self, p: &Point3<f64>) -> bool {
         p.z > self.low.z && p.z < self.high.z && self.place(p).is_some_and(|place| self.beside[place])
     }
 }
 
-/// What a camera measured in or beside the cells of a body, surface frame.
+/// The points that a camera measured in or beside the cells of a body, surface frame.
 fn shown_of(view: &Lying<'_>, body: &Cells) -> Vec<Point3<f64>> {
     let mut shown = Vec::new();
     let Some([columns, rows]) = pixels_of(view.map, &view.surface_from_camera.inverse(), body) else {

@@ -23,7 +23,7 @@ use nalgebra::Point3;
 /// degrees. From: chosen.
 const FACING: f64 = 0.5;
 
-/// What was measured of a thing that may lie, with either end for its foot, and the pixels that are asked about each.
+/// The measures of a thing that may lie, with either end for its foot, and the pixels used for each.
 pub(super) struct Toppled {
     pub ways: [Way; 2],
     /// The pixels around it as it lies.
@@ -68,12 +68,12 @@ impl Toppled {
         Some(Toppled { ways, flat, base_m: segment.base_m })
     }
 
-    /// How far the side is off the round body that lies, metres.
+    /// The spread of the side about the lying round body, metres.
     pub fn spread_m(&self) -> f64 {
         self.ways[0].measured.evidence.round_residual_m
     }
 
-    /// What known models that lie are compared with, for each way.
+    /// The references that known models that lie are compared with, for each way.
     pub fn own(&self, measured: &Measured) -> [Own<'_>; 2] {
         let as_it_lies = Own::of(&self.flat, measured, self.base_m);
         self.ways.each_ref().map(|way| as_it_lies.turned(&way.rays, &way.measured, way.foot_m))
@@ -128,12 +128,12 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
         && is_near(m.footprint.sides_m[0], 0.5 * long_m.low, long_m.high + out_m)
 }
 
-/// Whether what lies has a handle.
+/// The handle of a lying thing, if any was seen.
 struct HandleSeen {
     sighting: Sighting,
     /// Share of the directions in which one could hide.
     unseen: f64,
-    /// How far it reaches out, metres.
+    /// The reach of the handle out of the body, metres.
     reach_m: f64,
 }
 
@@ -161,7 +161,8 @@ impl Found {
         HandleSeen { sighting, unseen, reach_m }
     }
 
-    /// What may be a handle says nothing against the roundness of what it is the handle of.
+    /// The spread of the side without a possible handle, which says nothing against the roundness of its
+    /// body, metres.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)

@@ -1,4 +1,4 @@
-//! What rays tell of a round body's upper end.
+//! Evidence of rays on a round body's upper end.
 
 use super::body::{Body, Frustum, Ray};
 use super::likelihood::log_sum;
@@ -10,7 +10,7 @@ use crate::scale::{EDGE_M, PLACE_M, SPREADS};
 /// Chance that a view says nothing of an upper end, whatever it seems to show. From: chosen.
 const BAD_VIEW: f64 = 0.002;
 
-/// What is known of the upper end.
+/// The evidence on the upper end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Upper {
     /// Log of how much likelier the views are if it is open.
@@ -30,7 +30,8 @@ impl Upper {
         /// Share of the rays into it that tell, and the density of what the others say. From: chosen.
         const TELL: f64 = 0.9;
         const REST: f64 = 0.02;
-        /// Of what is in an open body a ray meets the wall or floor with this chance, else something on the way there. From: chosen.
+        /// Chance that a ray into an open body meets its wall or floor, rather than something on the way
+        /// there. From: chosen.
         const EMPTY: f64 = 0.5;
         /// A lid lies so many spreads of a measurement below what is taken for the top, one as likely as the other: noise makes things
         /// higher. From: derived, the highest but one in a hundred lies two spreads above the middle.

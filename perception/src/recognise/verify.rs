@@ -1,4 +1,5 @@
-//! How much worse a known model explains what the cameras saw around a thing than the thing's own measures do.
+//! Verification of known models: the likelihood of the views around a thing given a model, relative to that
+//! given the thing's own measures.
 
 use super::body::{Body, Cuboid, Frustum};
 use super::evidence::Measured;
@@ -12,8 +13,8 @@ use crate::scale::{EDGE_M, PLACE_M};
 pub(super) const WALL_M: f64 = 0.003;
 /// Steps by which a body is moved to where it suits a view best, one after the other, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
-/// How far off views are that were laid on each other, and how often each step is tried at the most.
-/// From: derived, as exactly as an edge is known; work.
+/// Maximum error of views that were aligned with each other, metres, and maximum number of tries of each
+/// step. From: derived, as exactly as an edge is known; work.
 const LAID: (f64, usize) = (EDGE_M, 2);
 /// The same of views that lie as they were merged. From: derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
@@ -21,7 +22,8 @@ pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 /// No round body is narrower, metres of radius. From: rounding.
 const LEAST_M: f64 = 0.01;
 
-/// How well a body suits a view, and how far it was moved for that along both axes of the surface, metres.
+/// The log likelihood of a body in a view, and the shift of the body for it along both axes of the surface,
+/// metres.
 #[derive(Clone, Copy)]
 pub(super) struct Placed {
     pub log: f64,
@@ -29,11 +31,11 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Where it lies, of which nothing is known. From: mark.
+    /// Placement of a body without evidence: not moved. From: mark.
     pub const UNMOVED: Placed = Placed { log: 0.0, shift_m: [0.0; 2] };
 }
 
-/// What a known model is compared with: the best body of a thing's own measures.
+/// The reference that a known model is compared with: the best body of a thing's own measures.
 pub(super) struct Own<'a> {
     rays: &'a Rays,
     measured: &'a Measured,
@@ -111,7 +113,7 @@ fn wall_m(measured: &Measured) -> Option<f64> {
     (measured.upper.open_log > 0.0).then_some(WALL_M)
 }
 
-/// What a view says against a model, that may be a bad one; for it, it says what it says.
+/// The evidence of one view, bounded where it speaks against the model, since the view may be a bad one.
 fn against(log: f64) -> f64 {
     if log < 0.0 { bounded(log, BAD_VIEW) } else { log }
 }

@@ -56,7 +56,7 @@ pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) ->
     })
 }
 
-/// Where the rounds stand.
+/// The state of the iterations.
 struct Progress {
     pose: Isometry3<f64>,
     centre: Point3<f64>,

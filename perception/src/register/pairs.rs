@@ -61,10 +61,10 @@ impl Place {
     }
 }
 
-/// What is known of one source point's partner since its last search.
+/// The state of one source point's partner since its last search.
 #[derive(Clone, Copy)]
 pub(crate) struct Partner {
-    /// Where the point was when it was searched for.
+    /// The position of the point at its last search.
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
     slot: u32,

@@ -24,18 +24,19 @@ pub struct Side {
     len: usize,
 }
 
-/// What a step of a fit needs to know of the points near the side of a body.
+/// The sums over the points near the side of a body that a step of a fit needs.
 pub struct Sums {
-    /// Of the products of what the distance of a point from the side grows with as axis, radius and slope fall.
+    /// Sum of the products of the derivatives of a point's distance from the side by axis, radius and slope,
+    /// with the sign reversed.
     pub normal: Matrix4<f64>,
-    /// Of the same times the distance.
+    /// Sum of the same derivatives times the distance.
     pub right: Vector4<f64>,
-    /// Of the squared distances.
+    /// Sum of the squared distances.
     pub squares: f64,
     pub count: f64,
-    /// Of the squared distances of all points that are not inside, each at most [`OUTSIDE_M`].
+    /// Sum of the squared distances of all points that are not inside, each at most [`OUTSIDE_M`].
     pub spread: f64,
-    /// How many those are.
+    /// The number of those points.
     pub outside: f64,
 }
 
@@ -121,9 +122,9 @@ impl Side {
 }
 
 impl Judges {
-    /// How well a circle explains the points, seen from above; `None` if not better than `best`.
+    /// The score of a circle given the points, seen from above; `None` if it is not better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
-        /// What a point inside of the circle says against it: less than one outside, a half. From: chosen.
+        /// Penalty of a point inside the circle: less than the half for one outside. From: chosen.
         const INSIDE: f32 = 0.15;
         /// Points after which a circle may be left. From: work.
         const BLOCK: usize = 16;
@@ -176,8 +177,8 @@ impl Seen {
         Seen { x, y, middle_m, radius_m, slope, gate }
     }
 
-    /// What each point adds to the sums: the products of the outward normal, the rise above the middle and the distance from the side, if
-    /// it is near, and its square if it is not inside.
+    /// The terms that each point adds to the sums: the products of the outward normal, the rise above the
+    /// middle and the distance from the side, if it is near, and its square if it is not inside.
     #[inline(always)]
     fn terms(&self, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
         /// Nearer to the axis there is no direction away from it, metres. From: rounding.

@@ -25,7 +25,7 @@ struct Face {
     normal: Vector2<f64>,
     /// Distance of its plane from the origin along the normal, metres.
     offset_m: f64,
-    /// Where it begins and ends along the horizontal direction in it, metres.
+    /// The start and the end of the face along its horizontal direction, metres.
     span_m: (f64, f64),
 }
 
@@ -59,7 +59,8 @@ impl Body {
         Body { name, top_m: quantile(&mut heights, VOXEL_ENDS.1), faces: faces(voxels, of) }
     }
 
-    /// Whether a face of both lies in one plane, is as high on both sides, and is hidden between them.
+    /// True if faces of both bodies lie in one plane, are equally high, and are hidden in the gap between
+    /// them.
     fn goes_on_in(&self, other: &Body, seen: &Visibility, surface: &Surface) -> bool {
         (self.top_m - other.top_m).abs() < PLACE_M
             && self.faces.iter().any(|a| {
@@ -117,7 +118,7 @@ impl Face {
         Point3::new(flat.x, flat.y, height_m)
     }
 
-    /// What lies between it and another that may be the same face.
+    /// The gap between this face and another that may be the same face.
     fn gap_to<'a>(&'a self, other: &'a Face) -> Option<Gap<'a>> {
         if self.normal.dot(&other.normal) < FLAT {
             return None;
@@ -134,7 +135,7 @@ impl Face {
     }
 }
 
-/// What is not seen of a face between two ends of it.
+/// The unseen part of a face between two of its ends.
 struct Gap<'a> {
     face: &'a Face,
     from_m: f64,

@@ -1,4 +1,4 @@
-//! Which voxels are one object: patches, and the creases between them.
+//! Grouping of voxels into objects: patches, and the creases between them.
 
 use super::SceneOptions;
 use super::mend::mend;
@@ -20,7 +20,7 @@ const SMOOTH_RAD: f64 = 0.35;
 /// Sets of voxels within which parts are sought.
 pub(super) struct Sets {
     thin: Vec<bool>,
-    /// What hangs together of those that are not thin.
+    /// The connected sets of voxels that are not thin.
     sets: Vec<Vec<usize>>,
     /// The number of each voxel in its set; [`NONE`] of what is thin.
     place: Vec<u32>,
@@ -59,7 +59,7 @@ pub(super) struct Piece<'a> {
     pub voxels: &'a Voxels,
     /// Their numbers among all, ascending.
     pub of: &'a [usize],
-    /// Where in `near` the neighbours of each begin, and where the last ones end.
+    /// The start of each voxel's neighbours in `near`, and the end of the last.
     starts: Vec<u32>,
     near: Vec<u32>,
 }
@@ -106,7 +106,8 @@ impl<'a> Piece<'a> {
 
 /// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
 fn thin(voxels: &Voxels) -> Vec<bool> {
-    /// Of the points of the voxel that three quarters of those around have no more than. From: chosen.
+    /// Share of a neighbour's points below which a voxel has far fewer points than that neighbour.
+    /// From: chosen.
     const SHARE: f64 = 0.25;
     /// Share of those around that must be so much fuller. From: chosen.
     const MOST: f64 = 0.75;

@@ -93,7 +93,7 @@ struct Link {
 
 struct Part {
     points: u32,
-    /// Of its voxels, ascending, metres.
+    /// Heights of the part's voxels, ascending, metres.
     heights_m: Vec<f64>,
     places: Vec<[f64; 2]>,
     /// Places whose hull is that of all.

@@ -13,14 +13,15 @@ pub(super) struct Voxels {
     pub centres: Vec<Point3<f64>>,
     /// Unit normal, towards the nearest viewpoint; zero if unknown.
     pub normals: Vec<Vector3<f64>>,
-    /// How flat the neighbourhood is: 0 for a plane, 1/3 for a ball.
+    /// The flatness of each neighbourhood: 0 for a plane, 1/3 for a ball.
     pub curvatures: Vec<f64>,
     /// Number of points.
     pub counts: Vec<u32>,
-    /// Where in `near` the neighbours of each voxel begin, and where the last ones end.
+    /// The start of each voxel's neighbours in `near`, and the end of the last.
     starts: Vec<u32>,
     near: Vec<u32>,
-    /// Where runs of points begin that follow each other in one voxel, and where the last one ends; and the voxel of each run.
+    /// The starts of runs of consecutive points in one voxel, and the end of the last; and the voxel of each
+    /// run.
     run_starts: Vec<u32>,
     of_run: Vec<u32>,
     /// The same runs voxel by voxel, and where those of each voxel end.
@@ -60,7 +61,7 @@ impl Voxels {
         sets
     }
 
-    /// How many runs there are of points that follow each other in one voxel.
+    /// The number of runs of consecutive points in one voxel.
     pub fn count_runs(&self) -> usize {
         self.of_run.len()
     }
@@ -97,7 +98,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// Of no points. From: mark.
+    /// The moments of no points. From: mark.
     const NONE: Moments = Moments { count: 0.0, sum: Vector3::new(0.0, 0.0, 0.0), products: [0.0; 6] };
 
     fn add(&mut self, p: &Point3<f64>) {

@@ -46,7 +46,7 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
     *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// What hardly fewer than `rank` of the values are below.
+/// An upper limit, from a sample, below which hardly fewer than `rank` of the values lie.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
     /// Spreads of how many of the sample fall below a value that more are let through by. From: work.
     const SAFE: f64 = 3.0;

@@ -19,21 +19,22 @@ use std::collections::{BTreeMap, BTreeSet};
 const RADII_M: (f64, f64) = (0.025, 0.085);
 /// Their step and that of places, metres. From: derived, so many radii in that range.
 const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
-/// What is this far out of the body is no longer the body itself, metres.
-/// From: chosen, a millimetre less leaves a piece beside one thing in 32.
+/// Distance from the body beyond which a point is no longer part of the body, metres. From: chosen, a
+/// millimetre less leaves a piece beside one thing in 32.
 const CLEAR_M: f64 = 0.009;
-/// What is this far out is no image of the body itself in a view that is misplaced, metres. From: chosen.
+/// Distance from the body beyond which a point is no image of the body in a misplaced view, metres.
+/// From: chosen.
 const BESIDE_M: f64 = 0.035;
 /// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
 /// From: chosen, between 1 and the cosine of 45°.
 const FACING: f64 = 0.9;
 /// Share of what stands at the radius that must face so. From: chosen.
 const ROUND_SHARE: f64 = 0.75;
-/// How many directions around an axis must show the side: a third. From: chosen.
+/// Fewest directions around an axis that must show the side: a third. From: chosen.
 const LEAST_SECTORS: usize = 12;
 /// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
-/// How well the normals of a box stand at right angles (1: all of them). From: chosen.
+/// Degree to which the normals of a box stand at right angles (1: all of them). From: chosen.
 const SQUARE: f64 = 0.55;
 
 /// Parts round bodies off, and joins what of them creases parted. Parts are named by one of their voxels.
@@ -94,7 +95,7 @@ fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
 struct Cut {
     /// With its handle and frayed edge. Ascending.
     body: Vec<usize>,
-    /// What is apart from it, in pieces that hang together, each ascending.
+    /// The voxels apart from the body, in connected pieces, each ascending.
     left: Vec<Vec<usize>>,
 }
 
@@ -133,8 +134,8 @@ impl Cut {
     }
 }
 
-/// Whether what is left beside a body is more than its handle, its frayed edge or its image in a view that lies beside the others, or
-/// rises above it.
+/// True if the remainder beside a body is more than its handle, its frayed edge or its image in a misaligned
+/// view, or rises above the body.
 fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
     let heights = |of: &[usize]| {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
@@ -147,7 +148,7 @@ fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> boo
     is_object || top_m > rim_m + APART_M
 }
 
-/// Whether the side of the voxels is that of an upright round body.
+/// True if the side of the voxels is that of an upright round body.
 fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints: &[Point3<f64>]) -> bool {
     // A face on top would speak against a box as well as against a cup.
     let side: Vec<usize> = body.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
@@ -261,8 +262,8 @@ impl Axis {
         wide.then(|| of.iter().copied().filter(belongs).collect())
     }
 
-    /// Whether the top of a body runs on into what is left beside it, in as many directions as a side must be seen from: what a circle cuts
-    /// out of the top of a low box is no body.
+    /// True if the top of a body runs on into the remainder beside the body, in as many directions as a side
+    /// must be seen from: a piece that a circle cuts out of the top of a low box is no body.
     fn parts_a_top(&self, voxels: &Voxels, body: &[usize], left: &[Vec<usize>]) -> bool {
         let mut heights: Vec<f64> = body.iter().map(|&v| voxels.centres[v].z).collect();
         let top_m = quantile(&mut heights, VOXEL_ENDS.1);

@@ -1,4 +1,4 @@
-//! What each thing stands on: the surface, another thing, or the bottom of one that it stands in.
+//! Support of each thing: the surface, another thing, or the bottom of one that the thing stands in.
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
 use crate::pool;
@@ -8,12 +8,13 @@ use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
 use std::sync::OnceLock;
 
-/// How high the bottom of a vessel or of an open carton is in which something stands, metres, and its spread. From: chosen.
+/// Height of the bottom of a vessel or of an open carton in which something stands, metres, and its spread.
+/// From: chosen.
 pub const BOTTOM_M: (f64, f64) = (0.005, 0.006);
 
-/// How far from its lower edge the top of what a thing stands on may be measured, metres. From: chosen.
+/// Maximum distance between a thing's lower edge and the measured top of its support, metres. From: chosen.
 const MEETS_M: f64 = 0.03;
-/// Of the directions from a place, how many what is around shows at least, and what bears. From: chosen.
+/// Fewest directions from a place in which an enclosing thing is seen, and a bearing one. From: chosen.
 const AROUND: usize = 27;
 const BEARS: usize = 15;
 
@@ -59,7 +60,8 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     tops
 }
 
-/// How high another thing bears a part, metres: its top is seen around the part's foot, or its side below. None if it does not.
+/// The height at which another thing bears a part, metres: the top of that thing is seen around the part's
+/// foot, or its side below. None if it does not bear the part.
 fn borne_at_m(outline: &Outline, (place, low): ([f64; 2], f64), other: &[Point3<f64>]) -> Option<f64> {
     /// Share of them that lie lower than the top. From: chosen.
     const TOP: f64 = 0.8;

@@ -20,7 +20,7 @@ const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
 /// From: chosen, two bodies cannot stand so near to each other.
 const ONE_PLACE: f64 = 0.5;
-/// How near a body's side has to be to what it is the side of, as a share of how near any box is. From: chosen.
+/// Maximum residual of a body's side, as a share of the residual of any box. From: chosen.
 const OF_BOX: f64 = 0.6;
 
 /// A part with what the pairs ask of it again and again.
@@ -157,7 +157,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     }) || one_rim([large, small], viewpoints)
 }
 
-/// Whether a part lies within the round body that another is, which lies on its side.
+/// True if a part lies within another part, a round body on its side.
 fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
     large.lying(viewpoints).is_some_and(|LyingRound { turned, round, ends_m: [low, high] }| {
         let ends_m = low - PLACE_M..high + PLACE_M;
@@ -168,7 +168,8 @@ fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>])
     })
 }
 
-/// Whether the upper ends of two parts lie on one circle that holds both: near outside and far inside of a bowl, whose side is no cone's.
+/// True if the upper ends of two parts lie on one circle that holds both: near outside and far inside of a
+/// bowl, whose side is no cone's.
 fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let top_m = parts[0].top_m.max(parts[1].top_m);
     let rims = parts.map(|part| {
@@ -193,7 +194,7 @@ fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
         && fitted.is_near(&both, ON_MOST)
 }
 
-/// Whether two parts are as high.
+/// True if two parts are equally high.
 fn is_level(large: &Candidate, small: &Candidate) -> bool {
     (large.top_m - small.top_m).abs() <= APART_M
 }
@@ -217,14 +218,15 @@ struct Fitted {
 
 impl Fitted {
     fn to(points: &[Point3<f64>], low_m: f64, top_m: f64, viewpoints: &[Point3<f64>]) -> Option<Fitted> {
-        /// Of the circles proposed. From: mark.
+        /// Seed of the proposed circles. From: mark.
         const SEED: u64 = 3;
         let sigma_m = nearest_sigma_m(points.first()?, viewpoints);
         let body = round::fit(points, low_m, top_m, sigma_m, SEED)?;
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }
 
-    /// Whether its points, the same as it was fitted to, are nearer to it than a share of how near they are to any box.
+    /// True if the points that the body was fitted to have a lesser residual from the body than this share of
+    /// their residual from any box.
     fn beats_box(&self, points: &[Point3<f64>], share: f64) -> bool {
         !outline::fits(points, self.body.residual_m / share)
     }
@@ -234,14 +236,15 @@ impl Fitted {
         self.is_near(points, ON_BODY)
     }
 
-    /// Whether so large a share of its points lies on it, as near as they are measured, and much nearer than to a box.
+    /// True if at least this share of the points lies on the body, within the measurement error, and much
+    /// nearer than to a box.
     fn is_near(&self, points: &[Point3<f64>], share: f64) -> bool {
         self.body.residual_m < 2.0 * self.sigma_m + SHAPE_M
             && self.body.inliers >= share
             && self.beats_box(points, OF_BOX)
     }
 
-    /// Whether most of its points lie on it, nearer than to a box, and tell where it stands.
+    /// True if most of the points lie on the body, nearer than to a box, and determine its position.
     fn is_placed(&self, points: &[Point3<f64>]) -> bool {
         self.body.inliers >= ON_MOST
             && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m
@@ -249,7 +252,8 @@ impl Fitted {
     }
 }
 
-/// Whether two parts are images of one body in views that lie a little beside each other: two bodies cannot stand in one place.
+/// True if two parts are images of one body in slightly misaligned views: two bodies cannot stand in one
+/// place.
 fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
     let (Some(one), Some(other)) = (a.fitted(viewpoints), b.fitted(viewpoints)) else { return false };
     let apart_m = (one.body.x - other.body.x).hypot(one.body.y - other.body.y);
@@ -258,8 +262,8 @@ fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> boo
         && other.is_placed(&b.segment.points)
 }
 
-/// Whether a part is what sticks out of a vessel's side: it begins at the wall, is no wider than a handle, reaches no further, and ends
-/// below the rim.
+/// True if a part is the protrusion of a vessel's side: the part begins at the wall, is no wider than a
+/// handle, reaches no further, and ends below the rim.
 fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
     let points = &small.segment.points;
     let [x, y] = middle(points);

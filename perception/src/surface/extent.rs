@@ -1,4 +1,5 @@
-//! How far a plane reaches where what stands on it hides it: on from where it was seen, as long as no camera saw it to be absent.
+//! Extent of a plane where things on it hide it: the plane goes on from where it was seen, as long as no
+//! camera saw its absence.
 
 use super::face::Grid;
 use super::hull::{area, convex_hull, parts};
@@ -13,15 +14,15 @@ use rustc_hash::FxHashSet;
 
 /// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
 const HIDDEN_M: f64 = 0.3;
-/// What stands on a plane is no taller, metres. From: chosen.
+/// Maximum height of a thing on a plane, metres. From: chosen.
 pub(crate) const TALLEST_M: f64 = 0.6;
-/// What is this much lower at the edge of a plane stands beside it, metres. From: chosen.
+/// Height below the plane's edge from which a thing stands beside the plane, metres. From: chosen.
 const BESIDE_M: f64 = 0.3;
 
-/// Where a cell is asked about, from its corner, cells. From: chosen, the middle and near the corners.
+/// Places of a cell that are tested, from its corner, cells. From: chosen, the middle and near the corners.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
-/// Which part of a plane a cell belongs to.
+/// The part of a plane that a cell belongs to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Owner {
     /// It was not asked yet whether the plane reaches on here.
@@ -38,7 +39,7 @@ pub(super) enum Owner {
 /// The owners of the cells of a plane.
 pub(super) type Owners = Tiles<Owner>;
 
-/// What hides a plane from the cameras.
+/// The occlusion of a plane in the views of the cameras.
 pub(super) struct Hiding<'a> {
     cameras: Vec<Above<'a>>,
     /// Cells across which a plane reaches on.
@@ -48,12 +49,12 @@ pub(super) struct Hiding<'a> {
 /// A camera above a plane.
 struct Above<'a> {
     map: &'a DepthMap,
-    /// How high it is above the plane, metres.
+    /// The height of the camera above the plane, metres.
     high_m: f64,
     /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
     origin: Vector3<f64>,
     steps: [Vector3<f64>; 2],
-    /// How long the longest ray of the image is for one metre of depth.
+    /// The length of the longest ray of the image for one metre of depth.
     longest: f64,
 }
 
@@ -147,7 +148,8 @@ pub(super) fn around([x, y]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
 }
 
 impl Above<'_> {
-    /// Whether what is seen at a place of the plane, in cells, lies above it (true) or lower (false); none where it lies on it or nothing returns.
+    /// Returns true if the return at a place of the plane, in cells, lies above the plane and false if it
+    /// lies lower; none if the return lies on the plane or is missing.
     fn above(&self, [x, y]: [f64; 2]) -> Option<bool> {
         let q = self.origin + self.steps[0] * x + self.steps[1] * y;
         let (u, v) = self.map.intrinsics.project(&q.into())?;
@@ -223,7 +225,7 @@ impl Surface {
 
 /// The cells along the edges of a surface, in order around it.
 fn along_edges(surface: &Surface, grid: &Grid) -> Vec<[i32; 2]> {
-    /// Of an edge of more cells not every one is named. From: chosen.
+    /// Maximum number of places named along one edge. From: chosen.
     const MOST: f64 = 2000.0;
     let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
     let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {

@@ -12,8 +12,8 @@ use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
 const CELL_M: f64 = 0.03;
-/// Where a wide plane is seen more sparsely than so many samples a cell, they are twice as wide, and twice again at the most, as long as
-/// there are so many of them. From: chosen.
+/// Fewest samples a cell of a wide plane: with fewer, the cells are twice as wide, and twice again at the
+/// most, as long as there are at least `MANY` of them. From: chosen.
 const FULL: f64 = 2.0;
 const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
@@ -87,7 +87,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     parts.iter().zip(&members).enumerate().filter_map(surface).collect()
 }
 
-/// Which part each cell belongs to.
+/// The part that each cell belongs to.
 fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
     let mut owners = Owners::new();
     let all = parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n)));
@@ -127,14 +127,16 @@ impl Counts {
 
     /// True if the plane goes through a wall or clutter here: about as much lies on either side of it as near it.
     fn is_slice(&self) -> bool {
-        /// Of a body that goes through, it is a half. From: chosen, less than that half.
+        /// Share of samples on either side of the plane from which it goes through a body; a body gives a
+        /// half. From: chosen, less than that half.
         const SHARE: f64 = 0.2;
         f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
     }
 
     /// True if it is hardly more than where something upright begins: of a wall, half as much lies above as near it.
     fn is_foot(&self) -> bool {
-        /// What may lie above, for each that lies near. From: chosen, less than that half.
+        /// Share of samples above the plane, of those near it, beyond which something upright begins there; a
+        /// wall gives a half. From: chosen, less than that half.
         const SHARE: f64 = 0.35;
         f64::from(self.beside[1]) > SHARE * f64::from(self.near)
     }
@@ -153,7 +155,7 @@ fn hull_of(cells: &[[i32; 2]], side_m: f64) -> Vec<[f64; 2]> {
 pub(super) struct Grid {
     /// Turns the plane's normal into z.
     pub turn: UnitQuaternion<f64>,
-    /// Of a cell, metres.
+    /// Side of a cell, metres.
     pub side_m: f64,
     /// Its two axes along the plane, in the world.
     axes: [Vector3<f64>; 2],
@@ -169,7 +171,7 @@ impl Grid {
 
     /// The finest in which samples of the plane lie cell by cell rather than here and there.
     fn filled_by(plane: &Plane, held: &[&Sample]) -> Grid {
-        /// Of the widest cells, one sample in so many tells enough. From: work.
+        /// Stride of the samples that are enough for the widest cells. From: work.
         const STRIDE: usize = 4;
         /// Cells in one that is twice as wide. From: derived, two along each side.
         const QUARTERS: f64 = 4.0;

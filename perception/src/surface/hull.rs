@@ -67,7 +67,7 @@ struct Run {
     x: i32,
     /// The first and the last.
     ends: [i32; 2],
-    /// Where the first lies among all cells in order, and how many they are.
+    /// The index of the run's first cell among all cells in order, and the number of its cells.
     at: usize,
     len: usize,
 }

@@ -1,4 +1,4 @@
-//! What lies above or below a surface.
+//! Things above and below a surface.
 
 use super::Surface;
 use nalgebra::{Point3, Vector3};
@@ -11,7 +11,7 @@ pub struct Outline {
 }
 
 impl Outline {
-    /// Of the corners of a convex region, anticlockwise seen from above.
+    /// The outline of a convex region, from its corners, anticlockwise seen from above.
     pub(crate) fn of(hull: &[Point3<f64>], up: &Vector3<f64>) -> Outline {
         let n = hull.len();
         let edge = |i: usize| {

@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 
 /// Points looked at when a plane is sought; more do not change it. From: chosen.
 pub(super) const SAMPLE: usize = 16_000;
-/// Of one view, which shows less, fewer do. From: chosen, on piles of things and on recordings.
+/// Points looked at in a single view, which shows less. From: chosen, on piles of things and on recordings.
 pub(super) const SAMPLE_OF_ONE: usize = 12_000;
 /// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
@@ -45,12 +45,12 @@ impl Plane {
         self.distance(&sample.point).abs() <= Plane::band_m(sample)
     }
 
-    /// How far from a plane a measurement of it may lie, metres.
+    /// The maximum distance of a measurement of a plane from the plane, metres.
     pub fn band_m(sample: &Sample) -> f64 {
         Plane::band_of(sample.sigma_m)
     }
 
-    /// How far from a plane a measurement with a spread may lie, metres.
+    /// The maximum distance of a measurement with a given spread from its plane, metres.
     pub fn band_of(sigma_m: f64) -> f64 {
         BAND.0 * sigma_m + BAND.1
     }
@@ -107,11 +107,11 @@ pub(super) fn large_planes(
     }
 }
 
-/// Which points lie in one cube.
+/// The points of each cube.
 struct Cubes {
     /// The cube of each point.
     of: Vec<u32>,
-    /// Where the points of each cube begin in `members`, and where the last ones end.
+    /// The start of each cube's points in `members`, and the end of the last.
     starts: Vec<u32>,
     /// Numbers of points, cube by cube, ascending in each.
     members: Vec<u32>,
@@ -213,8 +213,9 @@ impl Judges {
         Judges { count, origin, coordinates, per_band }
     }
 
-    /// How much speaks for the plane: of each judge the more the nearer it is (Torr and Zisserman 2000), so that a plane that leans through
-    /// two steps has less than that of one. `None` as soon as it cannot be more than `beaten`.
+    /// The score of the plane: the nearer a judging point, the more it adds (Torr and Zisserman 2000), so
+    /// that a plane that leans through two steps scores less than the plane of one. `None` as soon as the
+    /// score cannot exceed `beaten`.
     fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
         /// Sums side by side. From: work.
         const LANES: usize = 8;
@@ -290,7 +291,7 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     /// Spreads of a measurement, one a step, and a distance, metres. From: chosen.
     const BANDS: [f64; 4] = [4.0, 3.0, 2.5, 2.5];
     const BESIDE_M: f64 = 0.003;
-    /// What is so many times as far off at first is never near. From: chosen.
+    /// Multiple of the first band beyond which a sample is never considered. From: chosen.
     const EVER: f64 = 3.0;
     let is_near = |plane: &Plane, s: &Sample, band: f64, times: f64| {
         plane.distance(&s.point).abs() < times * (band * s.sigma_m + BESIDE_M)

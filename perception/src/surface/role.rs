@@ -1,4 +1,4 @@
-//! What a level surface is: the floor, or something to stand things on.
+//! Role of a level surface: the floor, or something to stand things on.
 //!
 //! A camera that looks past the edge of a table sees what lies lower. Past the floor nothing lies lower: where it ends in an image, the image
 //! ends, something stands before it or a wall rises from it.
@@ -12,7 +12,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// What a level surface is.
+/// The role of a level surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
@@ -26,7 +26,7 @@ pub enum Role {
     Other,
 }
 
-/// What tells the role of a surface.
+/// The sign that tells the role of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sign {
@@ -39,7 +39,7 @@ pub enum Sign {
     },
     /// Nothing lies lower, and a surface to stand things on lies above it.
     Under {
-        /// How far above, metres.
+        /// The height of that surface above this one, metres.
         by_m: f64,
     },
     /// Nothing lies lower, and it is larger than tables are.
@@ -51,7 +51,7 @@ pub enum Sign {
     LevelWithFloor,
     /// It is the top of something that stands on another surface.
     OnTop {
-        /// How far below that surface lies, metres.
+        /// The height above that surface, metres.
         by_m: f64,
     },
     /// It was seen through another surface: a mirror image.
@@ -68,7 +68,7 @@ pub enum Sign {
     },
     /// Nothing lower was seen past its edge.
     NoEdge {
-        /// How high the cameras are above it on average, metres.
+        /// The mean height of the cameras above the surface, metres.
         eye_m: f64,
     },
     /// It is not known from where it was seen, and nothing lies lower.
@@ -105,32 +105,36 @@ const RAYS: usize = 5000;
 /// From: chosen.
 const LOWER_M: f64 = 0.06;
 const LOWER_PER_M: f64 = 0.03;
-/// So many rays and such a share of all that return, past the edge, are no accident. From: chosen.
+/// Fewest rays past the edge, and least share of all returning rays, that are no accident. From: chosen.
 const PAST_RAYS: usize = 15;
 const PAST_SHARE: f64 = 0.005;
 /// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees. From: chosen.
 const PARALLEL: f64 = 0.99;
-/// What a thing stands on is seen around it within so far, by so many rays, and as level as this, metres. From: chosen.
+/// Distance around a thing within which its support is seen, metres, fewest rays of the support, and its
+/// maximum unevenness, metres. From: chosen.
 const AROUND_M: f64 = 0.1;
 const AROUND_RAYS: usize = 5;
 const LEVEL_M: f64 = 0.012;
-/// What is lower than this on another surface is a thing, or on the floor a step, metres. From: chosen.
+/// Least and greatest height of a surface on another one that is a thing, or on the floor a step, metres.
+/// From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
-/// So many samples so far within an outline and below it were seen beneath it, metres. From: chosen.
+/// Fewest samples seen beneath a surface, and their least distances within its outline and below it, metres.
+/// From: chosen.
 const BENEATH: usize = 15;
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
-/// What is narrower is a rail or the top of a wall, metres. From: chosen.
+/// Width below which a surface is a rail or the top of a wall, metres. From: chosen.
 const NARROW_M: f64 = 0.12;
 /// The floor is looked down on from at least so high, and lies at least so far below a surface to stand things on, metres. From: chosen.
 const EYE_M: f64 = 0.8;
 const UNDER_M: f64 = 0.25;
-/// How far the floor reaches in view if something stands on it, metres, and its area if nothing does, square metres. From: chosen.
+/// Least reach of the floor in view if something stands on it, metres, and least area if nothing does, square
+/// metres. From: chosen.
 const REACH_M: f64 = 1.2;
 const WIDE_M2: f64 = 2.5;
 /// A height band no wider than this speaks of tables alone, metres. From: chosen.
 const TELLING_M: f64 = 1.0;
 
-/// Where a return was seen from, if that is known, and where it lies.
+/// The origin of a ray, if known, and the place of its return.
 pub(super) struct Ray {
     eye: Option<Point3<f64>>,
     end: Point3<f64>,
@@ -237,7 +241,7 @@ fn past(surface: &Surface, rays: &[Ray]) -> Option<f64> {
     (count >= PAST_RAYS && share >= PAST_SHARE).then_some(share)
 }
 
-/// What a surface is if it is part of something else, or cameras saw past its edge.
+/// The role of a surface that is part of something else, or past whose edge cameras saw.
 fn supports(
     n: usize,
     surfaces: &[Surface],
@@ -286,7 +290,7 @@ fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
     surfaces[..n].iter().any(is_through)
 }
 
-/// What a surface is if nothing lower was seen.
+/// The role of a surface below which nothing was seen.
 fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Role, Sign) {
     if surface.role != Role::Untold {
         return (surface.role, surface.because.clone());
@@ -319,7 +323,7 @@ fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
     }
 }
 
-/// Which boards lie above a surface.
+/// The boards above a surface.
 fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Level> {
     let is_over = |s: &&&Surface| s.is_parallel(surface);
     let level = |s: &&Surface| Level { above_m: surface.height_m(&s.middle()), hull: s.hull.clone() };

@@ -9,7 +9,7 @@ const SIDE: usize = 1 << BITS;
 
 /// A value for each cell: the default where none was set. Neighbours lie in one tile, most often, so that few are looked up.
 pub struct Tiles<T> {
-    /// Where in `values` each tile begins.
+    /// The start of each tile in `values`.
     starts: FxHashMap<[i32; 2], usize>,
     /// The tile that was asked for last, and where it begins.
     last: Cell<([i32; 2], usize)>,
@@ -30,7 +30,7 @@ impl<T: Copy + Default> Tiles<T> {
         }
     }
 
-    /// Where the tile of a cell begins, if it is laid.
+    /// The start of a cell's tile, if the tile is laid.
     #[inline(always)]
     fn start(&self, tile: [i32; 2]) -> Option<usize> {
         let (last, start) = self.last.get();
@@ -88,7 +88,7 @@ impl<T: Copy + Default> Tiles<T> {
     }
 }
 
-/// Where in its tile a cell lies.
+/// The index of a cell in its tile.
 #[inline(always)]
 fn place(cell: [i32; 2]) -> usize {
     let [x, y] = cell.map(|at| at.cast_unsigned() as usize % SIDE);

@@ -1,4 +1,5 @@
-//! Which way is up where nobody says: the direction under which what was seen is level or upright, and things stand on what is level.
+//! Estimation of the up direction where it is not given: the direction under which the seen planes are level
+//! or upright, and things stand on the level ones.
 //!
 //! Every direction that the large planes in view suggest is a hypothesis: a plane may be level, or upright as a wall, alone or with another.
 //! It is as likely as cameras are held so, as most of what was seen lies in planes that are level or upright then, and as what lies in none of
@@ -17,7 +18,7 @@ use rustc_hash::FxHashMap;
 
 /// Planes that are sought at most. From: chosen, a shelf has a dozen.
 const PLANES: usize = 12;
-/// What holds a lesser share of the returns is a thing or a piece of one. From: chosen.
+/// Share of the returns below which a plane is a thing or a piece of one. From: chosen.
 const LEAST_SHARE: f64 = 0.0125;
 /// Planes are level or upright if they are no farther off, radians. From: chosen, 8°: twice what a poor camera bends.
 const ALIKE_RAD: f64 = 0.14;
@@ -49,7 +50,7 @@ const ANYHOW: f64 = 0.5;
 const THINGS: f64 = 10.0;
 const MANY: f64 = 0.05;
 
-/// Why no way is told to be up.
+/// The reason the up direction is undecided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
     /// Nothing in view is a plane.
@@ -110,7 +111,7 @@ struct Face {
     /// Its normal on the side of the cameras.
     plane: Plane,
     members: Vec<Point3<f64>>,
-    /// Of all returns.
+    /// Share of all returns.
     share: f64,
 }
 
@@ -145,7 +146,8 @@ fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Po
 }
 
 impl Face {
-    /// Which of some places belong to things that would stand on it, were it level: they begin near it and are no higher than things are.
+    /// Marks the places of things that would stand on the plane, were it level: they begin near it and are no
+    /// higher than things are.
     fn carries(&self, places: &[Point3<f64>]) -> Vec<bool> {
         /// Side of the cells in which things are told apart, and how near to the plane one begins, metres. From: chosen.
         const CELL_M: f64 = 0.04;
@@ -174,11 +176,11 @@ impl Face {
     }
 }
 
-/// What lies in no plane.
+/// The returns that lie in no plane.
 struct Things {
     /// For each plane, which of it would stand on it.
     standing: Vec<Vec<bool>>,
-    /// Of all returns.
+    /// Share of all returns.
     share: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What constants of perception are and where their values are from, as the sources state it.
+//! Constants of perception and the sources of their values, as the code states them.
 //!
 //! The documentation of a constant says what it is, with its unit, and ends with `From: ` and one of [`KINDS`]; after a comma, what it was
 //! fitted on, which paper it stands in, or what it was chosen by. A constant on the line after another shares its documentation; a number in
@@ -11,7 +11,7 @@ use std::path::Path;
 /// Files and folders of `src` whose constants have to say so.
 pub const PARTS: [&str; 7] = ["scale", "noise", "segment", "recognise", "round", "surface", "merge"];
 
-/// Where a value may be from, and whether it has to be said further what that is.
+/// The kinds of sources of a value, and whether each needs further words.
 const KINDS: [(&str, bool); 8] = [
     // Stated there, for the same purpose.
     ("paper", true),
@@ -43,13 +43,13 @@ pub struct Constant {
     pub line: usize,
     pub name: String,
     pub value: String,
-    /// What it is, without where its value is from.
+    /// The description, without the source of the value.
     pub what: String,
-    /// Where its value is from; empty if it does not say so.
+    /// The source of the value; empty if none is given.
     pub from: String,
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     pub constants: Vec<Constant>,
@@ -64,12 +64,12 @@ impl Constant {
         Constant { file: file.to_owned(), line, name: name.to_owned(), value: value.to_owned(), what, from }
     }
 
-    /// Of [`KINDS`], as far as it is said.
+    /// The kind of the source, of [`KINDS`], if one is given.
     fn kind(&self) -> &str {
         self.from.split([',', ' ']).next().unwrap_or_default()
     }
 
-    /// What is wrong with what it says of itself.
+    /// The fault in the constant's documentation, if any.
     fn fault(&self) -> Option<String> {
         let further = self.from.split_once(", ").is_some_and(|(_, more)| !more.is_empty());
         let why = match KINDS.iter().find(|(kind, _)| *kind == self.kind()) {
@@ -111,7 +111,7 @@ pub fn all(src: &Path) -> Found {
     found
 }
 
-/// What the text of a file holds before its tests.
+/// Reads the constants of a file before its tests.
 pub fn read(file: &str, text: &str) -> Found {
     let lines: Vec<&str> = text.lines().take_while(|line| *line != "#[cfg(test)]").collect();
     let mut found = Found::default();
@@ -269,7 +269,7 @@ pub fn table(found: &Found) -> String {
     table
 }
 
-/// What is wrong, with file and line.
+/// The faults, with file and line.
 pub fn faults(found: &Found) -> Vec<String> {
     let nameless =
         found.nameless.iter().map(|(file, line, number)| format!("{file}:{line}: {number} has no name"));

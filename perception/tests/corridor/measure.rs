@@ -1,4 +1,4 @@
-//! How well a map's walls agree with a building.
+//! Agreement of a map's walls with a building.
 
 use super::{Building, CAMERA_HEIGHT_M, Opening};
 use descry_perception::mapping::{RoomMap, Station, Survey, UprightCylinder};

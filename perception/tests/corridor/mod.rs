@@ -56,7 +56,7 @@ pub struct Opening {
     pub b: Point2<f64>,
 }
 
-/// What stands in a building.
+/// The contents of a building.
 #[derive(Clone, Debug, Default)]
 pub struct Building {
     pub panels: Vec<Panel>,
@@ -186,7 +186,7 @@ impl Building {
     }
 }
 
-/// How the camera and the wheels err, and what is driven.
+/// The errors of the camera and the wheels, and the path that is driven.
 #[derive(Clone, Copy, Debug)]
 pub struct Rig {
     /// Every so many columns and rows are looked at.
@@ -215,7 +215,7 @@ pub const CAMERA_HEIGHT_M: f64 = 1.2;
 /// Farther away nothing is matched, metres.
 pub const FAR_M: f64 = 8.0;
 
-/// What of it is used for rectification.
+/// The part of the camera's field of view that is used for rectification.
 pub fn field_of_view() -> FieldOfView {
     let half_rad = (320.0_f64 / 550.0).atan();
     FieldOfView { right_rad: -half_rad, left_rad: half_rad, near_m: 0.5, far_m: FAR_M }
@@ -234,7 +234,8 @@ fn is_textured(panel: usize, share: f64, u_m: f64, v_m: f64) -> bool {
     hash(panel, (u_m / TEXTURE_M).floor() as i64, (v_m / TEXTURE_M).floor() as i64) < share
 }
 
-/// Where a column's ray meets a panel or a pillar; pillars are numbered after the panels and level surfaces.
+/// The place where a column's ray meets a panel or a pillar; pillars are numbered after the panels and level
+/// surfaces.
 struct Hit {
     depth: f64,
     number: usize,
@@ -244,7 +245,7 @@ struct Hit {
 }
 
 impl Building {
-    /// What the camera measures from a pose, in the levelled frame of the camera.
+    /// The points that the camera measures from a pose, in the levelled frame of the camera.
     pub fn look(&self, truth: &Isometry2<f64>, rig: &Rig, draws: &mut Draws) -> Vec<Point3<f32>> {
         let mut points = Vec::new();
         for column in (0..CAMERA.width).step_by(rig.stride) {

@@ -23,7 +23,7 @@ fn paint(draws: &mut Draws) -> Paint {
     if printed { cubes(base, spread, coarse_m, seed) } else { Paint::Plain(base) }
 }
 
-/// What a thing is called, and how one is drawn.
+/// The name of a sort of thing, and the function that draws one.
 type Sort = (&'static str, fn(&mut Draws) -> Vec<Part>);
 
 /// An object of one of ten sorts.

@@ -33,7 +33,7 @@ pub struct Room {
 /// A part, its frame from the world, the middle and radius of a ball around it, and its owner.
 type Placed = (Part, Isometry3<f64>, Point3<f64>, f64, Option<usize>);
 
-/// How the room is made.
+/// The options of a room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoomOptions {
     /// A round table, free on all sides, with a printed sheet on it; otherwise a plain desk with chairs around it.
@@ -162,8 +162,9 @@ impl Room {
         best
     }
 
-    /// What the camera sees from its true pose: depth with the noise of Nguyen et al., neighbours erring together, and colour;
-    /// `labels` of the cloud are the truth: 0 the room, else the number of the thing and one.
+    /// The view of the camera from its true pose: depth with the noise of Nguyen et al., neighbours erring
+    /// together, and colour; `labels` of the cloud are the truth: 0 the room, else the number of the thing
+    /// and one.
     pub fn look(
         &self,
         camera: &Intrinsics,

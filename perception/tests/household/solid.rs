@@ -32,7 +32,7 @@ pub struct Part {
     pub here_from_part: Isometry3<f64>,
 }
 
-/// Where a ray meets a surface.
+/// The place where a ray meets a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
     /// Ray parameter.

@@ -105,7 +105,7 @@ fn ray<'a>(
     nearest
 }
 
-/// How a run differs from the paper's.
+/// The differences of a run from the paper's.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     /// Least and greatest number of scans of an object.
@@ -128,7 +128,7 @@ impl Default for Run {
 pub struct Lab {
     room: Vec<Vec<Point2<f64>>>,
     object: Vec<Vec<Point2<f64>>>,
-    /// Where it is.
+    /// The pose of the object in the map.
     pub map_from_object: Isometry2<f64>,
 }
 
@@ -141,7 +141,7 @@ impl Lab {
         Lab { room: room(), object: outline.0.iter().map(put).collect(), map_from_object }
     }
 
-    /// What a SICK LMS 200 reads: 180 degrees, a reading a degree, spread 5 mm, told in centimetres.
+    /// A scan of a SICK LMS 200: 180 degrees, a reading a degree, spread 5 mm, told in centimetres.
     pub fn sweep(&self, map_from_laser: &Isometry2<f64>, stated: &Isometry2<f64>, draws: &mut Draws) -> Scan {
         let angles_rad: Vec<f64> = (-90..=90).map(|d| f64::from(d).to_radians()).collect();
         let from = Point2::from(map_from_laser.translation.vector);
@@ -312,11 +312,11 @@ pub fn f_c_range(models: &[Alignment], a: usize, b: usize, options: &FitOptions)
 
 /// A scan of an instance put off and found again on another model (Fig. 9).
 pub struct Relocalised {
-    /// Of the middle of the thing, in the laser's frame, metres.
+    /// Error of the middle of the thing, in the laser's frame, metres.
     pub position_m: f64,
-    /// Of its heading, radians.
+    /// Error of its heading, radians.
     pub angle_rad: f64,
-    /// Where it ended.
+    /// The fit at the end.
     pub fit: ModelFit,
 }
 

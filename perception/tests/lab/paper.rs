@@ -1,4 +1,4 @@
-//! What Modayil and Kuipers measured, objects in the order of their tables.
+//! Measurements of Modayil and Kuipers, objects in the order of their tables.
 
 /// Fig. 7: area and its spread (cm²), perimeter and its spread (cm).
 pub const FEATURES: [[f64; 4]; 5] = [

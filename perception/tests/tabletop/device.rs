@@ -4,7 +4,7 @@ use super::{Draws, Thing, nearest};
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Intrinsics, View};
 
-/// How a depth camera falls short.
+/// The errors of a depth camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Device {
     pub camera: Intrinsics,
@@ -29,7 +29,7 @@ pub const KINECT: Device = Device {
 };
 
 impl Device {
-    /// What it sees from its true pose, told with the stated pose.
+    /// The view from the true pose, given with the stated pose.
     pub fn look(
         &self,
         things: &[Thing],
@@ -41,7 +41,7 @@ impl Device {
         self.see(hit, truth, stated, draws).0
     }
 
-    /// What it sees where a ray from an eye ends as told, and what is said of each end.
+    /// The view where `hit` gives the end of a ray from an eye, and the label of that end.
     pub(super) fn see(
         &self,
         hit: impl Fn(&Point3<f64>, &Vector3<f64>) -> Option<(f64, u32)>,

@@ -19,7 +19,7 @@ pub enum Thing {
     Cup { x: f64, y: f64, radius: f64, height: f64, handle_rad: Option<f64> },
     /// Closed round body.
     Tin { x: f64, y: f64, radius: f64, height: f64 },
-    /// What is left of a round side: so far to both sides of a direction.
+    /// A piece of a round side: `half_rad` to both sides of a direction.
     Sherd { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, half_rad: f64 },
     /// Half sides along its own axes, turned.
     Block { x: f64, y: f64, half: [f64; 2], height: f64, turn_rad: f64 },
@@ -54,7 +54,7 @@ impl Thing {
         }
     }
 
-    /// How far it reaches from there, metres.
+    /// The reach of the thing from its place, metres.
     pub fn reach_m(&self) -> f64 {
         let grip = |handle_rad: Option<f64>| if handle_rad.is_some() { 0.03 } else { 0.0 };
         match *self {
@@ -116,7 +116,8 @@ pub fn disturbed(pose: &Isometry3<f64>, sigma_m: f64, sigma_rad: f64, draws: &mu
     )
 }
 
-/// What the camera of paper 004 sees from its true pose, with the noise of Nguyen et al., told with the stated pose.
+/// The view of the camera of paper 004 from its true pose, with the noise of Nguyen et al., given with the
+/// stated pose.
 pub fn look(things: &[Thing], truth: &Isometry3<f64>, stated: &Isometry3<f64>, draws: &mut Draws) -> View {
     KINECT.look(things, truth, stated, draws)
 }
@@ -131,7 +132,7 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
     best.is_finite().then_some(best)
 }
 
-/// Where a ray meets the table's top or the floor; infinite if nowhere.
+/// The distance along a ray to the table's top or the floor; infinite if the ray meets neither.
 fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let level = |(z, half): (f64, Option<[f64; 2]>)| {
         let t = (z - eye.z) / ray.z;
@@ -141,7 +142,7 @@ fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     [(TABLE_M, Some(half_m)), (0.0, None)].into_iter().filter_map(level).fold(f64::INFINITY, f64::min)
 }
 
-/// Where a ray meets a thing first.
+/// The distance along a ray to the first place where the ray meets a thing.
 fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
     // What a ray passes by, seen from above, it does not meet.
     let across = (ray.x * ray.x + ray.y * ray.y).sqrt();

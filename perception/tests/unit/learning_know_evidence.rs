@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 262.5, cx: 159.5, cy: 119.5 };
 const PLATE_M: f32 = 0.1;
 
-/// What a camera sees of a wall a metre away, with a square plate before it or none.
+/// A camera's view of a wall a metre away, with a square plate before the wall or none.
 fn wall(plate_before_m: f32) -> Seen {
     let depth = |i: usize| {
         let (u, v) = ((i % 320) as f32 - 159.5, (i / 320) as f32 - 119.5);

@@ -14,7 +14,7 @@ type Block = [[f64; 3]; 2];
 const BOARD: Block = [[-0.8, -0.4, 0.695], [0.8, 0.4, 0.72]];
 const FLOOR: Block = [[-9.0, -9.0, -0.1], [9.0, 9.0, 0.0]];
 
-/// What the camera makes worse.
+/// The faults of the camera.
 #[derive(Clone, Copy, Default)]
 struct Faults {
     /// Farthest that a depth is off, as a share of its square.
@@ -30,7 +30,7 @@ fn outline() -> Vec<Point3<f64>> {
     corners.iter().map(|c| Point3::new(c[0], c[1], high[2])).collect()
 }
 
-/// How far along a ray the first of some blocks is; infinite without one.
+/// The distance along a ray to the first of some blocks; infinite if the ray meets none.
 fn hit(blocks: &[Block], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let each = blocks.iter().map(|[low, high]| {
         let (mut near, mut far) = (0.0_f64, f64::INFINITY);
@@ -43,7 +43,7 @@ fn hit(blocks: &[Block], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     each.fold(f64::INFINITY, f64::min)
 }
 
-/// What a camera sees that looks from one place at another.
+/// The view of a camera that looks from one place at another.
 fn view(blocks: &[Block], eye: [f64; 3], at: [f64; 3], faults: Faults) -> View {
     let (eye, at) = (Point3::from(eye), Point3::from(at));
     let forward = (at - eye).normalize();

@@ -15,7 +15,7 @@ fn wall([foot_m, rim_m]: [f64; 2], [low_m, high_m]: [f64; 2], [from, to]: [f64; 
     (0..1200).map(at).collect()
 }
 
-/// What the first of two things stands on, and its spread, metres.
+/// Checks the height of the support of the first of two things, and its spread, metres.
 fn check(what: &str, first: Vec<Point3<f64>>, second: Vec<Point3<f64>>, (base_m, sigma_m): (f64, f64)) {
     let part = |points: Vec<Point3<f64>>| Segment {
         indices: (0..points.len() as u32).collect(),

@@ -82,7 +82,7 @@ impl Header {
         self.fields.iter().map(Field::bytes).sum()
     }
 
-    /// Where each field begins within a point.
+    /// The offset of each field within a point, bytes.
     pub(super) fn offsets(&self) -> impl Iterator<Item = usize> {
         self.fields.iter().scan(0, |at, f| {
             let begin = *at;
@@ -116,7 +116,7 @@ impl Header {
     }
 }
 
-/// What the lines of a header say, each with its line.
+/// The entries of the header, each with its line.
 #[derive(Default)]
 struct Said<'a> {
     fields: Option<(usize, Vec<&'a str>)>,

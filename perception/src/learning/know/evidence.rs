@@ -52,9 +52,10 @@ impl Default for Judge {
 }
 
 impl Evidence {
-    /// What a [`Judge`] looks at: share of the points that could be seen that are explained; likeness of colour, and whether there is none; what carries
-    /// on beyond; votes; share of the model's side that is hidden; share of the points that could be seen that are seen through; how far normals are turned
-    /// from the model's; and one.
+    /// The features that a [`Judge`] weighs: share of the points that could be seen that are explained;
+    /// likeness of colour, and whether there is none; what carries on beyond; votes; share of the model's
+    /// side that is hidden; share of the points that could be seen that are seen through; how far normals are
+    /// turned from the model's; and one.
     pub fn measures(&self) -> [f64; WEIGHTS] {
         [
             self.explained_share(),
@@ -106,8 +107,8 @@ const TURNED_AS: f32 = 0.6;
 pub(super) const NEAR_M: f32 = 0.012;
 /// Colours that differ by so much (CIE 1976, lightness counts half) are as unlike as not, and points told apart by colour.
 const UNLIKE: f32 = 14.0;
-/// How far beyond what is explained the scene is asked whether it carries on, metres, where no point of the model lies within this; and the least cosine
-/// between normals for it to do so.
+/// Distance beyond the explained points at which the scene is tested for carrying on, metres, where no point
+/// of the model lies within this distance; and the least cosine between normals for it to do so.
 const BEYOND_M: f32 = 0.018;
 const WITHIN_M: f32 = 0.010;
 const SMOOTH: f32 = 0.94;
@@ -121,7 +122,7 @@ pub struct Verified {
     pub claims: Vec<u32>,
 }
 
-/// What a model's skin at a pose is worth against a scene.
+/// Verifies the pose of a model's skin against a scene.
 pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, votes: usize) -> Verified {
     let Rays { mut evidence, pairs, seen } = rays(model, camera_from_model, scene);
     evidence.votes = votes;

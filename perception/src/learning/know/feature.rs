@@ -38,7 +38,7 @@ pub struct Alike {
 /// Kind of descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// How normals are spread around a place.
+    /// Spread of the normals around a place.
     Shape,
     /// The colours around a place, in the tangent plane.
     Pattern,
@@ -131,14 +131,16 @@ impl Features {
         }
     }
 
-    /// Which features of these are the most alike to others of the same kind, so many of them, the most alike first, and the median distance of all these to
-    /// those most alike to them. Codes tell which are compared.
+    /// The features that are most alike to others of the same kind, at most `most` of them, the most alike
+    /// first, and the median distance of all features to their most alike ones. Codes select the pairs that
+    /// are compared.
     pub fn most_alike(&self, others: &Features, most: usize) -> (Vec<Alike>, u32) {
-        /// Of so many times as many as are wanted, each with so many of the others, descriptors are compared. In drawn scenes as many are named then as
-        /// when all are compared; with two times as many, more was said where nothing stands.
+        /// Number of candidates whose descriptors are compared, in multiples of the wanted number, and the
+        /// number of others that each is compared with. In drawn scenes as many are named then as when all
+        /// are compared; with two times as many, more was said where nothing stands.
         const LIKELY: usize = 6;
         const CLOSE: usize = 24;
-        /// So many in the middle by their codes tell the median.
+        /// Number of features in the middle by their codes that give the median.
         const MIDDLE: usize = 15;
         let codes = |own: usize| {
             let code = self.code(own);

@@ -12,7 +12,7 @@ use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::{Isometry3, Point3};
 
-/// What a camera saw, in its own frame.
+/// A camera's view of a scene, in the camera frame.
 pub struct Seen {
     pub skin: Skin,
     /// True for points of planes that are wider than any model.

@@ -59,8 +59,8 @@ impl Skin {
         (0..self.points.len() as u32).filter(seen).collect()
     }
 
-    /// Of the points before which nothing lies in a direction, those that face away where none of what is seen is: a body that is no shell has a side
-    /// there that hides them, of which nothing is known.
+    /// The foremost points in a direction that face away, in cells without any seen point: a body that is no
+    /// shell has a side there that hides them, of which nothing is known.
     pub fn backs_from(&self, away: &Vector3<f32>, seen: &[u32]) -> Vec<u32> {
         let front = Front::of(self, away);
         let shown: FxHashSet<_> = seen.iter().map(|&i| front.cell(&self.points[i as usize])).collect();
@@ -104,7 +104,7 @@ impl Skin {
     }
 }
 
-/// What lies foremost in a direction, in cells across it.
+/// The foremost points in a direction, in cells across the direction.
 struct Front {
     away: Vector3<f32>,
     axes: [Vector3<f32>; 2],

@@ -13,7 +13,8 @@ const FOOT_M: f32 = 0.015;
 /// In so many directions around the foot, so far beside it, it is looked whether there is something to stand on, metres.
 const AROUND: u16 = 24;
 const BESIDE_M: f32 = 0.02;
-/// What is level and no farther above or below carries it, metres: of a model the lowest centimetre may be missing.
+/// Maximum height difference between a level surface and the foot that it carries, metres: of a model the
+/// lowest centimetre may be missing.
 const STEP_M: f64 = 0.03;
 /// Least cosine between up and the normal of what is level.
 const LEVEL: f64 = 0.8;

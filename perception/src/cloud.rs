@@ -12,9 +12,9 @@ pub struct Grid {
     pub height: usize,
 }
 
-/// No depth camera and no scanner of rooms sees farther, metres. From: chosen.
+/// Upper bound of the range of depth cameras and of room scanners, metres. From: chosen.
 const FARTHEST_TYPICAL_M: f64 = 100.0;
-/// No coordinates of a map are greater, metres. From: derived, the width of the earth.
+/// Upper bound of the coordinates of a map, metres. From: derived, the width of the earth.
 const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
 /// A place whose points lie within this of their middle is in metres if it is far away, metres. From: chosen.
 const WIDEST_PLACE_M: f64 = 20.0;
@@ -50,7 +50,7 @@ pub enum CloudError {
     Length {
         /// The name of the attribute.
         attribute: &'static str,
-        /// Its entries.
+        /// The number of entries of the attribute.
         found: usize,
         /// Points in the cloud.
         points: usize,

@@ -128,7 +128,7 @@ impl Merged {
 /// Views that cannot be merged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MergeError {
-    /// There was no view.
+    /// The list of views is empty.
     #[error("no view to merge: give at least one")]
     NoViews,
     /// Options that mean nothing.

@@ -161,7 +161,7 @@ impl Turner {
     /// The same with each edge amid the points that are nearest to it: bounds lie as far out as noise reaches.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
-        /// Fewer points than this share leave an edge where it is.
+        /// Least share of the points that moves an edge.
         const LEAST_SHARE: f64 = 0.03;
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);

@@ -5,7 +5,7 @@ use image::{ImageEncoder, Rgb, RgbImage};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::io::Cursor;
 
-/// From where and how large.
+/// The viewpoint and the size of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureOptions {
     /// Columns.
@@ -55,7 +55,7 @@ pub enum PictureError {
         /// Rows.
         height: u32,
     },
-    /// There are not as many labels as points.
+    /// The numbers of labels and of points differ.
     #[error("{labels} labels for {points} points: give one a point")]
     Labels {
         /// Given.

@@ -78,13 +78,13 @@ pub struct PlaneFit {
 /// The reason there is no plane.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneError {
-    /// Fewer than three finite points.
+    /// Fewer than three points are finite.
     #[error("{found} finite points: a plane needs three")]
     TooFew {
         /// The number that was found.
         found: usize,
     },
-    /// Not one sample gave a plane that was asked for.
+    /// None of the samples gave a plane that was asked for.
     #[error(
         "none of {rounds} samples gave a plane of the asked tilt and height: do the points lie on one line? widen the band, or sample more"
     )]

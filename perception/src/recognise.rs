@@ -1,4 +1,4 @@
-//! From the objects on a surface to percepts (paper 004, section V, "Tabletop Scene Perception").
+//! Recognition of the objects on a surface as percepts (paper 004, section V, "Tabletop Scene Perception").
 
 #[doc(hidden)]
 pub mod asker;

@@ -118,7 +118,7 @@ pub enum Ending {
     Settled,
     /// All rounds were used and it still moved.
     OutOfRounds,
-    /// Fewer partners than asked: the clouds do not overlap where they were put.
+    /// Fewer partners were found than asked for: the clouds do not overlap where they were put.
     TooFewPartners,
 }
 

@@ -97,7 +97,7 @@ pub enum SurfaceError {
         /// Those of them that are out of reach.
         far: usize,
     },
-    /// No plane fits what was asked for.
+    /// No plane is as asked for.
     #[error("{}: widen the height band, give or check the direction of up, or look at the table", no_plane(wanted, *tried))]
     NotFound {
         /// Planes that were looked at.
@@ -128,7 +128,7 @@ pub enum SurfaceError {
         /// The sign that leaves the role undecided.
         because: Sign,
     },
-    /// No surface that is as wanted is one to stand things on.
+    /// None of the surfaces as wanted is one to stand things on.
     #[error("what is level here is nothing to stand things on ({because}): look at the table")]
     OnlyOther {
         /// The sign of that role.
@@ -190,7 +190,7 @@ pub struct Level {
 }
 
 impl Level {
-    /// Its outline made ready to be asked about many points.
+    /// The outline of the surface, prepared for tests of many points.
     pub(crate) fn outline(&self, up: &Vector3<f64>) -> Outline {
         Outline::of(&self.hull, up)
     }

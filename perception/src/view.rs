@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// The view of a camera from one pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
-    /// When, nanoseconds in the clock of the recording.
+    /// The time of the view, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
     /// The cloud in the camera's optical frame (x right, y down, z forward), metres.
     pub cloud: Cloud,

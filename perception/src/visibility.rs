@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// The state of a place in one camera's view, or in the best of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// No camera had it in view, or the pixel gave no return.
+    /// No camera had the place in view, or the pixel gave no return.
     Never,
     /// Behind what a camera saw.
     Hidden,
@@ -94,7 +94,7 @@ impl DepthMap {
         self.look_from(&(self.camera_from_world * p), tolerance_m)
     }
 
-    /// As [`DepthMap::look`], for a point in the camera's optical frame.
+    /// The same as [`DepthMap::look`], for a point in the camera's optical frame.
     pub(crate) fn look_from(&self, q: &Point3<f64>, tolerance_m: f64) -> Seen {
         let Some((u, v)) = self.intrinsics.project(q) else { return Seen::Never };
         let Some(middle) = self.intrinsics.pixel(u, v) else { return Seen::Never };

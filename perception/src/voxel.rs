@@ -20,7 +20,7 @@ pub enum VoxelError {
     TooFar {
         /// The index of the point.
         index: usize,
-        /// Its farthest coordinate.
+        /// The farthest coordinate of the point.
         distance_m: f32,
         /// The voxels' edge.
         edge_m: f32,

@@ -61,7 +61,8 @@ fn a_known_box_is_known_whichever_side_is_down() {
     }
 }
 
-/// From views whose poses err, what bounds a box from above is some millimetres too wide: its sides are told by where rays pass it.
+/// The rectangle that bounds a box from above is some millimetres too wide in views whose poses err: the
+/// lengths of the sides are told by the rays that pass the box.
 #[test]
 fn a_box_is_told_by_its_sides_from_one_like_it() {
     for (known_m, like_m) in [
@@ -143,7 +144,8 @@ fn a_low_box_far_off_is_in_one_piece() {
     assert!(broken.is_empty(), "height, seed, pieces: {broken:?}");
 }
 
-/// From far off the camera passes closely over the top of a tall box and may see its front alone, or in pieces: it may be the known one.
+/// The camera, far off, passes closely over the top of a tall box and may see its front alone, or in pieces:
+/// it may be the known one.
 #[test]
 fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
     let size_m = [0.20, 0.15, 0.25];
@@ -160,7 +162,8 @@ fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
     }
 }
 
-/// From far off sides are measured to centimetres: a box that is a little shorter may be another, and is not sure to be the known one.
+/// Sides are measured to centimetres from far off: a box that is a little shorter may be another, and is not
+/// sure to be the known one.
 #[test]
 fn a_box_of_nearly_the_size_is_not_surely_the_known_one() {
     for (known_m, there_m) in [

@@ -49,7 +49,7 @@ fn in_rows(pose: &Isometry3<f64>) -> Vec<Percept> {
     found(&view.cloud.transformed(pose), &Visibility::from_views(std::slice::from_ref(&view)))
 }
 
-/// Its bare points, and what else there is, seen from a pose.
+/// The percepts of bare points, seen from a pose.
 fn loose(points: Vec<Point3<f32>>, pose: &Isometry3<f64>) -> Vec<Percept> {
     let cloud = Cloud::from_points(points).transformed(pose);
     let seen = Visibility::from_viewpoints(&cloud, &[Point3::from(pose.translation.vector)]);

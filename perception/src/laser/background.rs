@@ -29,17 +29,17 @@ impl Default for ObserveOptions {
 /// Reason for which a scan contributes nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ignored {
-    /// No cluster of readings near where it was looked for.
+    /// No cluster of readings lies near the expected place.
     NotSeen,
-    /// It reaches to the left end of the field of view: LeftBound does not exist.
+    /// The thing reaches to the left end of the field of view: LeftBound does not exist.
     NoLeftBound,
-    /// It reaches to the right end of the field of view: RightBound does not exist.
+    /// The thing reaches to the right end of the field of view: RightBound does not exist.
     NoRightBound,
     /// Something nearer covers its left end.
     LeftCovered,
     /// Something nearer covers its right end.
     RightCovered,
-    /// It and its bounds fill half a turn or more.
+    /// The thing and its bounds fill half a turn or more.
     TooNear,
 }
 

@@ -33,7 +33,7 @@ impl Default for FitOptions {
 pub enum Start {
     /// Near a known pose.
     Near(Isometry2<f64>),
-    /// From every angle, the middles together.
+    /// Starts from every angle, with the middles together.
     AllAngles,
 }
 

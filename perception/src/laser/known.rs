@@ -63,8 +63,9 @@ pub struct RecogniseOptions {
     pub rigid_m: f64,
     /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: measured so for 97 % of scans of the same thing.
     pub same_m: f64,
-    /// It is ruled out if that is more than this, metres, the precision of the paper's laser: measured at most 5.5 mm for the same thing, at least 8.9 mm
-    /// for another of the paper's. Between the two it may be it.
+    /// A shape is ruled out if that root is above this, metres, the precision of the paper's laser: measured
+    /// at most 5.5 mm for the same thing, at least 8.9 mm for another of the paper's. Between the two it may
+    /// be it.
     pub other_m: f64,
     /// Options for aligning models.
     pub fit: FitOptions,
@@ -93,7 +94,7 @@ impl RecogniseOptions {
 /// A known shape that features or width did not rule out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// Its place in the list of known shapes.
+    /// The index in the list of known shapes.
     pub index: usize,
     /// Distance of its features or its width from the class, in standard deviations.
     pub distance: f64,

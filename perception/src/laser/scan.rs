@@ -35,7 +35,7 @@ pub enum ScanError {
     Angle {
         /// Index of the reading.
         index: usize,
-        /// Its value.
+        /// The value of the angle, radians.
         angle_rad: f64,
     },
     /// The pose is no pose.

@@ -58,7 +58,7 @@ impl TryFrom<Written> for ShapeModel {
 /// Scans that make no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
-    /// There is none.
+    /// The list of scans is empty.
     #[error("a shape model of no scans: give at least one scan in which the thing is bounded on both sides")]
     NoScans,
     /// A scan without points, or with a point that is nowhere.
@@ -76,7 +76,7 @@ pub enum ShapeError {
     Angles {
         /// Index of the scan.
         index: usize,
-        /// From right to left.
+        /// The angles, from right to left, radians.
         angles_rad: [f64; 4],
     },
     /// The pose is no pose.

@@ -33,7 +33,7 @@ impl Violation {
 struct Part {
     /// Index of the group of scans that move together.
     group: usize,
-    /// Its corners in `Assembly::corners`.
+    /// The start of the part's corners in `Assembly::corners`.
     begin: usize,
     end: usize,
     /// False if its laser looked past the thing only far beside it on either side: it may have missed an end, and need not reach what others saw.

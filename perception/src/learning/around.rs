@@ -40,7 +40,8 @@ impl Default for AroundOptions {
 /// Steps along a line, metres.
 const STEP_M: f64 = 0.05;
 
-/// On each line from the object the places where the body fits, the nearest first, in the order of the lines.
+/// The places where the body fits, on each line from the object: the nearest first, in the order of the
+/// lines.
 ///
 /// `obstacles` is what was seen (world, z up, metres). A place counts as free if nothing seen is within the footprint; which of them can be reached
 /// is asked of the ways: a body may keep farther away from what its map shows than it must.

@@ -9,7 +9,7 @@ use crate::voxel::VoxelError;
 /// Views, masks or options that cannot be learned from.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LearningError {
-    /// There was no view.
+    /// The list of views is empty.
     #[error("no view to learn from: give at least one")]
     NoViews,
     /// A view whose pixels are not known.
@@ -77,7 +77,7 @@ pub enum LearningError {
     /// A cloud could not be thinned.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
-    /// No clusters could be made.
+    /// Clustering failed.
     #[error(transparent)]
     Cluster(#[from] ClusterError),
 }

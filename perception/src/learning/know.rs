@@ -38,7 +38,7 @@ pub struct KnowOptions {
     pub range_m: f64,
     /// Distance of the places that are described, metres (paper: 1.5 cm).
     pub keypoint_m: f32,
-    /// Less confidence is not told.
+    /// Minimum confidence of a reported object.
     pub least_confidence: f64,
     /// Upper bound of the probability, from a few points of the model, below which a candidate is
     /// not examined closer: far below any that is reported, so nothing but time is saved.

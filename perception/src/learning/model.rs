@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearnOptions {
-    /// Nothing of the object lies farther from the middle of what the first view shows, metres.
+    /// Maximum distance of the object's points from the middle of the first view's points, metres.
     pub reach_m: f64,
     /// Side of a supervoxel, metres (paper: 5 mm).
     pub supervoxel_m: f32,

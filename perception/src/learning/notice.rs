@@ -22,7 +22,8 @@ pub struct NoticeOptions {
     /// Points farther than this from every point of the other cloud differ, metres (δ of Eq. 1; paper: 1 cm). Where the camera errs by more than a
     /// third of it, three of its standard deviations count.
     pub delta_m: f64,
-    /// Nothing farther from its camera is new, or gone, metres. What lies farther is background.
+    /// Maximum distance from the camera at which something is new, or gone, metres. Farther points are
+    /// background.
     pub range_m: f64,
     /// Side of the voxels that the static structure is kept in, metres.
     pub voxel_m: f64,
@@ -61,11 +62,11 @@ pub struct MetaRoom {
 /// Something that was not there before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appeared {
-    /// Its points, world frame, from all views of the visit.
+    /// The points of the object, world frame, from all views of the visit.
     pub cloud: Cloud,
     /// Index of the view that shows most of it and all that is seen of it: the first training view.
     pub view: usize,
-    /// Its pixels in that view, row by row (O_0).
+    /// The pixels of the object in that view, row by row (O_0).
     pub mask: Vec<bool>,
     /// True if most of it lies before what was there by far, to either side as well, as far as its cameras may be turned. Otherwise it may be an edge
     /// of what always stood there.

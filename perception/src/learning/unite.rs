@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 
 /// Neighbours that a normal is made of for registration.
 const NEIGHBOURS: usize = 20;
-/// From far to near, metres.
+/// Match distances, from far to near, metres.
 const WITHIN_M: [f32; 2] = [0.02, 0.006];
 /// Greatest correction of a found pose, metres and radians: beyond that it was found wrongly.
 const MOST_MOVED: (f64, f64) = (0.03, 0.3);

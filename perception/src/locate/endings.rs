@@ -51,7 +51,7 @@ pub fn endings(visibility: &Visibility, surface: &Surface) -> Vec<Ending> {
 /// The content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
-    /// No return.
+    /// A pixel without a return.
     Nothing,
     /// The surface.
     On,

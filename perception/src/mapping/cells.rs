@@ -20,7 +20,7 @@ pub struct Cells {
 /// A cube that holds points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Sums {
-    /// Whole coordinates.
+    /// Integer coordinates of the cube.
     cube: [i32; 3],
     count: u32,
     /// Sum of the points, from the cube's corner, metres.
@@ -53,7 +53,7 @@ pub enum CellsError {
     Damaged {
         /// Index of the station.
         index: usize,
-        /// Its points.
+        /// The number of points of the station.
         count: u32,
     },
 }
@@ -140,7 +140,7 @@ impl Default for NormalOptions {
 }
 
 impl Cells {
-    /// No cell yet.
+    /// An empty grid.
     ///
     /// # Errors
     /// If the edge is no positive length.

@@ -25,7 +25,7 @@ pub struct ClosureOptions {
     pub explained: f64,
     /// Length of the stretches of the drive that are compared, metres.
     pub stretch_m: f64,
-    /// From one stretch to the next, metres.
+    /// Spacing of the stretches, metres.
     pub every_m: f64,
 }
 

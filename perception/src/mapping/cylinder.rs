@@ -62,11 +62,11 @@ pub struct CylinderOptions {
     pub round_wall_m: RangeInclusive<f64>,
     /// Greatest distance of a point from the surface it belongs to, metres.
     pub tolerance_m: f64,
-    /// At least so much of the circle of a pillar is seen in one piece, radians: less may be a bend …
+    /// Least arc of a pillar that is seen in one piece, radians: less may be a bend …
     pub least_arc_rad: f64,
     /// … and of a round wall: less may be the walls of a cluttered room.
     pub least_round_rad: f64,
-    /// At least this share of what is seen there lies on it.
+    /// Least share of the points seen there that lie on the cylinder.
     pub least_share: f64,
 }
 

@@ -5,7 +5,7 @@ use super::patch::{Constraints, Fit, Patch, placed, through};
 use crate::plane::Plane;
 use nalgebra::Point3;
 
-/// When two patches are of one wall.
+/// Conditions under which two patches belong to one wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FuseOptions {
     /// The gap between their limits is no wider (U_d), metres: more than the distance at which patches grow, less than a door.

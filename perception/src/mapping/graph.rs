@@ -53,9 +53,9 @@ pub enum GraphError {
     Station {
         /// Index of the edge.
         edge: usize,
-        /// Its first end.
+        /// The first node of the edge.
         from: usize,
-        /// Its second end.
+        /// The second node of the edge.
         to: usize,
         /// Number of stations.
         stations: usize,

@@ -51,7 +51,7 @@ pub struct RectifyOptions {
     pub turn_sigma_rad: f64,
     /// Least share of the second plan that must lie on the first where [`Matcher::IcpEm`] is to be believed: else odometry is.
     pub explained: f64,
-    /// As many independent points a plan is worth: neighbours err together.
+    /// Number of independent points that a plan is worth: neighbours err together.
     pub looks: f64,
 }
 
@@ -113,7 +113,7 @@ const ROUNDS: usize = 2;
 /// Headings are looked for in such steps, radians, in a field of this spread, metres.
 const HEADING_STEP_RAD: f64 = 0.01;
 const HEADING_SIGMA_M: f64 = 0.12;
-/// From one spread to the next.
+/// Ratio of each spread to the one before.
 const COOLING: f64 = 0.7;
 /// Steps in which the translation is looked for: coarse, and fine, metres.
 const STEPS_M: [f64; 2] = [0.03, 0.006];
@@ -284,7 +284,7 @@ impl<'a> Problem<'a> {
         self.shifted(&Isometry2::from_parts(self.prior.pose.translation, turned.rotation))
     }
 
-    /// Both together, from the best heading.
+    /// The pose from rotation and translation together, starting at the best heading.
     fn joint(&self) -> Isometry2<f64> {
         let mut pose = self.annealed(self.headed(), |pose, sigma_m| self.moved(pose, sigma_m));
         for _ in 0..ROUNDS {

@@ -36,7 +36,7 @@ pub(super) struct Patch {
     pub middle: Point3<f64>,
     /// Level unit vector in the plane.
     pub along: Vector3<f64>,
-    /// Its ends from the middle: along, and up.
+    /// Ends of the patch from the middle, metres: along, and up.
     pub limits_m: [(f64, f64); 2],
     pub area_m2: f64,
     /// Ascending.
@@ -46,7 +46,7 @@ pub(super) struct Patch {
 /// Conditions under which two facets are one patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
-    /// They are no farther apart, metres (λ).
+    /// Maximum distance between the facets, metres (λ).
     pub within_m: f64,
     /// Nor so far along the normal, metres.
     pub across_m: f64,

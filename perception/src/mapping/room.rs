@@ -105,7 +105,7 @@ impl Wall {
         self.stretches_m.iter().map(move |(a, b)| (self.from + along * *a, self.from + along * *b))
     }
 
-    /// Its length from end to end, metres.
+    /// The length from end to end, metres.
     pub fn length_m(&self) -> f64 {
         (self.to - self.from).norm()
     }
@@ -115,7 +115,7 @@ impl Wall {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
-    /// Its height, metres.
+    /// The height, metres.
     pub height_m: f64,
     /// True if it was seen from above.
     pub faces_up: bool,
@@ -181,7 +181,7 @@ fn holds(outline: &[Point2<f64>], place: &Point2<f64>) -> bool {
 const STEP_M: f64 = 0.1;
 
 impl Survey {
-    /// Nothing seen yet; cells of `edge_m` metres.
+    /// An empty survey, with cells of `edge_m` metres.
     ///
     /// # Errors
     /// If the edge is no positive length.

@@ -82,9 +82,9 @@ pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spo
     keyed.into_iter().map(|(_, (sum, weight))| Spot { at: (sum / weight).into(), weight }).collect()
 }
 
-/// Fewer points in a square are noise.
+/// Fewest points in a square that are more than noise.
 const FEWEST: f64 = 2.0;
-/// More points in a square do not make it weigh more: they are of one place.
+/// Maximum weight of a square in points: more points are of one place.
 const MOST: f64 = 8.0;
 
 /// A square of the plan that holds points.
@@ -99,13 +99,13 @@ pub(super) struct Spot {
 /// Field of view in the plan: a sector around the direction ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
-    /// Its right end, anticlockwise from ahead: negative, radians.
+    /// The right end of the field of view, anticlockwise from ahead: negative, radians.
     pub right_rad: f64,
-    /// Its left end, radians.
+    /// The left end of the field of view, radians.
     pub left_rad: f64,
-    /// Its nearest depth, metres; of more than half a turn, its nearest range.
+    /// The nearest depth, metres; of more than half a turn, the nearest range.
     pub near_m: f64,
-    /// Its farthest depth that is used, metres: noise grows with its square.
+    /// The farthest depth that is used, metres: noise grows with its square.
     pub far_m: f64,
 }
 

@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 /// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around. From: work.
 pub(super) const SIDE: usize = 8;
 pub(super) const WIDE: usize = SIDE + 2;
-/// No cell, or no brick. From: mark.
+/// Mark of no cell, or no brick. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
 /// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then. From: derived, single precision has 24 bits.
 const MOST: f64 = (1 << 20) as f64;
@@ -66,7 +66,8 @@ pub(super) struct Bricks<C> {
 const RECENT: usize = 4;
 
 impl<C: Copy> Bricks<C> {
-    /// No cell yet; each begins as `empty`. Voxels that are columns along z make bricks of one layer.
+    /// An empty grid of bricks, whose cells begin as `empty`. Voxels that are columns along z make bricks of
+    /// one layer.
     pub fn new(columns: bool, empty: C) -> Bricks<C> {
         Bricks {
             numbers: FxHashMap::default(),

@@ -87,7 +87,7 @@ pub(super) fn gather(
     options: &MergeOptions,
     mut known: Option<&mut Vec<Arc<Looked>>>,
 ) -> Vec<Gathered> {
-    /// If there are too many voxels, they grow at least by this. From: chosen.
+    /// Factor by which voxels grow, at least, if there are too many. From: chosen.
     const GROWTH: f64 = 1.2;
     let _span = tracing::debug_span!("fuse", views = views.len()).entered();
     let used: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();

@@ -120,7 +120,8 @@ impl Askers {
         Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about `asked` of each sort, evenly spread, others for each partner; and their weights.
+    /// At most about `asked` points of each sort, evenly spread, different ones for each partner, with their
+    /// weights.
     fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f32)> {
         let spread = move |of: &'_ [u32]| {
             let stride = (of.len() / asked.max(1)).max(1);

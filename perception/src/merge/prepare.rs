@@ -178,7 +178,7 @@ fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
 
 /// Every nth row and column of an organised cloud, so that about as many columns are left; what is not to be merged is no return.
 pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Cloud> {
-    /// No return. From: mark.
+    /// Mark of a pixel without a return. From: mark.
     const NONE: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);
     let Grid { width, height } = view.cloud.grid?;
     let stride = (width / about).max(1);

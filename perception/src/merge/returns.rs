@@ -52,7 +52,7 @@ pub(super) struct Return {
 pub(super) struct Looked(Vec<Vec<Vec<Return>>>);
 
 impl Looked {
-    /// From its corrected pose, with these planes.
+    /// The returns of a view from its corrected pose, with these planes.
     pub fn at(
         view: &View,
         prepared: &Prepared,
@@ -137,7 +137,7 @@ impl<'a> Facing<'a> {
 
     #[inline(always)]
     fn normal(&self, row: usize, column: usize) -> Vector3<f32> {
-        /// No normal. From: mark.
+        /// Mark of a point without a normal. From: mark.
         const NONE: Vector3<f32> = Vector3::new(f32::NAN, f32::NAN, f32::NAN);
         self.normals.get(self.rows[row] + self.columns[column]).copied().unwrap_or(NONE)
     }

@@ -165,7 +165,7 @@ fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Ori
 
 /// A view and what it is to fall onto, turned level, metres from the middle of the view.
 struct Levelled {
-    /// At most about `TRIED` of the view's points.
+    /// A sample of the view's points, at most about `TRIED`.
     tried: Vec<Oriented>,
     /// The points near enough to be matched.
     placed: Vec<Oriented>,

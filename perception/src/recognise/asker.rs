@@ -58,7 +58,7 @@ impl<'a> Lying<'a> {
         (self.turn * place.coords + self.shift).into()
     }
 
-    /// As [`DepthMap::look`], of a place in the surface's frame.
+    /// The same as [`DepthMap::look`], of a place in the surface's frame.
     pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
         self.map.look_from(&self.seen_at(place), tolerance_m)
     }

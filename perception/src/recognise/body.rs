@@ -58,7 +58,7 @@ impl Frustum {
     /// The depths at which a ray crosses the infinite cone about its side, drawn in by `wall_m`, the lesser first.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
-        /// Nothing is lower, metres. From: rounding.
+        /// Least height of a body, metres. From: rounding.
         const LEAST_M: f64 = 1e-3;
         let slope = (self.rim_m - self.foot_m) / (self.top_m - self.base_m).max(LEAST_M);
         let (radius, widens) = (self.foot_m - wall_m + slope * from[2], slope * dz);

@@ -33,7 +33,7 @@ pub struct Side {
 }
 
 impl Side {
-    /// So much of what it tells is kept, as an exponent.
+    /// Flattens the likelihoods by an exponent.
     pub fn soften(&mut self, exponent: f64) {
         self.logs.iter_mut().for_each(|log| *log *= exponent);
     }

@@ -35,12 +35,13 @@ const SAID: f64 = 1.5;
 /// A handle has one in so many points of the body, far off and near, but at least and at most so many. From: chosen.
 pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
 pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
-/// It is higher than this, metres. From: chosen.
+/// Least height of a handle, metres. From: chosen.
 const HANDLE_HIGH_M: f64 = 0.012;
 
-/// So far beside and above a thing pixels may tell of it, and beyond its edge free space is asked for, metres. From: chosen.
+/// Distance beside and above a thing within which pixels may tell of the thing, and beyond its edge at which
+/// free space is tested, metres. From: chosen.
 const BESIDE_M: f64 = 0.012;
-/// Nothing is lower, metres. From: rounding.
+/// Least height of a thing, metres. From: rounding.
 const LEAST_HEIGHT_M: f64 = 0.001;
 /// The rim takes at least and at most these shares of the height. From: chosen.
 const RIMS: (f64, f64) = (0.1, 0.45);

@@ -8,7 +8,7 @@ use super::rays::BELL;
 use crate::noise::normal_cdf;
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 
-/// No density and no chance is taken to be less. From: chosen.
+/// Least density and least chance that are assumed. From: chosen.
 const LEAST_DENSITY: f64 = 1e-12;
 const LEAST_CHANCE: f64 = 1e-6;
 /// Share of a family's things of the measured size that are of a known kind all the same, at the least. From: chosen.
@@ -199,7 +199,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 
 /// Log likelihood of a side that misses a form by so much, metres.
 fn miss_log(miss_m: f64, m: &Measured) -> f64 {
-    /// No form is measured more sharply than this share of the spread of a measurement. From: chosen.
+    /// Least error of a form, as a share of the spread of a measurement. From: chosen.
     const OF_SIGMA: f64 = 0.7;
     let apart = m.apart_m();
     let floor = SHAPE_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);

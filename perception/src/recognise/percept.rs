@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stance {
-    /// Its base is down.
+    /// The base of the object is down.
     Upright,
-    /// Its top is down.
+    /// The top of the object is down.
     UpsideDown,
-    /// Its axis lies in the plane of the surface.
+    /// The axis of the object lies in the plane of the surface.
     Lying,
     /// The views do not tell.
     #[default]
@@ -22,7 +22,7 @@ pub enum Stance {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sighting {
-    /// It was seen.
+    /// The feature was seen.
     Seen,
     /// The places where it could be were looked through: it is not there.
     Absent,
@@ -69,7 +69,7 @@ pub struct Evidence {
 pub struct Percept {
     /// Name of the known object that it most likely is; `None` is *unknown*.
     pub label: Option<String>,
-    /// Its kind.
+    /// The kind of the object.
     pub kind: Option<String>,
     /// Probability of each model, in the order of the models. With `unknown` they sum to one.
     /// (The published recogniser gives similarity scores here, which are no probabilities.)

@@ -22,7 +22,7 @@ const SURFACE: f64 = 0.6;
 const ELSE: f64 = 0.3;
 /// Depth over which something else may be anywhere, metres. From: chosen.
 const ANYWHERE_M: f64 = 1.0;
-/// No pixel says more than this for or against. From: chosen.
+/// Bound of the log likelihood ratio of one pixel. From: chosen.
 pub(super) const MOST: f64 = 10.0;
 /// Chance that a view says nothing of a body. From: chosen.
 pub(super) const BAD_VIEW: f64 = 0.05;

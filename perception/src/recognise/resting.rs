@@ -240,7 +240,8 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
         .then(|| parted(segment, &axis, circle.top_m, (level_m, base_m, base_sigma_m)))
 }
 
-/// In how many directions something is seen around the foot of a body that is no lower, and right beside it as high as that.
+/// Numbers of directions in which something no lower is seen around the foot of a body, and in which
+/// something as high as the foot is seen right beside it.
 struct Bearing {
     around: usize,
     level: usize,

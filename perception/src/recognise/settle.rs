@@ -16,7 +16,7 @@ use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix4, Point3, Vector3, Vector4};
 use rustc_hash::FxHashMap;
 
-/// No view is moved farther than this: it shows something else, metres. From: chosen.
+/// Maximum shift of a view, metres: farther off, the view shows something else. From: chosen.
 const MOST_M: f64 = 0.03;
 /// The side has to spread by no more than this share of what it did. From: chosen.
 const ROUNDER: f64 = 0.85;

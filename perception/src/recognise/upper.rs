@@ -21,9 +21,9 @@ pub struct Upper {
 }
 
 impl Upper {
-    /// As views of a body tell it.
+    /// The evidence on the upper end from views of a body.
     pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
-        /// So near to the rim a ray does not tell, metres. From: chosen.
+        /// Distance from the rim within which a ray gives no evidence, metres. From: chosen.
         const RIM_M: f64 = 0.006;
         /// A ray that falls less tells of no end. From: rounding.
         const LEVEL: f64 = 1e-3;

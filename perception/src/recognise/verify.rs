@@ -19,7 +19,7 @@ const LAID: (f64, usize) = (EDGE_M, 2);
 /// The same of views that lie as they were merged. From: derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
-/// No round body is narrower, metres of radius. From: rounding.
+/// Least radius of a round body, metres. From: rounding.
 const LEAST_M: f64 = 0.01;
 
 /// The log likelihood of a body in a view, and the shift of the body for it along both axes of the surface,

@@ -230,7 +230,7 @@ pub(super) fn held_inverse(information: &Matrix6<f64>) -> (Matrix6<f64>, usize) 
 
 /// One step of the pose.
 pub(super) struct Motion {
-    /// To be applied on the left of the pose so far.
+    /// The step, to be applied on the left of the present pose.
     pub step: Isometry3<f64>,
     pub shift_m: f64,
     pub turn_rad: f64,

@@ -6,7 +6,7 @@ use crate::scale::{APART_M, PLACE_M};
 use crate::segment::{POINT_ENDS, end};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Its axis is sought about the sides of what bounds it from above, turned by so much, radians. From: chosen.
+/// Turns of the trial axes from the sides of the bounding rectangle seen from above, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
 /// Points by which the direction of its axis is sought, at the most. From: chosen.
 const SCOUTS: usize = 300;

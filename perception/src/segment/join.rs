@@ -26,7 +26,7 @@ pub(super) struct Sets {
     place: Vec<u32>,
 }
 
-/// No set, or no patch. From: mark.
+/// Mark of no set, or no patch. From: mark.
 const NONE: u32 = u32::MAX;
 
 impl Sets {

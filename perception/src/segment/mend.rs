@@ -123,7 +123,7 @@ impl Part {
         self.hull.get_or_init(|| convex_hull(self.outer.clone()))
     }
 
-    /// Both in one, without the links between them.
+    /// The union of both parts, without the links between them.
     fn with(self, other: Part, both: [u32; 2], made: u32) -> Part {
         let (mut large, small) =
             if self.places.len() >= other.places.len() { (self, other) } else { (other, self) };

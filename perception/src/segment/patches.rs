@@ -211,7 +211,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
 
 /// For each voxel where its neighbours begin, and all of them in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
-    /// In how many shares they are found, at the most. From: work.
+    /// Maximum number of shares in which the neighbours are found. From: work.
     const SHARES: usize = 8;
     let of = |range: Range<usize>| {
         let (mut starts, mut near) = (Vec::with_capacity(range.len() + 1), Vec::new());

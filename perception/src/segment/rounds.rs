@@ -93,7 +93,7 @@ fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
 
 /// A round body, and what is left of the parts that it takes voxels from.
 struct Cut {
-    /// With its handle and frayed edge. Ascending.
+    /// The voxels of the body with its handle and frayed edge, ascending.
     body: Vec<usize>,
     /// The voxels apart from the body, in connected pieces, each ascending.
     left: Vec<Vec<usize>>,

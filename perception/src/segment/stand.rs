@@ -85,7 +85,7 @@ fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>,
     (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
 }
 
-/// In how many directions from a place points lie.
+/// The number of directions from a place in which points lie.
 fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
     let mut seen = [false; SECTORS];
     points.for_each(|p| seen[sector(p.x - x, p.y - y)] = true);

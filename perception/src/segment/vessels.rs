@@ -106,7 +106,7 @@ pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment
     parts.into_iter().map(|c| c.segment).collect()
 }
 
-/// Both in one, in order of the indices.
+/// The union of two segments, in order of the indices.
 fn union(a: &Segment, b: &Segment) -> Segment {
     let count = a.indices.len() + b.indices.len();
     let mut both = Segment {

@@ -12,7 +12,8 @@ use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rustc_hash::FxHashSet;
 
-/// So far a plane is taken to reach on behind and beneath what hides it, metres: few things are twice as wide. From: chosen.
+/// Maximum distance that a plane is assumed to go on behind and beneath things that hide it, metres: few
+/// things are twice as wide. From: chosen.
 const HIDDEN_M: f64 = 0.3;
 /// Maximum height of a thing on a plane, metres. From: chosen.
 pub(crate) const TALLEST_M: f64 = 0.6;
@@ -25,7 +26,7 @@ const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [
 /// The part of a plane that a cell belongs to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Owner {
-    /// It was not asked yet whether the plane reaches on here.
+    /// The cell has not been tested yet.
     #[default]
     Untold,
     /// The plane may reach on here, from whichever part comes first.
@@ -171,7 +172,7 @@ fn longest_ray(camera: &Intrinsics) -> f64 {
 }
 
 impl Surface {
-    /// With the places on which things stand that hide its edge.
+    /// Adds the places on which things stand that hide the surface's edge.
     pub(super) fn with_hidden(self, samples: &[Sample], seen: &Visibility) -> Surface {
         let plane = Plane { normal: self.up.into_inner(), offset: self.offset_m };
         let grid = Grid::fine(&plane);
@@ -208,7 +209,7 @@ impl Surface {
         self.widened(&grid.turn, high.iter().map(|(_, p)| p))
     }
 
-    /// With the hull around its own and some places.
+    /// Widens the hull to hold some further places.
     fn widened<'a>(
         self,
         turn: &UnitQuaternion<f64>,

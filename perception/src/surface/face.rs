@@ -17,7 +17,7 @@ const CELL_M: f64 = 0.03;
 const FULL: f64 = 2.0;
 const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
-/// Fewer samples are no piece of a plane. From: chosen.
+/// Fewest samples of a piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
 
 /// The connected parts of a plane, most returns first. None if no camera is above it.
@@ -157,7 +157,7 @@ pub(super) struct Grid {
     pub turn: UnitQuaternion<f64>,
     /// Side of a cell, metres.
     pub side_m: f64,
-    /// Its two axes along the plane, in the world.
+    /// The two axes of the grid along the plane, in the world.
     axes: [Vector3<f64>; 2],
 }
 

@@ -160,7 +160,7 @@ fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 
 
 /// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
 fn drop_inner(points: &mut Vec<[f64; 2]>) {
-    /// Fewer points are sorted as they are. From: work.
+    /// Number of points below which they are sorted directly. From: work.
     const WORTH_IT: usize = 64;
     /// Directions of the corners of a box. From: derived, the four diagonals.
     const SLANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];

@@ -136,7 +136,7 @@ impl Cubes {
         cubes
     }
 
-    /// Only the points that are told to be kept, in their order.
+    /// Keeps only the points for which `kept` is true, in their order.
     fn keep(&mut self, mut kept: impl Iterator<Item = bool>) {
         self.of.retain(|_| kept.next().unwrap_or(false));
         self.sort();

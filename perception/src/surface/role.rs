@@ -47,21 +47,21 @@ pub enum Sign {
         /// Area in view, square metres.
         area_m2: f64,
     },
-    /// It is a further part of the floor.
+    /// The surface is a further part of the floor.
     LevelWithFloor,
-    /// It is the top of something that stands on another surface.
+    /// The surface is the top of something that stands on another surface.
     OnTop {
         /// The height above that surface, metres.
         by_m: f64,
     },
-    /// It was seen through another surface: a mirror image.
+    /// The surface was seen through another one: a mirror image.
     Mirrored,
-    /// It is a strip.
+    /// The surface is a strip.
     Narrow {
-        /// Its width, metres.
+        /// The width of the strip, metres.
         width_m: f64,
     },
-    /// It is not level with the surfaces that hold most returns.
+    /// The surface is not level with the surfaces that hold most returns.
     Slanted {
         /// Angle between the normals, radians.
         by_rad: f64,
@@ -71,7 +71,7 @@ pub enum Sign {
         /// The mean height of the cameras above the surface, metres.
         eye_m: f64,
     },
-    /// It is not known from where it was seen, and nothing lies lower.
+    /// The viewpoint is unknown, and nothing lies lower.
     NoCamera,
 }
 

@@ -20,7 +20,7 @@ pub struct Tiles<T> {
 
 impl<T: Copy + Default> Tiles<T> {
     pub fn new() -> Tiles<T> {
-        /// No cell lies in it. From: derived, tiles are numbered from the least cell by eight.
+        /// Mark of no tile. From: derived, tiles are numbered from the least cell by eight.
         const NONE: [i32; 2] = [i32::MIN; 2];
         Tiles {
             starts: FxHashMap::default(),

@@ -24,8 +24,8 @@ const LEAST_SHARE: f64 = 0.0125;
 const ALIKE_RAD: f64 = 0.14;
 /// Hypotheses that lie no farther apart are one, radians. From: chosen, 15°.
 const ONE_RAD: f64 = 0.26;
-/// So likely up must be told, against all other directions; and where it is against how cameras are held.
-/// From: chosen, more likely than not, and as good as sure.
+/// Minimum probability of the up direction, against all other directions; and the minimum where the direction
+/// is against how cameras are held. From: chosen, more likely than not, and as good as sure.
 const LIKELY: f64 = 0.5;
 pub(super) const SURE: f64 = 0.95;
 /// A way up that is farther from how cameras are held is against it, radians. From: chosen, about 70°.
@@ -55,7 +55,7 @@ const MANY: f64 = 0.05;
 pub(super) enum Doubt {
     /// Nothing in view is a plane.
     NoPlane,
-    /// More than one way may be up, or what is up shows nothing level.
+    /// More than one direction may be up, or the up direction shows nothing level.
     Untold,
 }
 
@@ -108,7 +108,7 @@ fn is_level(face: &Face, up: &Vector3<f64>) -> bool {
 
 /// A plane with the returns that it holds.
 struct Face {
-    /// Its normal on the side of the cameras.
+    /// The plane, with its normal on the side of the cameras.
     plane: Plane,
     members: Vec<Point3<f64>>,
     /// Share of all returns.
@@ -257,11 +257,13 @@ fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
     const ROLLED_RAD: f64 = 0.2;
     const TURNED: f64 = 0.003;
     const ANY_WAY: f64 = 0.0003;
-    /// They look up by no more than the first, radians, but for a spread; log of the least chance of more. From: chosen.
+    /// Angle up to which cameras look up at full chance, radians, the spread beyond, radians, and log of the
+    /// least chance. From: chosen.
     const RAISED_RAD: f64 = 0.2;
     const RAISED_SPREAD_RAD: f64 = 0.25;
     const LEAST_RAISED: f64 = -5.0;
-    /// From the first on, radians, over so much, radians, fewer look down; log of the chance to look straight down. From: chosen.
+    /// Angle of looking down from which fewer cameras do so, radians, the width of that fall, radians, and
+    /// log of the chance to look straight down. From: chosen.
     const STEEP_RAD: f64 = 1.1;
     const STEEPER_RAD: f64 = 0.3;
     const STRAIGHT: f64 = -2.0;

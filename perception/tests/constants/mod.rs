@@ -39,7 +39,7 @@ const PLAIN: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 100.0, 1000.0];
 pub struct Constant {
     /// Below `src`.
     pub file: String,
-    /// From 1.
+    /// Line number, from 1.
     pub line: usize,
     pub name: String,
     pub value: String,
@@ -82,7 +82,7 @@ impl Constant {
         Some(format!("{}:{}: {} {why}", self.file, self.line, self.name))
     }
 
-    /// As its name ends.
+    /// The unit that the end of the name gives.
     fn unit(&self) -> &'static str {
         let name = self.name.to_lowercase();
         let units =

@@ -84,7 +84,7 @@ fn cooler() -> Body {
     Body { name: "cooler", parts }
 }
 
-/// No texture at all.
+/// A head without any texture.
 fn head() -> Body {
     let grey = Paint::Plain([190, 186, 180]);
     let parts = vec![

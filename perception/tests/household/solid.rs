@@ -11,7 +11,7 @@ pub enum Solid {
     Cone { low_m: f64, high_m: f64, height_m: f64, wall_m: Option<f64> },
     /// Half axes, about the origin.
     Ball([f64; 3]),
-    /// From one point to another, round at its ends.
+    /// A rod from one point to another, round at its ends.
     Rod { from: [f64; 3], to: [f64; 3], radius_m: f64 },
 }
 
@@ -114,7 +114,7 @@ fn ball(half: [f64; 3], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<Hit> {
     (t > NEAREST).then_some(Hit { t, at, normal })
 }
 
-/// Both surfaces of a frustum's side, the nearest in front.
+/// The intersection with both surfaces of a frustum's side, the nearest in front.
 fn side(low: f64, high: f64, height: f64, from: f64, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<Hit> {
     side_from(low, high, height, from, eye, ray)
 }

@@ -80,7 +80,7 @@ impl Evidence {
         self.facing.saturating_sub(self.hidden)
     }
 
-    /// As if so many times the points said the same.
+    /// Scales the counts of points by a factor.
     pub(super) fn times(self, factor: f64) -> Evidence {
         let times = |count: usize| (count as f64 * factor).round() as usize;
         Evidence {

@@ -66,7 +66,7 @@ impl Kind {
 }
 
 impl Features {
-    /// No features of a kind.
+    /// An empty set of features of a kind.
     pub fn none(kind: Kind) -> Features {
         Features { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }

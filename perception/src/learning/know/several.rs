@@ -7,9 +7,9 @@ use super::{KnowError, KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 
-/// Less confidence than this is no guess.
+/// Minimum confidence of a guess.
 const LEAST: f64 = 0.02;
-/// Fewer points of a model that a look could have shown say nothing of it.
+/// Fewest points of a model that a look could have shown for the look to say anything of the model.
 const FEWEST: usize = 40;
 
 /// A look made ready, with what it suggests.
@@ -22,7 +22,7 @@ pub struct Glance {
 /// A model that may be somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guess {
-    /// Its number in the library.
+    /// The index of the model in the library.
     pub model: usize,
     /// Pose in the look.
     pub camera_from_model: Isometry3<f64>,

@@ -18,9 +18,9 @@ const BESIDE_M: f32 = 0.02;
 const STEP_M: f64 = 0.03;
 /// Least cosine between up and the normal of what is level.
 const LEVEL: f64 = 0.8;
-/// Fewer places say nothing.
+/// Fewest places that give evidence.
 const LEAST: usize = 6;
-/// It floats if so many times as many places are seen past as carry it.
+/// Ratio of places seen past to places that carry the model from which the model floats.
 const FLOATS: usize = 2;
 
 /// False if a model is tilted, or if hardly anything is beneath it: all around its foot the camera saw past where it would stand. `up` is up in the model

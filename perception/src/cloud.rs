@@ -21,7 +21,9 @@ const WIDEST_PLACE_M: f64 = 20.0;
 /// Extent as a share of the distance from the origin below which a cloud counts as far away rather than given
 /// in other units. From: chosen.
 const NARROW: f64 = 0.01;
-/// Nearer is too near for a depth camera that gives millimetres; farther is too far for one that gives centimetres. From: chosen.
+/// Median distances, in the cloud's unit, between which a cloud may be in millimetres or in centimetres:
+/// nearer is too near for a depth camera that gives millimetres; farther is too far for one that gives
+/// centimetres. From: chosen.
 const LEAST_MILLIMETRES: f64 = 300.0;
 const MOST_CENTIMETRES: f64 = 800.0;
 /// Coordinates that single precision tells less apart than this blur objects, metres. From: chosen.

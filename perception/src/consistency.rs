@@ -52,7 +52,7 @@ pub enum Fault {
     PrincipalPoint(Vector2<f64>),
     /// Columns run from right to left.
     Mirrored,
-    /// Each look has the pose of so many frames before it (after it, if negative).
+    /// Each look has the pose of a number of frames before it (after it, if negative).
     Late(i64),
     /// The stated poses all lie so far from the true ones: a shift in the map, metres, and a turn about the surface's middle, radians.
     Displaced(Vector2<f64>, f64),
@@ -125,7 +125,8 @@ impl Inconsistency {
     }
 }
 
-/// Tells whether looks at one surface of the map agree with it; none if they do, or show too little of it.
+/// Finds the fault that explains why looks at one surface of the map disagree with the map; none if they
+/// agree, or show too little of the surface.
 ///
 /// Each look is a view and its stated pose. `asked` is the number of the surface in `map`. `neighbours` has, for each number of frames by
 /// which poses may be late, the poses that the looks would have.

@@ -33,11 +33,12 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MergeOptions {
-    /// Up in the world, if known.
+    /// The up direction in the world, if known.
     pub up: Option<Unit<Vector3<f64>>>,
     /// Least and greatest height along `up` of what is merged, metres; outside it points are dropped.
     pub height_band_m: Option<(f64, f64)>,
-    /// Seen along `up`, what is merged, if not all of it; views are aligned by all that they show.
+    /// The region that is merged, seen along `up`, if not everything; views are aligned by all that they
+    /// show.
     pub region: Option<Region>,
     /// Returns farther from their camera than this are dropped, metres. From: chosen.
     pub range_m: f64,
@@ -167,7 +168,7 @@ const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 800, re
 const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 900, ..FIRST };
 /// Second alignment: planes and what is far weigh little, the objects decide (paper step 4). From: chosen.
 const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 1200, rest_weight: 0.2 };
-/// After a view was left out, the rest settles again. From: chosen.
+/// Alignment after a view was left out, in which the rest settles again. From: chosen.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
 
 /// Merges views into one cloud in the world frame. One view is filtered and fused only.
@@ -197,7 +198,7 @@ fn merged(gathered: &[Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps
     Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps }
 }
 
-/// One fit a view; takes the words of why views were left out.
+/// The fits of all views; takes the words of why views were left out.
 fn fits(prepared: &[Prepared], aligned: &mut Aligned) -> Vec<ViewFit> {
     let Aligned { poses, used, found, whys, .. } = aligned;
     (0..prepared.len()).map(|i| fit(&prepared[i], &poses[i], &found[i], used[i], whys[i].take())).collect()

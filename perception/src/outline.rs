@@ -226,7 +226,7 @@ fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32;
 
 /// A side of the rectangle, and the points that it leaves outside.
 struct Side {
-    /// Those and the one on the side: they were the farthest at the last turn.
+    /// The points outside the side and the one on it: they were the farthest at the last turn.
     outermost: Vec<usize>,
     /// The outermost values, [`ranked`].
     found: Vec<u64>,

@@ -16,7 +16,7 @@ pub struct PictureOptions {
     pub eye: Point3<f64>,
     /// The target of the camera, metres.
     pub target: Point3<f64>,
-    /// Up in the picture.
+    /// The up direction in the picture.
     pub up: Vector3<f64>,
     /// Vertical opening angle, radians.
     pub opening_rad: f64,

@@ -116,7 +116,7 @@ impl Default for RegisterOptions {
 pub enum Ending {
     /// The last round moved less than asked.
     Settled,
-    /// All rounds were used and it still moved.
+    /// All rounds were used while the source still moved.
     OutOfRounds,
     /// Fewer partners were found than asked for: the clouds do not overlap where they were put.
     TooFewPartners,

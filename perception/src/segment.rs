@@ -184,7 +184,7 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
 
 /// The same of some points that follow each other; the first has a number.
 fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, options: &SceneOptions) -> Placed {
-    /// Up to so many spreads of the surface is the surface itself. From: chosen.
+    /// Number of spreads of the surface within which a point belongs to the surface itself. From: chosen.
     const ROUGH: f64 = 2.5;
     /// Points whose heights are told together. From: work.
     const BLOCK: usize = 16;

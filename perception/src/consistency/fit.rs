@@ -9,7 +9,8 @@ use nalgebra::{Isometry3, Matrix6, Point2, Point3, Vector2, Vector3, Vector6};
 const EDGE_SIGMA_M: f64 = 0.015;
 /// Standard deviation of a surface's height in the map, metres. From: chosen.
 const HEIGHT_SIGMA_M: f64 = 0.01;
-/// All rays of a look together tell as much as so many independent ones: of where it ends, and of its height. From: chosen.
+/// Number of independent rays that all rays of a look together count as: for the outline, and for the height.
+/// From: chosen.
 const EDGES: f64 = 40.0;
 const HEIGHTS: f64 = 6.0;
 /// Distances from an edge beyond which more distance tells no more, metres. From: chosen.

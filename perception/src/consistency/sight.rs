@@ -43,7 +43,8 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    /// None if the view has no pixels, or too few of them tell of the surface.
+    /// The sight of the surface in a view. None if the view has no pixels, or too few of them tell of the
+    /// surface.
     pub(super) fn of(view: &View, world_from_camera: &Isometry3<f64>, surface: &MapSurface) -> Option<Sight> {
         let (camera, grid) = view.intrinsics.zip(view.cloud.grid)?;
         let side = ((grid.width * grid.height) as f64 / ASKED as f64).sqrt().max(1.0) as usize;

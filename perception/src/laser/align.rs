@@ -165,7 +165,8 @@ impl Contradictions {
     }
 }
 
-/// Two against one: an end that two other scans contradict is false, a scan that contradicts two ends which nobody else does has false points, or lacks some.
+/// Majority of scans over one: an end that two other scans contradict is false, a scan that contradicts two
+/// ends which nobody else does has false points, or lacks some.
 fn contradictions(
     scans: &[PosedScan],
     longest_m: f64,

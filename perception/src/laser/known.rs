@@ -105,7 +105,7 @@ pub struct Candidate {
 /// Result of recognition.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
-    /// One name fits.
+    /// Exactly one name fits.
     Is(String),
     /// Several names fit, or none fits and these are not ruled out: more scans, or other features, must tell.
     OneOf(Vec<String>),
@@ -118,9 +118,9 @@ pub enum Verdict {
 pub struct Recognition {
     /// Verdict.
     pub verdict: Verdict,
-    /// Those that were aligned, the best fit first.
+    /// The known shapes that were aligned, the best fit first.
     pub candidates: Vec<Candidate>,
-    /// Known shapes that features or width ruled out.
+    /// The number of known shapes that features or width ruled out.
     pub ruled_out: usize,
     /// Names that are not ruled out, the best fit first, whether or not they fit as well as the best.
     pub may_be: Vec<String>,

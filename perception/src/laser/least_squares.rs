@@ -3,7 +3,8 @@
 use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
-/// One round after the other: the softness of the farthest points, metres, and how many times as long outliers are; the last is the objective itself.
+/// Rounds of the solver: the softness of the farthest points, metres, and the factor on the length of
+/// outliers; the last is the objective itself.
 const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
 /// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
 const RADIUS_M: f64 = 0.3;
@@ -12,7 +13,7 @@ const NOTHING_M2: f64 = 1e-12;
 /// Damping at the start, and where steps are so short that they do not help any more.
 const DAMPING: (f64, f64) = (1e-3, 1e1);
 
-/// One round, as soft as can be.
+/// Runs the first, softest round alone.
 pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     rounds(problem, options, &ROUNDS[..1])
 }

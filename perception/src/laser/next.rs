@@ -54,7 +54,7 @@ pub struct Outlook {
     pub perimeter_m: f64,
     cell_m2: f64,
     open: usize,
-    /// For each pose the undetermined cells that a scan from there is expected to settle.
+    /// The undetermined cells that a scan from each pose is expected to settle, by pose.
     settles: Vec<Vec<u32>>,
 }
 

@@ -184,7 +184,7 @@ pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
     }
 }
 
-/// The same, no farther than tells whether it is worth going on.
+/// Solves the problem coarsely, to tell whether it is worth going on.
 pub(super) fn solve_roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     let rough = SolverOptions { settle: options.settle.max(ROUGH), ..*options };
     match options.solver {

@@ -1,4 +1,4 @@
-//! All looks in one cloud, each place from the measurement that is least in doubt (section V-C).
+//! Fusion of all looks into one cloud, each place from the measurement that is least in doubt (section V-C).
 
 use super::LearningError;
 use super::frame::Frame;

@@ -45,8 +45,8 @@ pub struct KnowOptions {
     pub hopeless: f64,
     /// Judge that turns evidence into a probability.
     pub judge: Judge,
-    /// Up in the frames of the models and in the world of the views, if it is the same in all of them: things mostly stand as they stood when they were
-    /// learned.
+    /// The up direction in the frames of the models and in the world of the views, if it is the same in all
+    /// of them: things mostly stand as they stood when they were learned.
     pub up: Option<Unit<Vector3<f64>>>,
 }
 
@@ -189,7 +189,8 @@ impl Library {
         Ok(choose(self.judged(view, options)?, options.least_confidence))
     }
 
-    /// All that was judged by itself and was not hopeless, whatever shares its place: for [`choose`], and for fitting a [`Judge`].
+    /// All candidates that were judged one by one and were not hopeless, even several in one place: for
+    /// [`choose`], and for fitting a [`Judge`].
     ///
     /// # Errors
     /// As [`Library::recognise`].
@@ -373,9 +374,10 @@ fn same(a: &Isometry3<f64>, b: &Isometry3<f64>, (within_m, within_rad): (f64, f6
         && a.rotation.angle_to(&b.rotation) < within_rad
 }
 
-/// Those that together explain the scene best without explaining any part of it twice, the surest first: from the best of each alone, changed one at
-/// a time for the better (add one and drop what it conflicts with). What another model explains as well is shared among both by their odds; less
-/// confidence than `least_confidence` is not told.
+/// The candidates that together explain the scene best without explaining any part of it twice, the surest
+/// first: from the best of each alone, changed one at a time for the better (add one and drop what it
+/// conflicts with). What another model explains as well is shared among both by their odds; less confidence
+/// than `least_confidence` is not told.
 pub fn choose(mut found: Vec<Candidate>, least_confidence: f64) -> Vec<Recognised> {
     found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let n = found.len();

@@ -147,8 +147,9 @@ impl MetaRoom {
     /// of a wall behind the room, which the camera measures to decimetres, two looks are two clouds that fit each other anywhere, and so many of its
     /// points outvote those that are known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        /// Pixel stride that thins the seen points: points of a grid of voxels are drawn onto those of
-        /// another grid, and centimetres off the truth where only edges hold what is seen along a plane.
+        /// Pixel stride by which views are thinned for alignment, rather than by voxels: points of one grid
+        /// of voxels are drawn onto those of another, centimetres off the truth where only edges hold a view
+        /// along a plane.
         const EVERY: usize = 6;
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
@@ -349,7 +350,8 @@ impl MetaRoom {
 struct Change {
     /// Pixels before it.
     before: Mask,
-    /// Those of them that lie before it by far, to either side as well, as far as the camera may be turned.
+    /// The pixels far before the static structure, to either side as well, as far as the camera may be
+    /// turned.
     apart: Mask,
     /// Pixels behind it: they may always have been there.
     revealed: Vec<u32>,
@@ -368,7 +370,7 @@ fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, Learn
     views.iter().zip(poses).enumerate().map(map).collect()
 }
 
-/// Each so many-th pixel along rows and columns.
+/// Keeps every `step`th pixel along rows and columns.
 fn every(cloud: &Cloud, step: usize) -> Cloud {
     let width = cloud.grid.map_or(1, |grid| grid.width.max(1));
     let kept =

@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQ
 const BLURS: [usize; 3] = [5, 2, 1];
 /// Rounds of moving at each.
 const ROUNDS: usize = 5;
-/// One mark and one point of the surface are taken a square of so many pixels.
+/// Side of the squares of which one mark and one point of the surface are taken each, pixels.
 const CELL_PX: usize = 12;
 /// Least change of lightness a pixel at a mark, of 255.
 const CONTRAST: f32 = 3.0;
@@ -29,7 +29,7 @@ const NEAR_M: f32 = 0.015;
 const STEP_M: f32 = 0.01;
 /// Neighbouring pixels err together: of so many marks or points one tells something new.
 const SHARED: f32 = 12.0;
-/// Each look is compared with so many whose directions are nearest.
+/// Number of looks, those with the nearest directions, that each look is compared with.
 const PARTNERS: usize = 6;
 /// Looks that share fewer marks say nothing of each other by them.
 const FEWEST: usize = 40;
@@ -229,7 +229,7 @@ fn add(sums: &mut Sums, q: &Point3<f32>, slope: &Vector3<f32>, residual: f32, si
     sums.add_scalar(derivative, f64::from(residual), f64::from(weight));
 }
 
-/// Each look with those that see things from the most similar side.
+/// The pairs of each look with those that see things from the most similar side.
 fn pairs(active: &[usize], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for &i in active {

@@ -1,4 +1,5 @@
-//! All that was seen of a building, by cubes: as many as there is surface, however many points there are. And normals by regions (section 4.1).
+//! Points seen of a building, by cubes, whose number grows with the surface, not with the points; and normals
+//! by regions (section 4.1).
 
 use super::station::{Spot, thinned};
 use crate::cloud::is_finite;

@@ -214,7 +214,7 @@ impl<'a> Floor<'a> {
         }
     }
 
-    /// For each square how likely another look shows it, after those that should have.
+    /// The probability that another look shows each square, given the looks that should have shown it.
     pub(super) fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
         let mut missed = vec![1.0; (width * height) as usize];

@@ -10,7 +10,7 @@ use nalgebra::Point3;
 pub struct FuseOptions {
     /// The gap between their limits is no wider (U_d), metres: more than the distance at which patches grow, less than a door.
     pub gap_m: f64,
-    /// Each lies no farther from the other's plane, metres.
+    /// Maximum distance of each patch from the other's plane, metres.
     pub across_m: f64,
     /// Their normals differ by no more (U_o), radians.
     pub turned_rad: f64,

@@ -146,7 +146,7 @@ impl PoseGraph {
         self.edges.iter().map(weigh).unzip()
     }
 
-    /// One step of Gauss and Newton; how far it moved.
+    /// Takes one Gauss-Newton step; returns how far the poses moved.
     fn step(&self, poses: &mut [Isometry2<f64>], weights: &[f64]) -> Result<f64, GraphError> {
         let mut normal = Envelope::of(poses.len(), &self.edges);
         let mut right = vec![0.0; 3 * poses.len()];

@@ -45,7 +45,8 @@ const STRAY: f64 = 0.1;
 const SOMETHING: u32 = 3;
 /// Points lower than this are of the floor, metres.
 const FLOOR_M: f64 = 0.1;
-/// Something is in a square if so many stations at least, and this share of those that looked there, saw it.
+/// Fewest stations, and least share of those that looked at a square, that saw something there for the square
+/// to be occupied.
 const OCCUPIED: (u32, f64) = (2, 0.35);
 
 impl Sightlines {

@@ -25,7 +25,7 @@ impl Default for OrientationOptions {
 pub struct Orientations {
     /// Direction of the normal, modulo half a turn, radians from 0 to π.
     pub centres_rad: Vec<f64>,
-    /// For each direction given the number of its orientation, if it has one.
+    /// The number of the orientation of each given direction, if it has one.
     pub of: Vec<Option<u32>>,
 }
 

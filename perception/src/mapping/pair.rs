@@ -352,7 +352,7 @@ impl<'a> Problem<'a> {
         self.options.looks / (all * sigma_m * sigma_m)
     }
 
-    /// One expectation and the rotation about the centroid that is best for it (Eq. 3).
+    /// The pose after one expectation and the best rotation about the centroid (Eq. 3).
     fn turned(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
         let (mut along, mut across) = (0.0, 0.0);
         for spot in self.after {
@@ -370,7 +370,7 @@ impl<'a> Problem<'a> {
         self.about_centroid(pose, turn.clamp(-0.2, 0.2))
     }
 
-    /// One expectation and the rotation and translation that are best for it.
+    /// The pose after one expectation and the best rotation and translation.
     fn moved(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
         let worth = self.worth(sigma_m);
         let prior = self.prior.information();

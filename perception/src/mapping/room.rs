@@ -17,7 +17,7 @@ use rustc_hash::FxHashSet;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// All that was seen of a building so far: what a later drive adds to.
+/// The parts of a building seen so far, to which a later drive adds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Survey {
@@ -86,7 +86,7 @@ impl Default for MapOptions {
 pub struct Wall {
     /// The plane; its normal points to where it was seen from.
     pub plane: Plane,
-    /// One end of its foot, metres.
+    /// One end of the wall's foot, metres.
     pub from: Point2<f64>,
     /// The other.
     pub to: Point2<f64>,

@@ -68,7 +68,8 @@ impl Station {
     }
 }
 
-/// One spot a square that holds any, at their centroid, with the weight of all, in the order of the squares.
+/// The spots thinned to one per square, at their centroid, with the weight of all, in the order of the
+/// squares.
 pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spot> {
     let mut squares: FxHashMap<(i32, i32), (Vector2<f64>, f64)> = FxHashMap::default();
     for spot in spots {

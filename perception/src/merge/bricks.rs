@@ -51,7 +51,7 @@ pub(super) struct Bricks<C> {
     slots: Vec<u32>,
     /// Layers of voxels in a brick, along z.
     layers: usize,
-    /// Those of columns are there, and `empty`, before they are occupied.
+    /// The cells; columns have theirs, `empty`, before they are occupied.
     pub cells: Vec<C>,
     empty: C,
     /// The number of occupied cells.

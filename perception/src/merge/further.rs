@@ -31,9 +31,10 @@ use std::thread::{self, JoinHandle};
 /// The first so many views are merged together: what one shows is too little to lay another on. From: chosen, names from two views with twice the
 /// assumed noise have a Brier score of .025 in place of .028.
 const TOGETHER: usize = 2;
-/// Up to so many earlier views all are merged together. From: chosen.
+/// Number of earlier views up to which all are merged together. From: chosen.
 const FEW: usize = 6;
-/// Up to so many views the earlier ones may move once a further one is laid on them. From: chosen, fewer false names at twice the assumed noise.
+/// Number of views up to which the earlier ones may move once a further one is aligned with them.
+/// From: chosen, fewer false names at twice the assumed noise.
 const MOVABLE: usize = 4;
 /// Least motion of the earlier views among each other by a further view from which they are gathered anew,
 /// metres. From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and
@@ -358,7 +359,7 @@ fn beside(used: &[bool], poses: &[Isometry3<f64>]) -> Vec<bool> {
     beside
 }
 
-/// All that merging takes of a view, in one number.
+/// A digest of all data of a view that merging uses.
 fn digest(view: &View) -> u64 {
     let View { cloud, intrinsics, world_from_camera: pose, pose_sigma_m, pose_sigma_rad, stamp_ns } = view;
     let Cloud { points, grid, colours, normals, .. } = cloud;

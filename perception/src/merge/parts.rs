@@ -12,7 +12,7 @@ use rustc_hash::FxHashMap;
 const DOMINANT: f64 = 0.06;
 /// A plane is level if its normal is this near to up: the cosine of the angle between them. From: chosen, about 18°.
 const LEVEL: f64 = 0.95;
-/// Between these heights above a surface lies what stands on it, metres. From: chosen.
+/// Least and greatest height of things that stand on a surface, metres. From: chosen.
 const STANDING_M: (f64, f64) = (0.01, 0.5);
 /// Side of the cells in which the outline of the surface is sought, metres. From: chosen.
 const CELL_M: f64 = 0.05;
@@ -209,7 +209,7 @@ impl Standing {
         height > STANDING_M.0 && height < STANDING_M.1 && self.outline.covers(p, 0.0)
     }
 
-    /// Tells what stands on the surface from what is around, if a view shows enough of the first.
+    /// Tells points that stand on the surface from those around, if a view shows enough of the former.
     fn part(&self, parts: &mut [Part], places: &[Point3<f64>]) {
         let around: Vec<usize> =
             (0..places.len()).filter(|&k| parts[k] == Part::Standing && !self.holds(&places[k])).collect();

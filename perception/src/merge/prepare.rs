@@ -85,7 +85,7 @@ impl Within {
         }
     }
 
-    /// The same, and in the region.
+    /// The bounds of the fused returns: those of the merged ones, and of the region.
     pub fn of_fused(world_from_camera: &Isometry3<f64>, options: &MergeOptions) -> Within {
         let within = Within::of(world_from_camera, options, 0.0);
         let (Some(up), Some(region)) = (options.up, &options.region) else { return within };
@@ -111,7 +111,7 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     /// paper's robot.
     const SIGMA_M: f64 = 0.03;
     const SIGMA_RAD: f64 = 0.035;
-    /// Beyond the height band, spreads of localisation and a distance, metres. From: chosen.
+    /// Margin beyond the height band: spreads of localisation, and a distance, metres. From: chosen.
     const SLACK: (f64, f64) = (3.0, 0.05);
     /// However far off, metres. From: chosen.
     const WORST_SIGMA_M: f32 = 0.03;

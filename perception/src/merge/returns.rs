@@ -43,7 +43,7 @@ pub(super) struct Return {
     pub at: Vector3<f32>,
     /// Camera frame; not finite if unknown.
     pub normal: Vector3<f32>,
-    /// One by the square of its spread, metres.
+    /// Inverse of the squared spread, one over square metres.
     pub weight: f32,
     pub pixel: u32,
 }
@@ -77,7 +77,7 @@ impl Looked {
         self.0.iter().all(|found| found.len() == 1 + planes.len())
     }
 
-    /// Those off the planes, or those on that plane, counted from one.
+    /// The returns off the planes (0), or those on the plane of a number, counted from one.
     pub fn of_grid(&self, grid: usize) -> impl Iterator<Item = &[Return]> {
         self.0.iter().map(move |found| found[grid].as_slice())
     }

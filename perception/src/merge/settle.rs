@@ -181,7 +181,8 @@ fn stays(before: &mut Peekable<Iter<Settled>>, cell: usize) -> Option<Settled> {
     before.next_if(|settled| settled.cell as usize == cell).map(|settled| Settled { anew: false, ..*settled })
 }
 
-/// One view's word against another's look through the place. What stays was held against the views that were known.
+/// Drops cells that only one view shows and another looked through. Cells that stay was held against the
+/// views that were known.
 fn drop_looked_through(row: &mut Vec<Settled>, gazes: &[Gaze], known: usize) {
     let mut looked = [(false, known), (true, 0)].map(|(anew, known)| {
         let mut alone: Vec<Point3<f32>> = Vec::new();

@@ -133,7 +133,7 @@ impl<'a> Asker<'a> {
     }
 }
 
-/// Those of the cameras that do not look through a body which others see.
+/// The cameras that do not look through a body which others see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
     /// A camera has a body in view if it is asked with success about more than one in so many points. From: chosen.
     const EDGE: usize = 8;

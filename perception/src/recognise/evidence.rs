@@ -49,7 +49,7 @@ const RIMS: (f64, f64) = (0.1, 0.45);
 const SHARING: f64 = 12.0;
 const MOST_GROUPS: f64 = 60.0;
 
-/// All that was measured on one segment.
+/// The measures of one segment.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub evidence: Evidence,

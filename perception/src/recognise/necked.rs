@@ -19,7 +19,7 @@ const RADIUS: f64 = 0.75;
 
 /// A body with a neck.
 pub(super) struct Necked {
-    /// All of it, and what is below its shoulder.
+    /// The whole body, and the part below its shoulder.
     pub whole: Segment,
     pub body: Segment,
     pub height_m: f64,

@@ -92,7 +92,7 @@ pub struct Percept {
     pub seen_fraction: f64,
     /// The evidence for and against each model.
     pub evidence: Evidence,
-    /// Those points: indices into the cloud that was segmented.
+    /// The points of the object: indices into the cloud that was segmented.
     #[serde(skip)]
     pub indices: Vec<u32>,
 }

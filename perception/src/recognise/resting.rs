@@ -24,7 +24,8 @@ const MOST: usize = 3;
 /// Least and greatest distance from a body at which its surroundings are searched, metres. From: chosen, no
 /// nearer than an edge is known.
 const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
-/// Something may bear a body if it is seen around it in so many directions. From: chosen, a single view shows half of what is around a foot.
+/// Fewest directions around a body in which something is seen that may bear it. From: chosen, a single view
+/// shows half of what is around a foot.
 const BEARS: usize = 9;
 /// Share of the greatest number of directions in which any level is seen that a level must reach; the support
 /// is the highest such level. From: chosen, nearly all.
@@ -111,7 +112,7 @@ struct HeightMap {
 }
 
 impl HeightMap {
-    /// None of a segment that is too large to be told from a room's furniture.
+    /// The height map of a segment; none for one that is too large to be told from a room's furniture.
     fn of(segment: &Segment) -> Option<HeightMap> {
         /// Cells at the most. From: work.
         const MOST_CELLS: usize = 1 << 20;

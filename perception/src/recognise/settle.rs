@@ -99,7 +99,7 @@ impl Side {
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
     /// Columns before those of the shifts: axis, radius and slope. From: derived, two for the axis and one each for radius and slope.
     const BODY: usize = 4;
-    /// Nearer to the axis there is no direction away from it, metres. From: rounding.
+    /// Distance from the axis below which the direction away from it is undefined, metres. From: rounding.
     const AT_AXIS_M: f64 = 1e-6;
     if sides.iter().filter(|side| !side.points.is_empty()).count() < 2 {
         return None;
@@ -160,8 +160,8 @@ impl Side {
     /// True if the points, moved back by a shift, lie on the side of a body, as smooth as the camera
     /// measures.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
-        /// Farther from the side than this, and than two spreads, a point is not asked whether it lies on it, metres.
-        /// From: derived, the last of the gates.
+        /// Distance from the side beyond which, if it is also beyond two spreads, a point is not tested,
+        /// metres. From: derived, the last of the gates.
         const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
         let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
         let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();

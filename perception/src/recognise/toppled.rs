@@ -39,7 +39,8 @@ pub(super) struct Way {
 }
 
 impl Toppled {
-    /// None if it is not as large as one of the models would be that lies, or not round about an axis along the surface.
+    /// The measures of a thing that may lie. None if it is not as large as any of the models when lying, or
+    /// not round about an axis along the surface.
     pub fn of(
         setting: &Setting,
         segment: &Segment,

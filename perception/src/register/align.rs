@@ -102,7 +102,7 @@ struct Run<'a> {
     source: &'a Prepared,
     /// Every so many points are looked at.
     stride: usize,
-    /// One for each of those.
+    /// The partner of each of those points.
     partners: Vec<Partner>,
     matched: usize,
     square: f64,

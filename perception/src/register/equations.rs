@@ -52,7 +52,7 @@ impl Sums {
         }
     }
 
-    /// Two points about the centre, for the closed form of point to point.
+    /// Adds two points about the centre, for the closed form of point to point.
     #[inline(always)]
     pub(super) fn add_points(&mut self, p: [f64; 3], t: [f64; 3], weight: f64) {
         self.matched += 1;
@@ -228,7 +228,7 @@ pub(super) fn held_inverse(information: &Matrix6<f64>) -> (Matrix6<f64>, usize) 
     (scale * inverse * scale, free)
 }
 
-/// One step of the pose.
+/// A step of the pose.
 pub(super) struct Motion {
     /// The step, to be applied on the left of the present pose.
     pub step: Isometry3<f64>,

@@ -68,7 +68,7 @@ pub(crate) struct Partner {
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
     slot: u32,
-    /// All other points of the target were at least as far then, metres.
+    /// Least distance of all other points of the target at that time, metres.
     others_m: f32,
     /// Squared distance to the nearest now; infinite if none is near enough.
     pub(super) distance_sq: f32,

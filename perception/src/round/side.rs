@@ -181,7 +181,8 @@ impl Seen {
     /// middle and the distance from the side, if it is near, and its square if it is not inside.
     #[inline(always)]
     fn terms(&self, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
-        /// Nearer to the axis there is no direction away from it, metres. From: rounding.
+        /// Distance from the axis below which the direction away from it is undefined, metres.
+        /// From: rounding.
         const AT_AXIS_M: f32 = 1e-9;
         const FARTHEST_M: f32 = OUTSIDE_M as f32;
         let (dx, dy) = (lanes(|i| x[i] - self.x), lanes(|i| y[i] - self.y));

@@ -93,7 +93,7 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
 }
 
 impl Face {
-    /// None if what faces so is too little or lies in no plane.
+    /// The face of the points; none if too few of them face one way or lie in no plane.
     fn through(of: &[(Point3<f64>, Vector2<f64>)]) -> Option<Face> {
         let normal = of.iter().map(|(_, n)| n).sum::<Vector2<f64>>().try_normalize(0.0)?;
         let mut offsets: Vec<f64> = of.iter().map(|(p, _)| normal.dot(&p.xy().coords)).collect();

@@ -40,7 +40,7 @@ impl Sets {
     }
 }
 
-/// For each voxel the number of its part. Numbers are voxel indices, the same in every run.
+/// The part number of each voxel. Numbers are voxel indices, the same in every run.
 pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options: &SceneOptions) -> Vec<u32> {
     let name = |set: &Vec<usize>| match options.part_touching {
         true => Piece::of(voxels, set, place).parts(),
@@ -86,7 +86,7 @@ impl<'a> Piece<'a> {
         self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize].iter().copied()
     }
 
-    /// For each the number of its part.
+    /// The part number of each voxel of the piece.
     fn parts(&self) -> Vec<u32> {
         let patch_of = grow_patches(self);
         let patches = describe(self, &patch_of);

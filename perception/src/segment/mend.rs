@@ -64,7 +64,7 @@ struct Belonging {
     /// The border's length below the greatest number.
     shortness: u32,
     large: u32,
-    /// After how many joins the two were made.
+    /// The numbers of joins after which each of the two was made.
     made: [u32; 2],
 }
 
@@ -99,9 +99,9 @@ struct Part {
     /// Places whose hull is that of all.
     outer: Vec<[f64; 2]>,
     hull: OnceLock<Vec<[f64; 2]>>,
-    /// One for each other part, in no order.
+    /// The links to other parts, one each, in no order.
     links: Vec<Link>,
-    /// After how many joins it was made.
+    /// The number of joins after which the part was made.
     made: u32,
 }
 
@@ -145,7 +145,7 @@ impl Part {
     }
 }
 
-/// Two ascending runs in one.
+/// Merges two ascending runs into one.
 fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
     let mut both = Vec::with_capacity(long.len() + short.len());
     let mut from = 0;
@@ -185,7 +185,7 @@ fn gather(joined: &mut Union, Piece { voxels, of, .. }: &Piece, patch_of: &[u32]
     parts
 }
 
-/// Tells each part which others it has borders with, and how long they are.
+/// Links each part with the parts that it borders on, with the length of the border.
 fn link(parts: &mut [Option<Part>], joined: &mut Union, borders: &[Border]) {
     let mut links: Vec<(u32, u32, u32)> = Vec::with_capacity(2 * borders.len());
     for Border { patches: (a, b), length } in borders {

@@ -209,7 +209,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
     (all.iter().zip(0..).map(|((key, _), run)| (*key, run)).collect(), starts)
 }
 
-/// For each voxel where its neighbours begin, and all of them in a row.
+/// The start of each voxel's neighbours, and the neighbours of all voxels in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     /// Maximum number of shares in which the neighbours are found. From: work.
     const SHARES: usize = 8;

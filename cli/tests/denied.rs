@@ -221,7 +221,7 @@ fn no_wording_of_absence_is_true_unseen() {
 }
 
 #[test]
-fn a_question_changes_nothing_and_is_answered_from_what_is_knwiping() {
+fn a_question_changes_nothing_and_is_answered_from_what_is_known() {
     let folder = wiping();
     let untold = "no look shows that, and nothing has said so";
     let mut reports = vec![check(&folder, "is the desk clean", 96501, "cannot tell", untold)];

@@ -196,19 +196,12 @@ impl Level {
     }
 }
 
-/// A surface that spreads by more hides things on it, metres. From: derived, no object is lower in [`crate::segment::SceneOptions`].
-const COARSE_M: f64 = 0.025;
-
 impl Surface {
     /// In words, after what it was taken for: why it may be nothing to stand things on; none if that is as good as sure.
     pub fn doubt(&self) -> Option<String> {
         let (because, chance) = (&self.because, self.up_chance);
         match self.role {
             Role::Untold => Some(format!("may be the floor: {because}")),
-            _ if self.residual_m > COARSE_M => {
-                let spread_mm = 1e3 * self.residual_m;
-                Some(format!("is measured to {spread_mm:.0} mm only, which hides what stands on it"))
-            }
             _ if chance >= upright::SURE => None,
             _ => {
                 Some(format!("may be a wall: which way is up is told from what is in view, with {chance:.2}"))

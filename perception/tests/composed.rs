@@ -1,4 +1,4 @@
-//! Known bodies on, in or under other things, and bodies made of parts.
+//! Known bodies made of parts.
 
 use crate::recognising::{cup_a, options};
 use crate::tabletop::{Draws, Thing, disturbed, look, on_ring};
@@ -39,20 +39,11 @@ fn models() -> Vec<ObjectModel> {
     ]
 }
 
-const SAUCER: &[[f64; 2]] = &[[0.0, 0.05], [0.02, 0.075]];
 const BOTTLE: &[[f64; 2]] = &[[0.0, 0.035], [0.16, 0.035], [0.2, 0.014], [0.25, 0.014]];
 const JAR: &[[f64; 2]] = &[[0.0, 0.0425], [0.125, 0.0425], [0.127, 0.025], [0.16, 0.025]];
 
 fn turned(knots: &'static [[f64; 2]], open: bool) -> Thing {
     Thing::Turned { x: 0.05, y: 0.02, knots, scale: 1.0, open, handle_rad: None, spout: false }
-}
-
-fn tin(radius: f64, height: f64) -> Thing {
-    Thing::Tin { x: 0.05, y: 0.02, radius, height }
-}
-
-fn cup_at(base: f64) -> Thing {
-    Thing::Raised { x: 0.052, y: 0.016, radius: 0.035, height: 0.104, base }
 }
 
 /// The percepts of several views of some things.
@@ -87,17 +78,6 @@ fn check(cases: Vec<Case>, seed: u64) {
             assert!((sum - 1.0).abs() < 1e-9, "{name}: probabilities sum to {sum}");
         }
     }
-}
-
-#[test]
-fn a_cup_on_another_thing_is_found_in_merged_views() {
-    check(
-        vec![
-            ("on a saucer", vec![turned(SAUCER, false), cup_at(0.02)], "cup A", [0.5, 1.0]),
-            ("on a tin", vec![tin(0.045, 0.13), cup_at(0.13)], "cup A", [0.5, 1.0]),
-        ],
-        1,
-    );
 }
 
 #[test]

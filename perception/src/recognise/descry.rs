@@ -11,9 +11,8 @@ use super::likelihood::{
     handle_log, height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
-use super::necked::{self, Necked};
+use super::necked::{Necked, necked};
 use super::percept::{Percept, Stance};
-use super::resting;
 use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
@@ -125,68 +124,39 @@ impl Recogniser for Descry {
             let setting = Setting::of(scene, fitted(scene, seen), models);
             let judge = |segment: &Segment| self.judge(&setting, segment, seen, models);
             let percepts = pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge);
-            self.explained(&setting, seen, models, percepts)
+            self.with_necks(&setting, seen, models, percepts)
         })
     }
 }
 
 impl Descry {
-    /// Percepts after each segment was also explained by other bodies: a known one on or in another thing, or one with a neck.
-    ///
-    /// Where such a body is more probably a known object than the whole segment is, its percept replaces that of the segment; otherwise
-    /// the segment may still be it, as probably as the body would be.
-    fn explained(
+    /// Replaces the percept of a segment by that of the body with a neck that it is part of, where that is more
+    /// probably a known object; the percepts of its other pieces go.
+    fn with_necks(
         &self,
         setting: &Setting,
         seen: &Visibility,
         models: &[ObjectModel],
         percepts: Vec<Percept>,
     ) -> Vec<Percept> {
-        let rounds = resting::Rounds::of(models);
         let viewpoints = seen.viewpoints();
         let segments = &setting.scene.segments;
         let world_from_surface = setting.scene.surface.surface_from_world.inverse();
-        let other = |n: usize| {
-            let (segment, percept) = (&segments[n], &percepts[n]);
+        let mut percepts: Vec<Option<Percept>> = percepts.into_iter().map(Some).collect();
+        for (n, segment) in segments.iter().enumerate() {
             let [x, y] = middle(&segment.points);
-            let sigma_m =
-                nearest_sigma_m(&(world_from_surface * Point3::new(x, y, segment.base_m)), &viewpoints);
-            let better = |all: Vec<Percept>| {
-                let known = |p: &Vec<Percept>| p.first().map_or(0.0, Percept::known);
-                (known(&all) > self.least.max(percept.known())).then_some(all)
+            let foot = world_from_surface * Point3::new(x, y, segment.base_m);
+            let Some(necked) = necked(setting.scene, n, models, nearest_sigma_m(&foot, &viewpoints)) else {
+                continue;
             };
-            let necked = necked::necked(setting.scene, n, models, sigma_m).and_then(|necked| {
-                Some((better(vec![self.judge_necked(setting, &necked, seen, models)])?, necked.pieces))
-            });
-            if necked.is_some() {
-                return necked;
+            let whole = self.judge_necked(setting, &necked, seen, models);
+            let is_better = |own: &Percept| whole.known() > self.least.max(own.known());
+            if percepts[n].as_ref().is_some_and(is_better) {
+                necked.pieces.iter().for_each(|&piece| percepts[piece] = None);
+                percepts[n] = Some(whole);
             }
-            if let Some(body) = resting::in_vessel(setting.scene, n, sigma_m) {
-                return Some((vec![self.judge(setting, &body, seen, models)], vec![n]));
-            }
-            let resting = resting::seek(segment, &rounds, sigma_m)
-                .into_iter()
-                .map(|resting| (self.judge(setting, &resting.body, seen, models), resting.rest));
-            let (body, rest) = resting.max_by(|a, b| a.0.known().total_cmp(&b.0.known()))?;
-            let all = match better(vec![body.clone()]) {
-                Some(mut all) => {
-                    if rest.indices.len() >= FEWEST_LEFT {
-                        all.push(self.judge(setting, &rest, seen, models));
-                    }
-                    all
-                }
-                None => vec![percept.clone().at_least(&body)],
-            };
-            Some((all, vec![n]))
-        };
-        let others: Vec<usize> = (0..segments.len()).collect();
-        let others = pool::map(&others, 1, |n| other(*n));
-        let mut explained: Vec<Vec<Percept>> = percepts.into_iter().map(|percept| vec![percept]).collect();
-        for (all, pieces) in others.into_iter().flatten() {
-            pieces.iter().for_each(|&piece| explained[piece].clear());
-            explained[pieces[0]] = all;
         }
-        explained.into_iter().flatten().collect()
+        percepts.into_iter().flatten().collect()
     }
 
     /// Judges a body with a neck: its sizes are those of the whole body, its form is that of the part below
@@ -223,9 +193,6 @@ struct Weighed {
 
 /// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
 const DOUBT: f64 = 0.1;
-/// Fewest points from which the remainder of a segment is a thing of its own. From: derived, the fewest of a
-/// segment.
-const FEWEST_LEFT: usize = 60;
 
 /// Factor by which tins, jars, rolls and boxes lie on their side more often than things that can spill.
 /// From: chosen.

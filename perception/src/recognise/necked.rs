@@ -57,16 +57,11 @@ pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: 
     };
     let others = (0..scene.segments.len()).filter(|&n| n != of && stands_on(&scene.segments[n]));
     let pieces: Vec<usize> = std::iter::once(of).chain(others).collect();
-    let mut whole = Segment {
-        indices: Vec::new(),
-        points: Vec::new(),
-        base_m: low.base_m,
-        base_sigma_m: low.base_sigma_m,
-    };
-    for piece in pieces.iter().map(|&n| &scene.segments[n]) {
-        whole.indices.extend(&piece.indices);
-        whole.points.extend(&piece.points);
-    }
+    let of_pieces = pieces.iter().map(|&n| &scene.segments[n]);
+    let mut points: Vec<_> = of_pieces.flat_map(|piece| piece.indices.iter().zip(&piece.points)).collect();
+    points.sort_by_key(|(index, _)| **index);
+    let (indices, points) = points.into_iter().map(|(index, point)| (*index, *point)).unzip();
+    let whole = Segment { indices, points, base_m: low.base_m, base_sigma_m: low.base_sigma_m };
     let height_m = top_m(&whole) - low.base_m;
     let neck_m = radius_m(&whole, &axis, low.base_m + (1.0 - NECK) * height_m..f64::INFINITY)?;
     let foot_radius_m = axis.radius_at(low.base_m);

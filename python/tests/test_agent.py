@@ -170,7 +170,7 @@ def test_functions_state_facts_answer_calls_and_carry_out_actions(bell, tmp_path
     )
     assert report.verdict == "achieved" and rung == ["table"], str(report)
     assert any("ding" in event["text"] for event in heard)
-    assert any("[2.500]" in event["text"] for event in heard)
+    assert any("(ring table), 2.5 s" in event["text"] for event in heard)
     # What functions answered is on record, as that of programs is.
     assert len(descry.Record(tmp_path / "run").query("program")) >= 3
 

@@ -26,7 +26,7 @@ fn written(folder: &Path, names: [&str; 2]) {
     }
 }
 
-/// What came of a run, without what takes time on the wall.
+/// The outcome of a run, without wall-clock times.
 fn outcome(folder: &Path, policy: &str, seed: &str) -> Value {
     let ask =
         ["find", "mug", "--domain", "own", "--seed", seed, "--policy", policy, "--run", policy, "--json"];

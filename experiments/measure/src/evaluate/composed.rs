@@ -211,7 +211,7 @@ async fn one(
     Ok((answer, heard.len(), last.unwrap_or_default()))
 }
 
-/// Where a part of an object stands in the map.
+/// The pose in the map of a part of an object.
 fn foot(object: &Object, at_m: [f64; 3]) -> Point3<f64> {
     object.map_from_object * Point3::from(at_m)
 }
@@ -226,7 +226,7 @@ fn heard(s: &Situation, place_m: Option<Point3<f64>>) -> Answer {
     if reasons::left_about(s, 0).is_none() { Answer::NotThere } else { Answer::CannotTell }
 }
 
-/// What is believed, in a line.
+/// The belief in one line.
 fn words(s: &Situation) -> String {
     let p = |t: &Track| s.things[0].probability(t, &s.surfaces);
     let track = |t: &Track| {

@@ -211,7 +211,7 @@ async fn one(
     Ok((answer, heard.len(), last.unwrap_or_default()))
 }
 
-/// The pose in the map of a part of an object.
+/// The position in the map, metres, of a part of an object.
 fn foot(object: &Object, at_m: [f64; 3]) -> Point3<f64> {
     object.map_from_object * Point3::from(at_m)
 }

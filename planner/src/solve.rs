@@ -8,7 +8,7 @@ use crate::attachment::{Attachments, CallStatistics};
 use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
-use crate::explain::{Explanation, constrained, explain, is_open, narrowed, too_slow};
+use crate::explain::{Explanation, constrained, explain, narrowed, too_slow};
 use crate::ground::{Earliest, Earns, Expression, GroundError, GroundTask, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
@@ -44,7 +44,7 @@ pub fn plan(
         && options.bound.is_none()
         && task.modules.is_empty()
         && statistics.actions <= MOST_ACTIONS_TAKEN_APART
-        && is_open(why)
+        && why.exhausted
     {
         let limit = statistics.evaluated.max(LEAST_EVALUATIONS);
         let options =

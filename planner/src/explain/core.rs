@@ -2,16 +2,10 @@
 
 use crate::task::{Condition, Task};
 
-use super::{Explanation, OVERLAP, UNREACHED, together};
+use super::{Explanation, together};
 
 /// Goals with more parts than this are not taken apart.
 const MOST_PARTS: usize = 24;
-
-/// True if the only reason is that every state was seen and none fulfils the goal.
-pub(crate) fn is_open(why: &Explanation) -> bool {
-    let mut reasons = why.findings.list.iter().filter(|finding| finding.code != OVERLAP);
-    reasons.next().is_some_and(|first| first.message == UNREACHED) && reasons.next().is_none()
-}
 
 /// Leaves out what need not be in the goal for it to stay out of reach, as far as `unsolvable` proves; and tells what
 /// is left; `only_lost` where all of it could be had if nothing were ever taken away. Nothing of it can be left out, where every question is answered.
@@ -33,6 +27,7 @@ pub(crate) fn narrowed(
             left = others;
         }
     }
-    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), left.len() < parts.len(), only_lost)];
-    Some(Explanation::new(task, list))
+    let exhausted = left.len() == parts.len();
+    let list = vec![together(task, &left.iter().collect::<Vec<_>>(), !exhausted, only_lost)];
+    Some(Explanation { exhausted, ..Explanation::new(task, list) })
 }

@@ -89,13 +89,8 @@ impl<P: Possible> Reach<'_, P> {
         let rules = self.rules;
         let fits: Vec<Vec<Option<Vec<u64>>>> =
             rules.iter().map(|r| r.domains.iter().map(|d| bits_of(d, objects)).collect()).collect();
-        let mut triggers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.fluent.len()];
+        let triggers = self.triggers();
         for (r, rule) in rules.iter().enumerate() {
-            for (position, pattern) in rule.body.iter().enumerate() {
-                if self.fluent[pattern.predicate as usize] {
-                    triggers[pattern.predicate as usize].push((r, position));
-                }
-            }
             if rule.body.iter().all(|p| !self.fluent[p.predicate as usize]) {
                 let mut join = self.start(r, &fits[r], NONE, usize::MAX);
                 self.extend(&mut join, (1u64 << rule.body.len()) - 1)?;
@@ -119,6 +114,19 @@ impl<P: Possible> Reach<'_, P> {
             next += 1;
         }
         Ok(())
+    }
+
+    /// By predicate: the rules and positions in them that its atoms may match.
+    fn triggers(&self) -> Vec<Vec<(usize, usize)>> {
+        let mut triggers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.fluent.len()];
+        for (r, rule) in self.rules.iter().enumerate() {
+            for (position, pattern) in rule.body.iter().enumerate() {
+                if self.fluent[pattern.predicate as usize] {
+                    triggers[pattern.predicate as usize].push((r, position));
+                }
+            }
+        }
+        triggers
     }
 
     fn start<'r>(

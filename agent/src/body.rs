@@ -117,7 +117,10 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
             let robot = if keeping::is_address(path) || recorded::is_record(path) {
                 recorded::open(keeping::open_whole(path)?, folder)?
             } else {
-                descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?
+                let (robot, notes) =
+                    descry_robots::recorded::RecordedRobot::open(path).map_err(CommandError::bad_input)?;
+                notes.iter().for_each(|note| tracing::warn!("recorded:{folder}: {note}"));
+                robot
             };
             Ok(Body::new(Arc::new(robot)))
         }

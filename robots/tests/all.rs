@@ -6,6 +6,7 @@ mod consistency;
 mod flat;
 mod folders;
 mod home;
+mod import;
 mod pinned;
 mod program;
 mod recorded;

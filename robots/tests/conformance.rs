@@ -24,7 +24,7 @@ async fn the_simulated_body_conforms() {
 #[tokio::test]
 async fn recordings_conform() {
     for folder in [folders::side_by_side(), folders::listed()] {
-        let robot = RecordedRobot::open(folder.path()).unwrap();
+        let robot = RecordedRobot::open(folder.path()).unwrap().0;
         conformance::check(&robot).await.unwrap();
     }
 }
@@ -33,7 +33,7 @@ async fn recordings_conform() {
 #[ignore = "data: the frames of ../shared/data/kitchen"]
 async fn a_real_recording_conforms() {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/kitchen");
-    conformance::check(&RecordedRobot::open(&path).unwrap()).await.unwrap();
+    conformance::check(&RecordedRobot::open(&path).unwrap().0).await.unwrap();
 }
 
 /// A body that violates one promise and keeps the others.

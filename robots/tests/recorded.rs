@@ -14,7 +14,7 @@ fn names(recording: &Recording) -> Vec<&str> {
 #[tokio::test]
 async fn frames_side_by_side_are_read() {
     let folder = folders::side_by_side();
-    let robot = RecordedRobot::open(folder.path()).unwrap();
+    let robot = RecordedRobot::open(folder.path()).unwrap().0;
     assert_eq!(names(&Recording::open(folder.path()).unwrap()), ["frame-9", "frame-10", "frame-100"]);
     let watch = Watch::default();
     let driven = robot.drive_to(&Place::Station("frame-100".into()), &watch).await.unwrap();
@@ -42,7 +42,7 @@ async fn frames_side_by_side_are_read() {
 #[tokio::test]
 async fn lists_are_read() {
     let folder = folders::listed();
-    let robot = RecordedRobot::open(folder.path()).unwrap();
+    let robot = RecordedRobot::open(folder.path()).unwrap().0;
     assert_eq!(names(&Recording::open(folder.path()).unwrap()), ["1", "2", "10"]);
     assert_eq!(robot.description().up, Some(Vector3::z()));
     assert_eq!(robot.pose().await.unwrap().station.as_deref(), Some("2"), "the start that was asked for");
@@ -197,7 +197,7 @@ async fn frames_where_tracking_was_lost_are_no_stations() {
 #[tokio::test]
 async fn a_frame_that_spoils_later_is_dropped_with_its_name() {
     let folder = folders::side_by_side();
-    let robot = RecordedRobot::open(folder.path()).unwrap();
+    let robot = RecordedRobot::open(folder.path()).unwrap().0;
     let file = folder.path().join("frame-9.depth.png");
     let bytes = fs::read(&file).unwrap();
     fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
@@ -217,7 +217,7 @@ fn shared(name: &str) -> PathBuf {
 #[ignore = "data: frames of ../shared/data"]
 async fn a_real_kitchen_is_driven_through() {
     let path = shared("kitchen");
-    let robot = RecordedRobot::open(&path).unwrap();
+    let robot = RecordedRobot::open(&path).unwrap().0;
     let stations = robot.stations().unwrap().to_vec();
     assert!(stations.len() > 10);
     for station in &stations[..3] {

@@ -55,7 +55,7 @@ fn simulated(seed: u64) -> Arc<dyn Robot> {
 
 /// A recorded body with frames of a few pixels, and no fourth one.
 fn recorded(folder: &Path) -> Arc<dyn Robot> {
-    Arc::new(RecordedRobot::open(folder).unwrap())
+    Arc::new(RecordedRobot::open(folder).unwrap().0)
 }
 
 /// The drive and the look of a step; for a body with stations, to its stations and one that does not exist.

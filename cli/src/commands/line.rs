@@ -26,7 +26,7 @@ const EXIT_CODES: &str = "Exit codes:
   130, 143, 129  stopped by Ctrl-C, by SIGTERM, by the end of its terminal";
 
 /// Example lines of each command.
-pub const EXAMPLES: [(&str, &[&str]); 24] = [
+pub const EXAMPLES: [(&str, &[&str]); 25] = [
     (
         "find",
         &[
@@ -68,6 +68,7 @@ pub const EXAMPLES: [(&str, &[&str]); 24] = [
         "recognise",
         &["descry recognise cloud.pcd --picture seen.svg", "descry recognise one.ply two.ply --json"],
     ),
+    ("import", &["descry import rgbd_dataset_freiburg1_desk desk", "descry find mug --robot recorded:desk"]),
     (
         "experiment",
         &[

@@ -8,6 +8,7 @@ mod find;
 pub mod fitted;
 mod fmt;
 mod goals;
+mod import;
 mod input;
 #[doc(hidden)]
 pub mod keeping;
@@ -72,6 +73,8 @@ pub enum Command {
     Serve(serve::Arguments),
     /// Find the table and the objects in point clouds (PCD, PLY)
     Recognise(recognise::Arguments),
+    /// Import a recording in a published layout: bags of ROS 2, TUM, BOP, ScanNet, Redwood and others
+    Import(import::Arguments),
     /// Run a batch of runs: tables with intervals, plots and a page; resumable
     Experiment(experiment::Arguments),
     /// Test a body: check that it fulfils the contract of bodies
@@ -123,6 +126,7 @@ pub fn run(command: &Command, stop: &Stop) -> Result<Exit, CommandError> {
         Command::Mcp(arguments) => mcp::run(arguments),
         Command::Serve(arguments) => serve::run(arguments),
         Command::Recognise(arguments) => recognise::run(arguments),
+        Command::Import(arguments) => import::run(arguments),
         Command::Experiment(arguments) => experiment::run(arguments, stop),
         Command::Robot(arguments) => robot::run(arguments),
         Command::Show(arguments) => show::run(arguments),

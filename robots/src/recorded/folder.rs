@@ -1,19 +1,20 @@
 //! Files of a recording.
 
 use crate::input::InputError;
+use crate::recorded::picture;
 use crate::recorded::pose::{self, MaybePose};
 use crate::recorded::settings::{CameraSettings, Settings};
 use descry_perception::Intrinsics;
-use image::{ColorType, ImageDecoder, ImageReader, RgbImage};
+use image::RgbImage;
 use nalgebra::Isometry3;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Name of the settings file.
-const SETTINGS_FILE: &str = "recording.toml";
+pub(crate) const SETTINGS_FILE: &str = "recording.toml";
 /// Name of the file with the camera matrix.
-const CAMERA_FILE: &str = "camera-intrinsics.txt";
+pub(crate) const CAMERA_FILE: &str = "camera-intrinsics.txt";
 const DEPTH_SUFFIX: &str = ".depth.png";
 const POSE_SUFFIX: &str = ".pose.txt";
 const COLOUR_SUFFIXES: [&str; 3] = [".color.jpg", ".color.jpeg", ".color.png"];
@@ -95,9 +96,9 @@ impl Recording {
                 "record again; a body needs at least one place to stand",
             ));
         };
-        let size = size_of(&first.depth)?;
+        let size = picture::size_of(&first.depth)?;
         for frame in &frames[1..] {
-            let other = size_of(&frame.depth)?;
+            let other = picture::size_of(&frame.depth)?;
             if other != size {
                 return Err(InputError::whole(
                     shown(&frame.depth),
@@ -106,16 +107,9 @@ impl Recording {
                 ));
             }
         }
-        check_distances(&folder, &frames)?;
+        check_distances(&folder, frames.iter().map(|f| (f.name.as_str(), &f.world_from_camera)))?;
         let camera = camera(&folder, &settings, size)?;
-        let intrinsics = Intrinsics {
-            width: size.0,
-            height: size.1,
-            fx: camera.fx,
-            fy: camera.fy,
-            cx: camera.cx,
-            cy: camera.cy,
-        };
+        let intrinsics = camera.with_size(size);
         let start = start_of(&frames, &settings, path)?;
         let own_name = folder.file_name().map(|n| n.to_string_lossy().into_owned());
         let name = settings.name.clone().or(own_name).unwrap_or_else(|| shown(&folder));
@@ -127,20 +121,12 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read or is not a 16-bit image.
     pub fn depth_m(&self, frame: &StoredFrame) -> Result<Vec<f32>, InputError> {
-        let image = decode(&frame.depth)?;
-        let image::DynamicImage::ImageLuma16(image) = image else {
-            return Err(no_depth(&frame.depth, image.color()));
-        };
         let scale = self.settings.depth_scale;
-        let metres = |&d: &u16| match d {
-            0 | u16::MAX => f32::NAN,
-            d => (f64::from(d) / scale) as f32,
-        };
-        let metres = |d: &u16| match metres(d) {
+        let metres = |d: f32| match (f64::from(d) / scale) as f32 {
             z if z.is_finite() && z > 0.0 => z,
             _ => f32::NAN,
         };
-        Ok(image.as_raw().iter().map(metres).collect())
+        Ok(picture::depth(&frame.depth)?.units.into_iter().map(metres).collect())
     }
 
     /// The colour image of a frame, if there is one.
@@ -148,15 +134,16 @@ impl Recording {
     /// # Errors
     /// If the file cannot be read.
     pub fn colour(&self, frame: &StoredFrame) -> Result<Option<RgbImage>, InputError> {
-        frame.colour.as_deref().map(|path| Ok(decode(path)?.into_rgb8())).transpose()
+        frame.colour.as_deref().map(picture::colour).transpose()
     }
 }
 
-fn shown(path: &Path) -> String {
+pub(crate) fn shown(path: &Path) -> String {
     path.display().to_string()
 }
 
-fn read(path: &Path) -> Result<String, InputError> {
+/// Reads a text file.
+pub(crate) fn read(path: &Path) -> Result<String, InputError> {
     crate::input::read_text(path).map_err(|e| {
         InputError::whole(shown(path), format!("cannot be read: {e}"), "a text file is expected here")
     })
@@ -187,7 +174,7 @@ fn find(path: &Path) -> Result<(PathBuf, Settings), InputError> {
 }
 
 /// Names in a folder in natural order: `9` before `10`.
-fn names(folder: &Path) -> Result<Vec<String>, InputError> {
+pub(crate) fn names(folder: &Path) -> Result<Vec<String>, InputError> {
     let listed = fs::read_dir(folder).and_then(|entries| {
         entries
             .map(|e| e.map(|e| e.file_name().to_string_lossy().into_owned()))
@@ -222,7 +209,8 @@ fn side_by_side(folder: &Path) -> Result<Vec<Candidate>, InputError> {
         return Err(InputError::whole(
             shown(folder),
             "no frames: neither NAME.depth.png files nor a folder depth/",
-            "give the folder that holds NAME.depth.png with NAME.pose.txt, or depth/NAME.pgm with pose.txt",
+            "give the folder that holds NAME.depth.png with NAME.pose.txt, or depth/NAME.pgm with pose.txt, or a recording in a layout that \
+             `descry import --help` lists",
         ));
     }
     let alone = names.iter().filter_map(|n| n.strip_suffix(POSE_SUFFIX)).find(|n| !stems.contains(n));
@@ -301,23 +289,25 @@ fn listed(folder: &Path) -> Result<Vec<Candidate>, InputError> {
 }
 
 /// The name of a file without its extension.
-fn stem(file: &str) -> &str {
+pub(crate) fn stem(file: &str) -> &str {
     Path::new(file).file_stem().and_then(OsStr::to_str).unwrap_or(file)
 }
 
 /// Rejects poses that are not in metres: most of them lie farther from the first than the extent of any
 /// building.
-fn check_distances(folder: &Path, frames: &[StoredFrame]) -> Result<(), InputError> {
-    let Some((first, others)) = frames.split_first() else { return Ok(()) };
-    let at = |frame: &StoredFrame| frame.world_from_camera.translation.vector;
-    let mut distances_m: Vec<f64> = others.iter().map(|f| (at(f) - at(first)).norm()).collect();
+pub(crate) fn check_distances<'a>(
+    folder: &Path,
+    mut poses: impl Iterator<Item = (&'a str, &'a Isometry3<f64>)>,
+) -> Result<(), InputError> {
+    let Some((first, from)) = poses.next() else { return Ok(()) };
+    let mut distances_m: Vec<f64> =
+        poses.map(|(_, pose)| (pose.translation.vector - from.translation.vector).norm()).collect();
     distances_m.sort_unstable_by(f64::total_cmp);
     match distances_m.get(distances_m.len() / 2) {
         Some(&median_m) if median_m > FARTHEST_TYPICAL_M => Err(InputError::whole(
             shown(folder),
             format!(
-                "the poses lie {median_m:.0} m from that of frame {} (the median), expected {FARTHEST_TYPICAL_M} m at most",
-                first.name
+                "the poses lie {median_m:.0} m from that of frame {first} (the median), expected {FARTHEST_TYPICAL_M} m at most"
             ),
             "are they in metres? write translations in metres, not in millimetres",
         )),
@@ -361,36 +351,4 @@ fn start_of(frames: &[StoredFrame], settings: &Settings, path: &Path) -> Result<
             format!("one of: {}", frames.iter().map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ")),
         )
     })
-}
-
-/// Columns and rows of a depth image, from its header alone.
-fn size_of(path: &Path) -> Result<(usize, usize), InputError> {
-    let head = open(path)?.into_decoder().map_err(|e| no_image(path, &e))?;
-    if head.color_type() != ColorType::L16 {
-        return Err(no_depth(path, head.color_type()));
-    }
-    let (columns, rows) = head.dimensions();
-    Ok((columns as usize, rows as usize))
-}
-
-fn decode(path: &Path) -> Result<image::DynamicImage, InputError> {
-    open(path)?.decode().map_err(|e| no_image(path, &e))
-}
-
-/// Maximum size of an image file, bytes. From: chosen.
-const MOST_IMAGE_BYTES: u64 = 256 << 20;
-
-fn open(path: &Path) -> Result<ImageReader<std::io::Cursor<Vec<u8>>>, InputError> {
-    let bytes = crate::input::read_bytes(path, MOST_IMAGE_BYTES).map(std::io::Cursor::new);
-    let reader = bytes.map(ImageReader::new).and_then(ImageReader::with_guessed_format);
-    reader.map_err(|e| InputError::whole(shown(path), format!("cannot be read: {e}"), "an image is expected"))
-}
-
-fn no_image(path: &Path, e: &image::ImageError) -> InputError {
-    InputError::whole(shown(path), format!("is no image: {e}"), "store it again as PNG, JPEG or PGM")
-}
-
-fn no_depth(path: &Path, found: ColorType) -> InputError {
-    let problem = format!("{found:?} pixels, expected one channel of 16 bits");
-    InputError::whole(shown(path), problem, "store depth as 16-bit grey")
 }

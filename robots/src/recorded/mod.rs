@@ -3,7 +3,7 @@
 //!
 //! A folder of depth frames with poses is a robot: it can stand where a frame was taken, and looking returns that frame.
 //!
-//! Two layouts are known:
+//! Two layouts are descry's own; others are in [`layouts`], and become own ones by [`import`]:
 //!
 //! | | frames side by side | lists |
 //! |---|---|---|
@@ -35,14 +35,19 @@
 //! ```
 
 mod folder;
+pub mod import;
+pub mod layouts;
 pub(crate) mod outline;
+mod picture;
 mod pose;
+pub mod reading;
 mod robot;
 mod settings;
 mod tape;
 mod taped;
 
 pub use folder::{Recording, StoredFrame};
+pub use picture::RawDepth;
 pub use robot::{Footage, RecordedRobot};
 pub use settings::{CameraSettings, Settings};
 pub use tape::{Entry, Known, Question, Reply, Tape};

@@ -14,7 +14,7 @@ const CAMERA_TOLERANCE: f64 = 1e-6;
 pub(crate) type MaybePose = Option<Isometry3<f64>>;
 
 /// The numbers of each line that is neither empty nor a comment, with the byte offset of the line.
-fn rows(file: &str, text: &str) -> Result<Vec<(usize, Vec<f64>)>, InputError> {
+pub(crate) fn rows(file: &str, text: &str) -> Result<Vec<(usize, Vec<f64>)>, InputError> {
     let mut rows = Vec::new();
     let mut start = 0;
     for line in text.split_inclusive('\n') {
@@ -96,18 +96,48 @@ pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, Inp
                 let problem = format!("{} numbers in a line, expected 7", row.len());
                 return Err(InputError::at(file, text, byte, problem, "write tx ty tz qx qy qz qw"));
             };
-            if row.iter().any(|v| !v.is_finite()) {
-                return Ok(None);
-            }
-            let quaternion = Quaternion::new(qw, qx, qy, qz);
-            if (quaternion.norm() - 1.0).abs() > ROTATION_TOLERANCE {
-                let problem = format!("the quaternion has length {:.3}, expected 1", quaternion.norm());
-                return Err(InputError::at(file, text, byte, problem, "write tx ty tz qx qy qz qw"));
-            }
-            let rotation = UnitQuaternion::from_quaternion(quaternion);
-            Ok(Some(Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)))
+            of_seven(file, text, byte, [x, y, z, qx, qy, qz, qw])
         })
         .collect()
+}
+
+/// The pose of `tx ty tz qx qy qz qw` at a byte of a text.
+pub(crate) fn of_seven(
+    file: &str,
+    text: &str,
+    byte: usize,
+    [x, y, z, qx, qy, qz, qw]: [f64; 7],
+) -> Result<MaybePose, InputError> {
+    if [x, y, z, qx, qy, qz, qw].iter().any(|v| !v.is_finite()) {
+        return Ok(None);
+    }
+    let quaternion = Quaternion::new(qw, qx, qy, qz);
+    if (quaternion.norm() - 1.0).abs() > ROTATION_TOLERANCE {
+        let problem = format!("the quaternion has length {:.3}, expected 1", quaternion.norm());
+        return Err(InputError::at(file, text, byte, problem, "write tx ty tz qx qy qz qw"));
+    }
+    let rotation = UnitQuaternion::from_quaternion(quaternion);
+    Ok(Some(Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)))
+}
+
+/// The pose at a time between two poses that are at most `gap_s` apart, or at the time of one. Poses are in order of time, seconds.
+pub(crate) fn interpolated(
+    poses: &[(f64, Isometry3<f64>)],
+    stamp_s: f64,
+    gap_s: f64,
+) -> Option<Isometry3<f64>> {
+    let after = poses.partition_point(|(s, _)| *s < stamp_s);
+    let (later_s, later) = poses.get(after)?;
+    if *later_s == stamp_s {
+        return Some(*later);
+    }
+    let (earlier_s, earlier) = poses.get(after.checked_sub(1)?)?;
+    let part = (stamp_s - earlier_s) / (later_s - earlier_s);
+    (later_s - earlier_s <= gap_s).then(|| {
+        let shift = earlier.translation.vector.lerp(&later.translation.vector, part);
+        let half_turned = earlier.rotation.try_slerp(&later.rotation, part, 1e-9);
+        Isometry3::from_parts(shift.into(), half_turned.unwrap_or(later.rotation))
+    })
 }
 
 /// Parses a 3x3 camera matrix for images of this size.

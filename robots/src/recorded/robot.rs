@@ -8,10 +8,14 @@ use crate::failure::Failure;
 use crate::grid::OccupancyGrid;
 use crate::input::InputError;
 use crate::parts::{Base, Camera, Description, Footprint, Frames, Part, Speeds};
-use crate::recorded::folder::Recording;
+use crate::recorded::folder::{CAMERA_FILE, Recording, SETTINGS_FILE};
+use crate::recorded::import::{Imported, Options};
+use crate::recorded::layouts::layout_of;
+use crate::recorded::settings::{Settings, SurfaceSettings};
 use crate::recorded::tape::Known;
 use crate::request::{Exposure, Pixels};
-use nalgebra::{Isometry3, Point3, Vector3};
+use descry_perception::Intrinsics;
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -44,65 +48,35 @@ struct State {
 }
 
 impl RecordedRobot {
-    /// Opens a folder of frames, or a `recording.toml` that names one.
+    /// Opens a folder of frames, a `recording.toml` that names one, or a recording in a published layout; with notes for people on
+    /// what was assumed of the latter.
     ///
     /// # Errors
-    /// See [`Recording::open`].
-    pub fn open(path: &Path) -> Result<RecordedRobot, InputError> {
-        Ok(RecordedRobot::new(Recording::open(path)?))
+    /// See [`Recording::open`] and [`Imported::open`].
+    pub fn open(path: &Path) -> Result<(RecordedRobot, Vec<String>), InputError> {
+        if is_foreign(path) {
+            let imported = Imported::open(path, &Options::default())?;
+            let layout = format!("read as {}: {}", imported.layout.name, imported.layout.files);
+            let notes = [vec![layout], imported.notes.clone()].concat();
+            return Ok((RecordedRobot::imported(imported), notes));
+        }
+        Ok((RecordedRobot::new(Recording::open(path)?), Vec::new()))
     }
 
     /// A body at the recording's first station.
     pub fn new(recording: Recording) -> RecordedRobot {
-        let settings = &recording.settings;
-        let description = Description {
-            name: format!("recording {}", recording.name),
-            simulated: false,
-            base: Some(Base {
-                footprint: Footprint::Disc { radius_m: 0.0 },
-                speeds: Speeds {
-                    linear_m_s: settings.linear_m_s,
-                    angular_rad_s: settings.angular_deg_s.to_radians(),
-                },
-            }),
-            head: None,
-            arm: None,
-            camera: Some(Camera {
-                frame: "camera".into(),
-                intrinsics: recording.intrinsics,
-                range_m: (settings.range_m[0], settings.range_m[1]),
-                colour: recording.frames.iter().any(|f| f.colour.is_some()),
-                latency_s: 0.0,
-            }),
-            laser: None,
-            senses: Vec::new(),
-            frames: Frames::default(),
-            up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
-            pose_sigma_m: settings.pose_sigma_m,
-            pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
-        };
-        let station = |f: &crate::recorded::StoredFrame| Station {
-            name: f.name.clone(),
-            map_from_base: f.world_from_camera,
-        };
-        let stations = recording.frames.iter().map(station).collect();
-        let hint = |s: &crate::recorded::settings::SurfaceSettings| SurfaceHint {
-            name: s.name.clone(),
-            outline_m: s.outline_m.iter().map(|&[x, y]| nalgebra::Point2::new(x, y)).collect(),
-            height_m: s.height_m,
-            room: None,
-        };
-        let (start, surfaces) = (recording.start, settings.surfaces.iter().map(hint).collect());
-        let known = Known {
-            description,
-            surfaces,
-            rooms: Vec::new(),
-            doors: Vec::new(),
-            stations: Some(stations),
-            map: None,
-            now_ns: 0,
-        };
-        Self::of(known, start, Box::new(recording))
+        let frames = recording.frames.iter().map(|f| (f.name.clone(), f.world_from_camera)).collect();
+        let coloured = recording.frames.iter().any(|f| f.colour.is_some());
+        let known = known(&recording.name, recording.intrinsics, &recording.settings, frames, coloured);
+        Self::of(known, recording.start, Box::new(recording))
+    }
+
+    /// A body at the first frame of a recording in a published layout.
+    pub fn imported(imported: Imported) -> RecordedRobot {
+        let frames = imported.frames.iter().map(|f| (f.name.clone(), f.world_from_camera)).collect();
+        let coloured = imported.coloured();
+        let known = known(&imported.name, imported.intrinsics, &imported.settings, frames, coloured);
+        Self::of(known, 0, Box::new(imported))
     }
 
     /// A body with recorded frames, starting at the station with index `start`. There must be at least one
@@ -173,6 +147,64 @@ impl RecordedRobot {
             pose_sigma_rad: self.description.pose_sigma_rad,
         };
         Ok(exposure.with(pixels))
+    }
+}
+
+/// True if a path holds a recording in a published layout and not in ours, which states its settings or its camera.
+fn is_foreign(path: &Path) -> bool {
+    let ours = [SETTINGS_FILE, CAMERA_FILE, "pose.txt"];
+    !ours.iter().any(|file| path.join(file).is_file()) && layout_of(path).is_some()
+}
+
+/// Facts about a body that stands where frames were taken.
+fn known(
+    name: &str,
+    intrinsics: Intrinsics,
+    settings: &Settings,
+    frames: Vec<(String, Isometry3<f64>)>,
+    coloured: bool,
+) -> Known {
+    let description = Description {
+        name: format!("recording {name}"),
+        simulated: false,
+        base: Some(Base {
+            footprint: Footprint::Disc { radius_m: 0.0 },
+            speeds: Speeds {
+                linear_m_s: settings.linear_m_s,
+                angular_rad_s: settings.angular_deg_s.to_radians(),
+            },
+        }),
+        head: None,
+        arm: None,
+        camera: Some(Camera {
+            frame: "camera".into(),
+            intrinsics,
+            range_m: (settings.range_m[0], settings.range_m[1]),
+            colour: coloured,
+            latency_s: 0.0,
+        }),
+        laser: None,
+        senses: Vec::new(),
+        frames: Frames::default(),
+        up: settings.up.map(|[x, y, z]| Vector3::new(x, y, z).normalize()),
+        pose_sigma_m: settings.pose_sigma_m,
+        pose_sigma_rad: settings.pose_sigma_deg.to_radians(),
+    };
+    let hint = |s: &SurfaceSettings| SurfaceHint {
+        name: s.name.clone(),
+        outline_m: s.outline_m.iter().map(|&[x, y]| Point2::new(x, y)).collect(),
+        height_m: s.height_m,
+        room: None,
+    };
+    let station = |(name, map_from_base)| Station { name, map_from_base };
+    Known {
+        description,
+        surfaces: settings.surfaces.iter().map(hint).collect(),
+        rooms: Vec::new(),
+        doors: Vec::new(),
+        stations: Some(frames.into_iter().map(station).collect()),
+        map: None,
+        now_ns: 0,
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::input::{self, InputError, Objection, Step};
 use crate::parts::Speeds;
 use crate::recorded::outline;
+use descry_perception::Intrinsics;
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
@@ -173,6 +174,11 @@ impl CameraSettings {
             }
         }
         Ok(())
+    }
+
+    /// The camera for images of a size, columns and rows.
+    pub(crate) fn with_size(&self, (width, height): (usize, usize)) -> Intrinsics {
+        Intrinsics { width, height, fx: self.fx, fy: self.fy, cx: self.cx, cy: self.cy }
     }
 
     /// The axis along which the principal point lies outside an image of this size, with a description; none

@@ -1,0 +1,330 @@
+//! Import of recordings in published layouts: units settled, frames chosen, all of it as a body or in our own layout.
+
+use crate::body::Colour;
+use crate::input::InputError;
+use crate::recorded::folder::{CAMERA_FILE, SETTINGS_FILE, check_distances, shown};
+use crate::recorded::layouts::{self, Asked, Layout, Stated};
+use crate::recorded::picture::RawDepth;
+use crate::recorded::reading::{self, Given, Pair, Reading, StatedView};
+use crate::recorded::robot::Footage;
+use crate::recorded::settings::{CameraSettings, Settings};
+use crate::request::Pixels;
+use descry_perception::Intrinsics;
+use image::{ImageBuffer, Luma};
+use nalgebra::{Isometry3, Vector3};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+/// Distance between the frames that are kept where the user says nothing, metres. From: chosen.
+pub const SPACING_M: f64 = 0.2;
+/// Distance that a turn of one radian counts as, metres: that of what is looked at. From: chosen.
+const LEVER_M: f64 = 0.6;
+/// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
+const FARTHEST_M: f64 = 100.0;
+/// Frames from which pairs of views are sought. From: chosen.
+const ANCHORS: usize = 24;
+/// Units in a metre of depth images made from floating point: half a millimetre, up to 32 m.
+const FINE_SCALE: f64 = 2000.0;
+
+/// Choices of the user.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// Facts that the folder does not state.
+    pub asked: Asked,
+    /// Units and conventions.
+    pub given: Given,
+    /// Distance between the frames that are kept, metres; 0 keeps all.
+    pub spacing_m: Option<f64>,
+}
+
+/// A recording in a published layout, understood.
+pub struct Imported {
+    /// Name for people.
+    pub name: String,
+    /// The layout.
+    pub layout: &'static Layout,
+    /// Meaning of its numbers.
+    pub reading: Reading,
+    /// Frames that are kept.
+    pub frames: Vec<ImportedFrame>,
+    /// The depth camera of all of them.
+    pub intrinsics: Intrinsics,
+    /// Settings of our own layout.
+    pub settings: Settings,
+    /// Notes for people: reasons, assumptions, frames left out.
+    pub notes: Vec<String>,
+    stated: Stated,
+}
+
+/// A frame that is kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportedFrame {
+    /// Name of the station.
+    pub name: String,
+    /// Pose of the optical frame, metres.
+    pub world_from_camera: Isometry3<f64>,
+    index: usize,
+}
+
+impl Imported {
+    /// Reads a recording in a published layout.
+    ///
+    /// # Errors
+    /// An unknown layout, a missing or broken part, or units that cannot be told: with the place and a fix.
+    pub fn open(path: &Path, options: &Options) -> Result<Imported, InputError> {
+        let (layout, stated) = layouts::read(path, &options.asked)?;
+        let mut notes = stated.notes.clone();
+        let doubt = |(problem, mend)| InputError::whole(shown(path), problem, mend);
+        let (reading, note) =
+            reading::settle(&stated.reading, &options.given, &pairs(&stated)?).map_err(doubt)?;
+        notes.push(note);
+        let mut poses: Vec<Isometry3<f64>> =
+            stated.frames.iter().map(|f| reading.world_from_camera(&f.pose)).collect();
+        notes.extend(recentre(&mut poses));
+        check_distances(path, poses.iter().zip(&stated.frames).map(|(pose, f)| (f.name.as_str(), pose)))?;
+        let kept = spaced(&poses, options.spacing_m.unwrap_or(SPACING_M));
+        if kept.len() < poses.len() {
+            notes.push(format!(
+                "{} of {} frames are kept: the others show what these show",
+                kept.len(),
+                poses.len()
+            ));
+        }
+        let frame = |&index: &usize| ImportedFrame {
+            name: stated.frames[index].name.clone(),
+            world_from_camera: poses[index],
+            index,
+        };
+        let frames: Vec<ImportedFrame> = kept.iter().map(frame).collect();
+        let first = stated.images.depth(kept[0])?;
+        let camera = stated.frames[kept[0]].camera;
+        let own = path.canonicalize().ok().and_then(|p| Some(p.file_stem()?.to_string_lossy().into_owned()));
+        let name = own.unwrap_or_else(|| shown(path));
+        let settings = Settings {
+            name: Some(name.clone()),
+            depth_scale: if stated.whole { reading.depth_scale } else { FINE_SCALE },
+            up: stated.up,
+            registered: stated.registered,
+            camera: Some(camera),
+            ..Settings::default()
+        };
+        let intrinsics = camera.with_size((first.width, first.height));
+        Ok(Imported { name, layout, reading, frames, intrinsics, settings, notes, stated })
+    }
+
+    /// Depth image of a frame as the camera of all frames would have taken it, in the units of its files.
+    fn depth(&self, frame: &ImportedFrame) -> Result<RawDepth, InputError> {
+        let depth = self.stated.images.depth(frame.index)?;
+        let size = (self.intrinsics.width, self.intrinsics.height);
+        if (depth.width, depth.height) != size {
+            return Err(InputError::whole(
+                &frame.name,
+                format!(
+                    "{}x{} pixels where the first frame has {}x{}",
+                    depth.width, depth.height, size.0, size.1
+                ),
+                "keep frames of one camera in one recording",
+            ));
+        }
+        Ok(self.resampled(depth, &self.stated.frames[frame.index].camera))
+    }
+
+    /// True if a frame's files can be copied as they are.
+    fn is_verbatim(&self, frame: &ImportedFrame) -> bool {
+        Some(self.stated.frames[frame.index].camera) == self.settings.camera
+    }
+
+    /// Looks up each pixel's ray in an image of another camera at the same place.
+    fn resampled(&self, depth: RawDepth, from: &CameraSettings) -> RawDepth {
+        if Some(*from) == self.settings.camera {
+            return depth;
+        }
+        let from = from.with_size((depth.width, depth.height));
+        let unit = |pixel: usize| {
+            let (column, row) = ((pixel % depth.width) as f64, (pixel / depth.width) as f64);
+            let there = from.project(&self.intrinsics.unproject(column, row, 1.0));
+            there.and_then(|(u, v)| from.pixel(u, v)).map_or(f32::NAN, |pixel| depth.units[pixel])
+        };
+        RawDepth { units: (0..depth.units.len()).map(unit).collect(), ..depth }
+    }
+
+    /// Writes the frames that are kept in our own layout into a new or empty folder. `progress` hears how many are written.
+    ///
+    /// # Errors
+    /// If the folder holds something, cannot be written, or a frame cannot be read.
+    pub fn write(&self, into: &Path, progress: &mut dyn FnMut(usize, usize)) -> Result<(), InputError> {
+        let failed = |path: &Path, e: std::io::Error| {
+            InputError::whole(
+                shown(path),
+                format!("cannot be written: {e}"),
+                "choose a folder that can be written",
+            )
+        };
+        fs::create_dir_all(into).map_err(|e| failed(into, e))?;
+        if fs::read_dir(into).map_err(|e| failed(into, e))?.next().is_some() {
+            return Err(InputError::whole(shown(into), "is not empty", "choose a new folder"));
+        }
+        for (done, frame) in self.frames.iter().enumerate() {
+            progress(done, self.frames.len());
+            self.write_frame(into, frame).map_err(|e| match e {
+                Failed::Input(e) => e,
+                Failed::Output(path, e) => failed(&path, e),
+            })?;
+        }
+        let CameraSettings { fx, fy, cx, cy } = self.settings.camera.unwrap_or(CameraSettings {
+            fx: self.intrinsics.fx,
+            fy: self.intrinsics.fy,
+            cx: self.intrinsics.cx,
+            cy: self.intrinsics.cy,
+        });
+        let matrix = format!("{fx} 0 {cx}\n0 {fy} {cy}\n0 0 1\n");
+        for (name, text) in [(CAMERA_FILE, matrix), (SETTINGS_FILE, self.settings_text())] {
+            let path = into.join(name);
+            fs::write(&path, text).map_err(|e| failed(&path, e))?;
+        }
+        progress(self.frames.len(), self.frames.len());
+        Ok(())
+    }
+
+    fn write_frame(&self, into: &Path, frame: &ImportedFrame) -> Result<(), Failed> {
+        let path = |ending: &str| into.join(format!("{}.{ending}", frame.name));
+        let m = frame.world_from_camera.to_homogeneous();
+        let mut pose = String::new();
+        for row in m.row_iter() {
+            let _ = writeln!(pose, "{} {} {} {}", row[0], row[1], row[2], row[3]);
+        }
+        let out = |path: std::path::PathBuf| move |e| Failed::Output(path, e);
+        fs::write(path("pose.txt"), pose).map_err(out(path("pose.txt")))?;
+        let files = self.stated.images.files(frame.index).filter(|_| self.is_verbatim(frame));
+        let ending = |p: &Path| p.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let depth = path("depth.png");
+        match files {
+            Some((from, _)) if ending(from).is_some_and(|e| e == "png") => {
+                fs::copy(from, &depth).map_err(|e| Failed::Output(from.into(), e))?;
+            }
+            _ => {
+                write_depth(&depth, &self.depth(frame)?, self.reading.depth_scale, self.settings.depth_scale)
+                    .map_err(out(depth.clone()))?
+            }
+        }
+        if let Some((from, ending)) =
+            files.and_then(|(_, colour)| colour).and_then(|from| Some((from, ending(from)?)))
+        {
+            let to = path(&format!("color.{ending}"));
+            fs::copy(from, &to).map_err(|e| Failed::Output(from.into(), e))?;
+        } else if let Some(image) = self.stated.images.colour(frame.index)? {
+            let to = path("color.png");
+            image.save(&to).map_err(|e| Failed::Output(to.clone(), std::io::Error::other(e)))?;
+        }
+        Ok(())
+    }
+
+    fn settings_text(&self) -> String {
+        let mut text = format!("# Imported from the layout {}.\n", self.layout.name);
+        for note in &self.notes {
+            let _ = writeln!(text, "# {}", note.replace('\n', " "));
+        }
+        let Settings { depth_scale, registered, up, .. } = &self.settings;
+        let name = toml::Value::String(self.name.clone());
+        let _ = writeln!(text, "name = {name}\ndepth_scale = {depth_scale:?}\nregistered = {registered}");
+        if let Some(up) = up {
+            let _ = writeln!(text, "up = {up:?}");
+        }
+        text
+    }
+
+    /// True if any frame has colour.
+    pub(crate) fn coloured(&self) -> bool {
+        self.stated.images.coloured()
+    }
+}
+
+impl Footage for Imported {
+    fn pixels(&self, station: usize) -> Result<Pixels, String> {
+        let frame = &self.frames[station];
+        let depth = self.depth(frame).map_err(|e| e.to_string())?;
+        let scale = self.reading.depth_scale;
+        let metres: Vec<f32> = depth.units.iter().map(|d| (f64::from(*d) / scale) as f32).collect();
+        let cloud = self.intrinsics.cloud_from_depth(&metres);
+        let mut cloud = cloud.map_err(|e| format!("{}: {e}", frame.name))?;
+        let image = self.stated.images.colour(frame.index).map_err(|e| e.to_string())?;
+        let registered = self.settings.registered && self.is_verbatim(frame);
+        if let Some(image) = image.as_ref().filter(|i| registered && i.pixels().len() == metres.len()) {
+            cloud.colours = Some(image.pixels().map(|p| p.0).collect());
+        }
+        Ok(Pixels { cloud, colour: image.map(|image| Colour { image, registered }) })
+    }
+}
+
+/// A frame that cannot be read, or a file that cannot be written.
+enum Failed {
+    Input(InputError),
+    Output(std::path::PathBuf, std::io::Error),
+}
+
+impl From<InputError> for Failed {
+    fn from(e: InputError) -> Failed {
+        Failed::Input(e)
+    }
+}
+
+/// Writes a depth image of 16 bits, its units changed from one scale to another.
+fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Result<()> {
+    let unit = |d: f32| match (f64::from(d) * to / from).round() {
+        d if d >= 1.0 && d < f64::from(u16::MAX) => d as u16,
+        _ => 0,
+    };
+    let pixels: Vec<u16> = depth.units.iter().map(|d| unit(*d)).collect();
+    let image = ImageBuffer::<Luma<u16>, _>::from_raw(depth.width as u32, depth.height as u32, pixels);
+    let image = image.ok_or_else(|| std::io::Error::other("the depth image has no such size"))?;
+    image.save(path).map_err(std::io::Error::other)
+}
+
+/// Pairs of views that show the same from different places, spread over the recording.
+fn pairs(stated: &Stated) -> Result<Vec<Pair>, InputError> {
+    let view = |i: usize| -> Result<StatedView, InputError> {
+        let frame = &stated.frames[i];
+        Ok(StatedView { pose: frame.pose, camera: frame.camera, depth: stated.images.depth(i)? })
+    };
+    let count = stated.frames.len();
+    let mut pairs = Vec::new();
+    for anchor in (0..count).step_by(count.div_ceil(ANCHORS).max(1)) {
+        let first = view(anchor)?;
+        let mut stride = 1;
+        while anchor + stride < count {
+            let pair = Pair(first.clone(), view(anchor + stride)?);
+            if pair.tells() {
+                pairs.push(pair);
+                break;
+            }
+            stride *= 2;
+        }
+    }
+    Ok(pairs)
+}
+
+/// Moves positions far from the origin to it by whole metres; says by how much.
+fn recentre(poses: &mut [Isometry3<f64>]) -> Option<String> {
+    let offset: Vector3<f64> = poses.first()?.translation.vector.map(f64::round);
+    if offset.norm() <= FARTHEST_M {
+        return None;
+    }
+    poses.iter_mut().for_each(|pose| pose.translation.vector -= offset);
+    Some(format!("positions are recentred: {} {} {} m is taken off each", offset.x, offset.y, offset.z))
+}
+
+/// Frames that are at least so far from all before them; a turn counts as the way of what is looked at.
+fn spaced(poses: &[Isometry3<f64>], spacing_m: f64) -> Vec<usize> {
+    let mut kept: Vec<usize> = Vec::new();
+    for (i, pose) in poses.iter().enumerate() {
+        let apart_m = |&k: &usize| {
+            let (there, turn) = (&poses[k], pose.rotation.angle_to(&poses[k].rotation));
+            (pose.translation.vector - there.translation.vector).norm() + LEVER_M * turn
+        };
+        if kept.iter().all(|k| apart_m(k) >= spacing_m) {
+            kept.push(i);
+        }
+    }
+    kept
+}

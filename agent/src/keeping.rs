@@ -109,10 +109,14 @@ impl Keeping {
         if let Some(address) = self.address()? {
             return address.write(self.options())?.retracing().map_err(CommandError::broken);
         }
-        match Record::resume(&run.join(RECORD), self.options()) {
-            Err(descry_memory::Error::NoRecord { .. }) => self.create(run),
-            opened => opened.map_err(CommandError::broken),
+        let record = match Record::resume(&run.join(RECORD), self.options()) {
+            Err(descry_memory::Error::NoRecord { .. }) => return self.create(run),
+            opened => opened.map_err(CommandError::broken)?,
+        };
+        for lost in &record.recovery().lost {
+            tracing::warn!("{lost}: they had not reached the disk; the run goes on without them");
         }
+        Ok(record)
     }
 }
 

@@ -77,7 +77,8 @@ pub enum Error {
     },
     /// A record with losses must not be continued: the rest would be mistaken for the whole.
     #[error(
-        "{place} is damaged, so that it can be read as far as it is whole and not be gone on with{}",
+        "{place} is damaged, so that it can be read as far as it is whole and not be gone on with{}\n  \
+         put back what is missing from a copy, or begin anew elsewhere; `descry export` writes what is whole to a file",
         listed(faults)
     )]
     Faulty {

@@ -71,23 +71,39 @@ fn killed(dir: &Path) -> (Vec<RecordId>, Vec<u64>) {
     (ids, ends)
 }
 
+/// Removes the index of a store.
+fn forget_index(dir: &Path) {
+    for file in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"] {
+        drop(fs::remove_file(dir.join(file)));
+    }
+}
+
+/// Truncates a file.
+fn cut(path: &Path, to: u64) {
+    fs::File::options().write(true).open(path).unwrap().set_len(to).unwrap();
+}
+
+/// Faults for which a store is not opened for writing.
+fn refusal(dir: &Path, options: LocalOptions) -> String {
+    match LocalStore::open(dir, "", options).map(drop) {
+        Err(e @ Error::Faulty { .. }) => e.to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn a_segment_cut_anywhere_keeps_what_was_whole_and_goes_on() {
     let dir = tempfile::tempdir().unwrap();
     let (ids, ends) = killed(dir.path());
     let source = dir.path().join("killed");
     let length = ends[4];
-    // With the index ahead of the segment, behind it, and gone.
+    // Without the index nobody knows of more than what is whole.
     for (round, cut) in (0..length).step_by(37).chain(ends.iter().copied()).enumerate() {
         let here = dir.path().join(format!("cut-{round}"));
         copy(&source, &here);
         let segment = segments(&here)[0].clone();
-        fs::File::options().write(true).open(&segment).unwrap().set_len(cut).unwrap();
-        if round % 3 == 0 {
-            for file in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm"] {
-                drop(fs::remove_file(here.join(file)));
-            }
-        }
+        self::cut(&segment, cut);
+        forget_index(&here);
         let store = LocalStore::open(&here, "", options()).unwrap();
         let whole = ends.iter().filter(|end| **end <= cut).count();
         let found = store.find(&Query::default()).unwrap();
@@ -107,6 +123,95 @@ fn a_segment_cut_anywhere_keeps_what_was_whole_and_goes_on() {
         }
         fs::remove_dir_all(here).unwrap();
     }
+}
+
+/// The index knows the records that were acknowledged: a segment without one of them stays as it is.
+#[test]
+fn what_was_acknowledged_is_never_cut_off() {
+    let dir = tempfile::tempdir().unwrap();
+    let (_, ends) = killed(dir.path());
+    let here = dir.path().join("here");
+    for to in (0..ends[4]).step_by(211) {
+        copy(&dir.path().join("killed"), &here);
+        let segment = segments(&here)[0].clone();
+        cut(&segment, to);
+        let first_lost = ends.iter().filter(|end| **end <= to).count() + 1;
+        let lost = match first_lost {
+            5 => "record 5 is lost".to_owned(),
+            first => format!("{} records are lost: {first} to 5", 6 - first),
+        };
+        for _ in 0..2 {
+            let said = refusal(&here, options());
+            assert!(said.contains(&lost) && said.contains("from a copy"), "cut at {to}: {said}");
+            assert_eq!(fs::metadata(&segment).unwrap().len(), to, "nothing is cut");
+        }
+        let said = format!("{:?}", LocalStore::open_shared(&here).unwrap().verify().unwrap());
+        assert!(said.contains(&lost), "cut at {to}: {said}");
+        fs::remove_dir_all(&here).unwrap();
+    }
+}
+
+/// Records that were acknowledged before they were on the disk may be gone after a power cut; they are named.
+#[test]
+fn what_a_power_cut_may_cost_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let (_, ends) = killed(dir.path());
+    let here = dir.path().join("killed");
+    cut(&segments(&here)[0], ends[3] - 1);
+    let not_waited_for = LocalOptions { durability: Durability::Process, ..options() };
+    let store = LocalStore::open(&here, "", not_waited_for).unwrap();
+    let lost: Vec<String> = store.recovery().lost.iter().map(ToString::to_string).collect();
+    assert!(lost.len() == 1 && lost[0].contains("2 records are lost: 4 to 5"), "{lost:?}");
+    assert_eq!(store.append(&[draft(9, 10)]).unwrap(), [RecordId(6)], "no number is given again");
+}
+
+/// A segment under another name is not read, and named, whatever the index knows of it.
+#[test]
+fn a_file_that_is_no_segment_by_its_name_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    killed(dir.path());
+    let here = dir.path().join("here");
+    for (name, has_index) in [
+        ("00000001x.mcap", false),
+        ("1.mcap", false),
+        ("00000001.mcap.bak", false),
+        (".mcap", true),
+        ("000000001.mcap", true),
+    ] {
+        copy(&dir.path().join("killed"), &here);
+        if !has_index {
+            forget_index(&here);
+        }
+        let segment = segments(&here)[0].clone();
+        let stray = segment.with_file_name(name);
+        fs::write(here.join("segments/notes.txt"), "nothing of ours").unwrap();
+        fs::rename(&segment, &stray).unwrap();
+        let said = format!("{}: is no segment by its name", stray.display());
+        let store = LocalStore::open_shared(&here).unwrap();
+        let faults: Vec<String> = store.verify().unwrap().faults.iter().map(ToString::to_string).collect();
+        assert!(faults.iter().any(|fault| fault.contains(&said)), "{name}: {faults:?}");
+        assert!(!faults.iter().any(|fault| fault.contains("notes.txt")), "{name}: {faults:?}");
+        assert!(refusal(&here, options()).contains(&said), "{name}");
+        fs::rename(&stray, &segment).unwrap();
+        assert_eq!(LocalStore::open(&here, "", options()).unwrap().verify().unwrap().whole, 5, "{name}");
+        fs::remove_dir_all(&here).unwrap();
+    }
+}
+
+/// Without an index the numbers of lost records are unknown; the count is told, and nothing else.
+#[test]
+fn how_many_records_are_lost_is_said_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = LocalStore::create(dir.path(), "", options()).unwrap();
+    store.append(&[draft(0, 100), draft(1, 100)]).unwrap();
+    drop(store);
+    let segment = &segments(dir.path())[0];
+    let length = fs::metadata(segment).unwrap().len();
+    cut(segment, 0);
+    forget_index(dir.path());
+    let said = refusal(dir.path(), options());
+    assert!(said.contains(&format!("has 0 of {length} bytes\n")), "{said}");
+    assert!(said.contains("2 of 2 records are lost") && !said.contains("no record is lost"), "{said}");
 }
 
 #[test]

@@ -69,9 +69,9 @@ pub struct Recovery {
     pub regained: u64,
     /// Bytes dropped behind the last complete record.
     pub dropped_bytes: u64,
-    /// Number of records in the index that never reached the disk, after a power cut under
+    /// Records in the index that are not on the disk, for each segment: a power cut costs them under
     /// [`Durability::Process`].
-    pub lost: u64,
+    pub lost: Vec<Fault>,
     /// True if the index was damaged and rebuilt from the segments.
     pub index_rebuilt: bool,
     /// Missing, truncated or damaged parts. A store with faults cannot be opened for writing.
@@ -163,7 +163,8 @@ impl LocalStore {
             options.segment_bytes = options.segment_bytes.min(bound / 16).max(64 << 10);
             log_bytes = bound / 64;
         }
-        let Opened { index, segments, next_segment, recovery } = recover::for_writing(dir, log_bytes)?;
+        let Opened { index, segments, next_segment, recovery } =
+            recover::for_writing(dir, log_bytes, options.durability)?;
         let segment = new_segment(dir, next_segment)?;
         let writer = WriteState {
             segment,

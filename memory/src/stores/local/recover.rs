@@ -5,9 +5,9 @@
 
 use super::closed::Closed;
 use super::index::{INDEX, Index, Place, SegmentRow};
-use super::scan::{Scan, scan};
+use super::scan::{self, Scan, scan};
 use super::segment::Segment;
-use super::{Recovery, lock, pins, segment_dir, segment_path};
+use super::{Durability, Recovery, lock, pins, segment_dir, segment_path};
 use crate::document::{Document, RecordId};
 use crate::error::Error;
 use crate::stores::Fault;
@@ -29,12 +29,13 @@ pub(super) struct Opened {
 /// opening or closing.
 const LOOKS: usize = 3;
 
-/// Opens a store for this process alone to write, and repairs the traces of a crash.
+/// Opens a store for this process alone to write, and repairs the traces of a crash. `written` is the
+/// durability under which it was recorded.
 ///
 /// # Errors
 /// [`Error::Faulty`] if anything is damaged; then nothing is changed. [`Error::Damaged`] for an index of a
 /// newer version, or what the system refuses.
-pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
+pub(super) fn for_writing(dir: &Path, log_bytes: u64, written: Durability) -> Result<Opened, Error> {
     let closed = Closed::read(dir);
     let whole = closed.as_ref().is_some_and(|closed| is_as_closed(dir, closed));
     let mut old = Old::read(dir, closed)?;
@@ -44,7 +45,8 @@ pub(super) fn for_writing(dir: &Path, log_bytes: u64) -> Result<Opened, Error> {
         Index::open(dir, log_bytes).and_then(|index| look_over(dir, index)).and_then(without_faults)?
     } else {
         move_index(dir, "", OLD)?;
-        let made = Index::open(dir, log_bytes).and_then(|index| Rebuild::new(dir, index, old, true).run());
+        let made =
+            Index::open(dir, log_bytes).and_then(|index| Rebuild::new(dir, index, old, Some(written)).run());
         made.and_then(without_faults).or_else(|e| move_index(dir, OLD, "").and(Err(e)))?
     };
     Closed::remove(dir)?;
@@ -105,26 +107,50 @@ pub(super) fn for_reading(dir: &Path) -> Result<Opened, Error> {
         }
     }
     let old = Old::read(dir, Closed::read(dir))?;
-    Rebuild::new(dir, Index::in_memory(dir)?, old, false).run()
+    Rebuild::new(dir, Index::in_memory(dir)?, old, None).run()
 }
 
 /// True if the index equals its state at closing, and no segment is new.
 fn is_as_closed(dir: &Path, closed: &Closed) -> bool {
     let known = |number: &u64| closed.segments.contains_key(number);
-    closed.has_index(dir) && on_disk(dir).is_ok_and(|found| found.iter().all(known))
+    closed.has_index(dir) && on_disk(dir).is_ok_and(|found| found.numbers.iter().all(known))
 }
 
-/// Numbers of the segments on the disk.
-fn on_disk(dir: &Path) -> Result<BTreeSet<u64>, Error> {
+/// Content of the folder of segments.
+#[derive(Default)]
+struct OnDisk {
+    /// Numbers of the segments.
+    numbers: BTreeSet<u64>,
+    /// Faults of MCAP files without the name of a segment.
+    strays: Vec<Fault>,
+}
+
+/// Lists the folder of segments.
+fn on_disk(dir: &Path) -> Result<OnDisk, Error> {
     let folder = segment_dir(dir);
     let fail = |e| Error::file("cannot read", &folder, e);
-    let mut numbers = BTreeSet::new();
+    let mut found = OnDisk::default();
     for entry in fs::read_dir(&folder).map_err(fail)? {
-        let name = entry.map_err(fail)?.file_name();
-        let number = name.to_str().and_then(|n| n.strip_suffix(".mcap")).and_then(|n| n.parse::<u64>().ok());
-        numbers.extend(number);
+        let path = entry.map_err(fail)?.path();
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        let number = name.strip_suffix(".mcap").and_then(|n| n.parse().ok());
+        match number.filter(|number| segment_path(dir, *number) == path) {
+            Some(number) => drop(found.numbers.insert(number)),
+            None if name.ends_with(".mcap") || scan::is_mcap(&path) => {
+                found.strays.push(stray(&path));
+            }
+            None => (),
+        }
     }
-    Ok(numbers)
+    found.strays.sort_by(|a, b| a.place.cmp(&b.place));
+    Ok(found)
+}
+
+/// Fault of an MCAP file without the name of a segment.
+fn stray(path: &Path) -> Fault {
+    let what = "is no segment by its name, and its records are not read: segments are named as in \
+                00000001.mcap; give it its number back, or move it elsewhere";
+    Fault { record: None, place: path.display().to_string(), what: what.into() }
 }
 
 /// Length of a segment, bytes; none if it is missing or no regular file.
@@ -134,7 +160,7 @@ fn length(dir: &Path, number: u64) -> Option<u64> {
 
 /// Checks the segments against a trusted index.
 fn look_over(dir: &Path, index: Index) -> Result<Opened, Error> {
-    let mut recovery = Recovery::default();
+    let mut recovery = Recovery { faults: on_disk(dir)?.strays, ..Recovery::default() };
     let rows = index.segments()?;
     let next_segment = rows.last().map_or(0, |row| row.number) + 1;
     let mut segments = BTreeMap::new();
@@ -243,8 +269,9 @@ struct Rebuild<'a> {
     dir: &'a Path,
     index: Index,
     old: Old,
-    /// True if torn ends are cut off and segments finished, provided that nothing is damaged.
-    mend: bool,
+    /// Durability of the records, if torn ends are to be cut off and segments finished, provided that nothing
+    /// is damaged.
+    mends: Option<Durability>,
     /// Segments with a torn end or without a summary.
     unfinished: Vec<(u64, Scan)>,
     segments: BTreeMap<u64, u64>,
@@ -255,12 +282,12 @@ struct Rebuild<'a> {
 }
 
 impl<'a> Rebuild<'a> {
-    fn new(dir: &'a Path, index: Index, old: Old, mend: bool) -> Self {
+    fn new(dir: &'a Path, index: Index, old: Old, mends: Option<Durability>) -> Self {
         Rebuild {
             dir,
             index,
             old,
-            mend,
+            mends,
             unfinished: Vec::new(),
             segments: BTreeMap::new(),
             recovery: Recovery::default(),
@@ -270,7 +297,8 @@ impl<'a> Rebuild<'a> {
     }
 
     fn run(mut self) -> Result<Opened, Error> {
-        let there = on_disk(self.dir)?;
+        let OnDisk { numbers: there, strays } = on_disk(self.dir)?;
+        self.recovery.faults.extend(strays);
         let expected = self.old.expected();
         let is_new = there.is_empty() && self.old.rows.is_empty();
         there.iter().try_for_each(|number| self.read(*number))?;
@@ -279,8 +307,8 @@ impl<'a> Rebuild<'a> {
             // A segment without a record is removed, and may still stand in an index that was not closed.
             if self.old.sealed(*number).is_some() || !known.is_empty() {
                 let lost: BTreeSet<RecordId> = known.difference(&self.found).copied().collect();
-                let what = if known.is_empty() { String::new() } else { lost_text(&lost) };
-                self.recovery.faults.push(fault(self.dir, *number, format!("is missing{what}")));
+                let lost = self.lost_text(*number, &lost);
+                self.recovery.faults.push(fault(self.dir, *number, format!("is missing{lost}")));
             }
         }
         let said: Vec<Document> = self.of_pins.values().cloned().collect();
@@ -288,7 +316,7 @@ impl<'a> Rebuild<'a> {
         let closed_next = self.old.closed.as_ref().map_or(0, |closed| closed.next);
         self.index.keep_numbers(RecordId(self.old.next.max(closed_next)))?;
         self.count(is_new);
-        if self.mend && self.recovery.faults.is_empty() {
+        if self.mends.is_some() && self.recovery.faults.is_empty() {
             let unfinished = std::mem::take(&mut self.unfinished);
             unfinished.into_iter().try_for_each(|(number, scan)| self.finish(number, scan))?;
         }
@@ -360,19 +388,29 @@ impl<'a> Rebuild<'a> {
         }
         match was_complete {
             Some(was) if bytes != was || !scan.damaged.is_empty() || !lost.is_empty() => {
-                let what = format!("has {bytes} of {was} bytes{}", lost_text(lost));
+                let what = format!("has {bytes} of {was} bytes{}", self.lost_text(number, lost));
                 self.recovery.faults.push(fault(self.dir, number, what));
             }
             Some(_) => (),
-            None if !lost.is_empty() && (!self.mend || !scan.damaged.is_empty()) => {
-                let what = format!("ends at byte {bytes}{}", lost_text(lost));
-                self.recovery.faults.push(fault(self.dir, number, what));
-            }
             None => {
-                self.recovery.lost += lost.len() as u64;
+                let fault = (!lost.is_empty())
+                    .then(|| fault(self.dir, number, format!("ends at byte {bytes}{}", lost_text(lost))));
+                // The index knows what was acknowledged. Only after a power cut may less be on the disk, and
+                // only if the disk was not waited for.
+                if self.mends == Some(Durability::Process) && scan.damaged.is_empty() {
+                    self.recovery.lost.extend(fault);
+                } else {
+                    self.recovery.faults.extend(fault);
+                }
                 self.recovery.dropped_bytes += if scan.complete { 0 } else { bytes - scan.end };
             }
         }
+    }
+
+    /// The numbers of lost records of a segment, as text; empty if the index that knew them is gone.
+    fn lost_text(&self, segment: u64, lost: &BTreeSet<RecordId>) -> String {
+        let is_known = self.old.records.get(&segment).is_some_and(|known| !known.is_empty());
+        if is_known { lost_text(lost) } else { String::new() }
     }
 
     /// Adds records of damaged chunks that the checksums in the index prove undamaged.

@@ -42,6 +42,12 @@ struct Bytes {
 /// Offset and description of a fault.
 pub(super) type Fault = (u64, String);
 
+/// True if a regular file begins as MCAP files do.
+pub(super) fn is_mcap(path: &Path) -> bool {
+    let is_file = path.metadata().is_ok_and(|metadata| metadata.is_file());
+    is_file && Bytes::open(path).is_ok_and(|bytes| bytes.read(0, 8).is_ok_and(|found| found == MAGIC))
+}
+
 /// Size of a read in the search for the next chunk, bytes.
 const WINDOW: u64 = 1 << 20;
 

@@ -35,7 +35,7 @@ use crate::report::{Event, Report};
 use crate::shell;
 use crate::stop::Stop;
 pub use beginning::Beginning;
-pub use files::{finish, has_ended, header, keep_header, lost_of_header, report};
+pub use files::{finish, has_ended, header, keep_header, lost_of_header, lost_of_record, report};
 pub use folder::Folder;
 pub use resumed::{GoingOn, Prepare, Resumed, resume};
 

@@ -201,13 +201,70 @@ fn what_is_lost_with_a_damaged_header_is_said() {
     }
     assert_eq!(spoiled, 1);
     let told = binary::check(folder.path(), &["explain", "run", "--json"], 1);
-    assert_eq!(told["lost"].as_array().map(Vec::len), Some(2), "{told}");
+    assert_eq!(told["lost"].as_array().map(Vec::len), Some(3), "{told}");
     assert!(told["verdict"].to_string().contains("achieved: cup A stands on the table"), "{told}");
     let shown = binary::outcome(folder.path(), &["show", "run"]);
     let (text, lost) = (String::from_utf8_lossy(&shown.stdout), String::from_utf8_lossy(&shown.stderr));
     assert_eq!(shown.status.code(), Some(1), "{lost}");
     assert!(lost.contains("what the end of the run rests on is not in the record"), "{lost}");
     assert!(text.contains("rests on  belief "), "{text}");
+}
+
+/// A byte of a view behind the verdict, then of a record that no sentence needs: both are told.
+#[test]
+fn nothing_of_a_run_is_lost_silently() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "1", "--run", "run"]);
+    assert!(run.status.success());
+    explained(folder.path(), &["achieved: cup A"]);
+    let shown = binary::check(folder.path(), &["show", "run", "--json"], 0);
+    let view = shown["rests_on"]["surfaces"][0]["looks"][0].as_u64().expect("a view");
+    let segment = folder.path().join("run/record/segments/00000001.mcap");
+    let whole = std::fs::read(&segment).expect("a segment");
+    for (part, is_basis) in [(format!("{{\"id\":{view},"), true), ("\"kind\":\"transforms\"".into(), false)] {
+        let mut bytes = whole.clone();
+        let at = bytes.windows(part.len()).position(|here| here == part.as_bytes()).expect("it is there");
+        bytes[at + 3] ^= 1;
+        std::fs::write(&segment, bytes).expect("it is spoiled");
+        let told = binary::check(folder.path(), &["explain", "run", "--json"], 1);
+        let lost = told["lost"].to_string();
+        assert!(lost.contains("is damaged"), "{lost}");
+        assert_eq!(lost.contains(&format!("views that are not in the record: {view}")), is_basis, "{lost}");
+    }
+}
+
+/// Every command says so of a run whose segment has another name, is gone, or has lost its settings too.
+#[test]
+fn a_run_whose_records_are_gone_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = binary::outcome(folder.path(), &["find", "cup A", "--seed", "1", "--run", "run"]);
+    assert!(run.status.success());
+    let record = folder.path().join("run/record");
+    for name in ["index.sqlite", "index.sqlite-wal", "index.sqlite-shm", "closed.json"] {
+        drop(std::fs::remove_file(record.join(name)));
+    }
+    let (segment, stray) = (record.join("segments/00000001.mcap"), record.join("segments/00000001x.mcap"));
+    std::fs::rename(&segment, &stray).expect("it is renamed");
+    let nothing = "holds no record of the run";
+    let told = |commands: &[&[&str]], exit: i32, words: &[&str]| {
+        for command in commands {
+            let output = binary::outcome(folder.path(), command);
+            let said = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned());
+            let said = said.concat().split_whitespace().collect::<Vec<_>>().join(" ");
+            assert_eq!(output.status.code(), Some(exit), "{command:?}: {said}");
+            words.iter().for_each(|word| assert!(said.contains(word), "{command:?}, {word:?}: {said}"));
+        }
+    };
+    let reads: [&[&str]; 3] = [&["memory", "verify", "run"], &["explain", "run"], &["show", "run"]];
+    let resumes: [&[&str]; 1] = [&["do", "--resume", "run"]];
+    told(&reads, 1, &["00000001x.mcap: is no segment by its name", nothing]);
+    told(&resumes, 5, &["00000001x.mcap: is no segment by its name"]);
+    std::fs::remove_file(&stray).expect("it is gone");
+    told(&reads, 1, &[nothing]);
+    told(&resumes, 5, &[nothing, "is not begun again"]);
+    // Without its settings it is still a run, though one of which nothing is known.
+    std::fs::write(folder.path().join("run/run.json"), "{").expect("it is damaged");
+    told(&[&["explain", "run"], &["show", "run"]], 5, &["run.json is damaged", "from a copy"]);
 }
 
 #[test]

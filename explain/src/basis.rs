@@ -37,46 +37,62 @@ pub struct Perceived {
     pub looks: Vec<RecordId>,
 }
 
+/// Kinds of the records that are evidence.
+const KINDS: [&str; 4] = [standing::RESTS, "belief", "percepts", "cloud"];
+
 /// Reads the evidence from a record, as far as the record holds it.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record) -> Result<Basis, CommandError> {
-    let mut lost = Vec::new();
-    let mut whole = |kind: &str| -> Result<Vec<Document>, CommandError> {
+    let (mut documents, mut lost) = (Vec::new(), Vec::new());
+    for kind in KINDS {
         let (found, faults) = record.find_whole(&Query::of_kind(kind)).map_err(CommandError::broken)?;
+        documents.extend(found);
         lost.extend(faults.iter().map(ToString::to_string));
-        Ok(found)
-    };
-    let (ends, beliefs, percepts, clouds) =
-        (whole(standing::RESTS)?, whole("belief")?, whole("percepts")?, whole("cloud")?);
-    let end = ends.last().and_then(|d| Some((d.id, serde_json::from_value::<Rests>(d.body.clone()).ok()?)));
-    if end.is_none() {
-        lost.push("what the end of the run rests on is not in the record".into());
     }
-    let mut surfaces: BTreeMap<String, Perceived> = BTreeMap::new();
-    for perceived in percepts.iter().filter_map(perceived) {
-        surfaces.insert(perceived.on.clone(), perceived);
-    }
-    let there: BTreeSet<RecordId> = clouds.iter().map(|d| d.id).collect();
-    for perceived in surfaces.values() {
-        let gone: Vec<String> =
-            perceived.looks.iter().filter(|id| !there.contains(id)).map(ToString::to_string).collect();
-        if !gone.is_empty() {
-            let (on, gone) = (&perceived.on, gone.join(", "));
-            lost.push(format!("what is believed of {on} rests on views that are not in the record: {gone}"));
+    let basis = Basis::among(&documents);
+    lost.extend(basis.lost);
+    Ok(Basis { lost, ..basis })
+}
+
+impl Basis {
+    /// Evidence among the whole documents of a record, oldest first.
+    pub fn among(documents: &[Document]) -> Self {
+        let mut lost = Vec::new();
+        let [ends, beliefs, percepts, clouds] =
+            KINDS.map(|kind| documents.iter().filter(|d| d.kind == kind).collect::<Vec<_>>());
+        let end =
+            ends.last().and_then(|d| Some((d.id, serde_json::from_value::<Rests>(d.body.clone()).ok()?)));
+        if end.is_none() {
+            lost.push("what the end of the run rests on is not in the record".into());
         }
+        let mut surfaces: BTreeMap<String, Perceived> = BTreeMap::new();
+        for perceived in percepts.into_iter().filter_map(perceived) {
+            surfaces.insert(perceived.on.clone(), perceived);
+        }
+        let there: BTreeSet<RecordId> = clouds.iter().map(|d| d.id).collect();
+        for perceived in surfaces.values() {
+            let gone: Vec<String> =
+                perceived.looks.iter().filter(|id| !there.contains(id)).map(ToString::to_string).collect();
+            if !gone.is_empty() {
+                let (on, gone) = (&perceived.on, gone.join(", "));
+                lost.push(format!(
+                    "what is believed of {on} rests on views that are not in the record: {gone}"
+                ));
+            }
+        }
+        // Where surfaces are not looked at, nothing is believed of what stands on them.
+        if beliefs.is_empty() && !surfaces.is_empty() {
+            lost.push("what was believed of the objects is not in the record".into());
+        }
+        let (ended, in_doubt) = match end {
+            Some((id, rests)) => (Some((id, rests.ended)), rests.in_doubt),
+            None => (None, Vec::new()),
+        };
+        let belief = beliefs.last().map(|d| d.id);
+        Basis { ended, in_doubt, belief, surfaces: surfaces.into_values().collect(), lost }
     }
-    // Where surfaces are not looked at, nothing is believed of what stands on them.
-    if beliefs.is_empty() && !surfaces.is_empty() {
-        lost.push("what was believed of the objects is not in the record".into());
-    }
-    let (ended, in_doubt) = match end {
-        Some((id, rests)) => (Some((id, rests.ended)), rests.in_doubt),
-        None => (None, Vec::new()),
-    };
-    let belief = beliefs.last().map(|d| d.id);
-    Ok(Basis { ended, in_doubt, belief, surfaces: surfaces.into_values().collect(), lost })
 }
 
 /// The surface, record ID and used views of a percepts document; none if it is malformed.

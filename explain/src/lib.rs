@@ -25,14 +25,17 @@ mod summary;
 mod verdict;
 pub mod wording;
 
+use std::collections::BTreeSet;
+
 use descry_domains::abilities::searching::policies;
 use descry_domains::lexicon::Places;
 use descry_domains::saying::Saying;
-use descry_memory::Record;
+use descry_memory::{Query, Record};
 use descry_robots::sim::SceneSpec;
 use descry_skills::Call;
 use serde::Serialize;
 
+use basis::Basis;
 use descry_agent::compared;
 use descry_agent::exit::CommandError;
 use descry_agent::report::Report;
@@ -85,7 +88,9 @@ pub struct Told {
 /// [`CommandError::Broken`] if the record cannot be read.
 pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<Explanation, CommandError> {
     let states = States::of(record)?;
-    let (chapters, mut lost) = chapters::of(record, &states, &header.resumed)?;
+    let mut lost = missing(record, report)?;
+    let (chapters, unread) = chapters::of(record, &states, &header.resumed)?;
+    lost.extend(unread);
     // The words of the domain of that time, if this version still understands it.
     let beginning = Beginning::of(record).ok().flatten();
     let domain = beginning.as_ref().and_then(|beginning| beginning.domain().ok());
@@ -129,7 +134,17 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
         negligible,
     };
     let verdict = verdict::rests_on(record, report, &states, &known, &mut lost)?;
+    let mut told = BTreeSet::new();
+    lost.retain(|message| told.insert(message.clone()));
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
+}
+
+/// Records of a run that cannot be read, and parts missing from the basis of its verdict, one message each.
+fn missing(record: &Record, report: Option<&Report>) -> Result<Vec<String>, CommandError> {
+    let (documents, faults) = record.find_whole(&Query::default()).map_err(CommandError::broken)?;
+    let mut lost: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    lost.extend(report.map(|_| Basis::among(&documents)).into_iter().flat_map(|basis| basis.lost));
+    Ok(lost)
 }
 
 /// State of the run after each look, with its time on the body's clock in nanoseconds; empty if the record

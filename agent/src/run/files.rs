@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use descry_memory::{Draft, Record};
+use descry_memory::{Draft, Fault, Record};
 use descry_robots::input::read_bytes;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -25,7 +25,8 @@ const CHECKSUM: &str = "crc32";
 /// Settings of a run from its folder, or from its record if the file is missing or damaged.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] if the folder holds no run.
+/// [`CommandError::BadInput`] if the folder holds no run; [`CommandError::Broken`] if neither the file nor the
+/// record of a run can be read.
 pub fn header(folder: &Path) -> Result<Header, CommandError> {
     if keeping::is_address(folder) {
         let text = format!(
@@ -36,8 +37,14 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
     }
     let begun = recorded(folder).as_ref().and_then(begun);
     own_header(folder, begun.as_ref()).or_else(|why| {
-        let expected = "expected the folder of a run; `descry runs` lists them";
-        let header = begun.ok_or_else(|| CommandError::BadInput(format!("{why}\n  {expected}")))?;
+        let header = begun.ok_or_else(|| match is_run(folder) {
+            true => CommandError::Broken(format!(
+                "{why}\n  its record does not say what the run was started with either: put back what is missing from a copy"
+            )),
+            false => CommandError::BadInput(format!(
+                "{why}\n  expected the folder of a run; `descry runs` lists them"
+            )),
+        })?;
         tracing::warn!("{why}; what the run was started with is taken from its record");
         Ok(header)
     })
@@ -82,6 +89,20 @@ pub(super) fn is_run(folder: &Path) -> bool {
 pub fn lost_of_header(folder: &Path) -> Option<String> {
     let why = own_header(folder, recorded(folder).as_ref().and_then(begun).as_ref()).err()?;
     Some(format!("whether the run was cut off and gone on with: {why}"))
+}
+
+/// Loss of all records of a run that was started; none for a record outside the folder of a run.
+///
+/// # Errors
+/// [`CommandError::Broken`] if the record cannot be read.
+pub fn lost_of_record(folder: &Path, record: &Record) -> Result<Option<Fault>, CommandError> {
+    let is_empty = record.stats().map_err(CommandError::broken)?.records == 0;
+    let what = "holds no record of the run: it was cut off before its first record, or its segments are gone";
+    Ok((is_empty && folder.join(HEADER).exists()).then(|| Fault {
+        record: None,
+        place: folder.join(RECORD).display().to_string(),
+        what: what.into(),
+    }))
 }
 
 /// Writes what a run was started with into its folder.

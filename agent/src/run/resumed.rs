@@ -67,6 +67,13 @@ pub async fn resume(
     let record = header.settings.keeping.resume(folder)?;
     begun()?;
     let beginning = Beginning::of(&record)?;
+    if files::has_ended(folder)
+        && let Some(lost) = files::lost_of_record(folder, &record)?
+    {
+        return Err(CommandError::Broken(format!(
+            "{lost}\n  it has ended, and is not begun again in its place"
+        )));
+    }
     let settings = &header.settings;
     // A run that was cut off before it had recorded anything begins now.
     let mut domain = match &beginning {

@@ -28,7 +28,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     };
     let mut explained = descry_explain::of(&record, &header, report.as_ref())?;
     let faults = &record.recovery().faults;
-    let otherwise = faults.iter().map(ToString::to_string).chain(damaged.iter().map(ToString::to_string));
+    let nothing = descry_agent::run::lost_of_record(folder, &record)?;
+    let otherwise = faults.iter().chain(&nothing).map(ToString::to_string);
+    let otherwise = otherwise.chain(damaged.iter().map(ToString::to_string));
     for lost in otherwise.chain(descry_agent::run::lost_of_header(folder)) {
         if !explained.lost.contains(&lost) {
             explained.lost.push(lost);

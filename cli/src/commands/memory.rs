@@ -188,7 +188,8 @@ fn exactly(query: Query, document: &Document) -> Query {
 
 fn verify(place: &Place) -> Result<Exit, CommandError> {
     let record = open(place)?;
-    let report = record.verify().map_err(CommandError::broken)?;
+    let mut report = record.verify().map_err(CommandError::broken)?;
+    report.faults.extend(descry_agent::run::lost_of_record(&place.record, &record)?);
     if place.json {
         input::print_json(&json!({ "report": report, "whole": report.is_whole() }))?;
     } else {

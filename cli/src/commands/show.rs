@@ -30,7 +30,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
     descry_agent::run::header(folder)?;
     let record = descry_agent::keeping::open(folder)?;
     let (events, mut lost) = descry_agent::run::events(&record)?;
-    lost.splice(0..0, record.recovery().faults.iter().cloned());
+    let nothing = descry_agent::run::lost_of_record(folder, &record)?;
+    lost.splice(0..0, record.recovery().faults.iter().cloned().chain(nothing));
     let (report, damaged) = match descry_agent::run::report(folder) {
         Ok(report) => (report, None),
         Err(e) => (None, Some(e)),

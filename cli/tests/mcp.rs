@@ -171,6 +171,8 @@ fn what_cannot_be_used_is_refused_with_what_was_expected() {
     refused(assistant.call("fly", json!({})), "there is no tool `fly`; there are check");
     refused(assistant.call("explain", json!({ "run": "/etc" })), "is not below");
     refused(assistant.call("run", json!({ "goal": "--help" })), "begins with a hyphen");
+    refused(assistant.call("recognise", json!({ "clouds": [] })), "expected a list of one path or more");
+    refused(assistant.call("goals", json!({ "domain": "" })), "`domain` is \"\"; expected the name");
     refused(assistant.ask("resources/list", json!({})), "there is no method");
     assistant.send(&json!("nothing"));
     refused(assistant.hear(), "needs a `method`");
@@ -178,6 +180,31 @@ fn what_cannot_be_used_is_refused_with_what_was_expected() {
         .answer("plan", json!({ "domain": DOMAIN.replace(":strips", ":stirps)"), "problem": PROBLEM }));
     assert_eq!(broken["exit"], 2, "{broken}");
     assert!(broken["findings"][0]["labels"][0]["line"].is_u64(), "{broken}");
+}
+
+/// A scene is named by its domain, or a file below the server's folder; no other file is opened.
+#[test]
+fn a_scene_lies_below_the_folder() {
+    let mut assistant = Assistant::begin(&[]);
+    let elsewhere = tempfile::tempdir().expect("a folder");
+    let secret = elsewhere.path().join("secret.toml");
+    std::fs::write(&secret, "word = \"sesame\"\n").expect("it is written");
+    std::os::unix::fs::symlink(&secret, assistant.folder.path().join("link")).expect("a link");
+    let ways = [secret.display().to_string(), "../secret.toml".into(), "link".into(), "./link".into()];
+    for scene in &ways {
+        for (tool, mut call) in [("goals", json!({})), ("run", json!({ "goal": "find mug" }))] {
+            call["scene"] = json!(scene);
+            let heard = assistant.call(tool, call);
+            let why = heard["error"]["message"].as_str().unwrap_or_default();
+            assert!(!heard.to_string().contains("sesame"), "{heard}");
+            assert!(why.contains("is not below") || why.contains("expected a path below"), "{heard}");
+        }
+    }
+    let said = assistant.answer("goals", json!({ "scene": "no-cup-a" }));
+    assert!(said["phrases"].as_array().is_some_and(|all| !all.is_empty()), "{said}");
+    std::fs::write(assistant.folder.path().join("own.toml"), "word = \"sesame\"\n").expect("it is written");
+    let own = assistant.answer("goals", json!({ "scene": "own.toml" }));
+    assert!(own["error"].as_str().is_some_and(|why| why.contains("own.toml")), "{own}");
 }
 
 #[test]

@@ -43,6 +43,8 @@ enum Holds {
     Words,
     /// A domain's folder, or the name of a built-in domain.
     Domain,
+    /// A scene file, or the name of a scene of the domain.
+    Scene,
     /// Path of an existing file or folder.
     Path,
     /// Several such paths.
@@ -65,7 +67,7 @@ const PROBLEM_TEXT: Parameter = needed("problem", Holds::Source, "PDDL problem: 
 const DOMAIN: Parameter =
     optional("domain", Holds::Domain, "built-in domain (tabletop, home, …) or a domain's folder");
 const SCENE: Parameter =
-    optional("scene", Holds::Words, "scene of the simulated robot, by its name in the domain");
+    optional("scene", Holds::Scene, "scene of the simulated robot: its name in the domain, or a file");
 
 /// All tools.
 pub(super) static TOOLS: [Tool; 9] = [
@@ -307,8 +309,10 @@ impl Values<'_> {
         let wrong = || format!("`{name}` is {value}; expected {}", parameter.holds.expected());
         let word = match (&parameter.holds, value) {
             (Holds::Words, Value::String(text)) => text.clone(),
+            (_, Value::String(text)) if text.trim().is_empty() => return Err(wrong()),
             (Holds::Source, Value::String(text)) => self.source(name, text)?,
-            (Holds::Domain, Value::String(text)) => self.domain(text)?,
+            (Holds::Domain, Value::String(text)) => self.named(text, Path::exists)?,
+            (Holds::Scene, Value::String(text)) => self.named(text, Path::is_file)?,
             (Holds::Path, Value::String(text)) => self.path(text)?,
             (Holds::Number, Value::Number(number)) if number.as_f64().is_some_and(|n| n > 0.0) => {
                 number.to_string()
@@ -317,7 +321,8 @@ impl Values<'_> {
             (Holds::Flag, Value::Bool(flag)) => flag.to_string(),
             (Holds::Paths, Value::Array(paths)) if !paths.is_empty() => {
                 for path in paths {
-                    let path = self.path(path.as_str().ok_or_else(wrong)?)?;
+                    let path = path.as_str().filter(|path| !path.trim().is_empty()).ok_or_else(wrong)?;
+                    let path = self.path(path)?;
                     self.all.push((name, path));
                 }
                 return Ok(());
@@ -342,13 +347,13 @@ impl Values<'_> {
             self.files.push((file, text.to_string()));
             return Ok(file.into());
         }
-        self.domain(text)
+        self.named(text, Path::exists)
     }
 
-    /// A path, or the name of a built-in domain.
-    fn domain(&self, text: &str) -> Result<String, String> {
-        let is_name = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
-        if is_name && !self.folder.join(text).exists() { Ok(text.to_string()) } else { self.path(text) }
+    /// A built-in name, unless the server's folder has such a path; else a path below the folder.
+    fn named(&self, text: &str, is_path: fn(&Path) -> bool) -> Result<String, String> {
+        let is_name = text.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+        if is_name && !is_path(&self.folder.join(text)) { Ok(text.to_string()) } else { self.path(text) }
     }
 
     /// Resolves an existing path below the server's folder.
@@ -371,8 +376,9 @@ impl Holds {
             Holds::Source => "a text or the name of a file",
             Holds::Words => "a text",
             Holds::Domain => "the name of a domain or of a folder",
+            Holds::Scene => "the name of a scene or of a file",
             Holds::Path => "a path",
-            Holds::Paths => "a list of paths",
+            Holds::Paths => "a list of one path or more",
             Holds::Number => "a number above 0",
             Holds::Whole => "a whole number from 0",
             Holds::Flag => "true or false",

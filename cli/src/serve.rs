@@ -20,7 +20,8 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::broadcast;
 
 use crate::child::{Child, Ended, HALT, POLL};
-use goals::{Goal, Goals, State};
+pub(crate) use goals::Goals;
+use goals::{Goal, State};
 
 /// Maximum number of events that a slow listener may lag behind.
 const NEWS: usize = 1024;
@@ -53,12 +54,16 @@ struct Inner {
     is_closing: bool,
 }
 
-/// Serves at an address until an error; `ready` receives the bound address.
+/// Serves goals at an address until an error; `ready` receives the bound address.
 ///
 /// # Errors
-/// The folder or the address cannot be used.
-pub(crate) fn serve(served: Served, address: SocketAddr, ready: impl FnOnce(SocketAddr)) -> io::Result<()> {
-    let mut goals = Goals::of(&served.folder)?;
+/// The journal cannot be written, or the address cannot be used.
+pub(crate) fn serve(
+    served: Served,
+    mut goals: Goals,
+    address: SocketAddr,
+    ready: impl FnOnce(SocketAddr),
+) -> io::Result<()> {
     let left: Vec<Goal> = goals.all().filter(|goal| goal.state == State::Running).cloned().collect();
     for goal in left {
         outlived(&goal);

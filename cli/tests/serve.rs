@@ -11,6 +11,8 @@ use serde_json::{Value, json};
 struct Server {
     process: Child,
     address: String,
+    /// Lines before that with the address.
+    before: String,
     told: BufReader<ChildStderr>,
 }
 
@@ -20,12 +22,15 @@ impl Server {
         command.args(["serve", "--listen", "127.0.0.1:0", "--folder"]).arg(folder).args(more);
         let mut process = command.stderr(Stdio::piped()).spawn().expect("it starts");
         let mut told = BufReader::new(process.stderr.take().expect("it tells"));
-        let mut line = String::new();
-        told.read_line(&mut line).expect("it tells where");
+        let (mut before, mut line) = (String::new(), String::new());
+        while !line.contains("http://") {
+            before += &std::mem::take(&mut line);
+            assert!(told.read_line(&mut line).expect("it tells where") > 0, "{before}");
+        }
         let address =
             line.split("http://").nth(1).unwrap_or_default().trim().trim_end_matches('/').to_string();
         assert!(!address.is_empty(), "{line}");
-        Server { process, address, told }
+        Server { process, address, before, told }
     }
 
     /// Status and JSON body of a response.
@@ -107,6 +112,56 @@ fn a_token_is_asked_for_where_one_was_given() {
         .output()
         .expect("it ends");
     assert_eq!(refused.status.code(), Some(2));
+}
+
+/// The standard error of a server that ends at once.
+fn refused(folder: &Path, exit: i32) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_descry"));
+    let ended = command.args(["serve", "--listen", "127.0.0.1:0", "--folder"]).arg(folder).output();
+    let ended = ended.expect("it ends");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(exit), "{said}");
+    said
+}
+
+#[test]
+fn a_folder_has_one_server() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = Server::begin(folder.path(), &[]);
+    let said = refused(folder.path(), 2);
+    let holder = format!("another server pursues the goals there (process {})", first.process.id());
+    assert!(said.contains(&holder) && said.contains("--folder"), "{said}");
+    drop(first);
+    drop(Server::begin(folder.path(), &[]));
+}
+
+/// A damaged last line is named, its bytes stay, and no number is given twice; another one is an error.
+#[test]
+fn no_goal_goes_silently() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("goals.jsonl");
+    let goal = |id: u64| {
+        let (run, process, report) = (Value::Null, Value::Null, Value::Null);
+        let goal = json!({ "id": id, "goal": "find mug", "urgent": false, "state": "cancelled",
+            "run": run, "process": process, "report": report });
+        goal.to_string()
+    };
+    let torn = format!("{}\n{}", goal(1), &goal(2)[..30]);
+    std::fs::write(&path, &torn).expect("it is written");
+    for next in [3, 4] {
+        let server = Server::begin(folder.path(), &[]);
+        assert_eq!(server.before.contains("goals.jsonl, line 2: is damaged"), next == 3, "{}", server.before);
+        let id = server.give("find the unknown", false);
+        assert_eq!(id, next);
+        server.wait(id, |goal| goal["state"] == "ended");
+        drop(server);
+        assert!(std::fs::read_to_string(&path).expect("a journal").starts_with(&torn));
+    }
+    let garbled = format!("{}\n\u{1}\n{}\n", goal(1), goal(2));
+    std::fs::write(&path, &garbled).expect("it is written");
+    let said = refused(folder.path(), 5);
+    assert!(said.contains("goals.jsonl, line 2: is damaged") && said.contains("sed -i 2d"), "{said}");
+    assert_eq!(std::fs::read_to_string(&path).expect("a journal"), garbled);
 }
 
 /// An urgent goal interrupts, one is cancelled, the server is killed: each goal ends once.

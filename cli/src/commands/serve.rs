@@ -7,7 +7,7 @@ use descry_agent::exit::{CommandError, Exit};
 use descry_domains::load::DEFAULT;
 
 use crate::commands::{input, narrate};
-use crate::serve::{self, Served};
+use crate::serve::{self, Goals, Served};
 
 /// Arguments of `descry serve`.
 #[derive(clap::Args)]
@@ -66,8 +66,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         vec!["--domain".into(), arguments.domain.clone(), "--robot".into(), arguments.robot.clone()];
     options.extend(["--seed".into(), arguments.seed.to_string(), "--remember".into(), seen]);
     options.extend(arguments.scene.iter().flat_map(|scene| ["--scene".to_string(), scene.clone()]));
+    let goals = Goals::of(&folder)?;
     let served = Served { folder, options, token };
-    serve::serve(served, address, |at| narrate(&format!("goals are taken at http://{at}/")))
+    serve::serve(served, goals, address, |at| narrate(&format!("goals are taken at http://{at}/")))
         .map_err(|e| CommandError::Broken(format!("{address}: {e}")))?;
     Ok(Exit::Done)
 }

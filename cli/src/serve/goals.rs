@@ -1,12 +1,17 @@
 //! Goals of the service: a queue, and a journal that survives the process.
+//!
+//! The journal has a line for each state of a goal. A damaged last line may be the unfinished write of a
+//! killed server: it is named and passed over, and its bytes stay. Any other damaged line is an error, since
+//! it was acknowledged.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write};
 use std::path::Path;
 
+use descry_agent::exit::CommandError;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// State of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,30 +55,129 @@ impl Goal {
 }
 
 /// All goals; each state is on the disk before anyone is notified of it.
-pub(super) struct Goals {
+pub(crate) struct Goals {
     all: BTreeMap<u64, Goal>,
+    /// Number of the next goal.
+    next_id: u64,
     journal: File,
+    /// Lock of the folder, held as long as the goals are in use.
+    _lock: File,
+}
+
+/// File name of the journal.
+const JOURNAL: &str = "goals.jsonl";
+/// File name of the lock; the file names its holder.
+const LOCK: &str = "serve.lock";
+
+/// A line of the journal.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum Line {
+    Goal(Goal),
+    /// Passes over damaged lines before this one.
+    Passed {
+        /// Numbers of the lines, from 1.
+        passed_over: Vec<usize>,
+    },
+}
+
+/// Content of a journal.
+#[derive(Default)]
+struct Read {
+    all: BTreeMap<u64, Goal>,
+    next_id: u64,
+    /// Damaged lines at the end, by number from 1.
+    damaged: Vec<usize>,
+}
+
+impl Read {
+    /// Reads the lines of a journal: the last line of a goal is its state.
+    ///
+    /// # Errors
+    /// The number of a damaged line before others.
+    fn of(bytes: &[u8]) -> Result<Self, usize> {
+        let mut read = Read { next_id: 1, ..Read::default() };
+        for (n, line) in bytes.split(|byte| *byte == b'\n').enumerate() {
+            match serde_json::from_slice::<Line>(line) {
+                _ if line.is_empty() => (),
+                Ok(Line::Passed { .. }) => read.damaged.clear(),
+                Ok(Line::Goal(goal)) => match read.damaged.first() {
+                    Some(damaged) => return Err(*damaged),
+                    None => {
+                        read.next_id = read.next_id.max(goal.id + 1);
+                        read.all.insert(goal.id, goal);
+                    }
+                },
+                Err(_) => {
+                    read.damaged.push(n + 1);
+                    // It may hold a goal whose number somebody knows.
+                    read.next_id += 1;
+                }
+            }
+        }
+        Ok(read)
+    }
+}
+
+/// Acquires the lock of a folder for this process.
+fn locked(folder: &Path) -> Result<File, CommandError> {
+    let path = folder.join(LOCK);
+    let refused = |e: io::Error| CommandError::bad_input(format!("{}: {e}", path.display()));
+    let lock = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(refused)?;
+    match lock.try_lock() {
+        Ok(()) => (),
+        Err(TryLockError::WouldBlock) => {
+            let holder = std::fs::read_to_string(&path).unwrap_or_default();
+            return Err(CommandError::bad_input(format!(
+                "{}: another server pursues the goals there ({})\n  stop it, or name another folder with --folder",
+                folder.display(),
+                holder.trim(),
+            )));
+        }
+        Err(TryLockError::Error(e)) => return Err(refused(e)),
+    }
+    let named = lock.set_len(0).and_then(|()| writeln!(&lock, "process {}", std::process::id()));
+    named.map_err(refused)?;
+    Ok(lock)
 }
 
 impl Goals {
-    /// Reads the journal in a folder: the last line of a goal is its state; a truncated line is ignored.
+    /// Claims a folder for this process, and reads its journal.
     ///
     /// # Errors
-    /// The journal cannot be read or written.
-    pub(super) fn of(folder: &Path) -> io::Result<Self> {
-        let path = folder.join("goals.jsonl");
-        let text = match std::fs::read(&path) {
-            Ok(bytes) => String::from_utf8_lossy(&bytes).into_owned(),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
-            Err(e) => return Err(e),
+    /// [`CommandError::BadInput`] if another server has the folder or it cannot be written;
+    /// [`CommandError::Broken`] if the journal is damaged or cannot be read.
+    pub(crate) fn of(folder: &Path) -> Result<Self, CommandError> {
+        let lock = locked(folder)?;
+        let path = folder.join(JOURNAL);
+        let broken = |e: io::Error| CommandError::broken(format!("{}: {e}", path.display()));
+        let bytes = match std::fs::read(&path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Vec::new(),
+            read => read.map_err(broken)?,
         };
-        let lines = text.lines().filter_map(|line| serde_json::from_str::<Goal>(line).ok());
-        let all = lines.map(|goal| (goal.id, goal)).collect();
-        let mut journal = OpenOptions::new().append(true).create(true).open(path)?;
-        if !text.is_empty() && !text.ends_with('\n') {
-            journal.write_all(b"\n")?;
+        let Read { all, next_id, damaged } = Read::of(&bytes).map_err(|line| {
+            let path = path.display();
+            CommandError::broken(format!(
+                "{path}, line {line}: is damaged, and other goals were given after it\n  \
+                 put the line back from a copy, or remove it: sed -i {line}d {path}"
+            ))
+        })?;
+        let mut journal = OpenOptions::new().append(true).create(true).open(&path).map_err(broken)?;
+        let mut end = String::new();
+        if bytes.last().is_some_and(|last| *last != b'\n') {
+            end.push('\n');
         }
-        Ok(Self { all, journal })
+        if !damaged.is_empty() {
+            for line in &damaged {
+                tracing::warn!(
+                    "{}, line {line}: is damaged and passed over; if a goal is missing now, give it again",
+                    path.display()
+                );
+            }
+            end += &format!("{}\n", json!(Line::Passed { passed_over: damaged }));
+        }
+        journal.write_all(end.as_bytes()).and_then(|()| journal.sync_data()).map_err(broken)?;
+        Ok(Self { all, next_id, journal, _lock: lock })
     }
 
     /// Adds a goal.
@@ -81,7 +185,7 @@ impl Goals {
     /// # Errors
     /// The journal cannot be written.
     pub(super) fn add(&mut self, goal: String, urgent: bool) -> io::Result<Goal> {
-        let id = self.all.keys().next_back().map_or(1, |last| last + 1);
+        let id = self.next_id;
         let (run, process, report) = Default::default();
         self.keep(Goal { id, goal, urgent, state: State::Queued, run, process, report })
     }
@@ -94,6 +198,7 @@ impl Goals {
         let line = format!("{}\n", serde_json::to_string(&goal)?);
         self.journal.write_all(line.as_bytes())?;
         self.journal.sync_data()?;
+        self.next_id = self.next_id.max(goal.id + 1);
         self.all.insert(goal.id, goal.clone());
         Ok(goal)
     }

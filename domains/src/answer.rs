@@ -23,7 +23,7 @@ use crate::goal::Goal;
 use crate::judge::{Judgement, Truth};
 use crate::lexicon::{Lexicon, one, plural};
 use crate::load::Domain;
-use crate::mind::Mind;
+use crate::mind::{Mind, Region};
 use crate::no_plan;
 use crate::saying::Saying;
 use crate::situation::{Situation, Thing, is_alike};
@@ -389,6 +389,11 @@ impl Asker<'_> {
     /// agree.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
         let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
+        let contradicts =
+            |(on, region): (usize, &Region)| Some(region.contradiction?.told(&self.s.surfaces[on].name));
+        if let Some(contradiction) = asked().find_map(contradicts) {
+            return Some(contradiction);
+        }
         if let Some((on, _)) = asked().find(|(_, region)| region.disputed) {
             return Some(format!(
                 "too few views of the {} can be laid on each other",

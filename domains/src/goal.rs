@@ -11,6 +11,7 @@ use crate::lexicon::Lexicon;
 use crate::load::Domain;
 use ending::Wanted;
 pub(crate) use ending::{CONFIDENCE, DEADLINE};
+pub(crate) use english::is_function_word;
 use sentence::{Clause, Joint, Miss, Reader, Sentence};
 
 /// A goal that a person gave, with what it means in the planner's language.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use descry_perception::laser::KnownShape;
-use descry_perception::recognise::{ObjectModel, check_models};
+use descry_perception::recognise::ObjectModel;
 use descry_planner::{Findings, Source};
 use descry_robots::input::{clipped, read_text};
 use include_dir::{Dir, include_dir};
@@ -98,12 +98,6 @@ pub enum LoadError {
         /// Each with its place.
         findings: Findings,
     },
-    /// The objects make no sense together or alone.
-    #[error("{because}")]
-    Objects {
-        /// The object at fault, and the expected values.
-        because: descry_perception::recognise::ModelError,
-    },
 }
 
 impl Domain {
@@ -162,9 +156,7 @@ pub fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
         .map(|(_, file)| Ok((file, parse::<ObjectModel>(&file.0, &file.1)?)))
         .collect::<Result<_, LoadError>>()?;
     names::check(&read)?;
-    let objects: Vec<ObjectModel> = read.into_iter().map(|(_, object)| object).collect();
-    check_models(&objects).map_err(|because| LoadError::Objects { because })?;
-    Ok(objects)
+    Ok(read.into_iter().map(|(_, object)| object).collect())
 }
 
 /// The files of a domain by their path within its folder, each with the name that errors show.

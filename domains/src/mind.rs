@@ -3,11 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use descry_memory::RecordId;
+use descry_memory::belief::Track;
 use descry_perception::merge::Merger;
 use descry_perception::nalgebra::Isometry3;
 
 use crate::abilities::learning::again::Glances;
 use crate::abilities::searching::change::Change;
+use crate::abilities::searching::consistent::Contradiction;
 use crate::abilities::searching::merging::LastMerged;
 use crate::situation::Known;
 use crate::words::Words;
@@ -51,6 +53,10 @@ pub struct Region {
     pub nothing: Option<String>,
     /// As many of its views as agree contradict them: which are wrong is not known.
     pub disputed: bool,
+    /// The contradiction between its looks and the map, or among them, for which they prove nothing; none if there is none.
+    pub contradiction: Option<Contradiction>,
+    /// Objects believed to stand there before any look of this run.
+    pub expected: Option<Vec<Track>>,
 }
 
 /// A view that was taken and recorded.

@@ -18,8 +18,6 @@ use std::fmt;
 const MISFIT: f64 = 30.0;
 /// A look contributes no more misfit than this: one look with a gross pose error must not name a fault of all. From: chosen.
 const MOST_MISFIT: f64 = 150.0;
-/// Misfit of all looks together below which no fault is asked for. From: derived, no fault could be likelier than not.
-const LEAST_MISFIT: f64 = 4.0;
 /// Share of the statement's misfit that a named fault may leave. From: chosen.
 const LEFT_SHARE: f64 = 0.35;
 /// Fewest looks that name a fault of all looks: from one, a wrong pose looks the same. From: derived.
@@ -144,7 +142,8 @@ pub fn judge(
     let stated = Model::default();
     let misfits: Vec<f64> = (0..sights.len()).map(|n| fit.misfit(n, &stated)).collect();
     let before = total(&misfits);
-    if before < LEAST_MISFIT {
+    // With less, no fault could be likelier than the statement.
+    if before < 2.0 * (1.0 / PRIOR).ln() {
         return None;
     }
     let (left, model) = likeliest(&fit, &sights, before, || {

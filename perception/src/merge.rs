@@ -20,6 +20,7 @@ use crate::scale::SPREADS;
 use crate::surface::Region;
 use crate::view::View;
 use crate::visibility::{DepthMap, Visibility};
+use check::Misfit;
 pub use further::Merger;
 use fuse::Gathered;
 use joint::{Found, Round};
@@ -81,6 +82,9 @@ pub struct ViewFit {
     pub converged: bool,
     /// False if the view was left out of the merged cloud.
     pub used: bool,
+    /// True if the view was left out since it and the others cannot both be as stated.
+    #[serde(default)]
+    pub is_at_odds: bool,
     /// The reason the view converged, or was left out, in words.
     pub why: String,
 }
@@ -259,7 +263,7 @@ struct Aligned {
     poses: Vec<Isometry3<f64>>,
     used: Vec<bool>,
     /// The reason each unused view is left out.
-    whys: Vec<Option<String>>,
+    whys: Vec<Option<Misfit>>,
     found: Vec<Found>,
     /// The dominant planes that are level, world frame.
     planes: Vec<Plane>,
@@ -283,10 +287,8 @@ fn align(
 ) -> Aligned {
     let mut steps = Vec::new();
     let mut poses: Vec<Isometry3<f64>> = prepared.iter().map(|p| p.prior).collect();
-    let mut whys: Vec<Option<String>> = prepared
-        .iter()
-        .map(|p| p.points.is_empty().then(|| "it has no usable point in range".to_owned()))
-        .collect();
+    let mut whys: Vec<Option<Misfit>> =
+        prepared.iter().map(|p| p.points.is_empty().then_some(Misfit::Empty)).collect();
     let mut used: Vec<bool> = whys.iter().map(Option::is_none).collect();
     align_everything(prepared, &used, &mut poses, first, &mut steps);
     let parts = parts::find(prepared, &used, &poses, up, &mut steps);
@@ -375,7 +377,7 @@ fn as_stated(prepared: &[Prepared]) -> Vec<f64> {
 fn align_objects(
     prepared: &[Prepared],
     used: &mut [bool],
-    whys: &mut [Option<String>],
+    whys: &mut [Option<Misfit>],
     parts: &[Vec<Part>],
     up: Option<Unit<Vector3<f64>>>,
     poses: &mut [Isometry3<f64>],
@@ -533,10 +535,10 @@ fn fit(
     pose: &Isometry3<f64>,
     found: &Found,
     used: bool,
-    left_out: Option<String>,
+    left_out: Option<Misfit>,
 ) -> ViewFit {
     let (turn, shift) = joint::departure(pose, &prepared.prior);
-    let why = match left_out {
+    let why = match &left_out {
         Some(why) => format!("left out: {why}"),
         None if found.matched == 0 => "nothing to align with".to_owned(),
         None if found.converged => "settled".to_owned(),
@@ -550,6 +552,7 @@ fn fit(
         residual_m: found.residual_m,
         converged: used && (found.converged || found.matched == 0),
         used,
+        is_at_odds: left_out.is_some_and(|why| why.is_at_odds()),
         why,
     }
 }

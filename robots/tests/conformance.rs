@@ -56,6 +56,7 @@ enum Lie {
     Mirrored,
     UpsideDown,
     TenTimes,
+    Covered,
     Late,
 }
 
@@ -115,6 +116,7 @@ impl Robot for Liar {
             Lie::Mirrored => shuffle(&mut sensed, |u, v, (width, _)| (width - 1 - u, v)),
             Lie::UpsideDown => shuffle(&mut sensed, |u, v, (width, height)| (width - 1 - u, height - 1 - v)),
             Lie::TenTimes => sensed.depth_m.iter_mut().for_each(|d| *d *= 10.0),
+            Lie::Covered => sensed.depth_m.fill(0.0),
             Lie::Late => sensed.stamp_ns -= 133_000_000,
             _ => {}
         }
@@ -165,7 +167,7 @@ fn shuffle(sensed: &mut Sensed, from: impl Fn(usize, usize, (usize, usize)) -> (
 #[tokio::test]
 async fn images_that_lie_are_refused() {
     let promise = "the camera shows the surfaces of the map where they are";
-    for lie in [Lie::Mirrored, Lie::UpsideDown, Lie::TenTimes] {
+    for lie in [Lie::Mirrored, Lie::UpsideDown, Lie::TenTimes, Lie::Covered] {
         let breaches = conformance::check(&Liar { honest: simulated(1), lie }).await.unwrap_err().0;
         assert!(breaches.iter().any(|b| b.promise == promise), "{lie:?}: {breaches:?}");
     }

@@ -42,6 +42,10 @@ impl Check<'_> {
             let is_there = |ending: &&[&str]| words.windows(ending.len()).any(|part| part == *ending);
             [&CONFIDENCE[..], &DEADLINE[..]].into_iter().find(is_there).map(|ending| ending.join(" "))
         };
+        if let Some(way) = phrase.ways().position(|say| pattern(say).is_empty()) {
+            let message = "this phrase has no words: whatever is said, it is not that".to_string();
+            return Some(self.error("unsayable", message, self.way(n, way, ""), "say it in words"));
+        }
         let (way, ending) = phrase.ways().enumerate().find_map(|(way, say)| Some((way, ends(say)?)))?;
         let message =
             format!("this phrase cannot be said: behind \"{ending}\" every goal says how sure or how soon");

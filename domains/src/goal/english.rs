@@ -196,6 +196,11 @@ pub(super) fn without_determiners(words: &[String]) -> &[String] {
     rest
 }
 
+/// True if a name is made of words alone that join and end what is said.
+pub(crate) fn is_function_word(name: &str) -> bool {
+    words(name).iter().all(|word| ["and", "or", "it", "not", "please"].contains(&word.as_str()))
+}
+
 /// The forms of a phrase: as given, and as an indirect question ("where is X": "where X is").
 pub(super) fn forms(pattern: &[String]) -> Vec<Vec<String>> {
     let mut indirect = pattern.to_vec();

@@ -147,11 +147,15 @@ impl<'a> Reader<'a> {
         Some(Sentence { joint, clauses: head.clauses.into_iter().chain(tail.clauses).collect() })
     }
 
-    /// One phrase, of whose slots one may hold several names.
+    /// One phrase, of whose slots one may hold several names. The domain's own words go before words that request the same.
     fn clause(&mut self, words: &[String]) -> Option<Sentence<'a>> {
+        self.clause_in(words, |own, said| own == said).or_else(|| self.clause_in(words, english::is_same))
+    }
+
+    fn clause_in(&mut self, words: &[String], is_same: fn(&str, &str) -> bool) -> Option<Sentence<'a>> {
         for (phrase, form) in Rc::clone(&self.forms).iter() {
             let form: Vec<&str> = form.iter().map(String::as_str).collect();
-            for slots in fits(&form, words, english::is_same) {
+            for slots in fits(&form, words, is_same) {
                 if let Some(clause) = self.filled(phrase, &slots) {
                     return Some(Sentence { joint: Joint::And, clauses: vec![clause] });
                 }

@@ -1,37 +1,66 @@
-//! Checks of object names: a name means one object, or one kind of them. Letters and digits alone distinguish
-//! names.
+//! Checks of object files: a name means one object, or one kind of them, and letters and digits alone distinguish names; a body has
+//! sensible measures.
 
-use descry_perception::recognise::ObjectModel;
+use descry_perception::recognise::{ModelError, ObjectModel};
 use descry_planner::{Diagnostic, Findings, Source, Span};
 
 use super::LoadError;
 use crate::check::place::Places;
+use crate::goal::is_function_word;
 use crate::lexicon::{plural, symbol};
 
 /// An object's file and what it says.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
 
-/// Checks that every name means one thing.
+/// Checks the objects of a folder: every name can be said and means one thing, and every body has sensible measures.
 ///
 /// # Errors
-/// [`LoadError::Findings`] points at a name that means another object, or a kind of several, too.
+/// [`LoadError::Findings`] points at everything that is wrong, file by file.
 pub fn check(objects: &[Read<'_>]) -> Result<(), LoadError> {
-    for (n, (file, object)) in objects.iter().enumerate() {
+    let mut list = Vec::new();
+    for (n, ((_, text), object)) in objects.iter().enumerate() {
+        let place = |key: &[&str]| Span { source: n as u32, ..Places::of(text).at(key) };
         for (key, name) in names(object) {
-            let because = if symbol(name).is_empty() {
-                Some((
-                    format!("\"{name}\" has neither a letter nor a digit"),
-                    "names are told apart by these".to_string(),
-                ))
-            } else {
-                another(&objects[..n], name).or_else(|| several(objects, n, name))
-            };
-            if let Some((message, help)) = because {
-                return Err(told(file, &key, message, help));
+            let fault = unsayable(name)
+                .or_else(|| another(&objects[..n], name))
+                .or_else(|| several(objects, n, name));
+            if let Some((message, help)) = fault {
+                let key: Vec<&str> = key.iter().map(String::as_str).collect();
+                list.push(Diagnostic::error("same-name", message, place(&key), "this name").with_help(help));
             }
         }
+        if let Some((message, help)) = unsayable(&object.kind) {
+            list.push(Diagnostic::error("same-name", message, place(&["kind"]), "this kind").with_help(help));
+        }
+        if let Err(fault) = object.check() {
+            let key = match &fault {
+                ModelError::Range { field, .. } => field,
+                ModelError::Missing { .. } | ModelError::Twice { .. } => "name",
+            };
+            let message = fault.to_string();
+            list.push(Diagnostic::error("no-measure", message, place(&[key]), "here"));
+        }
     }
-    Ok(())
+    if list.is_empty() {
+        return Ok(());
+    }
+    let sources = objects.iter().map(|((path, text), _)| Source::new(path.clone(), text.clone())).collect();
+    Err(LoadError::Findings { findings: Findings { sources, list } })
+}
+
+/// Fault of a name that no sentence can hold.
+fn unsayable(name: &str) -> Option<(String, String)> {
+    let shown = name.escape_debug();
+    if name.chars().any(char::is_control) {
+        let message = format!("\"{shown}\" holds a sign that cannot be shown");
+        return Some((message, "write it in letters, digits and spaces".into()));
+    }
+    if symbol(name).is_empty() {
+        let message = format!("\"{shown}\" has neither a letter nor a digit");
+        return Some((message, "names are told apart by these".into()));
+    }
+    let message = || format!("\"{shown}\" is a word of sentences, so no sentence can speak of it");
+    is_function_word(name).then(|| (message(), "give it the name of a thing".into()))
 }
 
 /// The names of an object, each with where it stands in its file.
@@ -64,13 +93,4 @@ fn several(objects: &[Read<'_>], own: usize, name: &str) -> Option<(String, Stri
             plural(name)
         ),
     ))
-}
-
-fn told((path, text): &(String, String), key: &[String], message: String, help: String) -> LoadError {
-    let key: Vec<&str> = key.iter().map(String::as_str).collect();
-    let place = Span { source: 0, ..Places::of(text).at(&key) };
-    let list = vec![Diagnostic::error("same-name", message, place, "this name").with_help(help)];
-    LoadError::Findings {
-        findings: Findings { sources: vec![Source::new(path.clone(), text.clone())], list },
-    }
 }

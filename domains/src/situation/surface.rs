@@ -32,6 +32,8 @@ pub struct KnownSurface {
     /// Certainty of its alignment with the outline of the map; none without such an outline, or while nothing
     /// was seen.
     pub placed: Option<Certainty>,
+    /// Distance by which looks show it beside the place that the map has it at, metres: which of the two is wrong is not known.
+    pub displaced_m: f64,
 }
 
 impl KnownSurface {

@@ -13,6 +13,7 @@ use crate::abilities;
 use crate::answer::{self, Asker, Conclusion, Ended, Listed};
 use crate::config::Answers;
 use crate::lexicon::symbol;
+use crate::mind::Region;
 use crate::saying::Saying;
 use crate::situation::{Situation, Thing, thing};
 
@@ -52,8 +53,10 @@ impl World<'_> {
     pub fn to_remember(&self) -> Option<Remembered> {
         let known = &self.mind.known;
         let past = known.past.as_ref()?;
+        let tells =
+            |region: &Region| region.taken > 0 && region.nothing.is_none() && region.contradiction.is_none();
         let looked_at: Vec<String> = (0..known.surfaces.len())
-            .filter(|&on| self.mind.regions[on].taken > 0 && self.mind.regions[on].nothing.is_none())
+            .filter(|&on| tells(&self.mind.regions[on]))
             .map(|on| known.surfaces[on].symbol.clone())
             .collect();
         let mut before = Remembered::clone(&past.remembered);

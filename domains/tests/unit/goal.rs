@@ -134,3 +134,19 @@ fn a_shape_has_any_name_that_is_no_other() {
     check("shapes", "learn !", None);
     check("tabletop", "find coffee table", None);
 }
+
+#[test]
+fn a_domains_own_words_go_before_words_that_request_the_same() {
+    let mut domain = Domain::load("tabletop").unwrap();
+    let find = domain.config.goal.iter().find(|goal| goal.say == "find <thing>").unwrap().clone();
+    let means = "(< (confidence <thing>) 0.1)".to_string();
+    domain.config.goal.push(descry_domains::config::GoalPhrase {
+        say: "look for <thing>".into(),
+        means,
+        ..find
+    });
+    let lexicon = Lexicon::new(&domain, &descry_domains::lexicon::Places::of_scene(&domain));
+    let pddl = |said: &str| read(said, &domain, &lexicon).unwrap().pddl;
+    assert_eq!(pddl("please look for cup A"), pddl("look for cup A"));
+    assert_ne!(pddl("please look for cup A"), pddl("find cup A"));
+}

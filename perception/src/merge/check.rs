@@ -6,6 +6,7 @@ use super::prepare::Prepared;
 use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Isometry3;
+use std::fmt;
 
 /// Fewest matched points for a view to count as overlapping. From: chosen.
 const FEWEST_MATCHED: usize = 80;
@@ -18,6 +19,47 @@ const CLEAR_SPREADS: f64 = 5.0;
 /// Share of points that another camera looked through from which a view counts as wrongly placed. From: chosen.
 const MOST_CONTRADICTED: f64 = 0.22;
 
+/// A reason why a view is left out of a merge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Misfit {
+    /// It has no usable point in range.
+    Empty,
+    /// It shares too few points with the others, so many.
+    Alone(usize),
+    /// It would have to move farther than localisation errs, metres and radians.
+    Far(f64, f64),
+    /// The share of what it shows that contradicts what the others saw through.
+    Contradicted(f64),
+}
+
+impl Misfit {
+    /// True if the view and the others cannot both be as stated; false if it merely tells too little.
+    pub(super) fn is_at_odds(&self) -> bool {
+        matches!(self, Misfit::Far(..) | Misfit::Contradicted(_))
+    }
+}
+
+impl fmt::Display for Misfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Misfit::Empty => write!(f, "it has no usable point in range"),
+            Misfit::Alone(matched) => write!(f, "it shares only {matched} points with the other views"),
+            Misfit::Far(shift_m, turn_rad) => write!(
+                f,
+                "it would have to move {shift_m:.2} m and turn {:.1}°, more than localisation errs",
+                turn_rad.to_degrees()
+            ),
+            Misfit::Contradicted(share) => {
+                write!(
+                    f,
+                    "{:.0} % of what it shows contradicts what the other views saw through",
+                    100.0 * share
+                )
+            }
+        }
+    }
+}
+
 /// The view that least belongs, with the reason; `None` if all that are used belong together.
 pub(super) fn misfit(
     views: &[Prepared],
@@ -26,14 +68,14 @@ pub(super) fn misfit(
     poses: &[Isometry3<f64>],
     maps: &[Option<DepthMap>],
     found: &[Found],
-) -> Option<(usize, String)> {
+) -> Option<(usize, Misfit)> {
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
     if active.len() < 2 {
         return None;
     }
     let lonely = active.iter().copied().filter(|&i| found[i].matched < FEWEST_MATCHED);
     if let Some(i) = lonely.min_by_key(|&i| (views[i].points.len(), usize::MAX - i)) {
-        return Some((i, format!("it shares only {} points with the other views", found[i].matched)));
+        return Some((i, Misfit::Alone(found[i].matched)));
     }
     let far = active.iter().copied().filter_map(|i| too_far(&views[i], &poses[i], 1.0).map(|why| (i, why)));
     if let Some(worst) = far.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) {
@@ -43,12 +85,7 @@ pub(super) fn misfit(
         active.iter().map(|&i| (contradicted(i, &active, views, parts, poses, maps), i)).collect();
     contradicted.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
     let (share, worst) = contradicted[0];
-    (share > MOST_CONTRADICTED).then(|| {
-        (
-            worst,
-            format!("{:.0} % of what it shows contradicts what the other views saw through", 100.0 * share),
-        )
-    })
+    (share > MOST_CONTRADICTED).then_some((worst, Misfit::Contradicted(share)))
 }
 
 /// Tests whether a further view of a given looseness belongs with the used views as they lie, itself
@@ -87,9 +124,8 @@ fn contradicted(
     sum / f64::from(n.max(1))
 }
 
-/// The correction of a camera pose as a multiple of the largest plausible one, with words; `None` if
-/// plausible.
-fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, String)> {
+/// The correction of a camera pose as a multiple of the largest plausible one, and the misfit; `None` if plausible.
+fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, Misfit)> {
     /// Localisation errs by more than it states now and then, and 10 cm and 6° must be mended: so many spreads are believed, and so much,
     /// metres and radians, in any case. From: chosen.
     const SPREADS: f64 = 5.0;
@@ -98,14 +134,7 @@ fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, S
     let most = most.map(|(sigma, mended)| loose * (SPREADS * sigma).max(mended));
     let (turn, shift) = super::joint::departure(pose, &view.prior);
     let excess = (shift.norm() / most[0]).max(turn.norm() / most[1]);
-    (excess > 1.0).then(|| {
-        let words = format!(
-            "it would have to move {:.2} m and turn {:.1}°, more than localisation errs",
-            shift.norm(),
-            turn.norm().to_degrees()
-        );
-        (excess, words)
-    })
+    (excess > 1.0).then(|| (excess, Misfit::Far(shift.norm(), turn.norm())))
 }
 
 /// Share of what stands on the surface in a view, of what another camera can judge, through which that camera looked; none if it

@@ -107,7 +107,14 @@ fn check_looks(robot: &dyn Robot, surface: &SurfaceHint, looks: &[Sensed]) -> Re
         format!("{} looks at the {} say that {fault}", looks.len(), surface.name)
     })?;
     let told = there + through;
-    ensure(told < FEWEST || there as f64 >= LEAST_SHARE * told as f64, PROMISE, || {
+    ensure(told >= FEWEST, PROMISE, || {
+        format!(
+            "{} looks at the {} return next to nothing where the map has it: is the camera covered, or the surface black or of glass?",
+            looks.len(),
+            surface.name
+        )
+    })?;
+    ensure(there as f64 >= LEAST_SHARE * told as f64, PROMISE, || {
         format!(
             "looks go past the {} at {through} of {told} points where the map has it: is the image upside down, or depth in another unit?",
             surface.name

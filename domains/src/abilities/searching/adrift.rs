@@ -21,12 +21,13 @@ const INSIDE_M: f64 = 0.01;
 
 /// Standard deviation of where an object stands, in the direction in which that is known worst, and this direction, metres.
 pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f64>>, f64) {
+    let own_m = track.position_sigma_m.hypot(surface.displaced_m);
     match &surface.placed {
         Some(placed) => {
             let (way, sigma_m) = placed.worst(&track.position_m);
-            (Some(way.into_inner()), sigma_m.hypot(track.position_sigma_m))
+            (Some(way.into_inner()), sigma_m.hypot(own_m))
         }
-        None => (None, track.position_sigma_m),
+        None => (None, own_m),
     }
 }
 

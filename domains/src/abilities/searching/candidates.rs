@@ -103,6 +103,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
         up,
         doubtful: None,
         placed: None,
+        displaced_m: 0.0,
     });
     let named =
         domain.config.surfaces.iter().filter(|_| robot.surfaces().is_empty()).map(|name| KnownSurface {
@@ -115,6 +116,7 @@ pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
             up,
             doubtful: None,
             placed: None,
+            displaced_m: 0.0,
         });
     on_map.chain(named).collect()
 }

@@ -4,6 +4,7 @@ pub(crate) mod adrift;
 mod calls;
 pub mod candidates;
 pub mod change;
+pub mod consistent;
 mod discover;
 pub mod doubt;
 mod facts;

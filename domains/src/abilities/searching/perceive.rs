@@ -8,6 +8,7 @@ use descry_memory::space::Space;
 use descry_memory::viewer::{self, Labelled};
 use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
 use descry_perception::View;
+use descry_perception::consistency::{Fault, Inconsistency};
 use descry_perception::hull::Hull;
 use descry_perception::merge::{MergeOptions, Merged, ViewFit};
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Vector3};
@@ -22,6 +23,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::change::Change;
+use super::consistent::{self, Contradiction};
 use super::discover;
 use super::merging;
 pub use super::merging::options;
@@ -126,6 +128,9 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let _span = tracing::info_span!("perceive", on = %mind.known.surfaces[on].symbol).entered();
+    let Mind { known, regions, .. } = &mut *mind;
+    let there = || known.belief.tracks.iter().filter(|t| t.on == known.surfaces[on].symbol).cloned();
+    regions[on].expected.get_or_insert_with(|| there().collect());
     let (options, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&options, &seeking.surface))?;
     if !keep_placed(&mut mind.regions[on].looks) {
@@ -134,6 +139,12 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         return Ok(());
     }
     let views = restore(mind, eyes, on)?;
+    let lie = consistent::with_map(eyes, &mind.known.surfaces[on], &mind.regions[on], &views);
+    mind.known.surfaces[on].displaced_m = match lie {
+        Some(Inconsistency { fault: Fault::Displaced(..), spread_m, .. }) => spread_m,
+        Some(lie) => return prove_nothing(mind, eyes, on, Contradiction::Fault(lie.fault), notes),
+        None => 0.0,
+    };
     let merged = merging::merged(mind, on, &views, &options);
     let seen = merged.map_err(|nothing| nothing.to_string()).and_then(|merged| {
         let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
@@ -154,6 +165,10 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         }
     };
     mind.regions[on].nothing = None;
+    if let Some(apart) = consistent::among(&merged.fits) {
+        return prove_nothing(mind, eyes, on, apart, notes);
+    }
+    mind.regions[on].contradiction = None;
     let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
     mind.regions[on].disputed = merged.fits.len() >= 2 * agreeing;
     let (merged, surface, placed) =
@@ -200,6 +215,30 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
             Ok(())
         }
     }
+}
+
+/// Looks at a surface contradict the map or each other: what they showed counts no longer, and what was expected there before them
+/// is believed again.
+fn prove_nothing(
+    mind: &mut Mind,
+    eyes: Eyes<'_>,
+    on: usize,
+    contradiction: Contradiction,
+    notes: &mut Vec<Note>,
+) -> Result<(), WorldError> {
+    let (symbol, name) = (mind.known.surfaces[on].symbol.clone(), mind.known.surfaces[on].name.clone());
+    let region = &mut mind.regions[on];
+    region.contradiction = Some(contradiction);
+    region.taken_in.clear();
+    mind.known.spaces[on] = Arc::default();
+    let belief = Arc::make_mut(&mut mind.known.belief);
+    belief.tracks.retain(|track| track.on != symbol);
+    belief.tracks.extend(region.expected.clone().unwrap_or_default());
+    belief.tracks.sort_by_key(|track| track.id);
+    put(eyes.record, "belief", eyes.robot.now_ns(), &*mind.known.belief)?;
+    let because = contradiction.told(&name);
+    notes.push(Note::Nothing { because, advice: String::new(), is_left_out: false });
+    Ok(())
 }
 
 /// Says of each percept which of the things that were learned it may be.
@@ -315,7 +354,7 @@ fn without_astray(
 }
 
 /// Localised camera pose of a view that may have been aligned with the outline of its surface.
-fn localised(look: &Look, view: &View) -> Isometry3<f64> {
+pub(super) fn localised(look: &Look, view: &View) -> Isometry3<f64> {
     match look.laid {
         Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
         Laid::AsLocalised | Laid::Nowhere => view.world_from_camera,

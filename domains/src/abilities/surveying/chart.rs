@@ -366,6 +366,7 @@ impl Chart {
             whole: false,
             doubtful: None,
             placed: None,
+            displaced_m: 0.0,
         })
     }
 }

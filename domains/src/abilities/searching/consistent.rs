@@ -1,0 +1,68 @@
+//! Consistency of the looks at a surface with the map and with each other: looks of a camera or a body that is not as stated
+//! prove nothing.
+
+use descry_perception::View;
+use descry_perception::consistency::{Fault, Inconsistency, MapSurface, judge};
+use descry_perception::merge::ViewFit;
+use descry_perception::nalgebra::Isometry3;
+
+use super::perceive::{Eyes, localised};
+use crate::lexicon::symbol;
+use crate::mind::Region;
+use crate::situation::KnownSurface;
+
+/// Fewest views of which the majority tells which are wrong.
+const FEWEST: usize = 3;
+
+/// A reason why the looks at a surface prove nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Contradiction {
+    /// Camera or poses are not as stated.
+    Fault(Fault),
+    /// As many views as agree cannot be where they are said to be.
+    Apart,
+}
+
+impl Contradiction {
+    /// The same in a sentence, of a surface by name.
+    pub fn told(&self, surface: &str) -> String {
+        match self {
+            Contradiction::Fault(fault) => {
+                format!("what the looks show of the {surface} contradicts the map: {fault}")
+            }
+            Contradiction::Apart => format!("too few views of the {surface} can be laid on each other"),
+        }
+    }
+}
+
+/// The contradiction of all looks at a surface with the map's outline and height of it, if a fault of camera or poses is likelier
+/// than what is stated. None for a surface that the map does not have.
+pub(super) fn with_map(
+    eyes: Eyes<'_>,
+    known: &KnownSurface,
+    region: &Region,
+    views: &[View],
+) -> Option<Inconsistency> {
+    let hints = eyes.robot.surfaces();
+    let asked = hints.iter().position(|hint| known.whole && symbol(&hint.name) == known.symbol)?;
+    let of_hint = |hint: &descry_robots::SurfaceHint| MapSurface {
+        outline_m: hint.outline_m.clone(),
+        height_m: hint.height_m,
+    };
+    let map: Vec<MapSurface> = hints.iter().map(of_hint).collect();
+    let stated: Vec<Isometry3<f64>> =
+        region.looks.iter().zip(views).map(|(look, view)| localised(look, view)).collect();
+    let looks: Vec<(&View, Isometry3<f64>)> = views.iter().zip(stated.iter().copied()).collect();
+    let last = stated.len().saturating_sub(1);
+    let shifted = |by: isize| -> Vec<Isometry3<f64>> {
+        (0..=last).filter_map(|n| stated.get(n.saturating_add_signed(by).min(last)).copied()).collect()
+    };
+    judge(&looks, &map, asked, &[(1, shifted(1)), (-1, shifted(-1))]).filter(Inconsistency::is_likely)
+}
+
+/// The contradiction among views, if as many as agree are at odds with them.
+pub(super) fn among(fits: &[ViewFit]) -> Option<Contradiction> {
+    let agreeing = fits.iter().filter(|fit| fit.used).count();
+    let at_odds = fits.iter().filter(|fit| fit.is_at_odds).count();
+    (agreeing + at_odds >= FEWEST && at_odds >= agreeing).then_some(Contradiction::Apart)
+}

@@ -47,13 +47,22 @@ pub(super) fn for_writing(dir: &Path, log_bytes: u64, written: Durability) -> Re
         move_index(dir, "", OLD)?;
         let made =
             Index::open(dir, log_bytes).and_then(|index| Rebuild::new(dir, index, old, Some(written)).run());
-        made.and_then(without_faults).or_else(|e| move_index(dir, OLD, "").and(Err(e)))?
+        made.and_then(without_faults).or_else(|e| move_index(dir, OLD, "").and(Err(as_read(dir, e))))?
     };
     Closed::remove(dir)?;
     for path in index_files(dir, OLD) {
         drop(fs::remove_file(path));
     }
     Ok(opened)
+}
+
+/// A refusal with the losses that a reader finds: records that the index proves undamaged are none.
+fn as_read(dir: &Path, refused: Error) -> Error {
+    let Error::Faulty { place, faults } = refused else { return refused };
+    let read = Old::read(dir, Closed::read(dir))
+        .and_then(|old| Rebuild::new(dir, Index::in_memory(dir)?, old, None).run());
+    let found = read.map(|opened| opened.recovery.faults).unwrap_or_default();
+    Error::Faulty { place, faults: if found.is_empty() { faults } else { found } }
 }
 
 /// Suffix of the old index during a rebuild.

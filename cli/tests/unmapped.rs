@@ -123,6 +123,45 @@ fn every_surface_in_view_is_looked_at() {
     );
 }
 
+/// Writes a recording again as Replica's renderings are laid out, without what only our own layout states.
+fn as_replica(own: &Path, other: &Path) {
+    fs::create_dir_all(other.join("results")).expect("a folder can be made");
+    let mut poses = String::new();
+    let frames = (0..).take_while(|k| own.join(format!("frame-{k}.depth.png")).is_file());
+    for k in frames {
+        let depth = other.join(format!("results/depth{k:06}.png"));
+        fs::copy(own.join(format!("frame-{k}.depth.png")), depth).expect("it is copied");
+        let pose = fs::read_to_string(own.join(format!("frame-{k}.pose.txt"))).expect("it was written");
+        poses += &(pose.replace('\n', " ") + "\n");
+    }
+    fs::write(other.join("traj.txt"), poses).expect("it is written");
+    let matrix = fs::read_to_string(own.join("camera-intrinsics.txt")).expect("it was written");
+    let n: Vec<&str> = matrix.split_whitespace().collect();
+    let camera = format!("\"fx\": {}, \"fy\": {}, \"cx\": {}, \"cy\": {}", n[0], n[4], n[2], n[5]);
+    let text = format!("{{\"camera\": {{{camera}, \"scale\": 1000}}}}");
+    fs::write(other.join("cam_params.json"), text).expect("it is written");
+}
+
+#[test]
+fn a_published_layout_gives_the_verdict_of_our_own() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let near = [[0.0, -1.9], [1.9, -1.2], [2.0, 1.0], [0.0, 1.9], [-1.9, 1.2], [-1.9, -1.1]];
+    record(&folder.path().join("own"), &format!("{TABLES}{CUP}"), &both_tables(near));
+    as_replica(&folder.path().join("own"), &folder.path().join("other"));
+    let find = |robot: &str| check(folder.path(), &["find", "cup A", "--robot", robot, "--json"], 0);
+    let own = find("recorded:own");
+    let said = check(folder.path(), &["import", "other", "imported", "--json"], 0);
+    assert_eq!((said["layout"].as_str(), said["frames"].as_u64()), (Some("replica"), Some(6)), "{said}");
+    for robot in ["recorded:other", "recorded:imported"] {
+        let found = find(robot);
+        let at = |said: &serde_json::Value| -> [f64; 3] {
+            serde_json::from_value(said["position_m"].clone()).expect("three numbers")
+        };
+        let apart_m: f64 = at(&found).iter().zip(at(&own)).map(|(a, b)| (a - b).abs()).sum();
+        assert_eq!((&found["verdict"], apart_m < 0.02), (&own["verdict"], true), "{robot}: {found}");
+    }
+}
+
 #[test]
 fn what_may_be_the_floor_proves_nothing() {
     let folder = TempDir::new().expect("a folder can be made");

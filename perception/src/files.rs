@@ -1,10 +1,14 @@
 //! Clouds and depth images from bytes and back. Nothing here touches a file system.
 
+mod columns;
 pub mod depth;
+mod las;
 #[doc(hidden)]
 pub mod lzf;
+mod npy;
 pub mod pcd;
 pub mod ply;
+mod text;
 
 use crate::cloud::{Cloud, CloudError, Grid};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -63,13 +67,22 @@ pub struct Loaded {
     pub notes: Vec<String>,
 }
 
-/// Reads a PCD or PLY file, told apart by its first bytes.
+/// Reads a cloud: PCD, PLY, NPY, LAS, or text (XYZ, CSV, PTS), told apart by the first bytes.
 ///
 /// # Errors
-/// If it is neither, or broken.
+/// If it is none of these, or broken.
 pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
     if bytes.starts_with(b"ply") {
         return ply::read(bytes);
+    }
+    if bytes.starts_with(npy::MAGIC) {
+        return npy::read(bytes);
+    }
+    if bytes.starts_with(las::MAGIC) {
+        return las::read(bytes);
+    }
+    if text::is(bytes) {
+        return text::read(bytes);
     }
     pcd::read(bytes)
 }

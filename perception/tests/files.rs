@@ -1,4 +1,4 @@
-//! PCD and PLY: round trips, what strangers write, and files that are broken.
+//! Files of clouds: round trips, what strangers write, and files that are broken.
 
 use descry_perception::files::{self, Loaded, pcd, ply};
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -249,9 +249,147 @@ fn ply_of_strangers() {
     assert_eq!(files::read_cloud(&big).unwrap().cloud.points, vec![Point3::new(1.5, -2.0, 3.0)]);
 }
 
+/// The cloud of a file is these points; returns it with its notes.
+fn check_points(bytes: &[u8], points: &[[f32; 3]]) -> Loaded {
+    let loaded = files::read_cloud(bytes).unwrap_or_else(|e| panic!("{e}"));
+    let found: Vec<[f32; 3]> = loaded.cloud.points.iter().map(|p| (*p).into()).collect();
+    assert_eq!(found, points, "{:?}", String::from_utf8_lossy(bytes));
+    loaded
+}
+
+#[test]
+fn a_row_of_ply_may_go_on_in_the_next_line() {
+    let head =
+        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n";
+    let text = format!("{head}end_header\n1 2\n3\n\n4\n5\n6\n");
+    check_points(text.as_bytes(), &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    check_error(
+        &format!("{head}end_header\n1.5 2.5 3.5\n4.5 5.5\n"),
+        &["line 9", "2 rows of element vertex", "cut"],
+    );
+}
+
+#[test]
+fn the_camera_of_ply_is_the_viewpoint() {
+    let vertices = "element vertex 4\nproperty double x\nproperty double y\nproperty double z\n";
+    let names = ["view_p", "x_axis", "y_axis", "z_axis"]
+        .map(|n| ["x", "y", "z"].map(|a| format!("property float {n}{a}\n")));
+    let names = names.as_flattened().concat() + "property int viewportx\nproperty int viewporty\n";
+    let read_at = |offset: f64, turn: &str| {
+        let point = |k: u8| format!("{} 2 3\n", offset + f64::from(k));
+        let points: String = (1..5).map(point).collect();
+        let row = format!("{} 0 9 {turn} 2 2\n", offset + 5.0);
+        read(&format!("ply\nformat ascii 1.0\n{vertices}element camera 1\n{names}end_header\n{points}{row}"))
+            .unwrap()
+    };
+    let loaded = read_at(0.0, "0 -1 0 1 0 0 0 0 1");
+    assert_eq!(loaded.viewpoint.translation.vector, Vector3::new(5.0, 0.0, 9.0));
+    assert!((loaded.viewpoint * Vector3::x() - Vector3::y()).norm() < 1e-6);
+    assert_eq!(loaded.cloud.grid, Some(Grid { width: 2, height: 2 }));
+    let far = read_at(500_000.0, "1 0 0 0 1 0 0 0 1");
+    let apart = far.viewpoint.translation.vector - far.cloud.points[0].coords.cast();
+    assert!(
+        (apart - Vector3::new(4.0, -2.0, 6.0)).norm() < 1e-6,
+        "the sensor moves with its points: {apart}"
+    );
+    assert_eq!(read_at(0.0, "2 0 0 0 1 0 0 0 1").viewpoint.translation.vector, Vector3::zeros());
+}
+
+#[test]
+fn clouds_of_lines_of_numbers() {
+    let two = [[1.0, 2.0, 3.0], [4.0, 5.0, -0.5]];
+    check_points(b"1 2 3\n4\t5 -5e-1\n", &two);
+    check_points(b"# by hand\n\n1, 2, 3\n4,5,-0.5\n", &two);
+    let named = check_points(b"id;Z;\"X\";y;label\n9;3;1;2;7\n9;-0.5;4;5;8\n", &two);
+    assert_eq!(
+        (named.cloud.labels, &named.notes[..]),
+        (Some(vec![7, 8]), &["1 of 5 columns are left out".to_string()][..])
+    );
+    let compare = check_points(b"//X Y Z R G B\n1 2 3 255 0 7\n4 5 -0.5 1 2 3\n", &two);
+    assert_eq!(compare.cloud.colours, Some(vec![[255, 0, 7], [1, 2, 3]]));
+    let pts = check_points(b"2\n1 2 3 -800 255 0 7\n4 5 -0.5 12 1 2 3\n", &two);
+    assert_eq!(pts.cloud.colours, Some(vec![[255, 0, 7], [1, 2, 3]]));
+    let normals = check_points(b"1 2 3 0 0 1\n4 5 -0.5 0.6 0 -0.8\n", &two);
+    assert_eq!((normals.cloud.normals.map(|n| n.len()), normals.cloud.colours), (Some(2), None));
+    let utm = check_points(
+        b"691234.25 5334567.5 520\n691235.25 5334567.5 521\n",
+        &[[-0.75, -0.5, -1.0], [0.25, -0.5, 0.0]],
+    );
+    assert!(utm.notes[0].contains("recentred: 691235 5334568 521"), "{:?}", utm.notes);
+    check_error("1 2 3\n4 5\n", &["line 2", "3 numbers", "found 2"]);
+    check_error("1 2 3\n4 five 6\n", &["line 2", "a number", "five"]);
+    check_error("3\n1 2 3\n", &["line 1", "3 points", "found 1"]);
+    check_error("x,y,z\n1,2\n", &["line 2", "3 numbers, as there are names"]);
+}
+
+/// An array as NumPy stores it.
+fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    [b"\x93NUMPY\x01\x00", &(text.len() as u16).to_le_bytes()[..], text.as_bytes(), data].concat()
+}
+
+#[test]
+fn clouds_of_arrays() {
+    let bytes: Vec<u8> = [1.0f32, 2.0, 3.0, 4.0, 5.0, -0.5].iter().flat_map(|v| v.to_le_bytes()).collect();
+    check_points(&npy("<f4", "(2, 3)", &bytes), &[[1.0, 2.0, 3.0], [4.0, 5.0, -0.5]]);
+    let big: Vec<u8> = (0..12).flat_map(|v| f64::from(v).to_be_bytes()).collect();
+    let image = check_points(
+        &npy(">f8", "(2, 2, 3)", &big),
+        &[[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [6.0, 7.0, 8.0], [9.0, 10.0, 11.0]],
+    );
+    assert_eq!(image.cloud.grid, Some(Grid { width: 2, height: 2 }));
+    let error = |bytes: &[u8]| files::read_cloud(bytes).unwrap_err().to_string();
+    assert!(error(&npy("<f4", "(9000000000000000000, 3)", &bytes)).contains("cut"));
+    assert!(error(&npy("<f4", "(3, 3)", &bytes)).contains("cut"));
+    assert!(error(&npy("<f4", "(6,)", &bytes)).contains("(points, 3)"));
+    assert!(error(&npy("<c8", "(2, 3)", &bytes)).contains("<f4 or <f8"));
+    assert!(error(b"\x93NUMPY\x01\x00\xff\xff{").contains("header of NPY"));
+}
+
+/// A survey of one point with its colour.
+fn las(format: u8, count: u32) -> Vec<u8> {
+    let mut bytes = vec![0; 227];
+    bytes[..4].copy_from_slice(b"LASF");
+    (bytes[24], bytes[25], bytes[104]) = (1, 2, format);
+    bytes[96..100].copy_from_slice(&227u32.to_le_bytes());
+    bytes[105..107].copy_from_slice(&26u16.to_le_bytes());
+    bytes[107..111].copy_from_slice(&count.to_le_bytes());
+    for k in 0..3 {
+        bytes[131 + 8 * k..139 + 8 * k].copy_from_slice(&0.01f64.to_le_bytes());
+        bytes[155 + 8 * k..163 + 8 * k].copy_from_slice(&(300_000.0 * k as f64).to_le_bytes());
+    }
+    for k in [125i32, -250, 375] {
+        bytes.extend(k.to_le_bytes());
+    }
+    bytes.resize(227 + 20, 0);
+    [256u16 * 9, 0, 65535].iter().for_each(|c| bytes.extend(c.to_le_bytes()));
+    bytes
+}
+
+#[test]
+fn clouds_of_surveys() {
+    let loaded = files::read_cloud(&las(2, 1)).unwrap();
+    assert_eq!((loaded.cloud.len(), loaded.cloud.colours), (1, Some(vec![[9, 0, 255]])));
+    assert!(
+        (loaded.cloud.points[0] - Point3::new(0.25, -0.5, -0.25)).norm() < 1e-5,
+        "{:?}",
+        loaded.cloud.points
+    );
+    assert!(loaded.notes[0].contains("recentred: 1 299998 600004"), "{:?}", loaded.notes);
+    let error = |bytes: &[u8]| files::read_cloud(bytes).unwrap_err().to_string();
+    assert!(error(&las(2, 4_000_000_000)).contains("cut"));
+    assert!(error(&las(2 | 0x80, 1)).contains("laszip"));
+    assert!(error(&las(63, 1)).contains("point format"));
+    assert!(error(&las(2, 1)[..200]).contains("header of LAS"));
+}
+
 fn files_of_all_kinds() -> Vec<Vec<u8>> {
     let cloud = sample(true);
     vec![
+        b"4\n1 2 3 0.5 255 0 7\n4 5 6 1 1 2 3\n7 8 9 2 1 2 3\n1 2 3 0 9 9 9\n".to_vec(),
+        b"x,y,z,label\n1,2,3,4\n4,5,6,7\n".to_vec(),
+        npy("<f4", "(2, 2, 3)", &[7; 48]),
+        las(2, 1),
         pcd::write(&cloud, pcd::Encoding::Ascii),
         pcd::write(&cloud, pcd::Encoding::Binary),
         pcd::write(&cloud, pcd::Encoding::BinaryCompressed),
@@ -264,7 +402,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
     #[test]
     fn damaged_files_never_panic(
-        kind in 0usize..5,
+        kind in 0usize..9,
         hits in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 0..6),
         keep in 0.0f64..1.2,
     ) {

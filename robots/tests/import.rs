@@ -180,6 +180,32 @@ fn a_body_from_a_bag_knows_what_is_up() {
     assert_eq!(robot.description().up, Some(Vector3::z()));
 }
 
+/// Points without pixels: told in which frame they are, and found where they are.
+fn check_loose(write: Writer, words: &str) {
+    let folder = TempDir::new().unwrap();
+    write(folder.path(), &shots());
+    let read = Imported::open(folder.path(), &all()).unwrap();
+    let said = read.notes.join("\n");
+    assert!(said.contains(words) && said.contains("the views agree"), "{said}");
+    let table_m = |i: usize| {
+        let cloud = read.pixels(i).unwrap().cloud.transformed(&read.frames[i].world_from_camera);
+        let near = cloud.points.iter().filter(|p| (p.z - 0.72).abs() < 0.02).count();
+        near as f64 / cloud.count_finite() as f64
+    };
+    assert!((0..read.frames.len()).all(|i| table_m(i) > 0.05), "the top of the table is where it is");
+}
+
+#[test]
+fn the_frame_of_points_is_told_from_the_views() {
+    check_loose(writers::loose_pcds, "points in the world");
+    check_loose(writers::loose_pcds_of_the_sensor, "points in the frame of the sensor");
+    let folder = TempDir::new().unwrap();
+    let same = restated(&shots(), |_| Isometry3::identity());
+    writers::pcds(folder.path(), &same);
+    let error = Imported::open(folder.path(), &all()).err().unwrap().to_string();
+    assert!(error.contains("same VIEWPOINT"), "{error}");
+}
+
 /// Checks the message for a bag with some messages changed.
 fn check_bag(change: impl Fn(&mut Vec<bags::Message>), options: &Options, words: &[&str]) {
     let folder = TempDir::new().unwrap();

@@ -71,7 +71,7 @@ pub enum Command {
     /// Run as a service: accept goals over HTTP, pursue one after the other, urgent ones first, and remember
     /// sightings
     Serve(serve::Arguments),
-    /// Find the table and the objects in point clouds (PCD, PLY)
+    /// Find the table and the objects in point clouds (PCD, PLY, NPY, LAS, text)
     Recognise(recognise::Arguments),
     /// Import a recording in a published layout: bags of ROS 2, TUM, BOP, ScanNet, Redwood and others
     Import(import::Arguments),

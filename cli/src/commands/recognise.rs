@@ -17,7 +17,7 @@ use descry_agent::exit::{CommandError, Exit};
 /// Arguments of `descry recognise`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// PCD or PLY files
+    /// Clouds: PCD, PLY, NPY, LAS, or text (XYZ, CSV, PTS)
     #[arg(required = true)]
     clouds: Vec<PathBuf>,
     /// Folder of object files [default: those of the domain tabletop]
@@ -90,9 +90,9 @@ fn look(
 ) -> Result<Seen, CommandError> {
     let shown = path.display().to_string();
     let bytes = input::read(path, MOST_CLOUD_BYTES).map_err(|e| match e {
-        CommandError::BadInput(why) => {
-            CommandError::BadInput(format!("{why}\n  expected a point cloud: a PCD or PLY file"))
-        }
+        CommandError::BadInput(why) => CommandError::BadInput(format!(
+            "{why}\n  expected a point cloud: PCD, PLY, NPY, LAS, XYZ, CSV or PTS"
+        )),
         other => other,
     })?;
     let loaded = read_cloud(&bytes).map_err(|e| CommandError::BadInput(format!("{shown}, {e}")))?;

@@ -1,8 +1,9 @@
 //! PLY: `ascii`, `binary_little_endian`, `binary_big_endian`; any elements and properties, of which the vertices are used.
 
+use super::columns::to_origin;
 use super::{FileError, Loaded, Place, finish, is_padding};
-use crate::cloud::Cloud;
-use nalgebra::{Isometry3, Point3, Vector3};
+use crate::cloud::{Cloud, Grid};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// The encoding in which [`write()`] stores the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,11 +103,13 @@ impl Element {
 /// If the header or the data are broken: with the line or byte, what was expected, and what to do.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let (stored, elements, mut cursor) = header(bytes)?;
-    let mut vertices = None;
+    let (mut vertices, mut camera) = (None, None);
     for element in &elements {
         let table = cursor.rows(stored, element)?;
-        if element.name == "vertex" {
-            vertices = Some((element, table));
+        match element.name.as_str() {
+            "vertex" => vertices = Some((element, table)),
+            "camera" => camera = Camera::of(element, &table),
+            _ => {}
         }
     }
     let (Some((element, table)), Some(last)) = (vertices, elements.last()) else {
@@ -119,8 +122,45 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     };
     cursor.ends_with(stored, last)?;
     let mut notes = Vec::new();
-    let cloud = cloud(element, &table, &mut notes)?;
-    finish(cloud, Isometry3::identity(), notes, Place::Line(element.line))
+    let (mut cloud, offset) = cloud(element, &table, &mut notes)?;
+    let mut viewpoint = Isometry3::identity();
+    if let Some(camera) = camera {
+        viewpoint = camera.viewpoint;
+        viewpoint.translation.vector -= Vector3::from(offset);
+        cloud.grid = camera.grid.filter(|g| g.width.checked_mul(g.height) == Some(cloud.len()));
+    }
+    finish(cloud, viewpoint, notes, Place::Line(element.line))
+}
+
+/// The element `camera` of the Point Cloud Library: pose of the sensor, and the size of its image.
+struct Camera {
+    viewpoint: Isometry3<f64>,
+    grid: Option<Grid>,
+}
+
+impl Camera {
+    /// Reads the first row; none if the element is another program's.
+    fn of(element: &Element, values: &[f64]) -> Option<Camera> {
+        let flat: Vec<&str> =
+            element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
+        let number = |name: &str| values.get(flat.iter().position(|n| *n == name)?).copied();
+        let triple = |names: [&str; 3]| Some([number(names[0])?, number(names[1])?, number(names[2])?]);
+        let eye = triple(["view_px", "view_py", "view_pz"])?;
+        let rows = [
+            triple(["x_axisx", "x_axisy", "x_axisz"])?,
+            triple(["y_axisx", "y_axisy", "y_axisz"])?,
+            triple(["z_axisx", "z_axisy", "z_axisz"])?,
+        ];
+        let turn = Matrix3::from_fn(|r, c| rows[r][c]);
+        let off = (turn * turn.transpose() - Matrix3::identity()).abs().max();
+        if !(off < 0.01 && turn.determinant() > 0.0 && eye.iter().all(|c| c.is_finite())) {
+            return None;
+        }
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        let size = [number("viewportx"), number("viewporty")].map(|n| n.map_or(0, |n| n.max(0.0) as usize));
+        let grid = (size[1] > 1).then_some(Grid { width: size[0], height: size[1] });
+        Some(Camera { viewpoint: Isometry3::from_parts(eye.into(), rotation), grid })
+    }
 }
 
 /// The reading position.
@@ -181,36 +221,37 @@ impl<'a> Cursor<'a> {
         Ok(values)
     }
 
+    /// The next line that is not empty.
+    fn filled_line(&mut self) -> Option<(usize, &'a str)> {
+        std::iter::from_fn(|| self.text_line()).find(|(_, text)| !text.trim().is_empty())
+    }
+
+    fn short_of(&self, element: &Element) -> FileError {
+        let expected = format!("{} rows of element {}", element.count, element.name);
+        let mend = "the file was cut: write it again";
+        FileError::new(Place::Line(self.line), expected, "the end of the file", mend)
+    }
+
     fn text_row(&mut self, element: &Element, values: &mut Vec<f64>) -> Result<(), FileError> {
-        let (line, text) = loop {
-            match self.text_line() {
-                Some((_, text)) if text.trim().is_empty() => continue,
-                Some(found) => break found,
-                None => {
-                    let expected = format!("{} rows of element {}", element.count, element.name);
-                    let place = Place::Line(self.line);
-                    return Err(FileError::new(
-                        place,
-                        expected,
-                        "the end of the file",
-                        "the file was cut: write it again",
-                    ));
-                }
-            }
-        };
+        let (begin, text) = self.filled_line().ok_or_else(|| self.short_of(element))?;
+        let mut line = begin;
         let mut words = text.split_ascii_whitespace();
         for property in &element.properties {
             let mut number = || -> Result<f64, FileError> {
-                let word = words.next();
-                word.and_then(|w| w.parse().ok()).ok_or_else(|| {
-                    let found = word.map_or("the end of the line".to_string(), |w| format!("{w:?}"));
+                // A row may go on in the next line.
+                let word = match words.next() {
+                    Some(word) => word,
+                    None => {
+                        let (next, text) = self.filled_line().ok_or_else(|| self.short_of(element))?;
+                        line = next;
+                        words = text.split_ascii_whitespace();
+                        words.next().unwrap_or_default()
+                    }
+                };
+                word.parse().map_err(|_| {
                     let expected = format!("a number for {}", property.name);
-                    FileError::new(
-                        Place::Line(line),
-                        expected,
-                        found,
-                        "one line holds one row of the element",
-                    )
+                    let mend = "write the numbers of each row, and each row on a line of its own";
+                    FileError::new(Place::Line(line), expected, format!("{word:?}"), mend)
                 })
             };
             let first = number()?;
@@ -224,12 +265,14 @@ impl<'a> Cursor<'a> {
         }
         match words.next() {
             None => Ok(()),
-            Some(extra) => Err(FileError::new(
-                Place::Line(line),
-                "the end of the line",
-                format!("{extra:?}"),
-                "the properties of the element must name every column",
-            )),
+            Some(extra) => {
+                let last = element.properties.last().map_or("", |p| p.name.as_str());
+                let expected = format!("the end of the line behind {last}");
+                let found =
+                    if line == begin { format!("{extra:?}") } else { format!("{extra:?} in line {line}") };
+                let mend = "the properties of the element must name every column";
+                Err(FileError::new(Place::Line(begin), expected, found, mend))
+            }
         }
     }
 
@@ -346,7 +389,8 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
-fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<Cloud, FileError> {
+/// The cloud of the vertices, and what was taken off each of them.
+fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<(Cloud, [f64; 3]), FileError> {
     let flat: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_none()).collect();
     let find = |name: &str| flat.iter().position(|p| p.name == name);
     let triple = |names: [&str; 3]| Some([find(names[0])?, find(names[1])?, find(names[2])?]);
@@ -360,7 +404,9 @@ fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<C
             "a cloud needs all three",
         ));
     };
-    let points = rows().map(|r| Point3::new(r[x] as f32, r[y] as f32, r[z] as f32)).collect();
+    let mut positions: Vec<[f64; 3]> = rows().map(|r| [r[x], r[y], r[z]]).collect();
+    let moved = to_origin(&mut positions);
+    let points = positions.into_iter().map(|p| Point3::from(p.map(|c| c as f32))).collect();
     let colour = triple(["red", "green", "blue"])
         .or_else(|| triple(["diffuse_red", "diffuse_green", "diffuse_blue"]))
         .or_else(|| triple(["r", "g", "b"]));
@@ -380,7 +426,9 @@ fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<C
     if !left.is_empty() {
         notes.push(format!("properties left out: {}", left.join(" ")));
     }
-    Ok(Cloud { points, grid: None, colours, normals, labels })
+    let offset = moved.as_ref().map_or([0.0; 3], |(offset, _)| *offset);
+    notes.extend(moved.map(|(_, note)| note));
+    Ok((Cloud { points, grid: None, colours, normals, labels }, offset))
 }
 
 /// The finite points of a cloud as a PLY file (float coordinates, uchar colours, float normals, uint label). PLY knows no grid.

@@ -282,7 +282,7 @@ fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Re
 }
 
 /// Pairs of views that show the same from different places, spread over the recording.
-fn pairs(stated: &Stated) -> Result<Vec<Pair>, InputError> {
+pub(crate) fn pairs(stated: &Stated) -> Result<Vec<Pair>, InputError> {
     let view = |i: usize| -> Result<StatedView, InputError> {
         let frame = &stated.frames[i];
         Ok(StatedView { pose: frame.pose, camera: frame.camera, depth: stated.images.depth(i)? })

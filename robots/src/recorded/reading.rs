@@ -14,7 +14,7 @@ const TOLERANCE: f64 = 0.02;
 /// Least share of the points that a right reading confirms: things move, and depth is noisy at edges. From: chosen.
 const LEAST_AGREEMENT: f64 = 0.6;
 /// Difference of two shares below which they say the same. From: chosen.
-const MARGIN: f64 = 0.1;
+pub(crate) const MARGIN: f64 = 0.1;
 /// Least share of the points that must meet a measurement of the other view before a share says anything. From: chosen.
 const LEAST_OVERLAP: f64 = 0.05;
 /// Share of points that stay where they are from one view to the next, above which the two tell nothing of the motion. From: chosen.
@@ -75,7 +75,7 @@ impl Axes {
     }
 
     /// Rotation from the optical frame into these axes.
-    fn from_optical(self) -> UnitQuaternion<f64> {
+    fn rotation_from_optical(self) -> UnitQuaternion<f64> {
         let rows = match self {
             Axes::Optical => return UnitQuaternion::identity(),
             Axes::OpenGl => Matrix3::new(1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0),
@@ -112,7 +112,7 @@ impl Reading {
             Poses::WorldFromCamera => in_metres,
             Poses::CameraFromWorld => in_metres.inverse(),
         };
-        world_from_axes * self.axes.from_optical()
+        world_from_axes * self.axes.rotation_from_optical()
     }
 
     /// Number of choices in which two readings differ.
@@ -270,7 +270,8 @@ impl Pair {
     }
 }
 
-fn share(pairs: &[Pair], reading: &Reading) -> f64 {
+/// Share of what one view shows that lies where the other measures it, over all pairs.
+pub(crate) fn agreement(reading: &Reading, pairs: &[Pair]) -> f64 {
     let mut tally = Tally::default();
     for Pair(a, b) in pairs {
         let (world_from_a, world_from_b) =
@@ -339,7 +340,7 @@ pub fn settle(
     let scored: Vec<(Reading, f64)> = candidates(&stated, given)
         .into_iter()
         .filter(|r| *r == stated || plausible(r))
-        .map(|r| (r, share(pairs, &r)))
+        .map(|r| (r, agreement(&r, pairs)))
         .collect();
     let as_stated = scored[0].1;
     let best = scored.iter().filter(|(r, _)| plausible(r)).map(|(_, s)| *s).fold(0.0, f64::max);

@@ -2,6 +2,7 @@
 
 use descry_robots::image::{ImageBuffer, Luma};
 use descry_robots::nalgebra::{Isometry3, Point3};
+use descry_robots::perception::{Cloud, Intrinsics};
 use descry_robots::recorded::CameraSettings;
 use descry_robots::sim::{DepthNoise, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::{Place, Pose2, Robot, Watch};
@@ -42,8 +43,15 @@ pub struct Shot {
 pub type Writer = fn(&Path, &[Shot]);
 
 /// Writers of the layouts that state their camera.
-pub const ALL: [(&str, Writer); 5] =
-    [("tum", tum), ("bop", bop), ("scannet", scannet), ("redwood", redwood), ("replica", replica)];
+pub const ALL: [(&str, Writer); 7] = [
+    ("tum", tum),
+    ("bop", bop),
+    ("scannet", scannet),
+    ("redwood", redwood),
+    ("replica", replica),
+    ("pcd", pcds),
+    ("pcd", pcds_of_the_world),
+];
 
 /// Views of a table from a half circle around it.
 pub fn shots() -> Vec<Shot> {
@@ -191,4 +199,44 @@ pub fn replica(folder: &Path, shots: &[Shot]) {
         "{{\"camera\": {{\"w\": {w}, \"h\": {h}, \"fx\": {fx}, \"fy\": {fy}, \"cx\": {cx}, \"cy\": {cy}, \"scale\": 6553.5}}}}"
     );
     write(&folder.join("cam_params.json"), &camera);
+}
+
+/// Files of points with the pose of their sensor; `points` changes each cloud before it is written.
+fn write_pcds(folder: &Path, shots: &[Shot], points: impl Fn(&Shot, Cloud) -> Cloud) {
+    fs::create_dir_all(folder).unwrap();
+    for (i, shot) in shots.iter().enumerate() {
+        let CameraSettings { fx, fy, cx, cy } = shot.camera;
+        let camera = Intrinsics { width: shot.size.0, height: shot.size.1, fx, fy, cx, cy };
+        let cloud = points(shot, camera.cloud_from_depth(&shot.depth_m).unwrap());
+        let (width, height) = cloud.grid.map_or((cloud.len(), 1), |grid| (grid.width, grid.height));
+        let (t, q) = (shot.stated.translation.vector, shot.stated.rotation.coords);
+        let mut bytes = format!(
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {width}\nHEIGHT {height}\nVIEWPOINT {} {} {} {} {} {} {}\n\
+             POINTS {}\nDATA binary\n",
+            t.x, t.y, t.z, q.w, q.x, q.y, q.z, width * height
+        )
+        .into_bytes();
+        bytes.extend(cloud.points.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f32::to_le_bytes));
+        fs::write(folder.join(format!("{i}.pcd")), bytes).unwrap();
+    }
+}
+
+/// Organised clouds in the frame of their sensor.
+pub fn pcds(folder: &Path, shots: &[Shot]) {
+    write_pcds(folder, shots, |_, cloud| cloud);
+}
+
+/// Organised clouds in the world.
+pub fn pcds_of_the_world(folder: &Path, shots: &[Shot]) {
+    write_pcds(folder, shots, |shot, cloud| cloud.transformed(&shot.stated));
+}
+
+/// Points without pixels, in the world.
+pub fn loose_pcds(folder: &Path, shots: &[Shot]) {
+    write_pcds(folder, shots, |shot, cloud| cloud.transformed(&shot.stated).finite());
+}
+
+/// Points without pixels, in the frame of the sensor.
+pub fn loose_pcds_of_the_sensor(folder: &Path, shots: &[Shot]) {
+    write_pcds(folder, shots, |_, cloud| cloud.finite());
 }

@@ -4,6 +4,7 @@
 
 mod bag;
 mod bop;
+mod pcds;
 mod pieces;
 mod redwood;
 mod replica;
@@ -32,7 +33,7 @@ pub struct Layout {
 }
 
 /// All layouts, the most telling first.
-pub const LAYOUTS: [Layout; 7] = [
+pub const LAYOUTS: [Layout; 8] = [
     Layout {
         name: "rosbag",
         files: "*.mcap or *.db3 of ROS 2: depth, camera_info, tf",
@@ -65,6 +66,7 @@ pub const LAYOUTS: [Layout; 7] = [
         is: seven_scenes::is,
         read: seven_scenes::read,
     },
+    Layout { name: "pcd", files: "*.pcd, each with its VIEWPOINT", is: pcds::is, read: pcds::read },
 ];
 
 /// Choices of the user about what a folder does not say.

@@ -154,7 +154,8 @@ impl<'a> Cdr<'a> {
         let [x, y, z] = [self.f64()?, self.f64()?, self.f64()?];
         let [i, j, k, w] = [self.f64()?, self.f64()?, self.f64()?, self.f64()?];
         let quaternion = Quaternion::new(w, i, j, k);
-        if ![x, y, z].iter().all(|v| v.is_finite()) || !((quaternion.norm() - 1.0).abs() < 0.01) {
+        let is_rotation = (quaternion.norm() - 1.0).abs() < 0.01;
+        if !is_rotation || ![x, y, z].iter().all(|v| v.is_finite()) {
             return Err(format!("the transform to {child} is none: {x} {y} {z}, {i} {j} {k} {w}"));
         }
         let rotation = UnitQuaternion::from_quaternion(quaternion);

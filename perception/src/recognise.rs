@@ -11,10 +11,12 @@ mod evidence;
 mod likelihood;
 mod model;
 mod necked;
+mod parting;
 mod percept;
 mod published;
 #[doc(hidden)]
 pub mod rays;
+mod resting;
 mod settle;
 mod toppled;
 #[doc(hidden)]
@@ -34,7 +36,7 @@ pub trait Recogniser: Send + Sync {
     /// The name by which it is chosen on the command line and in files.
     fn name(&self) -> &'static str;
 
-    /// One percept a segment, in the order of the segments; pieces of one body have one together. The models
+    /// The percepts of all segments, in their order; what rests on or in another thing of its segment follows that. The models
     /// exclude each other.
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept>;
 }

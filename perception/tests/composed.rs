@@ -1,4 +1,4 @@
-//! Known bodies made of parts.
+//! Known bodies on, in or under other things, and bodies made of parts.
 
 use crate::recognising::{cup_a, options};
 use crate::tabletop::{Draws, Thing, disturbed, look, on_ring};
@@ -33,17 +33,35 @@ fn models() -> Vec<ObjectModel> {
         named("other cup", "cup", range(0.07, 0.14), range(0.06, 0.10)),
         ObjectModel {
             top: Top::Closed,
+            taper: range(1.0, 1.0),
+            ..named("white cylinder", "cylinder", range(0.277, 0.277), range(0.106, 0.106))
+        },
+        ObjectModel {
+            top: Top::Closed,
             taper: range(2.0, 3.0),
             ..named("bottle", "bottle", range(0.24, 0.26), range(0.065, 0.075))
         },
     ]
 }
 
+const SAUCER: &[[f64; 2]] = &[[0.0, 0.05], [0.02, 0.075]];
 const BOTTLE: &[[f64; 2]] = &[[0.0, 0.035], [0.16, 0.035], [0.2, 0.014], [0.25, 0.014]];
 const JAR: &[[f64; 2]] = &[[0.0, 0.0425], [0.125, 0.0425], [0.127, 0.025], [0.16, 0.025]];
 
 fn turned(knots: &'static [[f64; 2]], open: bool) -> Thing {
     Thing::Turned { x: 0.05, y: 0.02, knots, scale: 1.0, open, handle_rad: None, spout: false }
+}
+
+fn tin(radius: f64, height: f64) -> Thing {
+    Thing::Tin { x: 0.05, y: 0.02, radius, height }
+}
+
+fn cup_at(base: f64) -> Thing {
+    Thing::Raised { x: 0.052, y: 0.016, radius: 0.035, height: 0.104, base }
+}
+
+fn larger_cup_at(base: f64) -> Thing {
+    Thing::Raised { x: 0.052, y: 0.016, radius: 0.041, height: 0.12, base }
 }
 
 /// The percepts of several views of some things.
@@ -78,6 +96,29 @@ fn check(cases: Vec<Case>, seed: u64) {
             assert!((sum - 1.0).abs() < 1e-9, "{name}: probabilities sum to {sum}");
         }
     }
+}
+
+#[test]
+fn a_cup_on_another_thing_is_found_in_merged_views() {
+    check(
+        vec![
+            ("on a saucer", vec![turned(SAUCER, false), cup_at(0.02)], "cup A", [0.5, 1.0]),
+            ("on a tin", vec![tin(0.045, 0.13), cup_at(0.13)], "cup A", [0.5, 1.0]),
+        ],
+        1,
+    );
+}
+
+#[test]
+fn no_other_body_is_taken_for_one_on_another() {
+    let long = Thing::Block { x: 0.1, y: 0.05, half: [0.17, 0.08], height: 0.28, turn_rad: 0.4 };
+    check(
+        vec![
+            ("a larger cup on a tin", vec![tin(0.045, 0.13), larger_cup_at(0.13)], "cup A", [0.0, 0.05]),
+            ("a long box", vec![long], "white cylinder", [0.0, 0.05]),
+        ],
+        1,
+    );
 }
 
 #[test]

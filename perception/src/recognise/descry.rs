@@ -5,14 +5,17 @@
 
 use super::Recogniser;
 use super::ends::Side;
-use super::evidence::{Measured, Setting, measure};
+use super::evidence::{Looked, Measured, Setting, measure, rays_around};
 use super::likelihood::{
     HEIGHTS, STRANGER, WIDTHS, alike_sides_log, box_sides_log, diameter_log, diameter_sigma_m, form_log,
     handle_log, height_log, inside, log_sum, other_taper_log, round_log, sides_log, taper_log, top_log,
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
-use super::necked::{Necked, necked};
+use super::necked::{self, Necked};
+use super::parting::parted_log;
 use super::percept::{Percept, Stance};
+use super::rays::PIXELS;
+use super::resting::{self, Resting};
 use super::toppled::Toppled;
 use super::verify::Own;
 use crate::noise::{KINECT, Residuals, Sensor};
@@ -124,39 +127,87 @@ impl Recogniser for Descry {
             let setting = Setting::of(scene, fitted(scene, seen), models);
             let judge = |segment: &Segment| self.judge(&setting, segment, seen, models);
             let percepts = pool::heaviest_first(&scene.segments, |segment| segment.indices.len(), judge);
-            self.with_necks(&setting, seen, models, percepts)
+            self.explained(&setting, seen, models, percepts)
         })
     }
 }
 
 impl Descry {
-    /// Replaces the percept of a segment by that of the body with a neck that it is part of, where that is more
-    /// probably a known object; the percepts of its other pieces go.
-    fn with_necks(
+    /// Percepts after each segment was also explained by other bodies: a known one on or in another thing, or one with a neck.
+    ///
+    /// Where pixels are by far likelier with such a body, and the body is more probably a known object than the whole segment, its
+    /// percept replaces that of the segment; if it is less probably one, the segment may still be it.
+    fn explained(
         &self,
         setting: &Setting,
         seen: &Visibility,
         models: &[ObjectModel],
         percepts: Vec<Percept>,
     ) -> Vec<Percept> {
+        let rounds = resting::Rounds::of(models);
         let viewpoints = seen.viewpoints();
         let segments = &setting.scene.segments;
         let world_from_surface = setting.scene.surface.surface_from_world.inverse();
-        let mut percepts: Vec<Option<Percept>> = percepts.into_iter().map(Some).collect();
-        for (n, segment) in segments.iter().enumerate() {
+        let other = |n: usize| {
+            let (segment, percept) = (&segments[n], &percepts[n]);
             let [x, y] = middle(&segment.points);
-            let foot = world_from_surface * Point3::new(x, y, segment.base_m);
-            let Some(necked) = necked(setting.scene, n, models, nearest_sigma_m(&foot, &viewpoints)) else {
-                continue;
+            let sigma_m =
+                nearest_sigma_m(&(world_from_surface * Point3::new(x, y, segment.base_m)), &viewpoints);
+            let better = |all: Vec<Percept>| {
+                let known = |p: &Vec<Percept>| p.first().map_or(0.0, Percept::known);
+                (known(&all) > self.least.max(percept.known())).then_some(all)
             };
-            let whole = self.judge_necked(setting, &necked, seen, models);
-            let is_better = |own: &Percept| whole.known() > self.least.max(own.known());
-            if percepts[n].as_ref().is_some_and(is_better) {
-                necked.pieces.iter().for_each(|&piece| percepts[piece] = None);
-                percepts[n] = Some(whole);
+            let necked = necked::necked(setting.scene, n, models, sigma_m).and_then(|necked| {
+                Some((better(vec![self.judge_necked(setting, &necked, seen, models)])?, necked.pieces))
+            });
+            if necked.is_some() {
+                return necked;
             }
+            if let Some(body) = resting::in_vessel(setting.scene, n, sigma_m) {
+                return Some((vec![self.judge(setting, &body, seen, models)], vec![n]));
+            }
+            let resting = resting::seek(segment, &rounds, sigma_m).into_iter();
+            let parted = resting.map(|resting| self.judge_parts(setting, segment, &resting, seen, models));
+            let Parted { body, rest, log } =
+                parted.max_by(|a, b| a.body.known().total_cmp(&b.body.known()))?;
+            if log < FAR {
+                return None;
+            }
+            let all = better(vec![body.clone()]).map(|mut all| {
+                all.push(rest);
+                all
+            });
+            let all = all.unwrap_or_else(|| vec![percept.clone().at_least(&body)]);
+            Some((all, vec![n]))
+        };
+        let others: Vec<usize> = (0..segments.len()).collect();
+        let others = pool::map(&others, 1, |n| other(*n));
+        let mut explained: Vec<Vec<Percept>> = percepts.into_iter().map(|percept| vec![percept]).collect();
+        for (all, pieces) in others.into_iter().flatten() {
+            pieces.iter().for_each(|&piece| explained[piece].clear());
+            explained[pieces[0]] = all;
         }
-        percepts.into_iter().flatten().collect()
+        explained.into_iter().flatten().collect()
+    }
+
+    /// Judges both parts of a segment, and how much likelier pixels are with the parts than with one body.
+    fn judge_parts(
+        &self,
+        setting: &Setting,
+        whole: &Segment,
+        Resting { body, rest }: &Resting,
+        seen: &Visibility,
+        models: &[ObjectModel],
+    ) -> Parted {
+        let [own, upper, lower] = [whole, body, rest].map(|part| measure(setting, part, seen));
+        let asker = setting.asker(whole, seen, &own.measured);
+        let (place, half_m) = own.measured.footprint_reach();
+        let rays =
+            rays_around((place, half_m, PIXELS), whole, (&whole.points, &own.measured), &asker, setting);
+        let parts = [(&upper.measured, body.base_m), (&lower.measured, rest.base_m)];
+        let log = parted_log(&rays, (&own.measured, whole.base_m), parts);
+        let judge = |part, looked| self.judge_looked(setting, part, looked, seen, models);
+        Parted { body: judge(body, upper), rest: judge(rest, lower), log }
     }
 
     /// Judges a body with a neck: its sizes are those of the whole body, its form is that of the part below
@@ -193,6 +244,16 @@ struct Weighed {
 
 /// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
 const DOUBT: f64 = 0.1;
+/// Log of how much likelier pixels have to be with two bodies than with one for a segment to be parted. From: derived, one more
+/// round body has five sizes, each told to one part in fifty.
+const FAR: f64 = 20.0;
+
+/// The percepts of both parts of a segment, and the log of how much likelier the parts make the pixels than one body does.
+struct Parted {
+    body: Percept,
+    rest: Percept,
+    log: f64,
+}
 
 /// Factor by which tins, jars, rolls and boxes lie on their side more often than things that can spill.
 /// From: chosen.
@@ -206,7 +267,18 @@ impl Descry {
         seen: &Visibility,
         models: &[ObjectModel],
     ) -> Percept {
-        let mut looked = measure(setting, segment, seen);
+        self.judge_looked(setting, segment, measure(setting, segment, seen), seen, models)
+    }
+
+    /// Judges a segment by its measures.
+    fn judge_looked(
+        &self,
+        setting: &Setting,
+        segment: &Segment,
+        mut looked: Looked,
+        seen: &Visibility,
+        models: &[ObjectModel],
+    ) -> Percept {
         for side in looked.measured.sides.iter_mut().flatten() {
             side.soften(self.verified);
         }

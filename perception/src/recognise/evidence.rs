@@ -10,7 +10,7 @@ use super::settle::settle;
 use super::upper::Upper;
 use crate::noise::Sensor;
 use crate::outline::{self, Rectangle};
-use crate::round::{self, ENDS, Edge, NO_CIRCLE, Round, SECTORS};
+use crate::round::{self, ENDS, Edge, NO_CIRCLE, Round, SECTORS, distance};
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M, SPREADS};
 use crate::segment::{Scene, Segment, VOXEL_ENDS, end, quantile, top_m};
 use crate::surface::nearest_sigma_m;
@@ -87,6 +87,12 @@ impl Measured {
     pub fn apart_m(&self) -> f64 {
         if self.evidence.views > 1 { self.blur_m } else { 0.0 }
     }
+
+    /// The middle of its footprint, and the distance of the corners from there, metres.
+    pub fn footprint_reach(&self) -> ([f64; 2], f64) {
+        let [long_m, short_m] = self.footprint.sides_m;
+        ([self.footprint.x, self.footprint.y], 0.5 * distance(long_m, short_m))
+    }
 }
 
 /// The measures of a thing, and the pixels around it.
@@ -109,6 +115,12 @@ impl<'a> Setting<'a> {
     pub fn of(scene: &'a Scene, sensor: Sensor, models: &[ObjectModel]) -> Setting<'a> {
         let box_sides_m = models.iter().filter_map(ObjectModel::box_sides_m).flatten().collect();
         Setting { scene, sensor, box_sides_m, reaches: scene.segments.iter().map(Reach::of).collect() }
+    }
+
+    /// The cameras asked about a segment.
+    pub fn asker<'v>(&self, segment: &Segment, seen: &'v Visibility, m: &Measured) -> Asker<'v> {
+        let world_from_surface = self.scene.surface.surface_from_world.inverse();
+        Asker::of(seen, world_from_surface, &segment.points, tolerance_m(m.sigma_m))
     }
 
     /// The maximum length of a thing that may be a box that is asked about, or is told from one by its

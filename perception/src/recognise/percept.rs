@@ -98,6 +98,20 @@ pub struct Percept {
 }
 
 impl Percept {
+    /// The same where each known object is no less probable than it is to be a part of it.
+    pub(super) fn at_least(mut self, part: &Percept) -> Percept {
+        for ((_, own), (_, part)) in self.probabilities.iter_mut().zip(&part.probabilities) {
+            *own = own.max(*part);
+        }
+        for ((_, own), (_, part)) in self.kinds.iter_mut().zip(&part.kinds) {
+            *own = own.max(*part);
+        }
+        let all = self.probabilities.iter().map(|(_, p)| p).sum::<f64>() + self.unknown;
+        self.probabilities.iter_mut().chain(&mut self.kinds).for_each(|(_, p)| *p /= all);
+        self.unknown /= all;
+        self
+    }
+
     /// Probability of the known object that it most likely is.
     pub(super) fn known(&self) -> f64 {
         self.probabilities.iter().map(|(_, p)| *p).fold(0.0, f64::max)

@@ -19,7 +19,7 @@ pub enum Thing {
     Cup { x: f64, y: f64, radius: f64, height: f64, handle_rad: Option<f64> },
     /// Closed round body.
     Tin { x: f64, y: f64, radius: f64, height: f64 },
-    /// What is left of a round side: so far to both sides of a direction.
+    /// A piece of a round side: `half_rad` to both sides of a direction.
     Sherd { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, half_rad: f64 },
     /// Half sides along its own axes, turned.
     Block { x: f64, y: f64, half: [f64; 2], height: f64, turn_rad: f64 },
@@ -34,6 +34,8 @@ pub enum Thing {
         handle_rad: Option<f64>,
         spout: bool,
     },
+    /// An open cup whose foot is at a height above the table, on or in something else.
+    Raised { x: f64, y: f64, radius: f64, height: f64, base: f64 },
     /// A cup, or closed a tin, on its side: its foot behind the middle, its rim before it along a direction; a handle lies beside it.
     Lying { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, open: bool, handle: bool },
 }
@@ -47,16 +49,17 @@ impl Thing {
             | Thing::Sherd { x, y, .. }
             | Thing::Block { x, y, .. }
             | Thing::Turned { x, y, .. }
+            | Thing::Raised { x, y, .. }
             | Thing::Lying { x, y, .. } => (x, y),
         }
     }
 
-    /// How far it reaches from there, metres.
+    /// The reach of the thing from its place, metres.
     pub fn reach_m(&self) -> f64 {
         let grip = |handle_rad: Option<f64>| if handle_rad.is_some() { 0.03 } else { 0.0 };
         match *self {
             Thing::Cup { radius, handle_rad, .. } => radius + grip(handle_rad),
-            Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } => radius,
+            Thing::Tin { radius, .. } | Thing::Sherd { radius, .. } | Thing::Raised { radius, .. } => radius,
             Thing::Block { half, .. } => half[0].hypot(half[1]),
             Thing::Lying { radius, height, handle, .. } => {
                 (radius + grip(handle.then_some(0.0))).hypot(0.5 * height)
@@ -113,7 +116,8 @@ pub fn disturbed(pose: &Isometry3<f64>, sigma_m: f64, sigma_rad: f64, draws: &mu
     )
 }
 
-/// What the camera of paper 004 sees from its true pose, with the noise of Nguyen et al., told with the stated pose.
+/// The view of the camera of paper 004 from its true pose, with the noise of Nguyen et al., given with the
+/// stated pose.
 pub fn look(things: &[Thing], truth: &Isometry3<f64>, stated: &Isometry3<f64>, draws: &mut Draws) -> View {
     KINECT.look(things, truth, stated, draws)
 }
@@ -128,7 +132,7 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
     best.is_finite().then_some(best)
 }
 
-/// Where a ray meets the table's top or the floor; infinite if nowhere.
+/// The distance along a ray to the table's top or the floor; infinite if the ray meets neither.
 fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let level = |(z, half): (f64, Option<[f64; 2]>)| {
         let t = (z - eye.z) / ray.z;
@@ -138,7 +142,7 @@ fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     [(TABLE_M, Some(half_m)), (0.0, None)].into_iter().filter_map(level).fold(f64::INFINITY, f64::min)
 }
 
-/// Where a ray meets a thing first.
+/// The distance along a ray to the first place where the ray meets a thing.
 fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
     // What a ray passes by, seen from above, it does not meet.
     let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
@@ -160,6 +164,10 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
             if let Some(angle) = handle_rad {
                 handle(eye, ray, x, y, radius, height, angle).for_each(&mut offer);
             }
+        }
+        Thing::Raised { x, y, radius, height, base } => {
+            let cup = Thing::Cup { x, y, radius, height, handle_rad: None };
+            return meets(&cup, &(eye - base * Vector3::z()), ray);
         }
         Thing::Tin { x, y, radius, height } => {
             tube(eye, ray, x, y, radius, height).for_each(&mut offer);

@@ -36,6 +36,7 @@ impl Placed {
                 | Thing::Tin { height, .. }
                 | Thing::Sherd { height, .. }
                 | Thing::Block { height, .. } => height,
+                Thing::Raised { height, base, .. } => base + height,
                 Thing::Turned { knots, scale, .. } => scale * knots[knots.len() - 1][0],
                 Thing::Lying { radius, .. } => 2.0 * radius,
             }
@@ -75,7 +76,8 @@ impl Placed {
     }
 }
 
-/// How far the nearest point of one outline lies beyond an edge of another, for the edge that it lies furthest beyond, metres.
+/// The greatest distance, over the edges of one outline, of the nearest point of the other outline beyond the
+/// edge, metres.
 fn furthest(of: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
     let edges = of.iter().zip(of.iter().cycle().skip(1));
     let beyond = |(a, b): (&[f64; 2], &[f64; 2])| {
@@ -136,8 +138,8 @@ impl Pile {
         Pile { things, half_m }
     }
 
-    /// What the camera of paper 004 sees, cropped to where things cover most of it. Labels are 10 for the table, 0 for the floor, and ten
-    /// times the number for the things from 2 on.
+    /// The view of the camera of paper 004, cropped to where things cover most of the image. Labels are 10
+    /// for the table, 0 for the floor, and ten times the number for the things from 2 on.
     pub fn look(&self, draws: &mut Draws) -> View {
         let angle = std::f64::consts::TAU * draws.next();
         let pose = on_ring(angle, 0.7 + 0.3 * draws.next(), super::TABLE_M + 0.5 + 0.4 * draws.next());
@@ -149,7 +151,7 @@ impl Pile {
         view
     }
 
-    /// Where a ray ends, and the label of what is there.
+    /// The distance along a ray to its end, and the label of the thing there.
     fn nearest(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<(f64, u32)> {
         let on_thing = (2..).zip(&self.things).filter_map(|(number, placed)| {
             let lowered = eye - Vector3::z() * placed.base_m;

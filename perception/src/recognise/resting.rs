@@ -1,0 +1,318 @@
+//! Known round bodies that rest on or in something else and were segmented together with it.
+//!
+//! A known body is sought from above: the height map of a segment is searched for circles of the radii that known bodies have, along which
+//! heights drop. What surrounds such a circle tells the height of what would bear the body, or the vessel that it would stand in.
+
+use super::model::{ObjectModel, Range, Shape};
+use crate::round::{self, Round, SECTORS, distance, sector};
+use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
+use crate::segment::stand::BOTTOM_M;
+use crate::segment::{Scene, Segment, bounds, top_m};
+use crate::surface::floor;
+use nalgebra::Point3;
+
+/// Side of a cell of the height map, metres. From: derived, no edge is known better than within a place.
+const CELL_M: f64 = PLACE_M;
+/// Heights drop by at least so much at the edge of a body's top, metres. From: derived, what is farther apart is in two places.
+const DROP_M: f64 = APART_M;
+/// Share of a circle on which heights drop, for a body to be sought there. From: chosen, a single view shows half of a top.
+const CIRCLE: f64 = 0.5;
+/// Radii that are tried are so far apart, metres. From: derived, half a cell.
+const RADII_M: f64 = EDGE_M;
+/// Circles of one segment that are followed up. From: work.
+const MOST: usize = 3;
+/// Least and greatest distance from a body at which its surroundings are searched, metres. From: chosen, no
+/// nearer than an edge is known.
+const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
+/// Fewest directions around a body in which something is seen that may bear it. From: chosen, a single view
+/// shows half of what is around a foot.
+const BEARS: usize = 9;
+/// Share of the greatest number of directions in which any level is seen that a level must reach; the support
+/// is the highest such level. From: chosen, nearly all.
+const NEARLY: f64 = 0.8;
+/// Spread of the height that it is found to have, metres. From: derived, a place.
+const LEVEL_SIGMA_M: f64 = PLACE_M;
+/// A body is borne if that is seen in so many directions; otherwise it stands in what is around it, if that is seen in so many.
+/// From: chosen.
+const BORNE: usize = 14;
+const ALL_AROUND: usize = 27;
+/// Share of the least height of a known body that tells its axis, below its top. From: chosen.
+const SIDE: f64 = 0.8;
+/// Share of the points between top and support that lie on the side of a body that stands there. From: chosen, more than half.
+const ON_SIDE: f64 = 0.55;
+/// Farthest from a body that something may be its handle, metres. From: derived, the greatest reach of one.
+const REACH_M: f64 = HANDLE_M.1;
+
+/// Fewest points from which the remainder of a segment is a thing of its own. From: derived, the fewest of a
+/// segment.
+const FEWEST_LEFT: usize = 60;
+
+/// A body in a segment, and what is left of that.
+pub(super) struct Resting {
+    pub body: Segment,
+    pub rest: Segment,
+}
+
+/// A circle in the height map.
+#[derive(Clone, Copy, Debug)]
+struct Circle {
+    x: f64,
+    y: f64,
+    radius_m: f64,
+    top_m: f64,
+    share: f64,
+}
+
+/// The radii of known round bodies, and the least height of one, metres.
+pub(super) struct Rounds {
+    radii_m: Vec<f64>,
+    least_m: f64,
+}
+
+impl Rounds {
+    pub fn of(models: &[ObjectModel]) -> Rounds {
+        let rounds = || models.iter().filter(|model| model.shape == Shape::Round);
+        let steps = |Range { low, high }: Range| {
+            let count = (0.5 * (high - low) / RADII_M).ceil() as usize;
+            (0..=count).map(move |n| 0.5 * low + 0.5 * (high - low) * n as f64 / count.max(1) as f64)
+        };
+        let mut radii_m: Vec<f64> = rounds().filter_map(|model| model.diameter_m).flat_map(steps).collect();
+        radii_m.sort_by(f64::total_cmp);
+        radii_m.dedup_by(|b, a| *b - *a < 0.5 * RADII_M);
+        let least_m = rounds().map(|model| model.height_m.low).fold(f64::INFINITY, f64::min) - APART_M;
+        Rounds { radii_m, least_m }
+    }
+}
+
+/// Bodies with one of some radii that a segment may have on or in it.
+pub(super) fn seek(segment: &Segment, models: &Rounds, sigma_m: f64) -> Vec<Resting> {
+    let Some(map) = HeightMap::of(segment) else { return Vec::new() };
+    let circles = map.circles(&models.radii_m);
+    circles.iter().filter_map(|circle| resting(segment, circle, models.least_m, sigma_m)).collect()
+}
+
+/// A segment that was taken to stand on another, as if it stood on the bottom of that, if that is a vessel: it is seen all around and as
+/// high as the foot, but not right beside that.
+pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<Segment> {
+    let segment = &scene.segments[of];
+    if segment.base_m < BOTTOM_M.0 + PLACE_M {
+        return None;
+    }
+    let axis = round::fit(&segment.points, segment.base_m, top_m(segment), sigma_m, round::SEED)?;
+    let others = scene.segments.iter().enumerate().filter(|(n, _)| *n != of).map(|(_, other)| other);
+    let Bearing { around, level } = Bearing::of(others, &axis, segment.base_m);
+    let (base_m, base_sigma_m) = BOTTOM_M;
+    (around >= ALL_AROUND && level < BORNE).then(|| Segment { base_m, base_sigma_m, ..segment.clone() })
+}
+
+/// Height map of a segment.
+struct HeightMap {
+    low: [f64; 2],
+    size: [usize; 2],
+    /// Lowest height, and number of levels a cell apart.
+    base_m: f64,
+    levels: usize,
+    tops_m: Vec<f64>,
+}
+
+impl HeightMap {
+    /// The height map of a segment; none for one that is too large to be told from a room's furniture.
+    fn of(segment: &Segment) -> Option<HeightMap> {
+        /// Cells at the most. From: work.
+        const MOST_CELLS: usize = 1 << 20;
+        let (low, high) = bounds(&segment.points);
+        let cells = |k: usize| ((high[k] - low[k]) / CELL_M) as usize + 1;
+        let (size, levels) = ([cells(0), cells(1)], cells(2) + 1);
+        if size[0] * size[1] * levels > MOST_CELLS {
+            return None;
+        }
+        let mut tops_m = vec![f64::NEG_INFINITY; size[0] * size[1]];
+        for p in &segment.points {
+            let [i, j] = [0, 1].map(|k| ((p[k] - low[k]) / CELL_M) as usize);
+            let top = &mut tops_m[j * size[0] + i];
+            *top = top.max(p.z);
+        }
+        Some(HeightMap { low: [low.x, low.y], size, base_m: low.z, levels, tops_m })
+    }
+
+    /// Cells beside which heights drop: column, row and height.
+    fn edges(&self) -> Vec<(usize, usize, f64)> {
+        /// Number of cells to either side that are searched. From: derived, an edge may lie on the border
+        /// between two.
+        const BESIDE: i64 = 2;
+        let [width, height] = self.size;
+        let at = |i: i64, j: i64| match (0..width as i64).contains(&i) && (0..height as i64).contains(&j) {
+            true => self.tops_m[j as usize * width + i as usize],
+            false => f64::NEG_INFINITY,
+        };
+        let drops = |&(i, j, top): &(usize, usize, f64)| {
+            let (i, j) = (i as i64, j as i64);
+            let beside = [(BESIDE, 0), (-BESIDE, 0), (0, BESIDE), (0, -BESIDE)];
+            beside.into_iter().any(|(di, dj)| at(i + di, j + dj) < top - DROP_M)
+        };
+        let cells = self.tops_m.iter().enumerate().filter(|(_, top)| top.is_finite());
+        cells.map(|(n, top)| (n % width, n / width, *top)).filter(drops).collect()
+    }
+
+    /// The circles on which most heights drop, none over another.
+    fn circles(&self, radii_m: &[f64]) -> Vec<Circle> {
+        let edges = self.edges();
+        let mut found: Vec<Circle> =
+            radii_m.iter().flat_map(|&radius_m| self.circles_of(&edges, radius_m)).collect();
+        found.sort_by(|a, b| b.share.total_cmp(&a.share));
+        let mut kept: Vec<Circle> = Vec::new();
+        for circle in found {
+            let is_over = |other: &Circle| distance(other.x - circle.x, other.y - circle.y) < other.radius_m;
+            if kept.len() < MOST && !kept.iter().any(is_over) {
+                kept.push(circle);
+            }
+        }
+        kept
+    }
+
+    fn circles_of(&self, edges: &[(usize, usize, f64)], radius_m: f64) -> Vec<Circle> {
+        let [width, height] = self.size;
+        let ring = ring(radius_m);
+        let needed = CIRCLE * std::f64::consts::TAU * radius_m / CELL_M;
+        if (edges.len() as f64) < needed {
+            return Vec::new();
+        }
+        let mut votes = vec![0_u16; width * height * self.levels];
+        for &(i, j, top) in edges {
+            let level = ((top - self.base_m) / CELL_M) as usize;
+            for (di, dj) in &ring {
+                let (x, y) = (i as i32 + di, j as i32 + dj);
+                if x >= 0 && y >= 0 && (x as usize) < width && (y as usize) < height {
+                    votes[(level * height + y as usize) * width + x as usize] += 1;
+                }
+            }
+        }
+        let layer = width * height;
+        let mut circles = Vec::new();
+        for n in 0..layer * (self.levels - 1) {
+            let count = f64::from(votes[n] + votes[n + layer]);
+            if count >= needed {
+                let (i, j) = (n % width, n / width % height);
+                circles.push(Circle {
+                    x: self.low[0] + (i as f64 + 0.5) * CELL_M,
+                    y: self.low[1] + (j as f64 + 0.5) * CELL_M,
+                    radius_m,
+                    top_m: self.base_m + (n / layer + 2) as f64 * CELL_M,
+                    share: CIRCLE * count / needed,
+                });
+            }
+        }
+        circles
+    }
+}
+
+/// The cells that a circle goes through, from its middle.
+fn ring(radius_m: f64) -> Vec<(i32, i32)> {
+    /// Maximum distance of a cell's middle from a circle that goes through the cell, cells. From: derived,
+    /// between half a side and half a diagonal.
+    const THROUGH: f64 = 0.6;
+    let reach = floor(radius_m / CELL_M) + 1;
+    let cells = (-reach..=reach).flat_map(|i| (-reach..=reach).map(move |j| (i, j)));
+    let is_on = |&(i, j): &(i32, i32)| {
+        (distance(f64::from(i), f64::from(j)) * CELL_M - radius_m).abs() < THROUGH * CELL_M
+    };
+    cells.filter(is_on).collect()
+}
+
+/// The body that a circle may be the top of, if it is no lower than another: on what is around it, or in a vessel around it.
+fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Option<Resting> {
+    let outside_m = |p: &Point3<f64>| distance(p.x - circle.x, p.y - circle.y) - circle.radius_m;
+    let mut beside = [false; SECTORS];
+    let lower = segment.points.iter().filter(|p| p.z < circle.top_m - APART_M && outside_m(p) > PLACE_M);
+    lower.for_each(|p| beside[sector(p.x - circle.x, p.y - circle.y)] = true);
+    if beside.iter().filter(|seen| **seen).count() < BEARS {
+        return None;
+    }
+    let foot_m = (circle.top_m - SIDE * least_m).max(segment.base_m);
+    let near = |p: &&Point3<f64>| p.z > foot_m && p.z < circle.top_m + CELL_M && outside_m(p).abs() < APART_M;
+    let side: Vec<Point3<f64>> = segment.points.iter().filter(near).copied().collect();
+    let axis = round::fit(&side, foot_m, circle.top_m, sigma_m, round::SEED)?;
+    if axis.inliers < ON_SIDE || (axis.radius_m - circle.radius_m).abs() > PLACE_M {
+        return None;
+    }
+    let level_m = level_m(segment, &axis, circle.top_m)?;
+    let (base_m, base_sigma_m) = match Bearing::of(std::iter::once(segment), &axis, level_m) {
+        Bearing { level, .. } if level >= BORNE => (level_m, LEVEL_SIGMA_M),
+        Bearing { around, .. } if around >= ALL_AROUND => (segment.base_m + BOTTOM_M.0, BOTTOM_M.1),
+        Bearing { .. } => return None,
+    };
+    let is_high = circle.top_m - base_m > least_m;
+    let parted = is_high.then(|| parted(segment, &axis, circle.top_m, (level_m, base_m, base_sigma_m)));
+    parted.filter(|parted| parted.rest.indices.len() >= FEWEST_LEFT)
+}
+
+/// Numbers of directions in which something no lower is seen around the foot of a body, and in which
+/// something as high as the foot is seen right beside it.
+struct Bearing {
+    around: usize,
+    level: usize,
+}
+
+impl Bearing {
+    fn of<'s>(others: impl Iterator<Item = &'s Segment>, axis: &Round, foot_m: f64) -> Bearing {
+        /// Maximum distance of a level from the foot's height, metres. From: derived, an edge, and how far
+        /// things differ from their forms.
+        const OFF_M: f64 = EDGE_M + SHAPE_M;
+        let [mut around, mut level] = [[false; SECTORS]; 2];
+        for p in others.flat_map(|other| &other.points).filter(|p| (p.z - foot_m).abs() < REACH_M) {
+            let outside_m = axis.outside_m(p);
+            if (AROUND_M.0..REACH_M).contains(&outside_m) {
+                let direction = sector(p.x - axis.x, p.y - axis.y);
+                around[direction] |= p.z > foot_m - PLACE_M;
+                level[direction] |= (p.z - foot_m).abs() < OFF_M && outside_m < AROUND_M.1;
+            }
+        }
+        let [around, level] = [around, level].map(|seen| seen.iter().filter(|seen| **seen).count());
+        Bearing { around, level }
+    }
+}
+
+/// Height of what is seen around a body, metres above the surface; none if nothing is, well below its top.
+fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
+    let band_m = segment.base_m..top_m - APART_M;
+    let level = |z: f64| ((z - segment.base_m) / EDGE_M) as usize;
+    let mut seen = vec![[false; SECTORS]; level(top_m) + 2];
+    let mut sums = vec![(0.0, 0.0); seen.len()];
+    let beside =
+        |p: &&Point3<f64>| band_m.contains(&p.z) && (AROUND_M.0..AROUND_M.1).contains(&axis.outside_m(p));
+    for p in segment.points.iter().filter(beside) {
+        let (level, direction) = (level(p.z), sector(p.x - axis.x, p.y - axis.y));
+        seen[level][direction] = true;
+        sums[level] = (sums[level].0 + p.z, sums[level].1 + 1.0);
+    }
+    // Two levels together: a height may lie on the border.
+    let count = |n: usize| (0..SECTORS).filter(|&k| seen[n][k] || seen[n + 1][k]).count();
+    let counts: Vec<usize> = (0..seen.len() - 1).map(count).collect();
+    let most = counts.iter().copied().max().unwrap_or(0);
+    // Below the top of what bears it, its side may be seen in as many directions.
+    let bears = |count: &usize| *count >= BEARS && *count as f64 >= NEARLY * most as f64;
+    let highest = counts.iter().rposition(bears)?;
+    let (sum, n) = (sums[highest].0 + sums[highest + 1].0, sums[highest].1 + sums[highest + 1].1);
+    let level_m = sum / n;
+    (level_m > segment.base_m + PLACE_M).then_some(level_m)
+}
+
+/// A segment parted into the body above what is around it, which stands at a height, and the rest.
+fn parted(
+    segment: &Segment,
+    axis: &Round,
+    top_m: f64,
+    (level_m, base_m, base_sigma_m): (f64, f64, f64),
+) -> Resting {
+    let is_body = |p: &Point3<f64>| {
+        p.z > level_m + PLACE_M
+            && p.z < top_m + APART_M
+            && distance(p.x - axis.x, p.y - axis.y) < axis.radius_at(p.z) + REACH_M
+    };
+    let part = |of_body: bool| {
+        let kept = segment.indices.iter().zip(&segment.points).filter(|(_, p)| is_body(p) == of_body);
+        let (indices, points) = kept.map(|(i, p)| (*i, *p)).unzip();
+        Segment { indices, points, base_m: segment.base_m, base_sigma_m: segment.base_sigma_m }
+    };
+    Resting { body: Segment { base_m, base_sigma_m, ..part(true) }, rest: part(false) }
+}

@@ -169,7 +169,7 @@ impl<'a> Agent<'a> {
             Taken::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
             Taken::LeftToPlanner => {}
         }
-        match self.plan(&round.task, round)? {
+        match self.plan(world, &round.task, round)? {
             Planned::Unsolvable { why, statistics } => {
                 let reason = Reason { is_late: round.situation.time_left_s.is_some(), ..reason };
                 match self.take_up(world, round, &reason, asked_of(&statistics), World::in_time)? {
@@ -214,7 +214,7 @@ impl<'a> Agent<'a> {
                     self.intend(round, plan, reason, calls)?;
                     return Ok(Taken::Up);
                 }
-                Choice::Towards { task, then } => match self.plan(&task, round)? {
+                Choice::Towards { task, then } => match self.plan(world, &task, round)? {
                     Planned::Solved { plan, statistics } => {
                         self.adopt(round, one_then(plan, then), &statistics, reason)?;
                         return Ok(Taken::Up);
@@ -225,8 +225,21 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Asks the planner, and notes how long it took.
-    fn plan(&mut self, task: &Task, round: &Round) -> Result<Planned, CommandError> {
+    /// Asks the planner, with more viewpoints as long as there is no plan, and notes how long it took.
+    fn plan(&mut self, world: &World<'_>, task: &Task, round: &Round) -> Result<Planned, CommandError> {
+        let mut statistics = Statistics::default();
+        for stage in 0.. {
+            let Some(focus) = world.focus(round, task, stage) else { break };
+            match self.plan_once(&focus.task, round)? {
+                Planned::Unsolvable { statistics: asked, .. } if !focus.is_whole => statistics = asked,
+                planned => return Ok(planned),
+            }
+        }
+        // Some viewpoints were left out every time: there may be a plan.
+        Ok(Planned::OutOfTime { best: None, statistics })
+    }
+
+    fn plan_once(&mut self, task: &Task, round: &Round) -> Result<Planned, CommandError> {
         let _span = tracing::info_span!("plan").entered();
         let started = Instant::now();
         let options = descry_planner::Options {

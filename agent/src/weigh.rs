@@ -476,6 +476,10 @@ impl<'r> Scale<'r> {
                 else {
                     continue;
                 };
+                // What is that much longer nobody would think of.
+                if first_s > FAR * lead_s {
+                    continue;
+                }
                 for what in action.parameters[1].objects.iter() {
                     let more = step(&action.name, [by, &task.object(*what).name]);
                     let on = step(&lead.action, [by, to]);
@@ -485,7 +489,6 @@ impl<'r> Scale<'r> {
                     let is_shorter =
                         self.apply(&mut there.clone(), &on).is_none_or(|old_s| on_s < old_s - SHORTER_S);
                     let takes_s = first_s + more_s + on_s;
-                    // What is that much longer nobody would think of.
                     let is_near = takes_s <= FAR * lead_s;
                     if is_near && is_shorter && best.as_ref().is_none_or(|(best_s, _)| takes_s < *best_s) {
                         let led = first.clone().into_iter().chain([more, on]);

@@ -11,6 +11,7 @@ pub mod config;
 pub mod culprit;
 pub mod declared;
 pub mod function;
+pub mod geometry;
 pub mod goal;
 #[doc(hidden)]
 pub mod judge;

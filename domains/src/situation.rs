@@ -1,5 +1,6 @@
 //! Everything that the symbols of a planning round are grounded in: the body, the belief, and where one could look from.
 
+mod sight;
 mod surface;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -8,8 +9,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use descry_memory::belief::{Belief, Track};
 use descry_memory::remember::Remembered;
 use descry_memory::space::Space;
-use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
-use descry_perception::noise::axial_sigma_m;
+use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_perception::recognise::ObjectModel;
 use descry_planner::{Call, CallError, FactValue};
 use descry_robots::{Place, Robot};
@@ -17,12 +17,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::abilities::learning::news::News;
 use crate::abilities::searching::adrift;
-use crate::abilities::searching::doubt::{Doubt, Hypothesis, Taken};
+use crate::abilities::searching::doubt::{self, Doubt, Hypothesis, Taken};
 use crate::abilities::searching::obstacle::{self, Obstacle};
 use crate::abilities::searching::reasons;
 use crate::abilities::shapes::floor::Floor;
 use crate::abilities::surveying::chart::Chart;
 use crate::config::Thresholds;
+use crate::geometry::Geometry;
 use crate::lexicon::symbol;
 use crate::load::Domain;
 pub use surface::KnownSurface;
@@ -146,6 +147,8 @@ pub struct Known {
     /// Prior weight of each thing, then each kind, then anything on each surface, relative to another
     /// surface.
     pub expected: Vec<Vec<f64>>,
+    /// Geometry of the map, kept from round to round.
+    pub geometry: Arc<Geometry>,
 }
 
 /// Snapshot of the world model that grounds the symbols of one planning round: all that is [`Known`], and
@@ -167,7 +170,8 @@ struct Derived {
     candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
     travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
-    cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
+    /// Objects by surface, by their index.
+    standing: OnceLock<Vec<Vec<usize>>>,
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
     of: Vec<OnceLock<Doubt>>,
@@ -194,7 +198,8 @@ impl Known {
 
 impl Situation {
     /// Grounds a round in what is known.
-    pub fn new(known: Known, thresholds: Thresholds) -> Self {
+    pub fn new(mut known: Known, thresholds: Thresholds) -> Self {
+        known.geometry = Arc::new(known.geometry.renewed(&known));
         fn cells<T>(n: usize) -> Vec<OnceLock<T>> {
             (0..n).map(|_| OnceLock::new()).collect()
         }
@@ -202,7 +207,7 @@ impl Situation {
             candidates: OnceLock::new(),
             travel_s: cells(known.candidates.len()),
             travel_past_s: Mutex::default(),
-            cameras: cells(known.candidates.len() * known.surfaces.len()),
+            standing: OnceLock::new(),
             about: cells(known.things.len()),
             on: cells(known.surfaces.len()),
             of: cells(known.kinds.len()),
@@ -339,86 +344,6 @@ impl Situation {
         find(self.obstacles().iter().map(|o| &o.symbol), name, "something that may be pushed aside")
     }
 
-    /// Pose of the camera if the body stood at a candidate and looked at a surface.
-    pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
-        *self.derived.cameras[from * self.surfaces.len() + on].get_or_init(|| {
-            let centre = self.surfaces[on].centre();
-            self.robot.camera_at(&self.candidates[from].place, centre.as_ref()).ok()
-        })
-    }
-
-    /// True if a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
-    pub fn sees(&self, from: usize, on: usize) -> bool {
-        let surface = &self.surfaces[on];
-        let Some(centre) = surface.centre() else { return true };
-        let Some(camera) = self.camera(from, on) else { return false };
-        let is_charted = self.chart.has(&surface.symbol);
-        if (surface.whole || is_charted) && self.clearness(from, on) < CLEAR_ENOUGH {
-            return false;
-        }
-        let eye = Point3::from(camera.translation.vector).xy();
-        if is_charted && self.chart.hides(&eye, &centre.xy()) {
-            return false;
-        }
-        let halfway = surface.outline.iter().map(|p| nalgebra_middle(p, &centre));
-        std::iter::once(centre)
-            .chain(surface.outline.iter().copied())
-            .chain(halfway)
-            .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
-    }
-
-    /// Clearness of a look from a candidate at objects on a surface, 0 to 1: the weight that a depth of its
-    /// noise has (a Kalman gain) where it must tell half of the smallest thing that distinguishes objects.
-    pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
-        let middle = self.camera(from, on).zip(self.surfaces[on].centre());
-        let Some((camera, centre)) = middle else { return 1.0 };
-        let distance_m = (centre - Point3::from(camera.translation.vector)).norm();
-        let sigma_m = axial_sigma_m(distance_m, 0.0).unwrap_or_default();
-        1.0 / (1.0 + (sigma_m / (SMALLEST_M / 2.0)).powi(2))
-    }
-
-    /// True if a point lies in the camera's field of view and range.
-    pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
-        let camera = self.robot.description().camera.as_ref();
-        camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
-    }
-
-    /// Share of a hypothesis that a look from a candidate at a surface would settle, 0 to 1: zero unless most
-    /// of its points are in view and not behind known occupied space (except an obstacle that is moved
-    /// before); else the clearness of the look times the probability that nothing stands in unseen space
-    /// before them.
-    pub(crate) fn would_settle(
-        &self,
-        from: usize,
-        on: usize,
-        hypothesis: &Hypothesis,
-        moved: Option<&Obstacle>,
-    ) -> f64 {
-        let Some(camera) = self.camera(from, on) else { return 0.0 };
-        let eye = Point3::from(camera.translation.vector);
-        if let Some(facing) = &hypothesis.facing {
-            let towards = (eye - hypothesis.centre).normalize();
-            if facing.dot(&towards) < SECTOR_COSINE {
-                return 0.0;
-            }
-        }
-        let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
-        let space = &self.spaces[on];
-        let visible = |p: &&Point3<f64>| {
-            self.in_view(&camera, p)
-                && space.line_of_sight(&eye, p, &gone)
-                && !self.is_walled_off(&eye.xy(), &p.xy())
-        };
-        if hypothesis.points.iter().filter(visible).count() * 2 <= hypothesis.points.len() {
-            return 0.0;
-        }
-        let sum = hypothesis.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
-        let middle = Point3::from(sum / hypothesis.points.len() as f64);
-        let before = middle + (eye - middle).normalize() * BEFORE_M;
-        let unseen_m = space.unseen_m(&eye, &before, UNSEEN_WITHIN_M);
-        self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
-    }
-
     /// Confidence in the place of a thing, 0 to 1: the probability of the likeliest object that it may be,
     /// where it is asked about, times the probability that this object stands where it is believed to, as far
     /// as looks can tell.
@@ -451,9 +376,8 @@ impl Situation {
 
     /// Probability that a thing stands on a surface, 0 to 1.
     pub fn presence(&self, what: usize, on: usize) -> f64 {
-        let (thing, surface) = (&self.things[what], &self.surfaces[on].symbol);
-        let there = self.belief.tracks.iter().filter(|t| t.on == *surface);
-        there
+        let thing = &self.things[what];
+        self.on_surface(on)
             .filter(|t| thing.track.is_none_or(|id| id == t.id))
             .map(|t| t.probability_of(&thing.name))
             .fold(0.0, f64::max)
@@ -482,8 +406,18 @@ impl Situation {
 
     /// The objects on a surface.
     pub fn on_surface(&self, on: usize) -> impl Iterator<Item = &Track> {
-        let symbol = &self.surfaces[on].symbol;
-        self.belief.tracks.iter().filter(move |t| t.on == *symbol)
+        let standing = self.derived.standing.get_or_init(|| {
+            let by_symbol: HashMap<&str, usize> =
+                self.surfaces.iter().enumerate().map(|(n, s)| (s.symbol.as_str(), n)).collect();
+            let mut standing = vec![Vec::new(); self.surfaces.len()];
+            for (n, track) in self.belief.tracks.iter().enumerate() {
+                if let Some(&on) = by_symbol.get(track.on.as_str()) {
+                    standing[on].push(n);
+                }
+            }
+            standing
+        });
+        standing[on].iter().map(|&n| &self.belief.tracks[n])
     }
 
     /// The surface that an object stands on.
@@ -499,6 +433,19 @@ impl Situation {
             p.max(1.0 - p)
         };
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
+    }
+
+    /// Completeness that looks can still bring about: of an object that was seen from all sides, none tells
+    /// more.
+    pub fn most_complete(&self, of: usize) -> f64 {
+        let sure = |p: f64| p.max(1.0 - p);
+        let told = self.belief.tracks.iter().filter(|track| doubt::is_seen_around(self, track));
+        told.map(|track| sure(self.kinds[of].probability(track, &self.surfaces))).product()
+    }
+
+    /// True if looks can still show that all of a kind are found, as surely as is required.
+    pub fn can_be_complete(&self, of: usize) -> bool {
+        self.most_complete(of) >= self.wanted_of(of)
     }
 
     /// True if a seen object is believed to be of a kind, where it is asked about.
@@ -532,8 +479,7 @@ impl Situation {
     /// last look, so that it stays the same while the body moves.
     pub fn going_there_s(&self, on: usize) -> f64 {
         *self.derived.going_there_s[on].get_or_init(|| {
-            let is_open = |n: &usize| self.sees(*n, on) && !self.observed.contains(&(*n, on));
-            let to = (0..self.candidates.len()).filter(is_open);
+            let to = self.viewers(on).iter().copied().filter(|&n| !self.observed.contains(&(n, on)));
             let way_s = |n| match n == self.looked_from {
                 true => 0.0,
                 false => self.travel_past_s(self.looked_from, n, &BTreeSet::new()),
@@ -567,24 +513,6 @@ impl Situation {
     pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
         holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
     }
-}
-
-/// Distance before the middle of a place that may hold something at which the line of sight to it ends,
-/// metres.
-const BEFORE_M: f64 = 0.05;
-/// Distance before it within which something unseen may stand in the way; and the mean free path of sight
-/// through unseen space among the things on a surface, metres.
-const UNSEEN_WITHIN_M: f64 = 0.4;
-const FREE_PATH_M: f64 = 0.5;
-/// A look at a known surface that shows things less clearly than this shows nothing of use: from over three metres for a Kinect.
-const CLEAR_ENOUGH: f64 = 0.1;
-/// Size of the smallest thing that tells objects apart, the wall of a cup's handle, metres.
-const SMALLEST_M: f64 = 0.01;
-/// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
-const SECTOR_COSINE: f64 = 0.5;
-
-fn nalgebra_middle(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
-    Point3::from((a.coords + b.coords) / 2.0)
 }
 
 /// The atoms of a predicate that hold among the facts that a call reads.

@@ -1,5 +1,7 @@
 //! Occlusion by the walls of the map: a line of sight leads from room to room through open doors only.
 
+use std::collections::BTreeSet;
+
 use descry_robots::nalgebra::{Point2, Vector2};
 use descry_robots::{Door, Room};
 
@@ -7,50 +9,110 @@ use crate::situation::Situation;
 
 /// Distance from the end of a line of sight within which a point stands before the wall behind it, metres.
 const BEFORE_M: f64 = 0.05;
-/// A wall is at most so thick, metres: the outlines of two rooms lie so far from the middle of the door between them.
+/// Maximum thickness of a wall, metres: the outlines of two rooms lie at most this far from the middle of
+/// the door between them.
 const THICK_M: f64 = 0.3;
+/// Least side of a cell of the index, metres, and the maximum number of cells along a side.
+const CELL_M: f64 = 2.0;
+const MOST_CELLS: f64 = 256.0;
 
 impl Situation {
     /// True if a wall of the map, or a door that is believed to be shut, stands between two places.
     pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
-        let is_open = |n: &usize| !self.shut.contains(n);
-        let open = (0..self.doors.len()).filter(is_open).map(|n| &self.doors[n].door);
-        crosses_a_wall(self.robot.rooms(), open, from, to)
+        self.geometry.walls().stand_between(&self.shut, from, to)
     }
 }
 
-/// True if the way between two places leads through the outline of a room anywhere but at one of the doors.
-pub fn crosses_a_wall<'a>(
-    rooms: &[Room],
-    doors: impl Iterator<Item = &'a Door> + Clone,
-    from: &Point2<f64>,
-    to: &Point2<f64>,
-) -> bool {
-    let way = to - from;
-    let far = way.norm() - BEFORE_M;
-    let Some(ahead) = way.try_normalize(1e-9) else { return false };
-    let crossing = |a: &Point2<f64>, b: &Point2<f64>| {
-        let wall = b - a;
-        let turn = ahead.perp(&wall);
-        let (along, share) = ((a - from).perp(&wall) / turn, (a - from).perp(&ahead) / turn);
-        let is_met = turn != 0.0 && (0.0..=1.0).contains(&share) && (0.0..far).contains(&along);
-        is_met.then(|| from + ahead * along)
-    };
-    // Most rooms lie aside of the way, and their walls need not be asked.
-    let is_aside = |room: &Room| {
-        let beyond = |c: usize| {
-            let (low, high) = (from[c].min(to[c]), from[c].max(to[c]));
-            room.outline_m.iter().all(|p| p[c] < low) || room.outline_m.iter().all(|p| p[c] > high)
+/// Walls of a map, found by place: the cost of a line of sight depends on its length, not on the size of
+/// the map.
+#[derive(Debug, Default)]
+pub struct Walls {
+    walls: Vec<Wall>,
+    doors: Vec<Door>,
+    low: Point2<f64>,
+    cell_m: f64,
+    /// Number of cells along each axis.
+    size: [usize; 2],
+    /// Walls whose bounding box touches the cell, by number.
+    cells: Vec<Vec<u32>>,
+}
+
+/// One side of a room's outline.
+#[derive(Debug)]
+struct Wall {
+    from: Point2<f64>,
+    to: Point2<f64>,
+    /// Doors near enough to lead through it, by number.
+    doors: Vec<usize>,
+}
+
+impl Walls {
+    /// Walls of rooms, and the doors that lead through them.
+    pub fn new(rooms: &[Room], doors: &[Door]) -> Walls {
+        let outlines = rooms.iter().map(|room| &room.outline_m).filter(|outline| outline.len() >= 3);
+        let sides = outlines
+            .flat_map(|corners| (0..corners.len()).map(|n| (corners[n], corners[(n + 1) % corners.len()])));
+        let is_finite = |p: &Point2<f64>| p.x.is_finite() && p.y.is_finite();
+        let walls: Vec<Wall> = sides
+            .filter(|(from, to)| is_finite(from) && is_finite(to))
+            .map(|(from, to)| Wall { from, to, doors: doors_near(doors, &from, &to) })
+            .collect();
+        let ends = || walls.iter().flat_map(|wall| [wall.from, wall.to]);
+        let low = ends().reduce(|a, b| a.inf(&b)).unwrap_or_default();
+        let extent = ends().reduce(|a, b| a.sup(&b)).unwrap_or_default() - low;
+        let cell_m = CELL_M.max(extent.x.max(extent.y) / MOST_CELLS);
+        let size = [extent.x, extent.y].map(|m| (m / cell_m) as usize + 1);
+        let cells = vec![Vec::new(); size[0] * size[1]];
+        let mut indexed = Walls { walls: Vec::new(), doors: doors.to_vec(), low, cell_m, size, cells };
+        for (wall, n) in walls.iter().zip(0..) {
+            for cell in indexed.cells_of(&wall.from, &wall.to) {
+                indexed.cells[cell].push(n);
+            }
+        }
+        Walls { walls, ..indexed }
+    }
+
+    /// True if the way between two places leads through a wall anywhere but at a door that is not `shut`.
+    pub fn stand_between(&self, shut: &BTreeSet<usize>, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let way = to - from;
+        let far = way.norm() - BEFORE_M;
+        let Some(ahead) = way.try_normalize(1e-9) else { return false };
+        let crossing = |wall: &Wall| {
+            let (a, side) = (wall.from, wall.to - wall.from);
+            let turn = ahead.perp(&side);
+            let (along, share) = ((a - from).perp(&side) / turn, (a - from).perp(&ahead) / turn);
+            let is_met = turn != 0.0 && (0.0..=1.0).contains(&share) && (0.0..far).contains(&along);
+            is_met.then(|| from + ahead * along)
         };
-        beyond(0) || beyond(1)
+        let is_opaque = |&n: &u32| {
+            let wall = &self.walls[n as usize];
+            let open = || wall.doors.iter().filter(|door| !shut.contains(door));
+            crossing(wall).is_some_and(|at| !open().any(|&door| leads_through(&self.doors[door], &at)))
+        };
+        !self.walls.is_empty() && self.cells_of(from, to).any(|cell| self.cells[cell].iter().any(is_opaque))
+    }
+
+    /// Cells that the bounding box of a segment touches.
+    fn cells_of(&self, a: &Point2<f64>, b: &Point2<f64>) -> impl Iterator<Item = usize> + use<> {
+        let cell = |at: f64, axis: usize| {
+            let n = ((at - self.low[axis]) / self.cell_m).floor().clamp(0.0, self.size[axis] as f64 - 1.0);
+            n as usize
+        };
+        let range = |axis: usize| cell(a[axis].min(b[axis]), axis)..=cell(a[axis].max(b[axis]), axis);
+        let (columns, rows, width) = (range(0), range(1), self.size[0]);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * width + column))
+    }
+}
+
+/// Doors near enough to a wall to lead through it, by number.
+fn doors_near(doors: &[Door], a: &Point2<f64>, b: &Point2<f64>) -> Vec<usize> {
+    let side = b - a;
+    let distance_m = |door: &Door| {
+        let share = (door.centre_m - a).dot(&side) / side.norm_squared().max(f64::MIN_POSITIVE);
+        (door.centre_m - (a + side * share.clamp(0.0, 1.0))).norm()
     };
-    rooms.iter().filter(|room| room.outline_m.len() >= 3 && !is_aside(room)).any(|room| {
-        let corners = &room.outline_m;
-        let walls = (0..corners.len()).map(|n| (&corners[n], &corners[(n + 1) % corners.len()]));
-        walls
-            .filter_map(|(a, b)| crossing(a, b))
-            .any(|at| !doors.clone().any(|door| leads_through(door, &at)))
-    })
+    let is_near = |door: &Door| distance_m(door) <= (door.width_m / 2.0).hypot(THICK_M) + BEFORE_M;
+    (0..doors.len()).filter(|&n| is_near(&doors[n])).collect()
 }
 
 fn leads_through(door: &Door, at: &Point2<f64>) -> bool {

@@ -4,6 +4,7 @@
 mod end;
 mod error;
 mod fallback;
+mod focus;
 mod grounds;
 mod steps;
 
@@ -28,6 +29,7 @@ use crate::abilities::surveying::chart::Chart;
 use crate::abilities::{self, Deed};
 use crate::actions::{self, Carried, Grounded};
 use crate::declared;
+use crate::geometry::Geometry;
 use crate::goal::Goal;
 use crate::lesson::Lesson;
 use crate::lexicon::{Lexicon, Places, symbol};
@@ -162,6 +164,7 @@ impl<'a> World<'a> {
             chart: Arc::new(chart),
             news: Arc::new(news),
             expected: Vec::new(),
+            geometry: Arc::new(Geometry::of_map(robot.rooms(), robot.doors())),
             surfaces,
         };
         let regions = known.surfaces.iter().map(|_| Region::default()).collect();
@@ -210,6 +213,7 @@ impl<'a> World<'a> {
         self.attend();
         let domain = self.setting.domain;
         let situation = Arc::new(Situation::new(self.mind.known.clone(), domain.config.thresholds));
+        self.mind.known.geometry = Arc::clone(&situation.geometry);
         let problem = self.problem(&situation)?;
         let mut task = Task::read(&domain.pddl, &problem).map_err(|f| WorldError::Domain(f.render(false)))?;
         if self.setting.goal.question {

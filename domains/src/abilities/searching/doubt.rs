@@ -4,19 +4,18 @@
 //! such possibility is a [`Hypothesis`] with the probability that hangs on it; a look settles those that it shows.
 
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use descry_memory::belief::{MISLAID_M, Track};
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::ObjectModel;
 
 use super::adrift;
-use super::unnoticed::{Unseen, across, around, grid, unseen_volume};
-use crate::situation::{Situation, Thing};
+use super::hidden::Hidden;
+use super::unnoticed::across;
+use crate::situation::{KnownSurface, Situation, Thing};
 
-/// Likelihood ratio of an object where something unexplained was measured, against a place of which nothing
-/// is known: the measurement is of something, if not of the requested object.
-const MEASURED_WEIGHT: f64 = 50.0;
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
 /// An object that is believed less than this to be the thing is no longer asked about.
@@ -34,7 +33,7 @@ pub struct Hypothesis {
     /// Its position.
     pub centre: Point3<f64>,
     /// Points that must be seen to settle it.
-    pub points: Vec<Point3<f64>>,
+    pub points: Arc<[Point3<f64>]>,
     /// The side from which it must be seen, as a unit vector away from it; none if any will do.
     pub facing: Option<Vector3<f64>>,
     /// The reason it is possible.
@@ -61,15 +60,33 @@ pub struct Doubt {
     pub hidden: f64,
     /// Some surface is not known yet: every look may settle everything.
     pub anywhere: bool,
-    /// Places where something can stand at all, by surface.
-    places: BTreeMap<usize, usize>,
-    /// Share of each hypothesis that a look settles, 0 to 1, by obstacle moved (0: none), candidate and
-    /// surface.
-    told: Vec<OnceLock<Vec<f64>>>,
+    /// Hypotheses by surface.
+    parts: BTreeMap<usize, Part>,
+    /// Settled shares with an obstacle moved, by obstacle, candidate and surface.
+    told_without: Mutex<BTreeMap<[usize; 3], Arc<[f64]>>>,
     /// Total that all looks together can settle, by obstacle moved (0: none).
     within_reach: Vec<OnceLock<Reach>>,
-    looks: usize,
-    surfaces: usize,
+}
+
+/// Hypotheses on one surface.
+#[derive(Debug, Default)]
+struct Part {
+    /// Places where it can stand at all, and those where it may stand unseen; none if it is not asked about
+    /// there.
+    hidden: Option<Arc<Hidden>>,
+    /// Indices of the hypotheses of hidden places.
+    places: Range<usize>,
+    /// Indices of the other hypotheses.
+    objects: Vec<usize>,
+    /// Settled shares of all of them, by viewer.
+    told: OnceLock<Vec<OnceLock<Arc<[f64]>>>>,
+}
+
+impl Part {
+    /// Indices of its hypotheses, in order.
+    fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.places.clone().chain(self.objects.iter().copied())
+    }
 }
 
 /// Actions of a plan before a look.
@@ -100,8 +117,8 @@ impl Doubt {
         for track in &situation.belief.tracks {
             let p = thing.probability(track, &situation.surfaces);
             if p > NEGLIGIBLE {
-                doubt.hypotheses.extend(unseen_sides(situation, track, p));
-                doubt.hypotheses.extend(adrift::ends_of(situation, track, p));
+                doubt.suppose(unseen_sides(situation, track, p));
+                doubt.suppose(adrift::ends_of(situation, track, p));
             }
         }
         doubt
@@ -115,7 +132,7 @@ impl Doubt {
         for track in situation.on_surface(on) {
             let p = thing.probability(track, &situation.surfaces);
             if p > NEGLIGIBLE {
-                doubt.hypotheses.extend(unseen_sides(situation, track, p));
+                doubt.suppose(unseen_sides(situation, track, p));
             }
         }
         doubt
@@ -128,7 +145,7 @@ impl Doubt {
         let mut doubt = Self::hidden(situation, kind, &situation.expected[situation.things.len() + of]);
         for track in &situation.belief.tracks {
             let p = kind.probability(track, &situation.surfaces);
-            doubt.hypotheses.extend(unseen_sides(situation, track, p.min(1.0 - p)));
+            doubt.suppose(unseen_sides(situation, track, p.min(1.0 - p)));
         }
         doubt
     }
@@ -137,7 +154,7 @@ impl Doubt {
     pub(crate) fn on(situation: &Situation, on: usize) -> Self {
         let mut doubt = Self::hidden_on(situation, &[(on, 1.0)], SMALL_M);
         for track in situation.on_surface(on) {
-            doubt.hypotheses.extend(unseen_sides(situation, track, 1.0 - track.certainty()));
+            doubt.suppose(unseen_sides(situation, track, 1.0 - track.certainty()));
         }
         doubt
     }
@@ -187,12 +204,13 @@ impl Doubt {
         if !self.is_worth_it(situation, total.weight, before.moved) {
             return 0.0;
         }
+        let Some(part) = self.parts.get(&look.1) else { return 0.0 };
         let told = |look: (usize, usize)| self.told(situation, look, before.moved);
-        let earlier: Vec<&[f64]> =
+        let earlier: Vec<Arc<[f64]>> =
             before.looks.iter().filter(|earlier| earlier.1 == look.1).map(|&look| told(look)).collect();
         let now = told(look);
         let fresh = |i: usize| (now[i] - earlier.iter().map(|e| e[i]).fold(0.0, f64::max)).max(0.0);
-        let settled: f64 = (0..self.hypotheses.len()).map(|i| self.hypotheses[i].weight * fresh(i)).sum();
+        let settled: f64 = part.all().enumerate().map(|(i, n)| self.hypotheses[n].weight * fresh(i)).sum();
         settled / total.as_told
     }
 
@@ -208,11 +226,14 @@ impl Doubt {
     fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
-            let looks = self.all_looks(situation, open, moved);
-            let best = |n: usize| looks.iter().map(|told| told[n]).fold(0.0, f64::max);
+            let mut best = vec![0.0_f64; self.hypotheses.len()];
+            for (&on, part) in &self.parts {
+                for told in self.looks_at(situation, on, &open, moved) {
+                    part.all().zip(&*told).for_each(|(n, told)| best[n] = best[n].max(*told));
+                }
+            }
             let mut reach = Reach::default();
-            for (n, hypothesis) in self.hypotheses.iter().enumerate() {
-                let best = best(n);
+            for (hypothesis, best) in self.hypotheses.iter().zip(best) {
                 reach.as_told += hypothesis.weight * best;
                 reach.weight += if best > 0.0 { hypothesis.weight } else { 0.0 };
             }
@@ -235,11 +256,8 @@ impl Doubt {
 
     /// True if looks would settle enough once an obstacle is moved, of all that no look shows now.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
-        let [before, after] = [None, Some(what)].map(|moved| self.all_looks(situation, |_| true, moved));
-        let only_after = |n: &usize| {
-            let shown = |looks: &[&[f64]]| looks.iter().any(|told| told[*n] > 0.0);
-            shown(&after) && !shown(&before)
-        };
+        let [before, after] = [None, Some(what)].map(|moved| self.shown(situation, moved));
+        let only_after = |n: &usize| after[*n] && !before[*n];
         let uncovered: f64 =
             (0..self.hypotheses.len()).filter(only_after).map(|n| self.hypotheses[n].weight).sum();
         uncovered >= negligible(situation, Some(what))
@@ -250,29 +268,36 @@ impl Doubt {
         if self.anywhere {
             return self.hidden;
         }
-        let open = |look: &(usize, usize)| look.1 == on && !situation.observed.contains(look);
-        let looks = self.all_looks(situation, open, None);
-        let settled =
-            |told: &&[f64]| self.hypotheses.iter().zip(*told).map(|(h, told)| h.weight * told).sum::<f64>();
-        looks.iter().map(settled).fold(0.0, f64::max)
+        let Some(part) = self.parts.get(&on) else { return 0.0 };
+        let open = |look: &(usize, usize)| !situation.observed.contains(look);
+        let settled = |told: Arc<[f64]>| {
+            part.all().zip(&*told).map(|(n, told)| self.hypotheses[n].weight * told).sum::<f64>()
+        };
+        self.looks_at(situation, on, &open, None).map(settled).fold(0.0, f64::max)
+    }
+
+    /// The probability that hangs on what looks from some candidates at a surface settle together.
+    pub(crate) fn settled_by(&self, situation: &Situation, from: &[usize], on: usize) -> f64 {
+        let Some(part) = self.parts.get(&on) else { return 0.0 };
+        let told: Vec<Arc<[f64]>> = from.iter().map(|&from| self.told(situation, (from, on), None)).collect();
+        let best = |i: usize| told.iter().map(|told| told[i]).fold(0.0, f64::max);
+        part.all().enumerate().map(|(i, n)| self.hypotheses[n].weight * best(i)).sum()
     }
 
     /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or
     /// nothing is known of the surface.
     pub fn share_seen(&self, on: usize) -> Option<f64> {
-        let places = *self.places.get(&on)?;
-        let hidden = self.hidden_at(on).count();
-        Some(1.0 - hidden as f64 / (places.max(1)) as f64)
+        let part = self.parts.get(&on)?;
+        let places = part.hidden.as_ref()?.all;
+        Some(1.0 - part.places.len() as f64 / places.max(1) as f64)
     }
 
     /// The probability that it is on a surface where it was not seen, and the part of that where something was measured.
     pub fn hidden_share(&self, on: usize) -> (f64, f64) {
-        let measured = self.hidden_at(on).filter(|h| h.ground == Ground::Measured);
-        (self.hidden_at(on).map(|h| h.weight).sum(), measured.map(|h| h.weight).sum())
-    }
-
-    fn hidden_at(&self, on: usize) -> impl Iterator<Item = &Hypothesis> {
-        self.hypotheses.iter().filter(move |h| h.on == on && h.ground != Ground::Object)
+        let places = self.parts.get(&on).map(|part| part.places.clone()).unwrap_or_default();
+        let places = &self.hypotheses[places];
+        let measured = places.iter().filter(|h| h.ground == Ground::Measured);
+        (places.iter().map(|h| h.weight).sum(), measured.map(|h| h.weight).sum())
     }
 
     /// The probability that hangs on all that is in doubt.
@@ -283,37 +308,80 @@ impl Doubt {
 
     /// The probability that hangs on hidden places that no look shows, and those places.
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
-        let looks = self.all_looks(situation, |_| true, None);
-        let hidden = self.hypotheses.iter().enumerate().filter(|(_, h)| h.facing.is_none());
-        let unseeable = hidden.filter(|(n, _)| !looks.iter().any(|told| told[*n] > 0.0));
-        let unseeable: Vec<&Hypothesis> = unseeable.map(|(_, h)| h).collect();
+        let shown = self.shown(situation, None);
+        let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
+        let unseeable: Vec<&Hypothesis> = hidden.filter(|(_, shown)| !shown).map(|(h, _)| h).collect();
         (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
     }
 
-    /// Settled shares of every look that is open, can be reached and sees the surface.
-    fn all_looks(
-        &self,
-        situation: &Situation,
-        open: impl Fn(&(usize, usize)) -> bool,
-        moved: Option<usize>,
-    ) -> Vec<&[f64]> {
-        (0..situation.candidates.len())
-            .flat_map(|from| (0..self.surfaces).map(move |on| (from, on)))
-            .filter(|look| open(look) && situation.can_reach(look.0) && situation.sees(look.0, look.1))
-            .map(|look| self.told(situation, look, moved))
-            .collect()
+    /// For each hypothesis, true if a look that can be reached settles any of it.
+    fn shown(&self, situation: &Situation, moved: Option<usize>) -> Vec<bool> {
+        let mut shown = vec![false; self.hypotheses.len()];
+        for (&on, part) in &self.parts {
+            for told in self.looks_at(situation, on, &|_| true, moved) {
+                part.all().zip(&*told).for_each(|(n, told)| shown[n] |= *told > 0.0);
+            }
+        }
+        shown
     }
 
-    /// Share of each hypothesis that a look (a candidate and a surface) settles.
-    fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> &[f64] {
-        let at = moved.map_or(0, |o| o + 1) * self.looks + from * self.surfaces + on;
-        self.told[at].get_or_init(|| {
-            let obstacle = moved.map(|o| &situation.obstacles()[o]);
-            let settled = |h: &Hypothesis| {
-                if h.on == on { situation.would_settle(from, on, h, obstacle) } else { 0.0 }
-            };
-            self.hypotheses.iter().map(settled).collect()
-        })
+    /// Settled shares of every look at a surface that is open, can be reached and sees it, in the order of the
+    /// part's hypotheses.
+    fn looks_at<'d>(
+        &'d self,
+        situation: &'d Situation,
+        on: usize,
+        open: &'d impl Fn(&(usize, usize)) -> bool,
+        moved: Option<usize>,
+    ) -> impl Iterator<Item = Arc<[f64]>> + 'd {
+        let looks = situation.viewers(on).iter().map(move |&from| (from, on));
+        looks
+            .filter(move |look| open(look) && situation.can_reach(look.0))
+            .map(move |look| self.told(situation, look, moved))
+    }
+
+    /// Share of each hypothesis of a surface that a look (a candidate and a surface) settles, in the order of
+    /// the part's hypotheses; a look that does not see the surface settles none.
+    fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> Arc<[f64]> {
+        let Some(part) = self.parts.get(&on) else { return Arc::default() };
+        let Ok(viewer) = situation.viewers(on).binary_search(&from) else {
+            return part.all().map(|_| 0.0).collect();
+        };
+        if let Some(obstacle) = moved {
+            return self.told_without(situation, part, (from, on), obstacle);
+        }
+        let told = part.told.get_or_init(|| situation.viewers(on).iter().map(|_| OnceLock::new()).collect());
+        let told = told[viewer].get_or_init(|| {
+            let hidden = part.hidden.as_ref().map(|hidden| hidden.told(situation, viewer, on));
+            let settled = |&n: &usize| situation.would_settle(from, on, &self.hypotheses[n], None);
+            match hidden {
+                Some(hidden) if part.objects.is_empty() => Arc::clone(hidden),
+                _ => {
+                    let hidden = hidden.into_iter().flat_map(|hidden| hidden.iter().copied());
+                    hidden.chain(part.objects.iter().map(settled)).collect()
+                }
+            }
+        });
+        Arc::clone(told)
+    }
+
+    /// The same once an obstacle is moved.
+    fn told_without(
+        &self,
+        situation: &Situation,
+        part: &Part,
+        (from, on): (usize, usize),
+        obstacle: usize,
+    ) -> Arc<[f64]> {
+        let kept = || self.told_without.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(told) = kept().get(&[obstacle, from, on]) {
+            return Arc::clone(told);
+        }
+        let moved = &situation.obstacles()[obstacle];
+        let settled = |n: usize| situation.would_settle(from, on, &self.hypotheses[n], Some(moved));
+        let told: Arc<[f64]> = part.all().map(settled).collect();
+        kept().insert([obstacle, from, on], Arc::clone(&told));
+        told
     }
 
     /// Hypotheses of a hidden body of a size on some surfaces, each surface with the factor by which it is
@@ -321,46 +389,43 @@ impl Doubt {
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;
-        let mut hypotheses = Vec::new();
-        let mut count = BTreeMap::new();
+        let mut hypotheses: Vec<Hypothesis> = Vec::new();
+        let mut parts: BTreeMap<usize, Part> = BTreeMap::new();
         for &(on, expected) in surfaces {
-            let surface = &situation.surfaces[on];
-            let standing: Vec<&Track> = situation.on_surface(on).collect();
-            let places = grid(surface, size_m.1);
-            anywhere |= places.is_empty() && surface.outline.is_empty();
-            if places.is_empty() {
+            let hidden = Hidden::on(situation, on, size_m);
+            anywhere |= hidden.all == 0 && situation.surfaces[on].outline.is_empty();
+            if hidden.all == 0 {
                 continue;
             }
             all += expected;
-            let each = expected / places.len() as f64;
-            count.insert(on, places.len());
-            hypotheses.extend(places.iter().filter_map(|centre| {
-                around(surface, centre).find_map(|centre| {
-                    let space = &situation.spaces[on];
-                    let Unseen { points, likely } =
-                        unseen_volume(surface, space, &standing, &centre, size_m)?;
-                    let (ground, times) =
-                        if likely { (Ground::Measured, MEASURED_WEIGHT) } else { (Ground::NotSeen, 1.0) };
-                    Some(Hypothesis { weight: each * times, on, centre, points, facing: None, ground })
-                })
-            }));
+            let each = expected / hidden.all as f64;
+            let first = hypotheses.len();
+            let weighted = |h: &Hypothesis| Hypothesis { weight: each * h.weight, ..h.clone() };
+            hypotheses.extend(hidden.hypotheses.iter().map(weighted));
+            let places = first..hypotheses.len();
+            parts.insert(on, Part { hidden: Some(hidden), places, ..Part::default() });
         }
         let unseen: f64 = hypotheses.iter().map(|h| h.weight).sum();
         let open = if anywhere || all == 0.0 { 1.0 } else { unseen / all };
         let prior = situation.thresholds.prior;
         let hidden = prior * open / (prior * open + 1.0 - prior);
         hypotheses.iter_mut().for_each(|h| h.weight *= hidden / unseen);
-        let looks = situation.candidates.len() * situation.surfaces.len();
         let moves = 1 + situation.belief.tracks.len();
         Self {
             hypotheses,
             hidden,
             anywhere,
-            places: count,
-            told: (0..moves * looks).map(|_| OnceLock::new()).collect(),
+            parts,
+            told_without: Mutex::default(),
             within_reach: (0..moves).map(|_| OnceLock::new()).collect(),
-            looks,
-            surfaces: situation.surfaces.len(),
+        }
+    }
+
+    /// Adds hypotheses about what was seen.
+    fn suppose(&mut self, more: Vec<Hypothesis>) {
+        for hypothesis in more {
+            self.parts.entry(hypothesis.on).or_default().objects.push(self.hypotheses.len());
+            self.hypotheses.push(hypothesis);
         }
     }
 
@@ -390,10 +455,30 @@ fn size_m(model: &ObjectModel) -> (f64, f64) {
 /// The sides of an object that no view has shown, each with its part of what hangs on the object.
 fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let Some(on) = situation.surface_of(track) else { return Vec::new() };
-    let surface = &situation.surfaces[on];
-    let (e1, e2) = across(surface);
-    let centre = track.position_m + surface.up * (track.size_m[2] / 2.0);
+    let centre = middle(&situation.surfaces[on], track);
     let radius = track.size_m[0].max(track.size_m[1]) / 2.0;
+    let open = open_sides(&situation.surfaces[on], track);
+    let each = weight / open.len().max(1) as f64;
+    let hypothesis = |side: &Vector3<f64>| Hypothesis {
+        weight: each,
+        on,
+        centre,
+        points: [centre + side * (radius + 0.02)].into(),
+        facing: Some(*side),
+        ground: Ground::Object,
+    };
+    open.iter().map(hypothesis).collect()
+}
+
+/// Middle of the body of an object on a surface.
+fn middle(surface: &KnownSurface, track: &Track) -> Point3<f64> {
+    track.position_m + surface.up * (track.size_m[2] / 2.0)
+}
+
+/// Sides of an object that no view has shown, as unit vectors away from it.
+fn open_sides(surface: &KnownSurface, track: &Track) -> Vec<Vector3<f64>> {
+    let (e1, e2) = across(surface);
+    let centre = middle(surface, track);
     let sides = (0..SECTORS).map(|k| {
         let angle = std::f64::consts::TAU * k as f64 / SECTORS as f64;
         e1 * angle.cos() + e2 * angle.sin()
@@ -404,15 +489,10 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
             .iter()
             .any(|eye| (eye - centre).normalize().dot(side) > std::f64::consts::FRAC_1_SQRT_2)
     };
-    let open: Vec<Vector3<f64>> = sides.filter(|side| !seen_from(side)).collect();
-    let each = weight / open.len().max(1) as f64;
-    let hypothesis = |side: &Vector3<f64>| Hypothesis {
-        weight: each,
-        on,
-        centre,
-        points: vec![centre + side * (radius + 0.02)],
-        facing: Some(*side),
-        ground: Ground::Object,
-    };
-    open.iter().map(hypothesis).collect()
+    sides.filter(|side| !seen_from(side)).collect()
+}
+
+/// True if an object was seen from all sides: looks tell no more of what it is.
+pub(crate) fn is_seen_around(situation: &Situation, track: &Track) -> bool {
+    situation.surface_of(track).is_some_and(|on| open_sides(&situation.surfaces[on], track).is_empty())
 }

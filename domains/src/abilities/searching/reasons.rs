@@ -21,12 +21,12 @@ pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     let is_open = |&of: &usize| s.completeness(of) < s.wanted_of(of);
     let kinds: Vec<&Doubt> = (0..s.kinds.len()).filter(is_open).map(|of| s.doubt_of(of)).collect();
     let doubts = if kinds.is_empty() { s.doubts() } else { kinds };
-    let looks = (0..s.candidates.len()).flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));
     let takes_s = |from: usize| s.travel_s(s.at, from) + LOOK_S;
     let is_in_time = |from: usize| s.time_left_s.is_none_or(|left_s| takes_s(from) <= left_s);
-    let open = looks.filter(|&(from, on)| {
-        !s.observed.contains(&(from, on)) && s.can_drive_to(from) && is_in_time(from) && s.sees(from, on)
-    });
+    let open = s
+        .all_looks()
+        .into_iter()
+        .filter(|&(from, on)| !s.observed.contains(&(from, on)) && s.can_drive_to(from) && is_in_time(from));
     let settles = |look: (usize, usize)| -> f64 {
         doubts.iter().map(|doubt| doubt.settled(s, look, Taken::default())).sum()
     };
@@ -188,7 +188,16 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let together = if hidden < 1.0 { all / (1.0 - hidden) } else { 1.0 };
     let about = about(least, together, hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
     let (all, place) = (floored(all), in_room(s, kind));
-    Some(format!("all {}{place} are found with {all:.2} only{about}", plural(&kind.name)))
+    let advice = if s.can_be_complete(open) { String::new() } else { at_most(s.most_complete(open), all) };
+    Some(format!("all {}{place} are found with {all:.2} only{about}{advice}", plural(&kind.name)))
+}
+
+/// Advice where no look can bring about what is asked for: what was seen from all sides leaves `most`, and
+/// `now` is reached.
+pub fn at_most(most: f64, now: f64) -> String {
+    let said =
+        if now > 0.5 { format!("; with a confidence of {now:.2} it could be said") } else { String::new() };
+    format!(", and what was seen from all sides leaves no more than {:.2}{said}", floored(most))
 }
 
 /// Subject of the doubt about a kind: the least sure object, or all of them where each is sure enough by

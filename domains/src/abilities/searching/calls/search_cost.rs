@@ -37,12 +37,16 @@ impl Situation {
         let finds = open.iter().map(finds).fold(0.0, f64::max).clamp(1e-6, 1.0);
         Some(FirstLook { finds, takes_s: self.going_there_s(on) })
     }
+
+    /// Seconds that a first look at a surface may turn out to have been in vain for.
+    pub(crate) fn in_vain_s(&self, on: usize) -> f64 {
+        let first = self.first_look(on);
+        first.map_or(0.0, |FirstLook { finds, takes_s }| ((1.0 - finds) / finds * takes_s).min(MOST_S))
+    }
 }
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {
     let on = situation.surface(argument(call, 0)?)?;
     let is_begun = situation.planned_looks(call).iter().any(|look| look.1 == on);
-    let first = if is_begun { None } else { situation.first_look(on) };
-    let in_vain_s = first.map(|FirstLook { finds, takes_s }| ((1.0 - finds) / finds * takes_s).min(MOST_S));
-    Ok(Answer::Number(in_vain_s.unwrap_or(0.0)))
+    Ok(Answer::Number(if is_begun { 0.0 } else { situation.in_vain_s(on) }))
 }

@@ -192,11 +192,9 @@ pub fn here(situation: &Situation) -> Option<Look> {
 
 /// Every look that can be taken, if need be by opening doors on the way, and has not been, in the order of the candidates.
 fn open(situation: &Situation) -> Vec<Look> {
-    let looks = (0..situation.candidates.len())
-        .flat_map(|from| (0..situation.surfaces.len()).map(move |on| (from, on)));
+    let looks = situation.all_looks().into_iter();
     looks
         .filter(|look| situation.can_reach(look.0) && !situation.observed.contains(look))
-        .filter(|&(from, on)| situation.sees(from, on))
         .map(|(from, on)| Look {
             from,
             on,

@@ -1,0 +1,85 @@
+//! Static geometry of a map, kept from round to round: walls, cameras at the viewpoints, and the viewpoints
+//! that see each surface. Whatever changes, such as a surface that grows or a door that turns out shut, is
+//! worked out anew; all else is taken over.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+
+use descry_perception::nalgebra::{Isometry3, Point3};
+use descry_robots::{Door, Place};
+
+use crate::abilities::searching::hidden::Places;
+use crate::situation::Known;
+use crate::walls::Walls;
+
+/// Geometry of a map for one set of viewpoints, surfaces and shut doors.
+#[derive(Debug, Default)]
+pub struct Geometry {
+    walls: Arc<Walls>,
+    viewpoints: Arc<[Place]>,
+    shut: BTreeSet<usize>,
+    sights: Vec<Arc<Sight>>,
+}
+
+/// Views of one surface from each viewpoint.
+#[derive(Debug)]
+pub(crate) struct Sight {
+    outline: Vec<Point3<f64>>,
+    is_whole: bool,
+    /// True if the surface stands on a map that the body makes itself, which changes with every look.
+    is_charted: bool,
+    /// Pose of the camera by viewpoint.
+    pub cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
+    /// Viewpoints that see any of it, in order.
+    pub viewers: OnceLock<Vec<usize>>,
+    /// Places on it where something may stand unseen.
+    pub places: Places,
+}
+
+impl Geometry {
+    /// Geometry of a body's map before anything is known.
+    pub fn of_map(rooms: &[descry_robots::Room], doors: &[Door]) -> Geometry {
+        Geometry { walls: Arc::new(Walls::new(rooms, doors)), ..Geometry::default() }
+    }
+
+    /// Walls of the map.
+    pub(crate) fn walls(&self) -> &Walls {
+        &self.walls
+    }
+
+    /// Views of a surface.
+    pub(crate) fn sight(&self, on: usize) -> &Sight {
+        &self.sights[on]
+    }
+
+    /// The same geometry for what is known now.
+    pub(crate) fn renewed(&self, known: &Known) -> Geometry {
+        let is_kept = self.viewpoints.len() == known.candidates.len()
+            && self.viewpoints.iter().zip(&known.candidates).all(|(kept, now)| *kept == now.place);
+        let same = is_kept && self.shut == known.shut;
+        let sights = known.surfaces.iter().enumerate().map(|(n, surface)| {
+            let is_charted = known.chart.has(&surface.symbol);
+            let fits = |sight: &&Arc<Sight>| {
+                same && !is_charted
+                    && !sight.is_charted
+                    && sight.is_whole == surface.whole
+                    && sight.outline == surface.outline
+            };
+            let fresh = || {
+                Arc::new(Sight {
+                    outline: surface.outline.clone(),
+                    is_whole: surface.whole,
+                    is_charted,
+                    cameras: known.candidates.iter().map(|_| OnceLock::new()).collect(),
+                    viewers: OnceLock::new(),
+                    places: Places::default(),
+                })
+            };
+            self.sights.get(n).filter(fits).cloned().unwrap_or_else(fresh)
+        });
+        let sights = sights.collect();
+        let places = || known.candidates.iter().map(|c| c.place.clone()).collect();
+        let viewpoints = if is_kept { Arc::clone(&self.viewpoints) } else { places() };
+        Geometry { walls: Arc::clone(&self.walls), viewpoints, shut: known.shut.clone(), sights }
+    }
+}

@@ -169,6 +169,10 @@ struct Derived {
     /// Candidates by their symbols.
     candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
+    /// Candidates that the plans of the round are made with, once they are chosen, in order.
+    focused: OnceLock<Vec<usize>>,
+    /// Travel to these alone.
+    travel_to_focused_s: Vec<OnceLock<Vec<f64>>>,
     travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
     /// Objects by surface, by their index.
     standing: OnceLock<Vec<Vec<usize>>>,
@@ -206,6 +210,8 @@ impl Situation {
         let derived = Derived {
             candidates: OnceLock::new(),
             travel_s: cells(known.candidates.len()),
+            focused: OnceLock::new(),
+            travel_to_focused_s: cells(known.candidates.len()),
             travel_past_s: Mutex::default(),
             standing: OnceLock::new(),
             about: cells(known.things.len()),
@@ -258,8 +264,13 @@ impl Situation {
 
     /// Seconds that a drive takes on the map, past the doors that are believed to be shut; infinite where no route leads.
     pub fn travel_s(&self, from: usize, to: usize) -> f64 {
-        let row = self.derived.travel_s[from].get_or_init(|| self.travel_row(from, &self.shut));
-        row[to]
+        let whole = &self.derived.travel_s[from];
+        let focused = self.derived.focused.get().filter(|_| whole.get().is_none());
+        if let Some((focused, at)) = focused.and_then(|all| Some((all, all.binary_search(&to).ok()?))) {
+            let row = || self.travel_row(from, focused.iter().copied(), &self.shut);
+            return self.derived.travel_to_focused_s[from].get_or_init(row)[at];
+        }
+        whole.get_or_init(|| self.travel_row(from, 0..self.candidates.len(), &self.shut))[to]
     }
 
     /// The same where other doors are shut than now.
@@ -271,15 +282,20 @@ impl Situation {
         let known =
             self.derived.travel_past_s.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
         let row = known.unwrap_or_else(|| {
-            let row = Arc::new(self.travel_row(from, shut));
+            let row = Arc::new(self.travel_row(from, 0..self.candidates.len(), shut));
             let mut rows = self.derived.travel_past_s.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(rows.entry(key).or_insert(row))
         });
         row[to]
     }
 
-    fn travel_row(&self, from: usize, shut: &BTreeSet<usize>) -> Vec<f64> {
-        let places: Vec<Place> = self.candidates.iter().map(|c| c.place.clone()).collect();
+    /// Notes the candidates that plans of this round are made with: ways between these are asked for together.
+    pub(crate) fn focus_on(&self, candidates: Vec<usize>) {
+        self.derived.focused.get_or_init(|| candidates);
+    }
+
+    fn travel_row(&self, from: usize, to: impl Iterator<Item = usize>, shut: &BTreeSet<usize>) -> Vec<f64> {
+        let places: Vec<Place> = to.map(|to| self.candidates[to].place.clone()).collect();
         let shut: Vec<String> = shut.iter().map(|&n| self.doors[n].door.name.clone()).collect();
         let travel = self.chart.travel(&*self.robot, &self.candidates[from].place, &places, &shut);
         travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()

@@ -50,6 +50,7 @@ impl World<'_> {
                 chosen.extend(covering(s, place.1));
             }
         }
+        s.focus_on(chosen.iter().copied().collect());
         let asks_programs = !self.setting.domain.config.attachments.is_empty();
         let is_whole = !asks_programs && ranked.iter().flat_map(useful).all(|from| chosen.contains(&from));
         Some(Focus { task: Cow::Owned(with_viewpoints(task, s, &chosen)), is_whole })

@@ -2,15 +2,17 @@
 //! that see each surface. Whatever changes, such as a surface that grows or a door that turns out shut, is
 //! worked out anew; all else is taken over.
 
+pub(crate) mod hidden;
+
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_robots::{Door, Place};
 
-use crate::abilities::searching::hidden::Places;
 use crate::situation::Known;
 use crate::walls::Walls;
+use hidden::Places;
 
 /// Geometry of a map for one set of viewpoints, surfaces and shut doors.
 #[derive(Debug, Default)]

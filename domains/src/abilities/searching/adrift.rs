@@ -1,8 +1,6 @@
 //! Localisation uncertainty of objects along a surface of the map: seen ends of the surface are aligned with
 //! its outline, and where none was seen, localisation's error remains.
 
-use std::sync::Arc;
-
 use descry_memory::belief::Track;
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -74,8 +72,8 @@ pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     let sides = (0..corners).map(|n| (surface.outline[n], surface.outline[(n + 1) % corners]));
     let ends = sides.filter_map(|(a, b)| end(s, on, &centre, [a, b], &way));
     let looks = || {
-        let from = s.viewers(on).iter().copied();
-        from.filter(|&from| !s.observed.contains(&(from, on)) && s.can_reach(from))
+        let from = 0..s.candidates.len();
+        from.filter(|&from| !s.observed.contains(&(from, on)) && s.can_reach(from) && s.sees(from, on))
     };
     ends.filter(|end| looks().any(|from| s.would_settle(from, on, end, None) > 0.0)).collect()
 }
@@ -97,7 +95,7 @@ fn end(
     }
     let steps = ((b - a).norm() / STEP_M) as usize;
     let point = |n: usize| a + along * (STEP_M * (n as f64 + 0.5)) + (inward + surface.up) * INSIDE_M;
-    let points: Arc<[Point3<f64>]> = (0..steps).map(point).collect();
+    let points: Vec<Point3<f64>> = (0..steps).map(point).collect();
     let unseen = points.iter().filter(|p| s.spaces[on].cell(p) == Cell::Unseen).count();
     let centre = a + (b - a) / 2.0;
     (2 * unseen > steps).then_some(Hypothesis {

@@ -12,8 +12,8 @@ use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::ObjectModel;
 
 use super::adrift;
-use super::hidden::Hidden;
 use super::unnoticed::across;
+use crate::geometry::hidden::Hidden;
 use crate::situation::{KnownSurface, Situation, Thing};
 
 /// Sides from which an object is looked at.
@@ -33,7 +33,7 @@ pub struct Hypothesis {
     /// Its position.
     pub centre: Point3<f64>,
     /// Points that must be seen to settle it.
-    pub points: Arc<[Point3<f64>]>,
+    pub points: Vec<Point3<f64>>,
     /// The side from which it must be seen, as a unit vector away from it; none if any will do.
     pub facing: Option<Vector3<f64>>,
     /// The reason it is possible.
@@ -463,7 +463,7 @@ fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypoth
         weight: each,
         on,
         centre,
-        points: [centre + side * (radius + 0.02)].into(),
+        points: vec![centre + side * (radius + 0.02)],
         facing: Some(*side),
         ground: Ground::Object,
     };

@@ -8,7 +8,6 @@ pub mod consistent;
 mod discover;
 pub mod doubt;
 mod facts;
-pub(crate) mod hidden;
 pub(crate) mod merging;
 pub mod obstacle;
 pub mod perceive;

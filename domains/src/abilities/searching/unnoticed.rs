@@ -45,7 +45,7 @@ pub(super) fn across(surface: &KnownSurface) -> (Vector3<f64>, Vector3<f64>) {
 }
 
 /// Places on a surface where the middle of an object can be; beyond the outline too while that is not all of it.
-pub(super) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
+pub(crate) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
     let Some(centre) = surface.centre() else { return Vec::new() };
     let (e1, e2) = across(surface);
     let margin = if surface.whole { -diameter_m / 2.0 } else { BEYOND_M };
@@ -60,7 +60,7 @@ pub(super) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> 
 }
 
 /// The places that stand for a square of the grid, nearest to its middle first.
-pub(super) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
+pub(crate) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
     const STEPS: [f64; 4] = [-0.125, 0.125, -0.375, 0.375];
     let (e1, e2) = across(surface);
     let place = *place;

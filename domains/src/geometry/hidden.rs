@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use descry_memory::belief::Track;
 use descry_memory::space::Space;
 
-use super::doubt::{Ground, Hypothesis};
-use super::unnoticed::{Unseen, around, grid, unseen_volume};
+use crate::abilities::searching::doubt::{Ground, Hypothesis};
+use crate::abilities::searching::unnoticed::{Unseen, around, grid, unseen_volume};
 use crate::situation::{KnownSurface, Situation};
 
 /// Likelihood ratio of an object where something unexplained was measured, against a place of which nothing
@@ -78,7 +78,7 @@ impl Hidden {
             let Unseen { points, likely } = unseen_volume(surface, space, &standing, &centre, *size_m)?;
             let (ground, weight) =
                 if likely { (Ground::Measured, MEASURED_WEIGHT) } else { (Ground::NotSeen, 1.0) };
-            Some(Hypothesis { weight, on, centre, points: points.into(), facing: None, ground })
+            Some(Hypothesis { weight, on, centre, points, facing: None, ground })
         };
         let hypotheses = places.iter().filter_map(|place| around(surface, place).find_map(unseen)).collect();
         let told = situation.viewers(on).iter().map(|_| OnceLock::new()).collect();

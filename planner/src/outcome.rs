@@ -126,6 +126,10 @@ pub enum PlanError {
     /// no search here handles. Each finding points at its place.
     #[error("{}", first_message(.0))]
     Refused(Findings),
+    /// The plans found break constraints of kinds that no search here keeps: whether some plan keeps them is not known. Each finding
+    /// points at a constraint.
+    #[error("{}", first_message(.0))]
+    Untried(Findings),
     /// An attachment failed; the finding points at the call in the domain.
     #[error("{error}")]
     Attachment {
@@ -148,7 +152,9 @@ impl PlanError {
     /// Findings to draw under the text of the domain, if the domain is at fault.
     pub fn findings(&self) -> Option<&Findings> {
         match self {
-            PlanError::Refused(findings) | PlanError::Attachment { findings, .. } => Some(findings),
+            PlanError::Refused(findings)
+            | PlanError::Untried(findings)
+            | PlanError::Attachment { findings, .. } => Some(findings),
             PlanError::Internal { .. } => None,
         }
     }

@@ -407,9 +407,12 @@ fn checked(
         if freely.valid {
             let help = "checked, but not planned for: `always-within`, `hold-during` and `hold-after`, `within` where actions take no \
                  time, and what attachments say or changes by itself; ask for the same in conditions and the goal";
-            let explained = |finding: Diagnostic| finding.with_help(help);
+            let explained = |finding: Diagnostic| {
+                let message = format!("not decided: in the plan that was found {}", finding.message);
+                Diagnostic { message, ..finding }.with_help(help)
+            };
             let list = verdict.findings.list.into_iter().map(explained).collect();
-            return Err(PlanError::Refused(Findings { list, ..verdict.findings }));
+            return Err(PlanError::Untried(Findings { list, ..verdict.findings }));
         }
     }
     if let Some(finding) = too_long(task, &plan) {

@@ -353,7 +353,9 @@ fn a_deadline_is_met_up_to_its_very_moment() {
 fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
     let domain = "(define (domain d) (:requirements :constraints) (:predicates (a) (b) (c))
       (:action one :parameters () :effect (a)) (:action two :parameters () :precondition (a) :effect (b)))";
-    for (constraint, kept) in [("(sometime-before (b) (a))", true), ("(within 1 (c))", false)] {
+    for (constraint, kept) in
+        [("(sometime-before (b) (a))", true), ("(within 1 (c))", false), ("(hold-during 10 11 (c))", false)]
+    {
         let problem =
             format!("(define (problem p) (:domain d) (:init) (:goal (b)) (:constraints (and {constraint})))");
         let task = Task::read(&Source::new("domain.pddl", domain), &Source::new("problem.pddl", problem));
@@ -361,7 +363,7 @@ fn a_plan_that_breaks_a_constraint_on_the_way_is_refused_under_the_text() {
         let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
         match found {
             Ok(Outcome::Solved { .. }) => assert!(kept, "{constraint}"),
-            Err(PlanError::Refused(findings)) => {
+            Err(PlanError::Untried(findings)) => {
                 assert!(!kept && findings.render(false).contains("the constraint on (c) is broken"));
             }
             other => panic!("{constraint}: {other:?}"),

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use descry_planner::{Attachments, Outcome, Plan, PlanError, Statistics, Task, endless, number_text};
+use descry_planner::{
+    Attachments, Findings, Outcome, Plan, PlanError, Statistics, Task, endless, number_text,
+};
 use serde::Serialize;
 use serde_json::json;
 
@@ -68,6 +70,7 @@ enum Status {
     Unsolvable,
     OutOfTime,
     OutOfMemory,
+    Untried,
 }
 
 pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandError> {
@@ -108,7 +111,10 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
             endless.iter().filter(|_| !arguments.json).for_each(|said| input::narrate(said));
         }
     };
-    let outcome = descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan).map_err(failed)?;
+    let outcome = match descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan) {
+        Err(PlanError::Untried(findings)) => return untried(&findings, arguments.json, started),
+        other => other.map_err(failed)?,
+    };
     unwritten?;
     let signal = is_asked().then(|| told.signal());
     let (status, exit) = match &outcome {
@@ -362,6 +368,16 @@ fn summary(plan: &Plan) -> String {
 fn write_plan(path: &Path, plan: &Plan) -> Result<(), CommandError> {
     std::fs::write(path, plan.to_string())
         .map_err(|e| CommandError::BadInput(format!("--out {}: {e}", path.display())))
+}
+
+/// Tells of constraints that no search keeps: neither a plan nor the proof that there is none.
+fn untried(findings: &Findings, as_json: bool, started: Instant) -> Result<Exit, CommandError> {
+    input::narrate(&input::drawn(findings));
+    if as_json {
+        let time_s = started.elapsed().as_secs_f64();
+        input::print_json(&json!({ "status": Status::Untried, "time_s": time_s, "findings": findings }))?;
+    }
+    Ok(Exit::OutOfTime)
 }
 
 fn failed(error: PlanError) -> CommandError {

@@ -6,7 +6,8 @@ use super::{Checker, usage};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::defeat::self_defeating;
 use crate::task::{
-    Action, Atom, Change, Condition, Effect, Fact, GroundChange, ObjectId, Parameter, Task, Term, Written,
+    Action, Atom, Change, Condition, Effect, Fact, GroundChange, Modal, ObjectId, Parameter, Task, Term,
+    Trajectory, Written,
 };
 
 impl Checker<'_> {
@@ -26,8 +27,22 @@ impl Checker<'_> {
         self.task.goal.body = goal;
         let mut unused = usage::unused(&self.task);
         unused.extend(usage::without_value(&self.task));
+        unused.extend(self.task.constraints.iter().filter_map(not_planned));
         self.findings.append(&mut unused);
     }
+}
+
+/// A constraint of a kind that no search keeps.
+fn not_planned(constraint: &Trajectory) -> Option<Diagnostic> {
+    let name = match constraint.operator {
+        Modal::AlwaysWithin => "always-within",
+        Modal::HoldDuring => "hold-during",
+        Modal::HoldAfter => "hold-after",
+        _ => return None,
+    };
+    let message = format!("`{name}` is checked in plans, but plans that keep it are not searched for");
+    let finding = Diagnostic::warning("not-planned", message, constraint.span, "this constraint");
+    Some(finding.with_help("ask for the same in conditions and the goal"))
 }
 
 /// Durative actions that take away what they need while they run.

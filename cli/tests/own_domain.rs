@@ -373,6 +373,22 @@ fn a_body_without_a_camera_cannot_tell() {
 }
 
 #[test]
+fn looks_that_contradict_the_map_prove_nothing() {
+    if Command::new("python3").arg("--version").output().is_err() {
+        return eprintln!("SKIPPED: python3 is not here");
+    }
+    let folder = TempDir::new().expect("a folder can be made");
+    for (what, expected) in [
+        ("honest", "cup A is not there"),
+        ("depth reads long", "contradicts the map: depth reads 6 % too long"),
+    ] {
+        let output = descry(folder.path(), &["find", "cup A", "--robot", &robot(what), "--run", what]);
+        let (out, err) = shown(&output);
+        assert!(output.status.code() == Some(1) && out.contains(expected), "{what}: {out}{err}");
+    }
+}
+
+#[test]
 fn a_domain_with_a_fault_is_refused_before_anything_begins() {
     let folder = own(&[replace("domain.toml", "\"observe ?from ?on\"", "\"observ ?from ?on\"")]);
     for arguments in

@@ -48,21 +48,34 @@ impl Sight {
     pub(super) fn of(view: &View, world_from_camera: &Isometry3<f64>, surface: &MapSurface) -> Option<Sight> {
         let (camera, grid) = view.intrinsics.zip(view.cloud.grid)?;
         let side = ((grid.width * grid.height) as f64 / ASKED as f64).sqrt().max(1.0) as usize;
-        let pixels = (side / 2..grid.height).step_by(side).flat_map(|row| {
-            (side / 2..grid.width).step_by(side).map(move |column| row * grid.width + column)
-        });
-        let returned = pixels.filter_map(|pixel| view.cloud.points.get(pixel)).filter(|p| is_finite(p));
-        let points: Vec<Point3<f64>> = returned.map(|p| p.cast()).collect();
+        let columns: Vec<usize> = (side / 2..grid.width).step_by(side).collect();
+        let point = |row: usize, column: usize| {
+            let point = view.cloud.points.get(row * grid.width + column)?;
+            is_finite(point).then(|| point.cast())
+        };
+        let asked: Vec<Option<Point3<f64>>> = (side / 2..grid.height)
+            .step_by(side)
+            .flat_map(|row| columns.iter().map(move |&column| (row, column)))
+            .map(|(row, column)| point(row, column))
+            .collect();
+        let points: Vec<Point3<f64>> = asked.iter().flatten().copied().collect();
         let plane = plane(&points, world_from_camera, surface);
         let eye_m = -plane.offset_m;
-        let ray = |p: &Point3<f64>| {
+        let is_near = |n: Option<usize>| {
+            let asked = n.and_then(|n| asked.get(n).copied().flatten());
+            asked.is_some_and(|p| plane.height_m(&p).abs() < NEAR_M[NEAR_M.len() - 1])
+        };
+        let ray = |(n, p): (usize, &Option<Point3<f64>>)| {
+            let p = p.as_ref()?;
             let height_m = plane.height_m(p);
             let fall_m = eye_m - height_m;
-            let met = height_m.abs() < NEAR_M[NEAR_M.len() - 1];
+            // Where a wall has the height of the surface, its points lie in the plane along a line alone.
+            let beside = |step: usize| is_near(n.checked_sub(step)) || is_near(Some(n + step));
+            let met = is_near(Some(n)) && beside(1) && beside(columns.len());
             let is_past = height_m < -PAST_M;
             ((met || is_past) && fall_m > 0.0).then(|| Ray { at: p.coords * (eye_m / fall_m), met })
         };
-        let rays: Vec<Ray> = points.iter().filter_map(ray).collect();
+        let rays: Vec<Ray> = asked.iter().enumerate().filter_map(ray).collect();
         (eye_m > 0.0 && rays.len() >= FEWEST_RAYS).then(|| Sight {
             rays,
             camera,

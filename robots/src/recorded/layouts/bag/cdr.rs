@@ -151,15 +151,15 @@ impl<'a> Cdr<'a> {
     fn transform(&mut self) -> Result<Transform, Fault> {
         let header = self.header()?;
         let child = self.text()?.trim_start_matches('/').into();
-        let [x, y, z] = [self.f64()?, self.f64()?, self.f64()?];
-        let [i, j, k, w] = [self.f64()?, self.f64()?, self.f64()?, self.f64()?];
-        let quaternion = Quaternion::new(w, i, j, k);
+        let shift_m = [self.f64()?, self.f64()?, self.f64()?];
+        let xyzw = [self.f64()?, self.f64()?, self.f64()?, self.f64()?];
+        let quaternion = Quaternion::from(xyzw);
         let is_rotation = (quaternion.norm() - 1.0).abs() < 0.01;
-        if !is_rotation || ![x, y, z].iter().all(|v| v.is_finite()) {
-            return Err(format!("the transform to {child} is none: {x} {y} {z}, {i} {j} {k} {w}"));
+        if !is_rotation || !shift_m.iter().all(|v| v.is_finite()) {
+            return Err(format!("the transform to {child} is none: shift {shift_m:?}, quaternion {xyzw:?}"));
         }
         let rotation = UnitQuaternion::from_quaternion(quaternion);
-        let parent_from_child = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        let parent_from_child = Isometry3::from_parts(Translation3::from(shift_m), rotation);
         Ok(Transform { header, child, parent_from_child })
     }
 }

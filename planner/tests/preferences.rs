@@ -2,7 +2,7 @@
 
 mod brute;
 
-use descry_planner::{Attachments, Options, Outcome, PlanError, Source, check, plan};
+use descry_planner::{Attachments, Options, Outcome, PlanError, Source, plan};
 
 use crate::solving::{read, solve, solve_twice};
 
@@ -151,7 +151,8 @@ fn constraints_on_times_are_checked_and_said_not_to_be_planned_for() {
     let found = plan(&task, &Attachments::new(), &Options::default(), &|| false, &mut |_| {});
     assert!(matches!(&found, Err(PlanError::Untried(_))), "{found:?}");
     let hold = Source::new("problem.pddl", problem("(:goal (at d)) (:constraints (hold-during 1 2 (lit)))"));
-    let told = check(&Source::new("domain.pddl", ROOMS), Some(&hold)).render(false);
+    let found = descry_planner::check(&Source::new("domain.pddl", ROOMS), Some(&hold));
+    let told = found.render(false);
     assert!(told.contains("[not-planned]") && told.contains("`hold-during` is checked in plans"), "{told}");
     let aims =
         "(:goal (at d)) (:constraints (preference p (within 1 (lit)))) (:metric minimize (is-violated p))";

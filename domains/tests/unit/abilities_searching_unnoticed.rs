@@ -109,6 +109,7 @@ fn table() -> KnownSurface {
         whole: true,
         doubtful: None,
         placed: None,
+        displaced_m: 0.0,
     }
 }
 

@@ -11,6 +11,8 @@ use crate::lexicon::symbol;
 use crate::mind::Region;
 use crate::situation::KnownSurface;
 
+/// Cameras nearer to each other than this look from one place, metres.
+const ONE_PLACE_M: f64 = 0.1;
 /// Fewest views of which the majority tells which are wrong.
 const FEWEST: usize = 3;
 
@@ -50,9 +52,15 @@ pub(super) fn with_map(
         height_m: hint.height_m,
     };
     let map: Vec<MapSurface> = hints.iter().map(of_hint).collect();
-    let stated: Vec<Isometry3<f64>> =
-        region.looks.iter().zip(views).map(|(look, view)| localised(look, view)).collect();
-    let looks: Vec<(&View, Isometry3<f64>)> = views.iter().zip(stated.iter().copied()).collect();
+    // Looks from one place share the error of localisation there: the last of them counts.
+    let mut looks: Vec<(&View, Isometry3<f64>)> = Vec::new();
+    for (look, view) in region.looks.iter().zip(views) {
+        let stated = localised(look, view);
+        let eye = stated.translation.vector;
+        looks.retain(|(_, other)| (other.translation.vector - eye).norm() > ONE_PLACE_M);
+        looks.push((view, stated));
+    }
+    let stated: Vec<Isometry3<f64>> = looks.iter().map(|(_, pose)| *pose).collect();
     let last = stated.len().saturating_sub(1);
     let shifted = |by: isize| -> Vec<Isometry3<f64>> {
         (0..=last).filter_map(|n| stated.get(n.saturating_add_signed(by).min(last)).copied()).collect()

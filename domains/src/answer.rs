@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 pub use self::own::changes;
 use crate::abilities;
 use crate::abilities::searching::adrift;
+use crate::abilities::searching::consistent::Contradiction;
 use crate::abilities::searching::doubt::Doubt;
 use crate::abilities::searching::reasons;
 use crate::culprit;
@@ -395,10 +396,7 @@ impl Asker<'_> {
             return Some(contradiction);
         }
         if let Some((on, _)) = asked().find(|(_, region)| region.disputed) {
-            return Some(format!(
-                "too few views of the {} can be laid on each other",
-                self.s.surfaces[on].name
-            ));
+            return Some(Contradiction::Apart.told(&self.s.surfaces[on].name));
         }
         let regions = asked();
         let named =

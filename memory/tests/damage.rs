@@ -258,11 +258,26 @@ impl Original {
                 bytes.drain(gone.clone());
                 whole(self.beside(&gone))
             }
+            Kind::Emptied => {
+                bytes.clear();
+                Left { records: BTreeSet::new(), is_torn: true }
+            }
+            Kind::Segment | Kind::Index | Kind::Renumbered | Kind::Renamed => {
+                return self.damage_files(here, kind, draw);
+            }
+        };
+        fs::write(path, bytes).unwrap();
+        left
+    }
+
+    /// Damages files beside the bytes of the segment, or their names, and returns the expected remains.
+    fn damage_files(&self, here: &Path, kind: Kind, draw: &mut Draw) -> Left {
+        match kind {
             Kind::Segment => {
                 let length = 50 + draw.below(3000);
                 let rubbish: Vec<u8> = (0..length).map(|_| draw.below(256) as u8).collect();
                 fs::write(here.join("segments/00000002.mcap"), rubbish).unwrap();
-                whole(self.all())
+                Left { records: self.all(), is_torn: false }
             }
             Kind::Index => {
                 let index = here.join("index.sqlite");
@@ -273,21 +288,16 @@ impl Original {
                 }
                 Left { records: self.all(), is_torn: true }
             }
-            Kind::Emptied => {
-                bytes.clear();
-                Left { records: BTreeSet::new(), is_torn: true }
-            }
-            Kind::Renumbered | Kind::Renamed => {
+            _ => {
                 let (name, records) = match kind {
                     Kind::Renumbered => (["00000002.mcap", "00000009.mcap"][draw.below(2)], self.all()),
                     _ => (["00000001x.mcap", "1.mcap", "old"][draw.below(3)], BTreeSet::new()),
                 };
+                let path = segment(here);
                 fs::rename(&path, path.with_file_name(name)).unwrap();
-                return Left { records, is_torn: kind == Kind::Renumbered };
+                Left { records, is_torn: kind == Kind::Renumbered }
             }
-        };
-        fs::write(path, bytes).unwrap();
-        left
+        }
     }
 
     /// Checks that a store holds these records, byte for byte; returns the number of all that it holds.

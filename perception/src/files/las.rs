@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Point3};
 
 pub(super) const MAGIC: &[u8] = b"LASF";
 
-/// Where the header has what is used, bytes. From: LAS Specification 1.4, table 3.
+/// Offsets of the header's fields that are used, bytes. From: LAS Specification 1.4, table 3.
 const MINOR_VERSION: usize = 25;
 const DATA: usize = 96;
 const FORMAT: usize = 104;
@@ -17,7 +17,7 @@ const SCALES: usize = 131;
 const OFFSETS: usize = 155;
 const COUNT: usize = 247;
 
-/// Where a point of a format has its colour, bytes. From: LAS Specification 1.4, tables 7 to 18.
+/// Offset of the colour within a point of a format, bytes; none without colour. From: LAS Specification 1.4, tables 7 to 18.
 fn colour_at(format: u8) -> Option<usize> {
     match format {
         2 => Some(20),

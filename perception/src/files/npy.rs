@@ -50,7 +50,7 @@ fn header(bytes: &[u8]) -> Option<(&str, usize)> {
     Some((std::str::from_utf8(bytes.get(start..end)?).ok()?, end))
 }
 
-/// What follows a key of the header.
+/// Text after a key of the header.
 fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(key)?;
     Some(rest.trim_start_matches(['\'', '"', ':', ' ']))

@@ -135,8 +135,8 @@ impl Recogniser for Descry {
 impl Descry {
     /// Percepts after each segment was also explained by other bodies: a known one on or in another thing, or one with a neck.
     ///
-    /// Where pixels are by far likelier with such a body, and the body is more probably a known object than the whole segment, its
-    /// percept replaces that of the segment; if it is less probably one, the segment may still be it.
+    /// Percepts of such bodies replace that of the segment where pixels are by far likelier with them and they are more probably known
+    /// objects than the whole segment; if they are less probably so, the segment may still be one.
     fn explained(
         &self,
         setting: &Setting,

@@ -186,25 +186,7 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
             let high = Point3::new(half[0], half[1], TABLE_M + height);
             cuboid(eye, ray, x, y, turn_rad, &low, &high).for_each(&mut offer);
         }
-        Thing::Turned { x, y, knots, scale, open, handle_rad, spout } => {
-            let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
-            turned(&here, ray, knots, scale, 0.0).for_each(&mut offer);
-            let [foot, rim] = [0, knots.len() - 1].map(|k| knots[k].map(|m| m * scale));
-            if open {
-                turned(&here, ray, knots, scale, 0.003).for_each(&mut offer);
-                disc(eye, ray, x, y, foot[1], TABLE_M + 0.004).for_each(&mut offer);
-            } else {
-                disc(eye, ray, x, y, rim[1], TABLE_M + rim[0]).for_each(&mut offer);
-            }
-            if let Some(angle) = handle_rad {
-                handle(eye, ray, x, y, foot[1], rim[0], angle).for_each(&mut offer);
-                if spout {
-                    let low = Point3::new(-rim[1] - 0.025, -0.012, TABLE_M + 0.85 * rim[0]);
-                    let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
-                    cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut offer);
-                }
-            }
-        }
+        Thing::Turned { .. } => meets_turned(thing, eye, ray, &mut offer),
         Thing::Lying { x, y, radius, height, towards_rad, open, handle: has_handle } => {
             // Across it, up from its axis, along it from its foot.
             let (sin, cos) = towards_rad.sin_cos();
@@ -225,6 +207,28 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
         }
     }
     best.is_finite().then_some(best)
+}
+
+/// The distances along a ray at which it meets a body turned on a lathe, each offered.
+fn meets_turned(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>, offer: &mut dyn FnMut(f64)) {
+    let Thing::Turned { x, y, knots, scale, open, handle_rad, spout } = *thing else { return };
+    let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
+    turned(&here, ray, knots, scale, 0.0).for_each(&mut *offer);
+    let [foot, rim] = [0, knots.len() - 1].map(|k| knots[k].map(|m| m * scale));
+    if open {
+        turned(&here, ray, knots, scale, 0.003).for_each(&mut *offer);
+        disc(eye, ray, x, y, foot[1], TABLE_M + 0.004).for_each(&mut *offer);
+    } else {
+        disc(eye, ray, x, y, rim[1], TABLE_M + rim[0]).for_each(&mut *offer);
+    }
+    if let Some(angle) = handle_rad {
+        handle(eye, ray, x, y, foot[1], rim[0], angle).for_each(&mut *offer);
+        if spout {
+            let low = Point3::new(-rim[1] - 0.025, -0.012, TABLE_M + 0.85 * rim[0]);
+            let high = Point3::new(-rim[1], 0.012, TABLE_M + rim[0]);
+            cuboid(eye, ray, x, y, angle, &low, &high).for_each(&mut *offer);
+        }
+    }
 }
 
 fn tube(

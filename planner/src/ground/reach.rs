@@ -116,7 +116,7 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// By predicate: the rules and positions in them that its atoms may match.
+    /// Rules and positions in them that the atoms of a predicate may match, by predicate.
     fn triggers(&self) -> Vec<Vec<(usize, usize)>> {
         let mut triggers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.fluent.len()];
         for (r, rule) in self.rules.iter().enumerate() {

@@ -17,6 +17,7 @@ use super::again::{self, Found};
 use super::news::{Change, DIRECTIONS, Fate, Look, Models, Novelty};
 use super::stands;
 use crate::abilities::searching::perceive::{self, Eyes};
+use crate::abilities::searching::remember;
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::KnownSurface;
@@ -58,7 +59,7 @@ const BEYOND_M: f64 = 0.03;
 
 /// Records a view of something that is learned from, and reads it back by its time.
 fn remember(mind: &mut Mind, eyes: Eyes<'_>, sensed: &Sensed) -> Result<View, WorldError> {
-    let id = perceive::remember(mind, eyes, &[], sensed)?;
+    let id = remember::view(mind, eyes, &[], sensed)?;
     let news = Arc::make_mut(&mut mind.known.news);
     news.records.push(id);
     let records: &[RecordId] = &news.records;

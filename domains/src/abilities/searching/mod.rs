@@ -15,6 +15,7 @@ mod placing;
 pub mod policies;
 pub mod reasons;
 #[doc(hidden)]
+pub mod remember;
 pub mod unnoticed;
 #[doc(hidden)]
 pub mod vanished;
@@ -102,7 +103,7 @@ fn seen(
     let is_mapped = |n: usize| s.surfaces[n].whole || s.chart.has(&s.surfaces[n].symbol);
     let is_shown = |&n: &usize| n == on || !is_mapped(on) && !is_mapped(n) && s.sees(at, n);
     let shown: Vec<usize> = (0..s.surfaces.len()).filter(is_shown).collect();
-    perceive::remember(mind, eyes, &shown, sensed)?;
+    remember::view(mind, eyes, &shown, sensed)?;
     let here = mind.known.candidates[at].symbol.clone();
     let shown: Vec<String> = shown.into_iter().map(|n| s.surfaces[n].symbol.clone()).collect();
     for surface in &shown {

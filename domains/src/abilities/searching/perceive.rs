@@ -6,9 +6,8 @@ use std::sync::Arc;
 use descry_memory::belief::{Sighted, Track};
 use descry_memory::space::Space;
 use descry_memory::viewer::{self, Labelled};
-use descry_memory::{Bounds, Draft, Image, Meta, Record, RecordId, Sensing, Sighting};
+use descry_memory::{Draft, Meta, Record, RecordId, Sighting};
 use descry_perception::View;
-use descry_perception::consistency::{Fault, Inconsistency};
 use descry_perception::hull::Hull;
 use descry_perception::merge::{MergeOptions, Merged, ViewFit};
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, Vector3};
@@ -16,14 +15,14 @@ use descry_perception::noise::axial_sigma_m;
 use descry_perception::plane::Plane;
 use descry_perception::recognise::{ObjectModel, Percept, Recogniser};
 use descry_perception::segment::{Scene, segment_on};
-use descry_perception::surface::{SurfaceOptions, find_surface};
+use descry_perception::surface::{Surface, SurfaceOptions, find_surface};
 use descry_perception::visibility::{DepthMap, Seen, Visibility};
-use descry_robots::{Description, Robot, Sensed};
+use descry_robots::{Description, Robot};
 use serde::Serialize;
 use serde_json::json;
 
 use super::change::Change;
-use super::consistent::{self, Contradiction};
+use super::consistent;
 use super::discover;
 use super::merging;
 pub use super::merging::options;
@@ -61,66 +60,8 @@ pub struct Eyes<'a> {
     pub thresholds: Thresholds,
 }
 
-/// Puts a view of some surfaces into the record: its transforms, its colours and its cloud together, so that none is ever without
-/// the others. When this returns it survives a crash.
-pub fn remember(
-    mind: &mut Mind,
-    eyes: Eyes<'_>,
-    shown: &[usize],
-    sensed: &Sensed,
-) -> Result<RecordId, WorldError> {
-    let record = eyes.record;
-    for t in &sensed.transforms {
-        record.put_transform_soon(t.stamp_ns, &t.parent, &t.child, &t.parent_from_child)?;
-    }
-    let camera = eyes.robot.description().camera.as_ref();
-    let frame = camera.map_or("camera", |camera| camera.frame.as_str());
-    put_colour(record, frame, sensed)?;
-    let eye = sensed.map_from_camera.translation.vector;
-    let sensing = Sensing {
-        intrinsics: Some(sensed.intrinsics),
-        pose_sigma_m: sensed.pose_sigma_m,
-        pose_sigma_rad: sensed.pose_sigma_rad,
-    };
-    let known = &mind.known;
-    let from = &known.candidates[known.at].symbol;
-    let on: Vec<&String> = shown.iter().map(|&n| &known.surfaces[n].symbol).collect();
-    let meta = Meta {
-        seen_from_m: Some(eye.into()),
-        covers_m: extent(sensed),
-        body: json!({ "from": from, "on": on }),
-        ..Meta::default()
-    };
-    let id = record.put_cloud(sensed.stamp_ns, frame, &sensed.cloud, &sensing, meta)?;
-    for &n in shown {
-        let away = mind.known.surfaces[n].centre().map(|centre| (centre.coords - eye).norm());
-        let away_m = away.unwrap_or_default();
-        let region = &mut mind.regions[n];
-        region.looks.push(Look { stamp_ns: sensed.stamp_ns, record: id, away_m, laid: Laid::AsLocalised });
-        region.taken += 1;
-    }
-    mind.views += 1;
-    mind.known.looked_from = mind.known.at;
-    // Every merge reads all views of its surface again.
-    record.hold(&views(mind), "views")?;
-    Ok(id)
-}
-
-/// Records the colours of a frame, if it has some.
-fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), WorldError> {
-    let Some(colour) = &sensed.colour else { return Ok(()) };
-    let image = Image::Raw {
-        width: colour.image.width(),
-        height: colour.image.height(),
-        encoding: "rgb8",
-        data: colour.image.as_raw(),
-    };
-    let meta = Meta { body: json!({ "registered": colour.registered }), ..Meta::default() };
-    Ok(record.put_image_soon(sensed.stamp_ns, frame, image, meta)?)
-}
-
 /// The records of all views that still hold.
-fn views(mind: &Mind) -> Vec<RecordId> {
+pub(super) fn views(mind: &Mind) -> Vec<RecordId> {
     mind.regions.iter().flat_map(|r| &r.looks).map(|look| look.record).collect()
 }
 
@@ -128,9 +69,7 @@ fn views(mind: &Mind) -> Vec<RecordId> {
 /// believe.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let _span = tracing::info_span!("perceive", on = %mind.known.surfaces[on].symbol).entered();
-    let Mind { known, regions, .. } = &mut *mind;
-    let there = || known.belief.tracks.iter().filter(|t| t.on == known.surfaces[on].symbol).cloned();
-    regions[on].expected.get_or_insert_with(|| there().collect());
+    consistent::keep_expected(mind, on);
     let (options, seeking) = options_at(eyes.robot, &mind.known.surfaces[on]);
     place_looks(mind, eyes, on, (&options, &seeking.surface))?;
     if !keep_placed(&mut mind.regions[on].looks) {
@@ -139,22 +78,10 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
         return Ok(());
     }
     let views = restore(mind, eyes, on)?;
-    let lie = consistent::with_map(eyes, &mind.known.surfaces[on], &mind.regions[on], &views);
-    mind.known.surfaces[on].displaced_m = match lie {
-        Some(Inconsistency { fault: Fault::Displaced(..), spread_m, .. }) => spread_m,
-        Some(lie) => return prove_nothing(mind, eyes, on, Contradiction::Fault(lie.fault), notes),
-        None => 0.0,
-    };
-    let merged = merging::merged(mind, on, &views, &options);
-    let seen = merged.map_err(|nothing| nothing.to_string()).and_then(|merged| {
-        let (surfaces, options) = (&mind.known.surfaces, &seeking.surface);
-        let found = match surfaces[on].whole {
-            true => find_surface(&merged.cloud, &merged.visibility, options).map(|s| (s, Vec::new())),
-            false => discover::look(&merged, options, surfaces, on),
-        };
-        found.map(|(surface, others)| (merged, surface, others)).map_err(|nothing| nothing.to_string())
-    });
-    let (merged, surface, others) = match seen {
+    if let Some(contradiction) = consistent::with_map(mind, eyes, on, &views) {
+        return consistent::prove_nothing(mind, eyes, on, contradiction, notes);
+    }
+    let (merged, surface, others) = match made_out(mind, on, &views, (&options, &seeking.surface)) {
         Ok(seen) => seen,
         Err(because) => {
             // What to set otherwise is for who programs it.
@@ -166,7 +93,7 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     };
     mind.regions[on].nothing = None;
     if let Some(apart) = consistent::among(&merged.fits) {
-        return prove_nothing(mind, eyes, on, apart, notes);
+        return consistent::prove_nothing(mind, eyes, on, apart, notes);
     }
     mind.regions[on].contradiction = None;
     let agreeing = merged.fits.iter().filter(|fit| fit.used).count();
@@ -217,28 +144,20 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
 }
 
-/// Looks at a surface contradict the map or each other: what they showed counts no longer, and what was expected there before them
-/// is believed again.
-fn prove_nothing(
+/// The merged views of a surface, the surface in them, and other surfaces that were not known yet; why there is none otherwise.
+fn made_out(
     mind: &mut Mind,
-    eyes: Eyes<'_>,
     on: usize,
-    contradiction: Contradiction,
-    notes: &mut Vec<Note>,
-) -> Result<(), WorldError> {
-    let (symbol, name) = (mind.known.surfaces[on].symbol.clone(), mind.known.surfaces[on].name.clone());
-    let region = &mut mind.regions[on];
-    region.contradiction = Some(contradiction);
-    region.taken_in.clear();
-    mind.known.spaces[on] = Arc::default();
-    let belief = Arc::make_mut(&mut mind.known.belief);
-    belief.tracks.retain(|track| track.on != symbol);
-    belief.tracks.extend(region.expected.clone().unwrap_or_default());
-    belief.tracks.sort_by_key(|track| track.id);
-    put(eyes.record, "belief", eyes.robot.now_ns(), &*mind.known.belief)?;
-    let because = contradiction.told(&name);
-    notes.push(Note::Nothing { because, advice: String::new(), is_left_out: false });
-    Ok(())
+    views: &[View],
+    (options, seeking): (&MergeOptions, &SurfaceOptions),
+) -> Result<(Merged, Surface, Vec<Surface>), String> {
+    let merged = merging::merged(mind, on, views, options).map_err(|nothing| nothing.to_string())?;
+    let surfaces = &mind.known.surfaces;
+    let found = match surfaces[on].whole {
+        true => find_surface(&merged.cloud, &merged.visibility, seeking).map(|s| (s, Vec::new())),
+        false => discover::look(&merged, seeking, surfaces, on),
+    };
+    found.map(|(surface, others)| (merged, surface, others)).map_err(|nothing| nothing.to_string())
 }
 
 /// Says of each percept which of the things that were learned it may be.
@@ -601,18 +520,6 @@ fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
 fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
     DepthMap::from_view(view, &fit.world_from_camera)
-}
-
-/// The part of the map that a frame shows; none if nothing returned.
-fn extent(sensed: &Sensed) -> Option<Bounds> {
-    let points =
-        sensed.cloud.points.iter().map(|p| p.cast::<f64>()).filter(|p| p.iter().all(|x| x.is_finite()));
-    points.map(|p| sensed.map_from_camera * p).fold(None, |bounds: Option<Bounds>, p| {
-        let at: [f64; 3] = p.coords.into();
-        let bounds = bounds.unwrap_or(Bounds { min_m: at, max_m: at });
-        let with = |side: [f64; 3], of: fn(f64, f64) -> f64| std::array::from_fn(|i| of(side[i], at[i]));
-        Some(Bounds { min_m: with(bounds.min_m, f64::min), max_m: with(bounds.max_m, f64::max) })
-    })
 }
 
 /// Names and probabilities under which percepts are recorded as sightings.

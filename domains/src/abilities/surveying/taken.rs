@@ -12,7 +12,8 @@ use serde_json::json;
 use super::chart::{BODY_M, Chart, far_m, rectify};
 use super::picture;
 use crate::abilities::searching::candidates::ring;
-use crate::abilities::searching::perceive::{self, Eyes};
+use crate::abilities::searching::perceive::Eyes;
+use crate::abilities::searching::remember;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
 use crate::situation::Candidate;
@@ -26,7 +27,7 @@ const MOVED_M: f64 = 0.15;
 /// Takes a look in: it is in the record when this returns, and so is the map as it is then.
 pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
     let body = eyes.robot.description();
-    let id = perceive::remember(mind, eyes, &[], sensed)?;
+    let id = remember::view(mind, eyes, &[], sensed)?;
     let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
     let camera = body.camera.as_ref().ok_or_else(|| WorldError::Bug("a look without a camera".into()))?;
     let strange = |e: String| WorldError::Bug(format!("a look that maps: {e}"));

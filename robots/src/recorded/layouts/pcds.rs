@@ -63,7 +63,7 @@ struct Pcds {
     coloured: bool,
 }
 
-/// What is kept of a cloud that was read, for each frame that its points may be in.
+/// Summary of a cloud that was read, for each frame that its points may be in.
 struct Summary {
     path: PathBuf,
     viewpoint: Isometry3<f64>,

@@ -23,13 +23,13 @@ pub(super) struct Stored {
     pub(super) place: Place,
 }
 
-/// What one walk through a bag gathers.
+/// Messages that one walk through a bag gathers.
 #[derive(Default)]
 pub(super) struct Gathered {
     pub(super) transforms: Transforms,
-    /// By topic: the first camera.
+    /// The first camera of each topic.
     pub(super) cameras: BTreeMap<String, CameraInfo>,
-    /// By topic: its images.
+    /// The images of each topic.
     pub(super) images: BTreeMap<String, Shown>,
 }
 

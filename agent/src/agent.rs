@@ -49,7 +49,7 @@ pub struct Totals {
     pub plans: usize,
     /// Distance driven, metres.
     pub distance_m: f64,
-    /// Longest time that one planning call took, what it asked of geometry apart, seconds.
+    /// Longest planning call on the wall clock, without the time of attachments, seconds.
     pub planning_s: f64,
     /// Longest time that the attachments of one planning call took, seconds.
     pub geometry_s: f64,

@@ -36,7 +36,7 @@ pub enum Event {
         round: usize,
         /// The reason the previous plan no longer works, in a sentence.
         because: String,
-        /// The same with the values that decide it; records of earlier versions do not have it.
+        /// The reason with its values; absent in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<Reason>,
         /// The steps.
@@ -188,14 +188,14 @@ pub struct Report {
     pub position_sigma_m: Option<f64>,
     /// True position of the requested object; simulation only.
     pub true_position_m: Option<[f64; 3]>,
-    /// The surface that it is believed to stand on, as people call it.
+    /// Surface that the object is believed to stand on, as people call it.
     pub on: Option<String>,
     /// The surface that it stands on; simulation only.
     pub true_on: Option<String>,
-    /// The room that it is believed to be in.
+    /// Room that the object is believed to be in.
     #[serde(rename = "in")]
     pub room: Option<String>,
-    /// The room that it is in; simulation only.
+    /// True room of the object; simulation only.
     #[serde(rename = "true_in")]
     pub true_room: Option<String>,
     /// Everything that was seen on the surface.
@@ -210,7 +210,8 @@ pub struct Report {
     pub sim_time_s: f64,
     /// Duration of the run on the wall clock, seconds.
     pub wall_s: f64,
-    /// The longest that one planning call took on the wall, what it asked of geometry apart; 0: nothing was planned, or it is not known.
+    /// Longest planning call on the wall clock, without the time of attachments, seconds; 0 if
+    /// nothing was planned or the time is unknown.
     #[serde(default)]
     pub planning_s: f64,
     /// The longest time that the attachments of one planning call took, seconds.

@@ -35,7 +35,7 @@ pub struct InDoubt {
     pub sure: Option<f64>,
     /// Confidence that is required, 0 to 1.
     pub wanted: f64,
-    /// The probability that hangs on it, 0 to 1.
+    /// Probability that is still unsettled, 0 to 1.
     pub left: f64,
     /// The part of that for which it is where nothing was seen.
     pub hidden: f64,
@@ -63,11 +63,12 @@ pub enum Of {
 pub struct Seen {
     /// The place, as people call it.
     pub on: String,
-    /// The share of it where nothing could stand unseen, 0 to 1; none while nothing is known of it.
+    /// Share of the place where nothing could be hidden, 0 to 1; none while the place is unknown.
     pub share: Option<f64>,
     /// The number of places from which it was seen, by views that still hold.
     pub places: usize,
-    /// The probability that it is there where it was not seen, 0 to 1; records of earlier versions do not say.
+    /// Probability that the object is in an unseen part of this place, 0 to 1; absent in records of
+    /// earlier versions.
     #[serde(default)]
     pub hidden: f64,
     /// The part of that where something was measured that no object explains.

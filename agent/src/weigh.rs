@@ -42,7 +42,8 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// The numbers that count, before the plan and as it expects them in the end; where it uses up what it gains, when it has most.
+    /// Numeric fluents that matter to the goal: value before the plan and expected value at its
+    /// end, or at its best moment if the plan uses them up again.
     pub numbers: Vec<Expected>,
     /// The plan until it first gains something.
     pub chosen: Option<Way>,
@@ -50,9 +51,9 @@ pub struct Weighed {
     pub others: Vec<Way>,
     /// The number of ways that were open in all, the chosen one and those left out here among them.
     pub open: usize,
-    /// The plan until it first gains something, where several steps of it could be one.
+    /// The plan up to its first gain, with consecutive steps merged into one where possible.
     pub shorter: Option<Way>,
-    /// The same with a step more, that makes one of its steps shorter: a door opened on the way. The quickest.
+    /// The quickest plan with one more step that shortens another one: a door opened on the way.
     pub through: Option<Way>,
     /// The remaining steps of the previous plan, where they differ from the new one.
     pub left: Option<Way>,
@@ -142,7 +143,7 @@ pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
 struct Scale<'r> {
     semantics: Semantics<'r>,
     state: State,
-    /// Functions of the task that count, each with whether less of it is wanted.
+    /// Numeric functions that matter to the goal, each with true if less is better.
     counting: Vec<(FunctionId, bool)>,
     /// Text of the goal, or else of the steps' conditions, that compares these numbers.
     asked: String,
@@ -181,7 +182,7 @@ impl<'r> Scale<'r> {
         Some(Scale { semantics, state, counting, asked: by, aims })
     }
 
-    /// The numbers that count in a state, by name, each with whether less of it is wanted.
+    /// Values of the numbers that matter in a state, by name, each with true if less is better.
     fn numbers(&self, state: &State) -> BTreeMap<String, (f64, bool)> {
         let task = self.semantics.task;
         let of = |&(id, less): &(FunctionId, bool)| {
@@ -405,8 +406,8 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
-    /// Values that a plan expects of the numbers at its end; where it uses up what it gains, at its best
-    /// moment.
+    /// Values that a plan expects of the numbers at its end, or at its best moment if it uses them
+    /// up again.
     fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
         let whole = self.expected(steps);
         if !whole.is_empty() {

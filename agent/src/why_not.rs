@@ -22,7 +22,7 @@ pub struct Answer {
     pub with_it: Tried,
 }
 
-/// Result of looking for a plan with it.
+/// Result of planning with the action.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tried {

@@ -42,9 +42,9 @@ pub struct MapSurface {
 /// A fault of the camera or of the poses, common to all looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// Depth reads so many times what it is.
+    /// Measured depth is the true depth times this factor.
     DepthScale(f64),
-    /// The stated focal length is so many times the true one.
+    /// The stated focal length is the true one times this factor.
     FocalLength(f64),
     /// The stated principal point lies beside the true one by so much, pixels.
     PrincipalPoint(Vector2<f64>),

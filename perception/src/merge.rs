@@ -426,7 +426,7 @@ fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>
     let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.at().coords) / n;
     let (before, after) = (view.prior * Point3::from(middle), pose * Point3::from(middle));
     let turn = pose.rotation * view.prior.rotation.inverse();
-    /// A turn with less of it is taken for none. From: rounding.
+    /// Rotation below which a turn is neglected. From: rounding.
     const NO_TURN: f64 = 1e-9;
     // Swing and twist: the twist is the part of the turn about the vertical.
     let along = up.dot(&turn.imag());

@@ -33,8 +33,9 @@ const SCOUTS: usize = 300;
 /// Points that are looked at together.
 const BLOCK: usize = 16;
 
-/// Fits a rectangle to points by turning it: the extents bound nearly all points, and once it is turned each edge lies amid the points
-/// that are nearest to it; the residual tells how well they keep to the edges.
+/// Fits a rectangle to points by rotation: the extents bound nearly all points, then each edge
+/// moves to the mean of the points nearest to it. The residual is the misfit of the points to the
+/// edges.
 pub fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
@@ -158,7 +159,8 @@ impl Turner {
         Turned { sin, cos, u: u.map(f64::from), v: v.map(f64::from) }
     }
 
-    /// The same with each edge amid the points that are nearest to it: bounds lie as far out as noise reaches.
+    /// Moves each edge to the mean of the points nearest to it; the bounding rectangle is too large
+    /// by the noise.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
         /// Least share of the points that moves an edge.

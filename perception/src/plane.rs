@@ -92,7 +92,7 @@ pub enum PlaneError {
         /// Samples taken.
         rounds: usize,
     },
-    /// The tolerance is no positive length.
+    /// The tolerance is not positive.
     #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
     Tolerance {
         /// The value that was given.

@@ -31,8 +31,9 @@ pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
 pub(crate) const RADIUS_SPREAD_M: f64 = 0.05;
 pub(crate) const SLOPE_SPREAD: f64 = 0.1;
 pub const STEEPEST: f64 = 0.6;
-/// A circle on which no more than this share of the side lies is no circle of it: any face has some that fits a third of it.
-/// From: chosen, just above that third; real mugs have a circle that half of the side keeps to.
+/// Share of the side's points that a fitted circle must explain: on any flat face some circle
+/// explains a third. From: chosen, just above a third; on real mugs a circle explains half of the
+/// side.
 pub(crate) const NO_CIRCLE: f64 = 0.34;
 /// Seed of the circles proposed where a segment is measured. From: mark.
 pub(crate) const SEED: u64 = 7;

@@ -64,7 +64,8 @@ pub fn plan(
     Ok(outcome)
 }
 
-/// Goals of tasks with more ground actions than this are not taken apart to find out which parts are to blame.
+/// Maximum number of ground actions up to which an unsolvable goal is split to find the conflicting
+/// parts.
 const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
 /// Spacing of `f64` at the end of a plan, as a fraction of epsilon, above which planning fails as `too-long`.
 /// From: a few times, each rounded by half of that spacing, are added up between two happenings.

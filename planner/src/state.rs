@@ -110,7 +110,7 @@ impl State {
         self.facts[predicate.index()].iter().map(|arguments| &**arguments)
     }
 
-    /// The arguments of which a numeric function has a value, with it, in no particular order.
+    /// Arguments for which a numeric function is defined, with the values, unordered.
     pub fn values(&self, function: FunctionId) -> impl Iterator<Item = (&[ObjectId], f64)> {
         self.numbers[function.index()].iter().map(|(arguments, value)| (&**arguments, *value))
     }

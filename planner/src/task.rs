@@ -96,9 +96,9 @@ pub struct Type {
     pub name: String,
     /// Its direct supertypes; none for `object` alone.
     pub parents: Vec<TypeId>,
-    /// Every type that it is, itself first.
+    /// The type itself, then all its supertypes.
     pub ancestors: Vec<TypeId>,
-    /// The objects that are of it, in rising order.
+    /// Objects of this type and its subtypes, in rising order.
     pub objects: Vec<ObjectId>,
     /// Span of the declaration.
     pub span: Span,

@@ -28,7 +28,7 @@ pub struct Model {
 pub struct Modelled {
     /// Pose and content of each view; inconsistent views are left out.
     pub keyframes: Vec<Keyframe>,
-    /// The model, or the reason for having none.
+    /// The learned model, or the reason that none was learned.
     pub model: Result<LearnedModel, String>,
 }
 

@@ -175,10 +175,10 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
 }
 
-/// The maximum size of such a file, bytes. From: chosen.
+/// Maximum size of a run's file, bytes. From: chosen.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Reads such a file; says why if it is not what was written.
+/// Reads a file of a run; an error if its content is not what was written.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
     let shown = path.display();
     let bytes = read_bytes(path, MOST_BYTES).map_err(|e| format!("{shown}: {e}"))?;

@@ -32,7 +32,7 @@ pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 
 pub struct GoingOn<'a> {
     /// The run's folder.
     pub folder: &'a Path,
-    /// The goal that it is expected to have, if one was said.
+    /// Expected goal, if the caller gave one.
     pub said: Option<&'a str>,
     /// Address of the body now, if it has changed since the beginning.
     pub robot: Option<&'a str>,

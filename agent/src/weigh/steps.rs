@@ -32,7 +32,8 @@ impl Instead {
     }
 }
 
-/// Steps of which some that lead on from each other, by the same action from one object to another, are one; none if there are none.
+/// Merges consecutive steps of one action that lead from object to object (a to b, b to c) into one
+/// step; `None` if no steps can be merged.
 pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     let mut all: Vec<Step> = Vec::new();
     for step in steps {

@@ -10,7 +10,8 @@ use std::f64::consts::{PI, TAU};
 /// Options for separating readings of a thing from the background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserveOptions {
-    /// Readings of one thing lie no farther apart, metres: more than the gap between a chair's legs.
+    /// Maximum gap between readings of one object, metres: wider than the gap between a chair's
+    /// legs.
     pub step_m: f32,
     /// Fewest readings of a thing.
     pub least: usize,

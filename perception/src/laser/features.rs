@@ -54,7 +54,7 @@ pub struct Nearest<'a> {
     pub class: &'a FeatureClass,
     /// Spreads from its mean.
     pub distance: f64,
-    /// The same for the class that comes second; infinite if there is none.
+    /// Distance to the second-nearest class, in the same units; infinite if there is none.
     pub second: f64,
 }
 

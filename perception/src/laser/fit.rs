@@ -169,8 +169,7 @@ fn within(scans: &[PosedScan]) -> f64 {
     assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2
 }
 
-/// The starts of a ring that violate no more than their neighbours, the least first; the first of all where
-/// there is none such.
+/// Local minima of a ring of starts, the least violation first; the first start if there are none.
 fn promising(violations: &[f64], most: usize) -> impl Iterator<Item = usize> {
     let n = violations.len();
     let (before, after) = (|i: usize| violations[(i + n - 1) % n], |i: usize| violations[(i + 1) % n]);

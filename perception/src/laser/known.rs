@@ -7,7 +7,7 @@ use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// A fit that, roughly settled, violates by so many times what rules a shape out does not come down to it.
+/// Multiple of the rejection threshold at which a coarse fit is given up without refinement.
 const HOPELESS: f64 = 3.0;
 /// Directions in which the width of a shape is measured.
 const WIDTHS: usize = 18;
@@ -126,7 +126,7 @@ pub struct Recognition {
     pub may_be: Vec<String>,
 }
 
-/// Takes a shape for one of those known.
+/// Classifies a shape as one of the known ones.
 pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise", known = known.len()).entered();
     let features = instance.features();
@@ -140,7 +140,8 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     decide(candidates, known, options)
 }
 
-/// Takes what a single scan shows for one of the shapes known; the candidates say from where it was taken. One scan seldom leaves one name.
+/// Classifies one scan as one of the known shapes; the candidates hold the sensor pose relative to
+/// the shape. One scan is seldom enough for one name.
 ///
 /// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
 pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
@@ -156,8 +157,9 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     decide(candidates, known, options)
 }
 
-/// Takes what several scans show, from one side perhaps, for one of the shapes known. `loose_m` says how far on average the thing may reach beyond what was
-/// met of it ([`super::Outlook::looseness_m`]): the features of its hull count where that is little, else only what is too wide or too narrow for one of the scans.
+/// Classifies several scans, perhaps all from one side. `loose_m` is the mean distance by which the
+/// object may extend beyond the measured hull ([`super::Outlook::looseness_m`]): if it is small,
+/// the features of the hull are compared, else only the width in each scan.
 pub fn recognise_scans(
     scans: &ShapeModel,
     loose_m: f64,

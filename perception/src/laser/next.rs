@@ -36,7 +36,7 @@ const MOST_ACROSS: f64 = 2000.0;
 pub struct NextScan {
     /// Index of the pose.
     pub index: usize,
-    /// Undetermined area that it is expected to settle, square metres.
+    /// Undetermined area that the scan is expected to settle, square metres.
     pub settles_m2: f64,
     /// Undetermined area that is expected to stay, square metres.
     pub leaves_m2: f64,
@@ -50,7 +50,7 @@ pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
 /// Expected gain of scans from several poses, together and each by itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Round the hull of what was met, metres.
+    /// Perimeter of the hull of all hits, metres.
     pub perimeter_m: f64,
     cell_m2: f64,
     open: usize,

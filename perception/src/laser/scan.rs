@@ -38,7 +38,7 @@ pub enum ScanError {
         /// The value of the angle, radians.
         angle_rad: f64,
     },
-    /// The pose is no pose.
+    /// The pose is not finite.
     #[error("the pose of the laser is not finite: give metres and radians")]
     Pose,
 }

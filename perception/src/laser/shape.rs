@@ -15,9 +15,9 @@ pub struct ObjectScan {
     pub points: Vec<Point2<f64>>,
     /// RightBound: the nearest angle to the right of the thing at which the laser looked past it.
     pub right_bound_rad: f64,
-    /// RightObject: the rightmost angle at which the thing was met.
+    /// RightObject: rightmost angle at which the scan hit the object.
     pub right_object_rad: f64,
-    /// LeftObject: the leftmost angle at which the thing was met.
+    /// LeftObject: leftmost angle at which the scan hit the object.
     pub left_object_rad: f64,
     /// LeftBound: the nearest angle to the left of the thing at which the laser looked past it.
     pub left_bound_rad: f64,
@@ -79,7 +79,7 @@ pub enum ShapeError {
         /// The angles, from right to left, radians.
         angles_rad: [f64; 4],
     },
-    /// The pose is no pose.
+    /// The pose is not finite.
     #[error("the pose of scan {index} is not finite, or its rotation is no unit complex number")]
     Pose {
         /// Index of the scan.

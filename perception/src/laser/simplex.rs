@@ -11,7 +11,7 @@ pub struct Found {
     pub evaluations: usize,
 }
 
-/// The corners of the simplex are told apart no finer than this part of the first steps.
+/// Convergence limit of the simplex, as a fraction of the first steps.
 const FINEST: f64 = 1e-4;
 
 /// Minimises a function near the origin, from a simplex of the given steps. Settled once the corners lie within a ten-thousandth of the first steps, or

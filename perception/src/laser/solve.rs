@@ -39,7 +39,8 @@ impl Default for Objective {
 
 /// Weight of what chooses among poses that violate nothing.
 const CENTRED: f64 = 0.1;
-/// Spread of a silhouette between two rays that are a degree apart, 1.5 m away, metres: their distance over the square root of twelve.
+/// Standard deviation of a silhouette edge between two rays one degree apart at 1.5 m, metres:
+/// their spacing over the square root of twelve.
 const GAP_SIGMA_M: f64 = 0.0075;
 
 /// Options of the solver: objective, minimiser, limits.
@@ -184,7 +185,7 @@ pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
     }
 }
 
-/// Solves the problem coarsely, to tell whether it is worth going on.
+/// Solves the problem coarsely, to decide if refinement pays.
 pub(super) fn solve_roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     let rough = SolverOptions { settle: options.settle.max(ROUGH), ..*options };
     match options.solver {

@@ -16,9 +16,9 @@ pub struct AroundOptions {
     pub most_m: f64,
     /// Nearest one: the camera must have the object in view, metres.
     pub least_m: f64,
-    /// Radius of the body, grown by what it should keep away, metres.
+    /// Radius of the robot's base plus its clearance, metres.
     pub footprint_m: f64,
-    /// Least and greatest height of what it could run into, metres.
+    /// Minimum and maximum height of possible obstacles, metres.
     pub band_m: (f64, f64),
     /// A way that is longer than the straight line times this is a detour: the look around is cut there.
     pub detour: f64,

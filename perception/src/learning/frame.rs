@@ -28,7 +28,7 @@ const WIDE: OrganisedOptions =
 const WIDEST_PX: f64 = 32.0;
 
 impl Frame {
-    /// Pixels of a view within `reach_m` of `centre` (world, metres). `None` if the view is no
+    /// Pixels of a view within `reach_m` of `centre` (world, metres). `None` if the view has no
     /// depth image.
     pub fn new(
         view: &View,

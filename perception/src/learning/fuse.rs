@@ -51,7 +51,7 @@ impl Measured {
         }));
     }
 
-    /// Adds what so many meetings have made already.
+    /// Initialises the map with a model from earlier encounters, weighted by their number.
     pub fn carry(&mut self, made: &Cloud, meetings: u32) {
         let part = Cloud {
             points: made.points.clone(),

@@ -70,7 +70,7 @@ pub struct Recognised {
     pub model: usize,
     /// Pose, by the stated pose of the view.
     pub world_from_model: Isometry3<f64>,
-    /// Probability that it is that object at that place.
+    /// Probability of this object at this pose.
     pub confidence: f64,
     /// Evidence for it.
     pub evidence: Evidence,
@@ -109,7 +109,7 @@ pub struct Library {
 
 struct Known {
     skin: Skin,
-    /// Every so many of its points: for a first sight.
+    /// Stride through the points for a first, coarse check.
     coarse: Skin,
     features: [Features; 2],
     /// Largest extent, metres.

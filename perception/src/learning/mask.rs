@@ -49,7 +49,7 @@ impl Mask {
         Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }
     }
 
-    /// Fills gaps narrower than the square. The border of the image is no side of a gap.
+    /// Closes gaps narrower than the square; the image border does not count as a side of a gap.
     pub fn closed(&self, reach: usize) -> Mask {
         let Grid { width, height } = self.grid;
         let wide = Grid { width: width + 2 * reach, height: height + 2 * reach };

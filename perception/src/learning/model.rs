@@ -31,7 +31,7 @@ pub struct LearnOptions {
     pub plane_object_share: f64,
     /// A plane of which as much was invisible in the first view stays (ϑ_vis of Eq. 4).
     pub plane_hidden_share: f64,
-    /// Points within this of the object are of it, metres (paper: 1 cm).
+    /// Distance from the object within which points belong to it, metres (paper: 1 cm).
     pub radius_m: f32,
     /// Greatest angle between normals of one surface, radians (paper: 20 degrees).
     pub angle_rad: f64,

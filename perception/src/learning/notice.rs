@@ -27,7 +27,7 @@ pub struct NoticeOptions {
     pub range_m: f64,
     /// Side of the voxels that the static structure is kept in, metres.
     pub voxel_m: f64,
-    /// Dynamic points no farther apart hang together, metres.
+    /// Maximum distance between neighbouring points of one dynamic cluster, metres.
     pub cluster_step_m: f32,
     /// Fewest pixels of a dynamic cluster in the view that shows it best.
     pub least_pixels: usize,
@@ -64,7 +64,7 @@ pub struct MetaRoom {
 pub struct Appeared {
     /// The points of the object, world frame, from all views of the visit.
     pub cloud: Cloud,
-    /// Index of the view that shows most of it and all that is seen of it: the first training view.
+    /// Index of the view that shows most of the object: the first training view.
     pub view: usize,
     /// The pixels of the object in that view, row by row (O_0).
     pub mask: Vec<bool>,
@@ -100,7 +100,7 @@ const COVER: f64 = 0.75;
 /// Multiple of the tolerance from which a point is looked through by far: two measurements of one surface are
 /// not, nor if the camera errs by twice as much as is known of it.
 const FAR: f64 = 2.5;
-/// A camera may be turned by so many times as much as localisation errs by.
+/// Factor on the localisation's heading error that covers a rotated camera.
 const TURNED: f64 = 2.0;
 /// Background is kept up to this, metres: to have seen it is to have seen past what stands before it now.
 const BACKGROUND_M: f32 = 8.0;

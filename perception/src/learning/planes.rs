@@ -26,7 +26,7 @@ const SAMPLE: usize = 20_000;
 /// Greatest angle between a pixel's normal and its plane's, and between planes of a group, radians.
 const TILT_RAD: f64 = 0.5;
 const GROUP_RAD: f64 = 0.12;
-/// Planes of a group are no farther apart, metres.
+/// Maximum distance between planes of one group, metres.
 const GROUP_M: f64 = 0.01;
 
 /// The planes taken out so far, world frame.

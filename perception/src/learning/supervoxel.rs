@@ -17,7 +17,7 @@ pub(super) struct Supervoxels {
 }
 
 const ROUNDS: usize = 2;
-/// A normal that is at right angles counts as much as a distance of so many sides.
+/// Weight of the normal in the distance: a right angle counts as this many voxel sides.
 const NORMAL_WEIGHT: f32 = 2.0;
 
 #[derive(Clone, Default)]

@@ -27,7 +27,7 @@ const LIGHTNESS: f32 = 8.0;
 const NEAR_M: f32 = 0.015;
 /// Neighbouring pixels that differ by more than this and what the camera errs are of two surfaces, metres.
 const STEP_M: f32 = 0.01;
-/// Neighbouring pixels err together: of so many marks or points one tells something new.
+/// Number of correlated measurements (neighbouring pixels) that count as one independent one.
 const SHARED: f32 = 12.0;
 /// Number of looks, those with the nearest directions, that each look is compared with.
 const PARTNERS: usize = 6;

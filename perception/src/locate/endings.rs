@@ -20,7 +20,7 @@ const AROUND: usize = 4;
 const CERTAIN: usize = 3;
 /// A surface reaches so far back from its end, metres: where something upright goes through its plane, less is near that.
 const DEEP_M: f64 = 0.04;
-/// A side is seen in so many pixels of a line.
+/// Minimum number of pixels of an image line that see an edge.
 const SIDE: usize = 2;
 /// A surface ends within so many pixels of the last that shows it: an edge loses one or two. What else is lost there lies behind, in the
 /// shadow of the projector.

@@ -41,7 +41,7 @@ struct Stored {
 /// Cells that cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CellsError {
-    /// The edge is no positive length.
+    /// The edge length is not positive.
     #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
     Edge {
         /// Given edge.
@@ -126,7 +126,7 @@ pub struct NormalOptions {
     pub least_points: u32,
     /// … and so is one with less than this share of the points of the fullest cube within reach: the edges of surfaces are blurred along the line of sight.
     pub least_share: f64,
-    /// Regions reach so many cubes to each side of the point's own.
+    /// Radius of a region around the point's own cube, in cubes.
     pub reach: i64,
     /// Fewest regions that are evidence enough.
     pub least_regions: usize,

@@ -115,7 +115,7 @@ fn checked(
     poses.iter().enumerate().try_for_each(|(i, pose)| check_pose("station", i, pose))
 }
 
-/// Stations that are held against earlier ones: one every so many metres.
+/// Distance driven between two stations that are matched against earlier ones, metres.
 fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
     let mut last = 0.0;
     (0..ways.len())

@@ -25,7 +25,7 @@ pub struct UprightCylinder {
     pub heights_m: (f64, f64),
     /// The parts of the circle that were seen: from and to, anticlockwise from the x axis, radians.
     pub arcs_rad: Vec<(f64, f64)>,
-    /// Root mean square distance of what it was fitted to, metres.
+    /// Root mean square residual of the fit, metres.
     pub rms_m: f64,
     /// Share of what was seen there that lies on it.
     pub share: f64,
@@ -86,7 +86,7 @@ impl Default for CylinderOptions {
 /// Parts by which it is told what of a circle was seen.
 const PARTS: usize = 24;
 const PART_RAD: f64 = TAU / PARTS as f64;
-/// A square of the plan that is upright holds cells at so many heights at least.
+/// Minimum number of occupied heights in an upright column of cells.
 const LEVELS: u32 = 3;
 /// A narrower wall may be a side of a pillar, in diameters of the largest.
 const NARROW: f64 = 1.0;
@@ -94,7 +94,7 @@ const NARROW: f64 = 1.0;
 const OF_WALL: f64 = 1.5;
 /// Blur of a measured surface to each side, in tolerances.
 const BLURRED: f64 = 3.0;
-/// A round wall stands for so many planes at least.
+/// Minimum number of planes that a round wall must replace.
 const PLANES: usize = 3;
 /// Circles that are tried at most, and steps of least squares.
 const TRIES: usize = 3000;

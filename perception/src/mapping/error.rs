@@ -5,7 +5,7 @@ use nalgebra::Isometry2;
 /// Options or poses that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MappingError {
-    /// An option that is no positive length, or none that can be.
+    /// A length in the options is not positive, or impossible.
     #[error("{name} is {value}: give a number from {least} to {most}")]
     Option {
         /// Name of the option.
@@ -17,7 +17,7 @@ pub enum MappingError {
         /// The greatest that can be.
         most: f64,
     },
-    /// A pose that is no pose.
+    /// The pose is not finite.
     #[error(
         "the pose of {what} {index} is not finite, or farther out than {FARTHEST_M} m: mend the localisation that it came from"
     )]

@@ -75,11 +75,11 @@ const HEADINGS: usize = 12;
 const MOST_STEPS: usize = 2000;
 /// Rays all around a place.
 pub(super) const RAYS: usize = 180;
-/// Places that are tried lie so far apart, metres.
+/// Spacing of the poses that are tried, metres.
 const PLACES_M: f64 = 0.6;
 /// Places are tried within this of a frontier, metres.
 const AROUND_M: f64 = 2.0;
-/// Least gain that makes a pose worth a look, square metres.
+/// Minimum gain of a pose that is worth a look, square metres.
 pub(super) const LEAST_M2: f64 = 0.2;
 /// Ways to neighbouring squares, and their lengths in squares.
 const STEPS: [(i64, i64, f64); 8] = {
@@ -151,7 +151,7 @@ impl<'a> Floor<'a> {
         free
     }
 
-    /// Length of the shortest way to each square over squares where the body may be, metres; infinite where there is none.
+    /// Length of the shortest route to each free cell, metres; infinite if unreachable.
     pub(super) fn ways_m(&self, from: &Point2<f64>, stand: &[bool], radius_m: f64) -> Vec<f64> {
         let may_stand = |index: usize| stand.get(index).copied().unwrap_or(false);
         let mut ways = vec![f64::INFINITY; (self.width * self.height) as usize];

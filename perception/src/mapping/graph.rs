@@ -15,7 +15,8 @@ pub struct Edge {
     pub from_from_to: Isometry2<f64>,
     /// Inverse covariance of that pose: shift in the frame of `from` (metres), and turn (radians).
     pub information: Matrix3<f64>,
-    /// True if it may be wrong altogether: a place taken for another. It then loses weight the less it fits (Cauchy).
+    /// True if the edge may be a false loop closure; its weight then falls with its residual
+    /// (Cauchy).
     pub doubtful: bool,
 }
 
@@ -35,7 +36,7 @@ pub struct Settled {
     pub poses: Vec<Isometry2<f64>>,
     /// Squared error of each edge, in spreads: about three if spreads are right.
     pub squares: Vec<f64>,
-    /// Weight of each edge, from 0 (taken for wrong) to 1.
+    /// Weight of each edge, from 0 (rejected) to 1.
     pub weights: Vec<f64>,
     /// Steps taken.
     pub rounds: usize,
@@ -68,7 +69,7 @@ pub enum GraphError {
         /// Index of the edge.
         index: usize,
     },
-    /// Some station hangs on nothing.
+    /// A station has no edge.
     #[error("station {station} is held by no edge: give each the step from the one before it")]
     Loose {
         /// Index of the station.
@@ -79,7 +80,8 @@ pub enum GraphError {
 const MOST_ROUNDS: usize = 60;
 /// A step that moves no pose farther than this, metres and radians, is the last.
 const SETTLED: f64 = 1e-4;
-/// Errors of doubtful edges beyond so many spreads lose weight, from round to round fewer: at first all are believed, for a long way drifts far.
+/// Residual, in standard deviations, beyond which doubtful edges lose weight; it shrinks over the
+/// iterations, because drift on a long route is large at first.
 const DOUBT: (f64, f64, f64) = (1e4, 0.5, 3.0);
 
 impl PoseGraph {

@@ -33,7 +33,7 @@ pub struct Orientations {
 const BINS: usize = 90;
 /// Spread by which the histogram is smoothed, bins.
 const SMOOTH: f64 = 2.0;
-/// A peak stands out if it is so many times as high as the median of the histogram: a round room has none.
+/// Minimum ratio of a peak to the histogram's median; a round room has no such peak.
 const STANDS_OUT: f64 = 1.7;
 const MOST: usize = 8;
 const ROUNDS: usize = 30;

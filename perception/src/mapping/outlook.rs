@@ -22,7 +22,7 @@ pub struct Outlook {
     square_m2: f64,
 }
 
-/// The floor that some looks have left unknown, as far as it can be told before they are taken.
+/// Floor that is expected to be still unknown after some planned looks.
 #[derive(Clone, Debug, Default)]
 pub struct Unseen {
     /// Probability that a square is still unknown; squares without an entry surely are.

@@ -51,7 +51,8 @@ pub struct RectifyOptions {
     pub turn_sigma_rad: f64,
     /// Least share of the second plan that must lie on the first where [`Matcher::IcpEm`] is to be believed: else odometry is.
     pub explained: f64,
-    /// Number of independent points that a plan is worth: neighbours err together.
+    /// Number of independent points that one plane counts for, as neighbouring errors are
+    /// correlated.
     pub looks: f64,
 }
 
@@ -108,7 +109,7 @@ pub struct PairFit {
 const FEWEST: usize = 12;
 /// Expectations at each spread.
 const EXPECTATIONS: usize = 3;
-/// Translation and both together are found so many times in turns at the end.
+/// Number of final alternations between translation and full pose.
 const ROUNDS: usize = 2;
 /// Headings are looked for in such steps, radians, in a field of this spread, metres.
 const HEADING_STEP_RAD: f64 = 0.01;
@@ -117,7 +118,7 @@ const HEADING_SIGMA_M: f64 = 0.12;
 const COOLING: f64 = 0.7;
 /// Steps in which the translation is looked for: coarse, and fine, metres.
 const STEPS_M: [f64; 2] = [0.03, 0.006];
-/// The translation is looked for within so many spreads of odometry.
+/// Search range of the translation, in standard deviations of odometry.
 const WINDOW: f64 = 3.0;
 /// A fit farther from odometry, in spreads, is not believed.
 const STRAYED: f64 = 4.0;

@@ -101,7 +101,7 @@ pub(super) fn grow(
 }
 
 impl Constraints {
-    /// The normal nearest to one that keeps to them.
+    /// Unit normal closest to one that satisfies the constraints.
     pub fn keep(&self, normal: &Vector3<f64>) -> Vector3<f64> {
         let level = Vector3::new(normal.x, normal.y, 0.0).try_normalize(1e-6);
         let Some(level) = level.filter(|_| self.upright) else { return *normal };
@@ -187,7 +187,7 @@ fn least_upright<'a>(facets: impl Iterator<Item = &'a Facet>, middle: &Point3<f6
     (least < 0.5 * most).then(|| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned().push(0.0))
 }
 
-/// The direction of the normals of most of the area, modulo a quarter turn; `None` if there is no such.
+/// Dominant direction of the normals by area, modulo a quarter turn; `None` if there is none.
 pub(super) fn main_direction(patches: &[Patch], within_rad: f64) -> Option<f64> {
     const BINS: usize = 90;
     let direction = |p: &Patch| p.plane.normal.y.atan2(p.plane.normal.x).rem_euclid(FRAC_PI_2);

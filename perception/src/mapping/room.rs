@@ -36,7 +36,7 @@ pub struct MapOptions {
     pub normals: NormalOptions,
     /// Options for orientations.
     pub orientations: OrientationOptions,
-    /// Facets of one patch are no farther apart (λ), metres.
+    /// Maximum distance between neighbouring facets of one patch (λ), metres.
     pub grow_m: f64,
     /// Normals of walls are tilted by no more, those of level surfaces from the plumb line, radians.
     pub tilt_rad: f64,

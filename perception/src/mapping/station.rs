@@ -16,10 +16,10 @@ pub struct Station {
     pub odom_from_level: Isometry2<f64>,
 }
 
-/// A view that is no station.
+/// The view cannot serve as a station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StationError {
-    /// The pose is no pose.
+    /// The pose is not finite.
     #[error("the pose of the camera is not finite: give metres and a unit quaternion")]
     Pose,
     /// The camera looks along the plumb line.

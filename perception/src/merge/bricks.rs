@@ -216,7 +216,7 @@ impl<C: Copy> Bricks<C> {
         std::array::from_fn(|y| self.wide_row(beside, 1, y))
     }
 
-    /// Numbers of the cells of the brick in the middle and of a layer of those around: by z, y, x.
+    /// Cell numbers of a brick and of the layer of voxels around it, indexed by z, y, x.
     fn wide(&self, beside: &Beside, wide: &mut [[[u32; WIDE]; WIDE]; WIDE]) {
         for (z, layer) in wide.iter_mut().enumerate() {
             for (y, row) in layer.iter_mut().enumerate() {
@@ -242,7 +242,8 @@ impl<C: Copy> Bricks<C> {
         beside
     }
 
-    /// A row of a wide brick, from the bricks beside the one in its middle.
+    /// One row of a brick extended by one voxel on each side; the outer voxels come from the
+    /// neighbouring bricks.
     #[inline(always)]
     fn wide_row(&self, beside: &Beside, z: usize, y: usize) -> [u32; WIDE] {
         let ((above, z), (behind, y)) = (in_brick(z), in_brick(y));

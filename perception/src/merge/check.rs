@@ -24,11 +24,11 @@ const MOST_CONTRADICTED: f64 = 0.22;
 pub(super) enum Misfit {
     /// It has no usable point in range.
     Empty,
-    /// It shares too few points with the others, so many.
+    /// The view shares too few points with the others: this many.
     Alone(usize),
     /// It would have to move farther than localisation errs, metres and radians.
     Far(f64, f64),
-    /// The share of what it shows that contradicts what the others saw through.
+    /// Share of the view that contradicts free space seen by the others.
     Contradicted(f64),
 }
 

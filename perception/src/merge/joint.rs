@@ -46,7 +46,8 @@ struct Link {
     squares: f64,
 }
 
-/// Spread that all partners have at least: they are seldom the same place, metres. From: derived, as far as forms differ.
+/// Minimum standard deviation of corresponding points, metres: they are seldom the same surface
+/// point. From: derived, within the limits of the shape model.
 const LEAST_SIGMA_M: f32 = SHAPE_M as f32;
 /// Number of nearest views that hold a view in its place. From: chosen.
 pub(super) const PARTNERS: usize = 5;
@@ -56,13 +57,14 @@ const SAME_SIDE: f32 = 0.75;
 const SLACK: f32 = 0.1;
 /// A pass that moves no camera farther than this, metres and radians, ends the round. From: chosen.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
-/// Views whose last pass moved no camera by so many times as much have settled all the same. From: chosen.
+/// Multiple of the convergence limit at which views still count as settled after the last
+/// iteration. From: chosen.
 const NEARLY: f64 = 5.0;
-/// A round ends early once partners lie within so many times what they do at its last pass. From: chosen.
+/// Multiple of the final correspondence distance at which a round ends early. From: chosen.
 const LATE: f64 = 1.5;
 
-/// Aligns the views that are `used` among each other. Where localisation has a view errs by so many times what it states as `loose` tells; what is
-/// not loose at all stays where it is. `parts` tells for each view what its points belong to.
+/// Aligns the views marked `used` with each other. `loose` is a factor on the stated localisation
+/// error of each view; views with 0 stay fixed. `parts` labels the points of each view.
 pub(super) fn align(
     views: &[Prepared],
     used: &[bool],
@@ -254,7 +256,8 @@ fn step(
     poses: &mut [Isometry3<f64>],
     links: &[Link],
 ) -> (f64, f64) {
-    /// Neighbouring points share their errors: the matched surface counts for no more than so many independent looks. From: chosen.
+    /// Maximum number of independent measurements that a matched surface counts for, as
+    /// neighbouring errors are correlated. From: chosen.
     const INDEPENDENT: f64 = 150.0;
     let mut slots = vec![None; views.len()];
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && loose[i] > 0.0).collect();
@@ -350,7 +353,7 @@ pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<
 
 /// A camera far from where localisation had it loses its say on the common frame: one lost view must not drag the others.
 fn prior_weight(sigmas: f64) -> f64 {
-    /// Spreads at which half of it is left. From: chosen.
+    /// Distance, in standard deviations, at which the weight is one half. From: chosen.
     const HALVED: f64 = 4.0;
     1.0 / (1.0 + (sigmas / HALVED).powi(2))
 }

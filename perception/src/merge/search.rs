@@ -28,12 +28,12 @@ pub(super) const PERHAPS_SHARE: f64 = 0.0;
 /// From: chosen.
 const PRIOR: f64 = 0.15;
 
-/// Score of a point in a cell of a surface that faces the same way, and of a point beside such a cell, units
-/// of the score. From: chosen.
+/// Score of a point in an occupied cell with the same facing, and in a neighbour of such a cell.
+/// From: chosen.
 const HIT: u8 = 20;
 const BESIDE: u8 = 7;
 
-/// Surfaces of placed views in cells: for each side that a surface can face, what a point in a cell is worth.
+/// Score grid of the aligned surfaces: for each of six facings, the score of a point in each cell.
 struct Cells {
     side_m: f64,
     low: [i32; 3],
@@ -94,7 +94,8 @@ impl Cells {
         self.worth[table + at] = HIT;
     }
 
-    /// Mean worth (1 for a hit) of points over all shifts of up to `reach` cells along x and y, row by row of x.
+    /// Mean score (1 for a hit) of the points for all shifts of up to `reach` cells along x and y,
+    /// row by row of x.
     fn scores(&self, points: &[(Point3<f64>, usize)], reach: i32) -> Vec<f64> {
         /// Shifts along y are summed up by as many at once. From: work.
         const LANES: usize = 8;

@@ -157,7 +157,8 @@ impl WindowSums {
     /// without a branch.
     #[inline(always)]
     fn surfaces(&self, at: &[[f32; LANES]; 3], options: &OrganisedOptions) -> [[f32; LANES]; 4] {
-        /// Newton's steps; in single precision they have settled then, but where there is no direction of least spread.
+        /// Number of Newton iterations; single precision has converged by then, unless no direction
+        /// has the least variance.
         const STEPS: usize = 6;
         /// Spread across a line below this part of that along it is rounding.
         const COLLINEAR: f32 = 1e-6;

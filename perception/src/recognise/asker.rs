@@ -135,7 +135,8 @@ impl<'a> Asker<'a> {
 
 /// The cameras that do not look through a body which others see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
-    /// A camera has a body in view if it is asked with success about more than one in so many points. From: chosen.
+    /// A camera has a body in view if it measured more than one in this many of the sampled points.
+    /// From: chosen.
     const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);
     let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).copied().collect();

@@ -242,7 +242,7 @@ struct Weighed {
     stances: Vec<Stance>,
 }
 
-/// A model that is less probable than this by cheap measures is not worth asking rays about. From: chosen.
+/// Minimum probability by cheap measures for a model to be checked by rays. From: chosen.
 const DOUBT: f64 = 0.1;
 /// Log of how much likelier pixels have to be with two bodies than with one for a segment to be parted. From: derived, one more
 /// round body has five sizes, each told to one part in fifty.
@@ -487,7 +487,7 @@ impl Descry {
     }
 }
 
-/// Standard deviation of where a thing stands is no less, metres. From: chosen.
+/// Minimum standard deviation of an object's position, metres. From: chosen.
 const LEAST_PLACE_SIGMA_M: f64 = 0.001;
 /// Log of the chance that a thing of a family, as measured, is of none of the known kinds.
 fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {

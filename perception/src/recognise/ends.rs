@@ -27,7 +27,8 @@ pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool
 /// The likelihood of each length of one side of a box given the views, relative to the likeliest length.
 #[derive(Clone, Debug)]
 pub struct Side {
-    /// The least of the lengths that were tried, [`EDGE_M`] apart, metres, and the log of each.
+    /// Smallest length that was tried, metres (steps of [`EDGE_M`]), and the log-likelihood of each
+    /// length.
     least_m: f64,
     logs: Vec<f64>,
 }
@@ -61,7 +62,7 @@ impl Side {
 
     /// The integral of the likelihood over lengths of a density, metres, of which there is so much beyond the longest that was tried.
     pub fn sum(&self, density: impl Fn(f64) -> f64, beyond: f64) -> f64 {
-        /// Shorter by so many steps than the least that was tried it is not. From: rounding.
+        /// Number of steps below the smallest tried length that are integrated too. From: rounding.
         const SHORTER: usize = 8;
         let steps = SHORTER + ((self.longest_m() - self.least_m) / STEP_M).round() as usize;
         let lengths_m = (0..steps).map(|n| self.longest_m() - (n as f64 + 0.5) * STEP_M);

@@ -32,7 +32,8 @@ pub(super) const UNSEEN: f64 = 0.08;
 const ROOT: f64 = 0.35;
 /// An inside is said to be seen, or not to be there, where it is so much likelier, log. From: chosen.
 const SAID: f64 = 1.5;
-/// A handle has one in so many points of the body, far off and near, but at least and at most so many. From: chosen.
+/// Number of body points for each point that a visible handle has, far and near, with lower and
+/// upper limit of the expected count. From: chosen.
 pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
 pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
 /// Least height of a handle, metres. From: chosen.

@@ -186,8 +186,9 @@ fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
     (samples.iter().map(number).collect(), keys)
 }
 
-/// The points that proposals are judged by, each coordinate by itself, from the first of them: a micrometre is more than they know. Filled
-/// up to whole blocks with what is no number, which is near no plane.
+/// Sample points that score plane proposals, one array a coordinate, relative to the first point in
+/// single precision (accurate to a micrometre). Padded to whole blocks with NaN, which lies near no
+/// plane.
 struct Judges {
     count: usize,
     origin: Vector3<f64>,

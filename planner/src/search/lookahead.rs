@@ -77,8 +77,9 @@ impl Lookahead {
         self.steer_to_goal(task);
     }
 
-    /// Applies every operator that can be applied, in order, but those that are there to move a number; these come before
-    /// one that takes away what they need. Tells whether there was one.
+    /// Applies every applicable operator of the relaxed plan in order. Operators that only change
+    /// numbers are kept back, and applied just before an operator that would disable them. Returns
+    /// true if any was applied.
     fn pass(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         let mut rest = std::mem::take(&mut self.rest);

@@ -348,7 +348,8 @@ impl<'a, 's> Run<'a, 's> {
         end
     }
 
-    /// Improves a plan for so much work and takes it if it is the best so far; tells whether more work would do no more.
+    /// Improves a plan within a work budget and adopts it if it is the best so far; true if more
+    /// work would change nothing.
     fn improve(&mut self, mut plan: Vec<u32>, work: u64) -> bool {
         let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
         improve.evaluation_limit =

@@ -93,8 +93,8 @@ impl Lookahead {
         task.applicable(operator, &self.state)
     }
 
-    /// Moves numbers until a numeric condition holds, if possible without breaking others of `keep`; tells whether
-    /// anything moved.
+    /// Applies operators until a numeric condition holds, if possible without breaking other
+    /// conditions in `keep`; true if any was applied.
     fn approach(&mut self, task: &Compiled, fact: u32, keep: &[u32], depth: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || task.holds(fact, &self.state) {
@@ -124,8 +124,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// The applicable operator that brings a comparison about at least cost, with how often it must be applied; one that
-    /// breaks nothing of `keep` first.
+    /// The applicable operator that achieves a comparison at least cost, and the number of
+    /// applications; operators that break nothing in `keep` are preferred.
     fn best_mover(&self, task: &Compiled, comparison: u32, keep: &[u32]) -> Option<(u32, u32)> {
         let gap = task.numbers.gap(comparison as usize, &self.state);
         let relation = task.numbers.comparisons[comparison as usize].relation;
@@ -154,7 +154,7 @@ impl Lookahead {
         task.numbers.gain_in(comparison, &task.numbers.changes[operator as usize], &self.state)
     }
 
-    /// True if so many applications of an operator falsify a condition that holds.
+    /// True if this many applications of an operator falsify a condition that holds now.
     fn breaks(&self, task: &Compiled, operator: u32, times: u32, fact: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || !task.holds(fact, &self.state) {

@@ -210,7 +210,8 @@ impl World<'_> {
         Ok(gates)
     }
 
-    /// Lets an action end in a situation that it is no longer open in; `false` if it cannot.
+    /// Applies the end of an action that is already removed from the running ones; `false` if it
+    /// cannot end now.
     fn finish(&self, own: &Open, situation: &mut Situation) -> Result<bool, Failure> {
         let act = &self.acts[own.act as usize];
         if !act.flow_effects.is_empty() {

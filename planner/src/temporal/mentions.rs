@@ -21,9 +21,9 @@ use super::order::{Access, Inconsistent};
 use super::space::{Space, Track};
 use super::world::{Act, World};
 
-/// Rounds of moving happenings apart, each of which may bring others together.
+/// Maximum number of passes; separating two happenings may bring others together.
 const MOST_ROUNDS: usize = 100;
-/// After so many happenings that were compared with their neighbours, it asks whether to stop.
+/// Number of compared pairs of happenings between two queries of `stop`.
 const TOUCHES_A_LOOK: usize = 1024;
 
 /// A predicate or a function: whether it is a function, its number.
@@ -33,7 +33,7 @@ type Name = (bool, u32, Vec<u32>);
 
 /// In place of arguments: all instances of a predicate or function.
 const ALL: u32 = u32::MAX;
-/// In place of arguments: one instance, which one a state decides.
+/// Stands for the arguments of one instance that only the state determines.
 const SOME: u32 = u32::MAX - 1;
 /// In place of a step: a timed literal.
 const GIVEN: usize = usize::MAX;
@@ -46,7 +46,7 @@ enum Use {
     Deletes,
     /// Adds or deletes one of several.
     Changes,
-    /// Gives a number a value: not even two of the same kind may happen together.
+    /// Assigns a number; excludes every other access at the same time, another assignment too.
     Writes,
 }
 
@@ -61,8 +61,8 @@ struct Touch {
     does: Use,
 }
 
-/// Moves apart what happens at the same time where one changes what the other mentions; whether it came to an end with that: of a
-/// long plan it does not once asked to stop.
+/// Separates simultaneous happenings of which one changes what the other reads. Returns false if
+/// `stop` ended it early.
 pub fn keep_apart(
     space: &Space,
     steps: &[Step],

@@ -21,7 +21,7 @@ use super::world::{Act, World};
 /// The part of an action that a relaxed operator stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
-    /// All of it in one go.
+    /// Start and end as one operator.
     Whole,
     /// The start of an action that then stays open.
     Start,
@@ -48,7 +48,7 @@ pub(super) struct Operator {
     pub(super) moves: Vec<u32>,
     /// Calls that never change: asked once the rest is reached.
     pub(super) gates: Vec<(CallId, bool)>,
-    /// Seconds that it takes at least, as far as known without a state.
+    /// Lower bound on the duration that holds in every state, seconds.
     pub(super) seconds: Seconds,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct Hot {
     pub(super) needs: u32,
     /// True if its applicability needs no attachment.
     pub(super) plain: bool,
-    /// Seconds that it takes, infinite where it can never be applied; NaN where that must be asked.
+    /// Duration, seconds; infinite if the action can never be applied, NaN if it depends on a call.
     pub(super) seconds: f64,
     /// Cost of being a step at all.
     pub(super) step: f64,
@@ -87,7 +87,7 @@ pub(super) struct Waiter {
     pub(super) operator: u32,
     /// The only thing that it gives or moves; [`NOBODY`] where there are more.
     pub(super) target: u32,
-    /// Seconds that it takes, as far as known by now.
+    /// Duration as far as known now, seconds.
     pub(super) seconds: f64,
     /// Cost of being a step at all.
     pub(super) step: f64,
@@ -124,8 +124,8 @@ pub(crate) struct Relaxed {
     /// The tests that read each resource.
     tests_on: Vec<Vec<u32>>,
     pub(super) test_base: u32,
-    /// For each action whose start and end are separate: the propositions that it is open, and that it is
-    /// closed.
+    /// For each action with separate start and end: the propositions "is running" and "is not
+    /// running".
     pub(super) tokens: FxHashMap<u32, (u32, u32)>,
     /// First of those.
     pub(super) token_base: u32,
@@ -578,7 +578,7 @@ fn needs_of_whole(world: &World, act: &Act) -> Merged {
     merged
 }
 
-/// The duration of an action as far as known without a state, in seconds.
+/// Duration of an action that holds in every state, seconds.
 fn seconds_of(world: &World, act: usize) -> Seconds {
     let act = &world.acts[act];
     if !act.durative {

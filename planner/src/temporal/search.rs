@@ -61,7 +61,7 @@ const PASSED: u64 = 1 << 63;
 /// Work of putting a step of a path in its time, and of making a state.
 const WORK_A_STEP: u64 = 20;
 const WORK_A_STATE: u64 = 50;
-/// Memory is looked at after so many entries, of which a state counts for some.
+/// Number of queue entries between two checks of the memory limit; a state counts for several.
 const MOST_UNSEEN: usize = 4096;
 const UNSEEN_A_STATE: usize = 64;
 /// Priority of the preferred queue after progress (Richter and Westphal 2010).

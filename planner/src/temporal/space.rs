@@ -20,7 +20,7 @@ use super::world::{Act, Moment, Span, World};
 const MOST_STRETCHED: usize = 8;
 /// Differences of times that rounding makes are no stretch.
 const LEAST_STRETCH_S: f64 = 1e-7;
-/// After so many steps of a replay, it asks whether to stop.
+/// Number of replayed steps between two queries of `stop`.
 const STEPS_A_LOOK: usize = 256;
 
 /// Measure of plans.

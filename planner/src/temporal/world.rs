@@ -29,8 +29,8 @@ pub struct Act<'a> {
     pub durative: bool,
     /// Bounds on the duration.
     pub bounds: &'a [DurationBound],
-    /// Fraction of the slack between its duration bounds that it takes: 0 for the shortest duration, or for
-    /// as long as it has to; more where the shortest alone would not give all that its effects can do.
+    /// Position of the duration within its bounds: 0 for the shortest that the conditions allow, 1
+    /// for the longest; above 0 only where the shortest cannot give all effects.
     pub share: f64,
     /// Holds right before the start.
     pub at_start: &'a Conjunction,

@@ -6,9 +6,9 @@ use crate::model::walk::{self, Part};
 use crate::plan::{EPSILON_S, Plan, Step};
 use crate::task::{Assignment, Change, Expression, FunctionId, Task};
 
-/// Different steps that are done again, at most, to see what comes of it.
+/// Maximum number of distinct steps that are tried as repeatable.
 const MOST_TRIED: usize = 8;
-/// A step that can be done so many times more, and is worth as much each time, is taken to be so for ever.
+/// Number of further repetitions with equal gain after which a step counts as repeatable for ever.
 const OFTEN: usize = 100;
 
 /// A step of a valid plan that can be done again and again at its end, with what the metric becomes better by each time; as far as
@@ -62,7 +62,7 @@ fn may_help(task: &Task, step: &Step, (counted, adds): &(Vec<FunctionId>, bool))
     })
 }
 
-/// The plan with a step so many times more after all others, one after the other.
+/// The plan with a step repeated this many times at its end.
 fn with_more(plan: &Plan, step: &Step, times: usize) -> Plan {
     let mut more = plan.clone();
     let mut next_s = plan.makespan_s().map(|end_s| end_s + EPSILON_S);

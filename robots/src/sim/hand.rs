@@ -89,7 +89,7 @@ fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
 /// Reason for which an object cannot be placed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoPlace {
-    /// There is no surface.
+    /// There is no such surface.
     NoSurface,
     /// The surface ends too close.
     Edge(String),

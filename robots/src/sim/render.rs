@@ -22,7 +22,7 @@ pub struct Frame {
     pub depth_m: Vec<f32>,
     /// Cosine of the angle between the ray and the surface's normal.
     pub cosine: Vec<f32>,
-    /// Label of what it shows, as in [`world`](crate::sim::world).
+    /// Label of the surface hit, as in [`world`](crate::sim::world).
     pub label: Vec<u16>,
     /// Red, green, blue, shaded.
     pub colour: Vec<[u8; 3]>,

@@ -19,7 +19,7 @@ use crate::note::Note;
 use crate::situation::{Held, Situation, Thing};
 use crate::world::WorldError;
 
-/// A hand may touch what stands so near to what it takes, metres.
+/// Distance within which the hand may touch what stands beside the object that it takes, metres.
 const TOUCHED_M: f64 = 0.03;
 /// Distance from its place within which an object that slipped out of the hand may lie, metres.
 const SLIPPED_M: f64 = 0.15;

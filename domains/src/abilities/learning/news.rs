@@ -14,7 +14,7 @@ use descry_perception::recognise::{Handle, ObjectModel, Range, Shape, Top};
 use crate::lexicon::symbol;
 use crate::situation::{Past, Situation};
 
-/// Directions around a thing that are told apart.
+/// Number of viewing directions around an object that are distinguished.
 pub(super) const DIRECTIONS: usize = 36;
 /// A look shows what lies so far to either side of where it comes from, directions: 15 degrees.
 const TO_EITHER_SIDE: usize = 1;
@@ -64,7 +64,7 @@ pub struct Novelty {
     pub centre: Point3<f64>,
     /// Sides of the box around what was noticed of it, metres.
     pub size_m: [f64; 3],
-    /// Looks at it, the one that noticed it first.
+    /// Looks at the object; the first one noticed it.
     pub looks: Vec<Look>,
     /// Its pixels in that.
     pub mask: Arc<Vec<bool>>,

@@ -39,11 +39,13 @@ const EDGE_M: f64 = 0.08;
 const LONG: f64 = 6.0;
 /// Distance from a novel object, beyond its radius, within which an appeared part belongs to it, metres.
 const OF_IT_M: f64 = 0.1;
-/// A piece that hangs over something new by no more than this is of it, metres: what is between them is hidden from above.
+/// Maximum gap below a piece that hangs over a new object and is still taken to be part of it,
+/// metres: a camera from above cannot see into the gap.
 const OVER_IT_M: f32 = 0.1;
 /// Things nearer to each other than this are one, metres.
 const SAME_M: f64 = 0.12;
-/// So sure must it be that something is what was learned before, and as great a share of it must be explained.
+/// Minimum confidence, and minimum share of explained points, to identify an object with a learned
+/// one.
 const SURE: f64 = 0.8;
 const EXPLAINED: f64 = 0.5;
 /// A thing of which less of its sides was seen is looked at from around again when it is met.
@@ -51,7 +53,8 @@ const KNOWN_ROUND: f64 = 0.8;
 /// A model that is along any axis longer than this many times what was noticed, and so much more (metres), has taken in what it stands on or beside.
 const GROWN: f64 = 2.0;
 const GROWN_M: f64 = 0.1;
-/// A thing is seen through if of its points so many were looked through, of those that were looked at, and at least so many were.
+/// Minimum share of an object's points that a view looked through, and minimum number of points
+/// that it looked at, for the object to count as gone.
 const THROUGH: f64 = 0.6;
 const LOOKED_AT: u32 = 50;
 /// A depth so much beyond a point has looked through it, metres.

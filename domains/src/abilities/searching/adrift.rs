@@ -11,11 +11,12 @@ use crate::situation::{KnownSurface, Situation};
 
 /// A thing that is farther than this from where it is said to stand is not there, metres: nobody would grasp it.
 const OFF_M: f64 = 0.03;
-/// A chance below this of being that far off is none.
+/// Probability of a displacement below which it is neglected.
 const NEGLIGIBLE: f64 = 0.01;
-/// Cosine of the widest angle between a direction and the normal of a side that tells of it.
+/// Cosine of the largest angle between a direction and the normal of an edge that constrains it.
 const ACROSS: f64 = 0.7;
-/// A side is looked for at points so far apart, and so far inside of it and above the surface, metres.
+/// Spacing of the sample points along an edge, and their distance inside the edge and above the
+/// surface, metres.
 const STEP_M: f64 = 0.05;
 const INSIDE_M: f64 = 0.01;
 
@@ -78,7 +79,7 @@ pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     ends.filter(|end| looks().any(|from| s.would_settle(from, on, end, None) > 0.0)).collect()
 }
 
-/// A side of a surface, if it tells of a direction and most of it has not been seen.
+/// An edge of a surface, if it constrains a direction and most of it is unseen.
 fn end(
     s: &Situation,
     on: usize,

@@ -71,7 +71,7 @@ impl Features {
         Features { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }
 
-    /// The features at some points of a skin; where there is nothing to describe there is none.
+    /// Features at some points of a surfel cloud; points without enough neighbours have none.
     pub fn of(skin: &Skin, keypoints: &[u32], kind: Kind) -> Features {
         let describe = |&i: &u32| {
             let descriptor = match kind {

@@ -39,7 +39,7 @@ pub struct Judged {
     pub world_from_model: Isometry3<f64>,
     /// Evidence of all looks.
     pub evidence: Evidence,
-    /// Probability that it is that object at that place.
+    /// Probability of this object at this pose.
     pub confidence: f64,
     /// Number of looks that could have shown it.
     pub looks: usize,

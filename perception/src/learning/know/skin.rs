@@ -12,7 +12,7 @@ pub(super) const STEP_M: f32 = 0.004;
 /// Cells in which what lies behind is hidden, and how far behind, metres.
 const CELL_M: f32 = 0.008;
 const BEHIND_M: f32 = 0.012;
-/// Least cosine between a normal and the direction that it is seen from.
+/// Minimum cosine between a normal and its viewing direction.
 const FACING: f32 = 0.2;
 
 /// A direction across another, unit lengths.

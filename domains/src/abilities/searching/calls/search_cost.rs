@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::abilities::argument;
 use crate::situation::Situation;
 
-/// No look costs more than so many seconds for being in vain: where next to nothing is left, one look is as vain as another.
+/// Maximum penalty of a look in vain, seconds: with almost nothing left to find, all looks are
+/// alike.
 const MOST_S: f64 = 10_000.0;
 
 /// Evidence for a first look at a surface.

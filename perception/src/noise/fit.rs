@@ -18,8 +18,8 @@ const COVERED: f64 = 0.8;
 const NEAR_SHARE: f64 = 0.012;
 /// A block is so far within the face, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
-/// Residual, in standard deviations of the block, beyond which a pixel is off the face. From:
-/// chosen.
+/// Residual, in standard deviations of the block, beyond which a pixel is off the face.
+/// From: chosen.
 const OUTLIER: f64 = 4.0;
 /// Fewest blocks to go by, and the weight of what was assumed before, in blocks. From: chosen.
 const FEWEST: usize = 4;

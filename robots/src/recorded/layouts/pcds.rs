@@ -20,8 +20,8 @@ const MOST_BYTES: u64 = 1 << 30;
 const EXPLAINED: f64 = 0.9;
 /// Rows and columns of the image of a cloud without pixels, at the most and at the least. From: chosen.
 const SIDE: [f64; 2] = [64.0, 320.0];
-/// Minimum number of cloud points for each image pixel; with fewer the image has holes. From:
-/// chosen.
+/// Minimum number of cloud points for each image pixel; with fewer the image has holes.
+/// From: chosen.
 const POINTS_PER_PIXEL: f64 = 4.0;
 /// Share of the points that such an image shows, and the least and greatest half angle, as slopes. From: chosen.
 const IN_VIEW: f64 = 0.98;

@@ -254,7 +254,8 @@ impl Asker<'_> {
         }
     }
 
-    /// None of a kind was seen, as sure as was asked for that all of it is known.
+    /// Answer that no object of a kind was seen, once the kind is searched to the required
+    /// confidence.
     fn none_of(&self, kind: &Thing) -> (Verdict, String) {
         let s = self.s;
         let left = 1.0 - s.completeness(0);

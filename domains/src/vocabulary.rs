@@ -224,7 +224,7 @@ fn changed(task: &Task, is_such: impl Fn(&Change) -> bool) -> BTreeSet<String> {
     effects.filter(|effect| is_such(&effect.change)).flat_map(|e| changed_by(task, &e.change)).collect()
 }
 
-/// The words that a change is of.
+/// Names of the predicates and functions that an effect changes.
 fn changed_by(task: &Task, change: &Change) -> Vec<String> {
     let predicate = |id: descry_planner::task::PredicateId| task.predicate(id).name.clone();
     let function = |id: descry_planner::task::FunctionId| task.function(id).name.clone();

@@ -232,7 +232,7 @@ impl Cloud {
 
     /// True if more than half of the points lie well within what is typical: told without a root of each.
     fn is_surely_near(&self) -> bool {
-        /// Share of the square of that range up to which single precision tells it. From: rounding.
+        /// Fraction of the squared range below which single precision is safe. From: rounding.
         const SURE: f32 = 0.999;
         let sure_sq = (FARTHEST_TYPICAL_M * FARTHEST_TYPICAL_M) as f32 * SURE;
         let count = |(near, finite): (u32, u32), p: &Point3<f32>| {

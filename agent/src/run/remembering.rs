@@ -40,7 +40,7 @@ pub fn check(store: &str, run: &Path) -> Result<(), CommandError> {
     open(store).map(|_| ())
 }
 
-/// Keeps in a store what a run leaves that began with what there was in the store at that time.
+/// Writes what a run learned into a store, merged with what other runs have written since `began`.
 ///
 /// # Errors
 /// As [`recall`].

@@ -11,7 +11,7 @@ use crate::world::WorldError;
 /// The kind under which a reading is recorded.
 const READING: &str = "reading";
 
-/// See the module.
+/// The ability *reading*.
 pub const ABILITY: Ability = Ability {
     name: "reading",
     about: "reads the body's sensors that are neither camera nor laser, for facts by programs",

@@ -176,7 +176,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Answer to a question of which nothing that can be done tells more.
+    /// Answer to a question that no further action can decide better.
     pub(super) fn to_question(&self) -> (Verdict, String) {
         let Judgement { value, word } = self.judgement();
         match value {

@@ -45,7 +45,7 @@ impl Check<'_> {
         list
     }
 
-    /// Who carries an action out.
+    /// Skill or program that carries an action out.
     fn performed(
         &self,
         name: &str,

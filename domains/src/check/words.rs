@@ -14,7 +14,8 @@ use crate::words;
 const GIVEN: [&str; 8] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle", SENSE];
 
 impl Check<'_> {
-    /// Words that an ability states have its types; words that nothing states or changes begin somewhere.
+    /// Checks that words stated by an ability have its types, and that words nothing changes have a
+    /// beginning.
     pub(super) fn words(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();

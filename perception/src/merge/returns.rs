@@ -115,7 +115,7 @@ impl InCamera {
 /// Normals (camera frame) of some of a view's pixels: of every nth row and column.
 struct Facing<'a> {
     normals: Cow<'a, [Vector3<f32>]>,
-    /// Number of the first normal of each row of the view, and of its columns from there.
+    /// Index of the first normal of each row, and offset of each column within its row.
     rows: Vec<usize>,
     columns: Vec<usize>,
 }

@@ -219,8 +219,8 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
     if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
 }
 
-/// Calls `found` for each column of the brick in the middle with its number and, if it is of the mask, its mean, and where that lies once moved
-/// along z onto the mean of the columns around it.
+/// Calls `found` for each column of the middle brick with its number and, if the mask holds it, its
+/// mean and the same point moved along z to the mean of the columns around it.
 fn level(
     bricks: &Bricks<Cell>,
     beside: &Beside,

@@ -229,7 +229,7 @@ impl Descry {
     }
 }
 
-/// The sensor that errs as what the cameras show of the surface.
+/// Sensor model whose noise is fitted to the residuals of the supporting surface.
 fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
     let mut residuals = Residuals::default();
     seen.maps.iter().for_each(|map| residuals.add(map, &scene.surface));

@@ -131,7 +131,8 @@ impl<'a> Run<'a> {
         self.stride = stride;
     }
 
-    /// Rounds up to a number of them in all, until one moves less than `ease` times what counts as settled.
+    /// Runs at most `most` iterations in all; ends when the motion is below `ease` times the
+    /// convergence limit.
     fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Ending {
         let options = self.options;
         let mut first = true;

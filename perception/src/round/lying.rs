@@ -59,7 +59,8 @@ pub(crate) fn fit(points: &[Point3<f64>], bounds: &Rectangle, base_m: f64, sigma
     [Some(found), risen].into_iter().flatten().min_by(best)
 }
 
-/// The round body about an axis in a direction, which rises by an angle, if it rests on what is below it.
+/// Fits a body of revolution to an axis of given direction and elevation; `None` unless it rests on
+/// what is below.
 fn about(
     points: &[Point3<f64>],
     origin: &Translation3<f64>,

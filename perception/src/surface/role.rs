@@ -309,7 +309,7 @@ fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Rol
     }
 }
 
-/// A surface that nothing tells of is the floor if it lies where the floor goes on.
+/// A surface without other evidence is the floor if it is level with a floor surface.
 fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
     let goes_on = |floor: &Surface| {
         let gap = surface.middle() - floor.middle();

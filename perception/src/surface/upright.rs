@@ -38,8 +38,8 @@ const LEVEL: f64 = 4.0;
 const UPRIGHT: f64 = 4.0;
 const UNDERSIDE: f64 = 3.0;
 const OBLIQUE: f64 = 0.05;
-/// Chance that a view that is asked for a surface shows none, against one that shows so much of it, a share of the returns, or more; and that
-/// planes tell no direction at all. From: chosen.
+/// Prior probability that a requested surface is not in view, against one that covers this share of
+/// the returns or more; and that planes tell no upward direction at all. From: chosen.
 const NO_LEVEL: f64 = 0.1;
 const SHOWN: f64 = 0.2;
 const SHAPELESS: f64 = 0.2;

@@ -322,7 +322,7 @@ impl Intervals {
         range(expression, &|number| self.near[number as usize].range)
     }
 
-    /// Lets one change widen its number; `None` if it does not.
+    /// Widens the reachable interval of a number by one effect; `None` if the effect adds nothing.
     fn widen(&mut self, node: u32, place: usize) -> Option<u32> {
         let NumberChange { number, change: Some(change), amount: Some(amount), .. } =
             &self.changes.get(node as usize)[place]

@@ -170,7 +170,8 @@ fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> V
     keep
 }
 
-/// Asks for what a condition needs before an action whose own start does not give it.
+/// Collects what the condition of an action needs before its start, except what its own start
+/// provides.
 fn ask_but_for(asked: &mut Asked, condition: &Conjunction, start: &[crate::ground::Effect], whole: bool) {
     let given = |fact: &Fact| whole && start.iter().any(|effect| effect.outcome == Outcome::Set(*fact));
     let facts = condition.facts.iter().filter(|fact| !given(fact)).copied().collect();

@@ -291,7 +291,8 @@ fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
 }
 
 impl Node {
-    /// Lets time go on to a happening: what is in progress holds, and what flows has flown.
+    /// Advances time to a happening: checks invariants of running actions and applies their
+    /// continuous effects.
     fn pass(&mut self, world: &World, now: u32) -> Option<()> {
         let now = Linear::variable(now);
         let Some(last) = self.last.map(Linear::variable) else { return Some(()) };

@@ -90,8 +90,8 @@ impl Order {
         })
     }
 
-    /// Least time after one happening of each from `first` on, seconds; minus infinity where it is free to
-    /// come before.
+    /// Minimum delay of each happening from `first` on after `start`, seconds; minus infinity if it
+    /// may come before.
     pub fn after_s(&self, start: u32, first: usize) -> Vec<f64> {
         let mut after_s = vec![f64::NEG_INFINITY; self.len() - first];
         after_s[start as usize - first] = 0.0;

@@ -31,7 +31,7 @@ const FROM_M: f64 = 1.2;
 /// The skill that puts down what is in the hand.
 const PUT_DOWN: &str = "put-down";
 
-/// See the module.
+/// The ability *carrying*.
 pub const ABILITY: Ability = Ability {
     name: "carrying",
     about: "takes one thing into the hand and puts it down elsewhere",

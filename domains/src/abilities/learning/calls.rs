@@ -47,7 +47,8 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     )
 }
 
-/// The quickest of the visits and looks that promise anything; a look that searches where none is asked for.
+/// Choices without a plan, best first: useful visits and looks by travel time, then modelling an
+/// open novelty, then search looks.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let visits = s.news.places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), None));
     let open = s.news.novelties.iter().filter(|n| n.fate == Fate::Open);

@@ -31,7 +31,7 @@ use news::Place;
 /// Returns farther than this are not learned from, metres.
 const RANGE_M: f64 = 2.5;
 
-/// See the module.
+/// The ability *learning*.
 pub const ABILITY: Ability = Ability {
     name: "learning",
     about: "visits places, notices what is new there, looks at it from all around and learns it",

@@ -11,7 +11,7 @@ use crate::situation::Situation;
 /// A thing of which less was seen is not known from all sides.
 const ALL_ROUND: f64 = 0.9;
 
-/// See the module; none where something else was asked.
+/// Answers a goal about learning; `None` for other goals.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     goal.asked.of_word(PATROLLED).next()?;
     let is_to_learn = goal.asked.of_word("settled").next().is_some();

@@ -17,7 +17,7 @@ use crate::world::WorldError;
 /// The skill that drives from one pose to another.
 pub(crate) const MOVE: &str = "move";
 
-/// See the module.
+/// The ability *moving*.
 pub const ABILITY: Ability = Ability {
     name: "moving",
     about: "drives on the map, opens doors",

@@ -35,7 +35,7 @@ use perceive::Eyes;
 /// The skill that looks at a surface.
 pub(crate) const OBSERVE: &str = "observe";
 
-/// See the module.
+/// The ability *searching*.
 pub const ABILITY: Ability = Ability {
     name: "searching",
     about: "looks for things on surfaces until it is sure, pushes aside what hides them",

@@ -14,8 +14,8 @@ const BEYOND_M: f64 = 0.3;
 const UNSEEN_SHARE: f64 = 0.6;
 /// Share of an object's volume that may have been seen free, for noise, if it stands there.
 const FREE_SHARE: f64 = 0.15;
-/// The number of the five columns of an object that may seem to lie within a solid body where the object only
-/// stands close to it.
+/// Number of an object's five sample columns that may fall into a solid body by error, if the
+/// object only stands close to it.
 const GRAZED: usize = 2;
 /// Share of an object's volume in which something was measured that no object explains, for it to be likely that one stands there.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;

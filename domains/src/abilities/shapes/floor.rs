@@ -17,8 +17,9 @@ pub const THIS: &str = "this";
 pub const NOTHING_KNOWN_M: f64 = 1.0;
 /// Prior probability that a thing is none of the known ones.
 const STRANGER: f64 = 0.5;
-/// Known shapes that scans fit to none, up to so loose a shape (metres): measured one of 210 where the outline is closed, see
-/// `experiments/measure/src/shapes`. Scans of an open one hold each other in place too loosely: it is not called unknown before it was scanned once more.
+/// Probability that the scans of a known shape fit no model, by looseness of the outline (metres):
+/// 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Scans of an open
+/// outline constrain each other too little: it is scanned once more before it is called unknown.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
 /// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
 /// as long as several shapes were left.

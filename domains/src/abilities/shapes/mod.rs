@@ -28,7 +28,7 @@ use crate::world::WorldError;
 use floor::{Floor, Outline, thing};
 use unseen::Unseen;
 
-/// See the module.
+/// The ability *shapes*.
 pub const ABILITY: Ability = Ability {
     name: "shapes",
     about: "scans what stands on the floor with a laser, learns its shape, names it by its shape",

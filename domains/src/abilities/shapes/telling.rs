@@ -13,7 +13,7 @@ use crate::situation::Situation;
 /// So much of an outline may be open before it is said, metres.
 const OPEN_M: f64 = 0.02;
 
-/// See the module. `s` is the last round's.
+/// Answers a goal about shapes; `s` is the situation of the last round.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     let teller = Teller { mind, s };
     let is_to_learn = goal.asked.of_word("learned").next().is_some();

@@ -186,7 +186,8 @@ impl Chart {
         self.open = open;
     }
 
-    /// Floor that would be seen, beyond what is seen from poses that can be reached, from those to which a way led before drives failed, square metres.
+    /// Additional floor that could be seen from poses that became unreachable when drives failed,
+    /// square metres.
     fn cut_off_m2(
         &self,
         floor: &Occupancy,

@@ -31,7 +31,7 @@ const AHEAD_M: (f64, f64) = (3.0, 0.35);
 /// The skill that takes a look into the map.
 const CHART: &str = "chart";
 
-/// See the module.
+/// The ability *surveying*.
 pub const ABILITY: Ability = Ability {
     name: "surveying",
     about: "maps the room that it is in: walls, surfaces and open floor, and drives on that map",

@@ -6,7 +6,7 @@ use crate::mind::Mind;
 use crate::note::and_round;
 use crate::situation::Situation;
 
-/// See the module; none where something else was asked for, too.
+/// Answers a goal that is about the map alone; `None` for other goals.
 pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     if !(s.things.is_empty() && s.kinds.is_empty() && s.asked.is_empty()) {
         return None;

@@ -107,8 +107,8 @@ impl Library {
 }
 
 impl Evidence {
-    /// The evidence of several looks as that of one: what is seen through in one speaks against what others explain. Looks err together, so that many
-    /// count as the square root of their number.
+    /// Combines the evidence of several looks: free space in one counts against matches in others.
+    /// Errors of looks are correlated, so n looks count as √n.
     fn of_several(all: &[Evidence]) -> Evidence {
         let root = (all.len().max(1) as f64).sqrt();
         let sum =

@@ -187,10 +187,14 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Note::Perceived { on, merged, left_out, points, residual_m, objects, changed } => {
-                let (views, mm) = (if *merged == 1 { "view" } else { "views" }, residual_m * 1e3);
+                // A single view is merged with nothing.
+                let (views, apart) = match merged {
+                    1 => ("1 view".to_string(), String::new()),
+                    n => (format!("{n} views merged"), format!(", {:.1} mm apart", residual_m * 1e3)),
+                };
                 write!(
                     f,
-                    "{on}: {merged} {views} merged, {points} points, {mm:.1} mm apart; {} {}",
+                    "{on}: {views}, {points} points{apart}; {} {}",
                     objects.len(),
                     if objects.len() == 1 { "object" } else { "objects" }
                 )?;

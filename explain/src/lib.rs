@@ -198,14 +198,14 @@ pub fn saying_of(beginning: &Beginning) -> Saying {
 }
 
 /// Note on the figures of an alternative.
-const WAYS: &str = "A way to get further is what may be done next, up to the first step that may bring the numbers nearer to \
-                    what is wanted. In brackets behind it: by how much it is, of all numbers together, in how many \
-                    seconds, and how much that is a second; behind its steps their seconds. What is hoped for is what \
-                    is reckoned with if what is looked for is there: a look may show more, or less.";
+const WAYS: &str = "A way to get further is a sequence of steps up to the first that may bring the numbers nearer to what is \
+                    wanted. In brackets behind it: the sum of all improvements, the seconds until then, and the \
+                    improvement a second; behind each step its seconds. Numbers that are hoped for assume that what is \
+                    looked for is there: a look may show more, or less.";
 
 /// Note on the reading of alternatives.
-const OTHERWISE: &str = "What is hoped for is reckoned as if what is looked for were there. What a plan would come to that begins \
-                         otherwise is told with the rest of the plan behind it, as far as it can follow and is needed.";
+const OTHERWISE: &str = "What is hoped for assumes that what is looked for is there. The time of a plan that begins otherwise \
+                         includes the rest of the plan behind it, as far as that can follow and is needed.";
 /// Note on a metric that counts more seconds than pass.
 const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
                        earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \

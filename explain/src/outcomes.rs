@@ -78,7 +78,7 @@ fn outcome(deed: &Deed, doing: Option<&Call>, has_standings: bool, saying: &Sayi
         Deed::Noted(Note::Perceived { on, merged, left_out, residual_m, objects, changed, .. }) => {
             let views = match merged {
                 1 => "one view".to_string(),
-                n => format!("{n} views (laid on each other to {:.1} mm)", residual_m * 1e3),
+                n => format!("{n} views (aligned to {:.1} mm)", residual_m * 1e3),
             };
             let left_out: String = left_out.iter().map(|view| format!("; {view}")).collect();
             let is_said = |change: &&BeliefChange| has_standings && matches!(change, BeliefChange::Confidence { .. });

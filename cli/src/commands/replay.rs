@@ -45,11 +45,11 @@ fn say(replayed: &Replayed, json: bool) -> Result<(), CommandError> {
         input::print_text("the record is damaged, and nothing of it is played")?;
         return replayed.damage.iter().try_for_each(|fault| input::print_text(&format!("damaged: {fault}")));
     }
-    let counts: Vec<String> = replayed.compared.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
+    let counts: Vec<String> = replayed.compared.iter().map(|(kind, n)| format!("{kind} {n}")).collect();
     if let Some(why) = &replayed.cut_off {
         input::print_text(&format!("the run was cut off: {why}"))?;
     }
-    input::print_text(&format!("the same, byte for byte: {}", counts.join(", ")))?;
+    input::print_text(&format!("the same, byte for byte, in documents of each kind: {}", counts.join(", ")))?;
     replayed.differences.iter().try_for_each(|line| input::print_text(&format!("not the same: {line}")))
 }
 

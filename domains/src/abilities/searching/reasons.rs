@@ -69,7 +69,7 @@ pub(super) fn hope(s: &Situation, from: usize, on: usize) -> String {
             return format!("nothing is known yet of where {name} could be");
         }
         let share = doubt.share_settled(s, (from, on), Taken::default()) * 100.0;
-        format!("shows {share:.0} % of where {name} is in doubt ({:.2} left)", doubt.remaining())
+        format!("would settle {share:.0} % of the doubt about {name} ({:.2} left)", doubt.remaining())
     };
     doubts.into_iter().map(said).collect::<Vec<_>>().join(", ")
 }

@@ -143,9 +143,9 @@ pub struct ActionConfig {
     pub program: Option<Vec<String>>,
     /// Effect of that program on the world: `sensing`, `moving` or `changing`; none: changing. A question is answered without changing.
     pub kind: Option<ActionKind>,
-    /// Time for each of its skills on the body's clock, or for the program, seconds.
+    /// Time for each of its skills on the body's clock, or for the program, seconds; 60 if left out.
     pub limit_s: Option<f64>,
-    /// Failures that may pass are tried again so often.
+    /// Number of tries again after a failure that may pass; 2 if left out.
     pub retries: Option<usize>,
     /// What becomes true when it is given up: atoms of remembered words over its variables.
     #[serde(default)]

@@ -29,13 +29,14 @@ const STYLE: &str = "
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--ground); max-width: 100rem; margin: 2rem auto; padding: 0 1.5rem; }
 h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); } h3 { margin: 1.8rem 0 .4rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .8rem; text-align: left; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th, td { padding: .2rem .5rem; text-align: left; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { border-bottom: 2px solid var(--faint); } th.n, td.n { text-align: right; } tbody tr:hover { background: var(--field); }
 .scroll { overflow-x: auto; } .note { color: var(--faint); margin: .4rem 0 0; max-width: 60rem; } #live { color: var(--now); }
 figure { margin: 1.2rem 0; overflow-x: auto; } figure svg { max-width: 100%; min-width: 34rem; height: auto; border-radius: 8px; } progress { width: 100%; accent-color: var(--done); }
 pre { background: var(--field); padding: 1rem; overflow-x: auto; } dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .1rem 1rem; }
 dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace; font-size: 90%; overflow-wrap: anywhere; }
 @media (max-width: 600px) { body { padding: 0 .8rem; } th, td { padding: .2rem .45rem; } }
+@media (prefers-color-scheme: dark) { figure svg { filter: invert(1) hue-rotate(180deg); } }
 ";
 
 /// Progress of a batch.

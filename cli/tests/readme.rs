@@ -6,14 +6,25 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Pages with commands.
-const PAGES: [&str; 7] = [
+const PAGES: [&str; 18] = [
     "README.md",
+    "cli/README.md",
+    "docs/agent.md",
     "docs/commands.md",
     "docs/cookbook.md",
-    "docs/see.md",
-    "docs/scale.md",
     "docs/editors.md",
     "docs/introduction.md",
+    "docs/reference/recordings.md",
+    "docs/ros.md",
+    "docs/scale.md",
+    "docs/see.md",
+    "docs/tutorial.md",
+    "domains/home/README.md",
+    "domains/learning/README.md",
+    "domains/multi-object-search/README.md",
+    "domains/shapes/README.md",
+    "domains/survey/README.md",
+    "domains/template/README.md",
 ];
 
 fn root() -> PathBuf {

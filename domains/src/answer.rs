@@ -430,7 +430,7 @@ impl Asker<'_> {
         self.s.things.iter().enumerate().filter(|(_, t)| t.track.is_none())
     }
 
-    /// The object that a thing most likely is, if any may be it.
+    /// The object that is most probably the requested one, if any may be.
     fn best(&self, thing: &Thing) -> Option<&Track> {
         let p = |t: &Track| thing.probability(t, &self.s.surfaces);
         self.s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) > 0.0)

@@ -451,7 +451,7 @@ fn read_error(answer: &Value) -> Option<CallError> {
     timed_out().or_else(wrong).or_else(other)
 }
 
-/// Answers as they were [`written`], so many.
+/// Reads back answers as [`written`], at most `most` of them.
 fn read_answers(answers: Value, most: usize) -> Result<Vec<Result<Answer, CallError>>, CallError> {
     let line = answers.to_string();
     let said: Vec<Value> =

@@ -52,7 +52,7 @@ impl Saying {
         Saying::of_lexicon(domain, &Lexicon::new(domain, places))
     }
 
-    /// As a domain has it, with the names that a lexicon has.
+    /// Wording of a domain, with the names of a lexicon.
     pub(crate) fn of_lexicon(domain: &Domain, lexicon: &Lexicon) -> Self {
         let named =
             |of: &str| lexicon.of_type(of).iter().map(|n| (n.symbol.clone(), n.names[0].clone())).collect();

@@ -46,7 +46,7 @@ pub enum Fault {
     DepthScale(f64),
     /// The stated focal length is the true one times this factor.
     FocalLength(f64),
-    /// The stated principal point lies beside the true one by so much, pixels.
+    /// Offset of the stated from the true principal point, pixels.
     PrincipalPoint(Vector2<f64>),
     /// Columns run from right to left.
     Mirrored,

@@ -513,7 +513,7 @@ fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f6
     const WIDEST_M: f64 = 0.3;
     /// Objects are taken to be no farther, metres. From: chosen.
     const FARTHEST_M: f64 = 3.0;
-    /// The turn is searched for in so much more. From: chosen.
+    /// Factor on the search range of the rotation. From: chosen.
     const WIDER: f64 = 1.2;
     let sum = objects.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords);
     let distance = (sum / objects.len().max(1) as f64 - pose.translation.vector).norm().min(FARTHEST_M);

@@ -33,7 +33,8 @@ pub struct Sensor {
     pub steepest_deg: f64,
     /// Share of returns that have to do with nothing on their ray.
     pub stray: f64,
-    /// Neighbouring pixels err together: a block of 8 by 8 tells as much as so many that err by themselves.
+    /// Number of independent measurements that a block of 8 by 8 pixels counts for, as neighbouring
+    /// errors are correlated.
     pub looks: f64,
 }
 

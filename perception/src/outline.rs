@@ -24,7 +24,8 @@ impl Rectangle {
         Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
 }
 
-/// Orientations over a quarter turn, and one in so many that is tried before those beside the best.
+/// Number of orientations over a quarter turn, and stride of the coarse search before the best is
+/// refined.
 const TURNS: usize = 30;
 const APART: usize = 3;
 /// Points that are looked at, at the most, and those by which the turn is sought.

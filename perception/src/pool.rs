@@ -36,7 +36,7 @@ fn share(range: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)
     both(&mut || share(range.start..middle, least, work), &mut || share(middle..range.end, least, work));
 }
 
-/// Least length of a share of so many, where `least` are worth a thread.
+/// Length of one share of `count` items, where at least `least` are worth a thread.
 fn length(count: usize, least: usize) -> usize {
     count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
 }

@@ -83,7 +83,8 @@ const EDGE_SIGMA_M: f64 = 0.0025;
 /// more than so many; where views are laid on each other, those of each view. From: chosen.
 pub(crate) const MOST_INDEPENDENT: f64 = 25.0;
 
-/// A point is taken for one of the side up to so many tolerances from it, once the fit is near. From: chosen.
+/// Factor on the tolerance within which a point counts as part of the side, once the fit is near.
+/// From: chosen.
 const LAST_GATE: f64 = 1.5;
 /// A point farther out than this tells no more by being still farther, metres. From: chosen.
 const OUTSIDE_M: f64 = 0.02;

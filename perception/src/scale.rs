@@ -1,7 +1,8 @@
 //! Lengths that many judgements share: how exactly a place, an edge and a shape are known once views are merged.
 
-/// Merged views show a thing up to this far beside itself: what is no farther apart is in one place, metres.
-/// From: chosen, what is left of poses that err by centimetres; most uses bear half of it and twice as much.
+/// Accuracy of position in merged views: points closer than this are one place, metres.
+/// From: chosen, what is left of poses that err by centimetres; most uses bear half of it and twice as
+/// much.
 pub(crate) const PLACE_M: f64 = 0.008;
 /// Distance from which two positions are two places, whichever way both are off, metres. From: derived, two
 /// of them.

@@ -25,7 +25,7 @@ impl MemoryLimit {
         (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
     }
 
-    /// The same limit beside something else that takes so much.
+    /// The limit that remains beside `others` bytes in use elsewhere.
     pub fn beside(self, others: usize) -> MemoryLimit {
         match self.used {
             Some(_) => self,
@@ -33,7 +33,7 @@ impl MemoryLimit {
         }
     }
 
-    /// True if there is room for so many more bytes beside those `counted`.
+    /// True if `more` bytes fit beside those `counted`.
     pub fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
         let used = match self.used {
             Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
@@ -62,7 +62,7 @@ pub struct Rows<T> {
 }
 
 impl<T> Rows<T> {
-    /// No rows; each will have so many items.
+    /// An empty table whose rows have `width` items.
     pub fn new(width: usize) -> Rows<T> {
         let fitting = PIECE_BYTES / (width * size_of::<T>()).max(1);
         Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }

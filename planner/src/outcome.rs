@@ -135,7 +135,7 @@ pub enum PlanError {
     Attachment {
         /// The failed call.
         error: Box<AttachmentError>,
-        /// The same, under the text.
+        /// Findings, to be drawn under the text.
         findings: Findings,
     },
     /// The search's plan does not pass validation: a fault of this crate.

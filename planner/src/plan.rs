@@ -60,7 +60,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The same without what rounding has left in the last digits of its times; a third of a second stays what it is.
+    /// The plan with times rounded where only the last digits differ from a short number; a third
+    /// of a second stays as it is.
     pub fn tidy(&self) -> Plan {
         let rounded = |seconds: f64| {
             let short = (seconds * 1e6).round() / 1e6;
@@ -103,7 +104,7 @@ impl fmt::Display for Plan {
     }
 }
 
-/// Three digits, or six where three are not exact, or all that it takes to read the same number.
+/// Seconds with three digits, six if three are not exact, or as many as the exact number needs.
 pub fn seconds(value: f64) -> String {
     let short = [3, 6].map(|digits| format!("{value:.digits$}"));
     let exact = |text: &&String| text.parse() == Ok(value);

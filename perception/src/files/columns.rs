@@ -34,7 +34,8 @@ impl Columns {
         })
     }
 
-    /// Columns of so many without names: x, y, z, then colours or normals, as all rows allow; `intensity` between, if there are seven.
+    /// Meaning of unnamed columns by their number: x, y, z, then colours or normals as all rows
+    /// allow; `intensity` between if there are seven.
     pub(super) fn unnamed(values: &[f64], width: usize) -> Columns {
         let mut columns = Columns { position: [0, 1, 2], colour: None, normal: None, label: None };
         let rest = match width {

@@ -17,7 +17,8 @@ pub struct ObserveOptions {
     pub least: usize,
     /// The middle of its readings lies no farther from where the thing is looked for, metres.
     pub within_m: f64,
-    /// A reading bounds the thing if it ended so much farther out than the thing's own last one, metres; nearer by as much, it was cut off.
+    /// A reading bounds the object if it ends this much farther out than the object's own last
+    /// reading, metres; if it ends nearer by as much, the object was cut off.
     pub clear_m: f64,
 }
 

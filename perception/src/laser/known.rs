@@ -57,9 +57,10 @@ pub struct RecogniseOptions {
     /// Shapes whose features, or width, are off by more spreads are not aligned: measured at most 5.8 for the same thing, scanned from three to nine
     /// sides; see `experiments/measure/src/shapes`.
     pub gate: f64,
-    /// Features of a hull count where its outline is known to so much, metres.
+    /// Accuracy of the outline from which hull features are used, metres.
     pub tight_m: f64,
-    /// Scans constrain each other's poses where the outline is known to so much, metres; else each is held against a shape by itself.
+    /// Accuracy of the outline from which scans fix each other's poses, metres; otherwise each scan
+    /// is matched with a shape by itself.
     pub rigid_m: f64,
     /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: measured so for 97 % of scans of the same thing.
     pub same_m: f64,
@@ -213,7 +214,7 @@ fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
 }
 
-/// The names of those that fit, and of those that are not ruled out.
+/// Names of the shapes that fit, and of those that are not ruled out.
 fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 /// Rounds of the solver: the softness of the farthest points, metres, and the factor on the length of
 /// outliers; the last is the objective itself.
 const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
-/// A turn of one radian about the middle of a thing counts as a shift by so much, metres: about its radius.
+/// Length that a rotation by one radian about the middle of an object counts for, metres: about its
+/// radius.
 const RADIUS_M: f64 = 0.3;
 /// An objective below this is nothing, square metres.
 const NOTHING_M2: f64 = 1e-12;

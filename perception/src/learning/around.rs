@@ -81,8 +81,8 @@ pub fn stands(
     Ok((0..options.lines).map(on_line).collect())
 }
 
-/// Neighbouring stands strung together as far as the way between them is no detour; each runs along the lines. `way_m` is the length of the way
-/// from one place to another, metres, if there is one.
+/// Sequences of neighbouring poses that are reachable without a detour; each sequence follows the
+/// lines. `way_m` is the length of the route between two places, metres, if there is one.
 pub fn trajectories(
     stands: &[Option<Point2<f64>>],
     detour: f64,

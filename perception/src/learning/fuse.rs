@@ -22,7 +22,7 @@ const SMOOTH_M: f32 = 0.004;
 const DEEP_M: f32 = 0.01;
 /// Measurements that are asked where a place is, at most: more tell it no better.
 const ASKED: usize = 60_000;
-/// A model of one meeting is off by so much, metres.
+/// Error of a model from one encounter, metres.
 const MADE_M: f64 = 0.001;
 /// Least cosine between normals of one surface.
 const SAME_SIDE: f32 = 0.6;

@@ -29,7 +29,8 @@ pub struct LearnOptions {
     pub supervoxel_share: f64,
     /// Least share of a plane that is of the object, for it to stay (ϑ_obj of Eq. 3).
     pub plane_object_share: f64,
-    /// A plane of which as much was invisible in the first view stays (ϑ_vis of Eq. 4).
+    /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis of
+    /// Eq. 4).
     pub plane_hidden_share: f64,
     /// Distance from the object within which points belong to it, metres (paper: 1 cm).
     pub radius_m: f32,

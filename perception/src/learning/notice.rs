@@ -97,8 +97,8 @@ pub struct Visit {
 
 /// Half the side of a square that a point of the static structure covers when it is looked at, in voxels.
 const COVER: f64 = 0.75;
-/// Multiple of the tolerance from which a point is looked through by far: two measurements of one surface are
-/// not, nor if the camera errs by twice as much as is known of it.
+/// Multiple of the tolerance beyond which a point is surely looked through: two measurements of one
+/// surface differ by less, also if the camera errs by twice its known error.
 const FAR: f64 = 2.5;
 /// Factor on the localisation's heading error that covers a rotated camera.
 const TURNED: f64 = 2.0;

@@ -13,7 +13,7 @@ use nalgebra::Point3;
 pub(super) struct PlaneRules {
     /// Least share of a plane that is of the object, for it to stay (ϑ_obj).
     pub object_share: f64,
-    /// A plane of which as much was invisible in the first view stays (ϑ_vis).
+    /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis).
     pub hidden_share: f64,
 }
 

@@ -21,7 +21,7 @@ const ROUNDS: usize = 5;
 const CELL_PX: usize = 12;
 /// Least change of lightness a pixel at a mark, of 255.
 const CONTRAST: f32 = 3.0;
-/// Lightness differs so much between looks without being wrong, and marks that differ more weigh little.
+/// Usual difference of lightness between looks at one mark; marks that differ more weigh little.
 const LIGHTNESS: f32 = 8.0;
 /// A mark that would lie farther before or behind what the other look measured there is hidden or of another surface, metres.
 const NEAR_M: f32 = 0.015;

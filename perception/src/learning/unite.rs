@@ -13,7 +13,8 @@ const NEIGHBOURS: usize = 20;
 const WITHIN_M: [f32; 2] = [0.02, 0.006];
 /// Greatest correction of a found pose, metres and radians: beyond that it was found wrongly.
 const MOST_MOVED: (f64, f64) = (0.03, 0.3);
-/// Least share of the smaller one that lies on the other, and how far that is off at most, metres: a model is good to two millimetres.
+/// Minimum overlap of the smaller model with the other, and maximum distance between them, metres:
+/// a model is accurate to two millimetres.
 const LEAST_SHARED: f64 = 0.35;
 const MOST_OFF_M: f64 = 0.003;
 

@@ -22,8 +22,8 @@ const CERTAIN: usize = 3;
 const DEEP_M: f64 = 0.04;
 /// Minimum number of pixels of an image line that see an edge.
 const SIDE: usize = 2;
-/// A surface ends within so many pixels of the last that shows it: an edge loses one or two. What else is lost there lies behind, in the
-/// shadow of the projector.
+/// Number of pixels lost at an edge: a surface ends within this many pixels of the last one that
+/// shows it. Any further loss is the shadow of the projector.
 const LOST: usize = 3;
 /// Distance without a return behind the surface's last point from which nothing is there, metres.
 const NOTHING_M: f64 = 0.09;

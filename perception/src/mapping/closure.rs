@@ -19,7 +19,7 @@ pub struct ClosureOptions {
     pub most_m: f64,
     /// Headings of two stations that may show the same differ by no more, radians.
     pub turn_rad: f64,
-    /// Headings may have drifted by so much, radians.
+    /// Maximum drift of the heading, radians.
     pub heading_drift_rad: f64,
     /// Least share of what both fields of view see that must lie on each other.
     pub explained: f64,

@@ -358,7 +358,8 @@ pub(super) fn next_within(
     found
 }
 
-/// True if a look was taken from there: what that one did not show, another from the same place and with the same heading does not show either.
+/// True if a look was taken from the same place with the same heading: another would show nothing
+/// new.
 pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) -> bool {
     let (apart_m, turned_rad) = (0.5 * PLACES_M, 0.5 * TAU / HEADINGS as f64);
     looked.iter().any(|look| {

@@ -131,7 +131,7 @@ pub struct Level {
 pub struct RoomMap {
     /// Walls, the largest first.
     pub walls: Vec<Wall>,
-    /// Pillars and round walls; what is one of them is no wall.
+    /// Pillars and round walls; their facets are not counted as walls.
     pub cylinders: Vec<UprightCylinder>,
     /// Level surfaces, the largest first.
     pub levels: Vec<Level>,

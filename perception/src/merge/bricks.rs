@@ -22,7 +22,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The grid over a box. The voxels are at least `voxel_m` wide, wider if they could not be told apart.
+    /// Grid over a box, with voxels of `voxel_m`, or wider if the box needs more voxels than the
+    /// index has numbers.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, voxel_m: f64) -> Grid {
         /// Voxels of the grid's border, and of where it begins. From: chosen.
         const BORDER: f64 = 4.0;

@@ -126,8 +126,9 @@ fn contradicted(
 
 /// The correction of a camera pose as a multiple of the largest plausible one, and the misfit; `None` if plausible.
 fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, Misfit)> {
-    /// Localisation errs by more than it states now and then, and 10 cm and 6° must be mended: so many spreads are believed, and so much,
-    /// metres and radians, in any case. From: chosen.
+    /// Maximum pose correction that is believed, in standard deviations of localisation, or in
+    /// metres and radians if that is more: stated errors are sometimes too small, and 10 cm and 6°
+    /// must be corrected. From: chosen.
     const SPREADS: f64 = 5.0;
     const MENDED: (f64, f64) = (0.2, 0.2);
     let most = [(view.sigma_m, MENDED.0), (view.sigma_rad, MENDED.1)];

@@ -28,8 +28,9 @@ use std::fmt;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-/// The first so many views are merged together: what one shows is too little to lay another on. From: chosen, names from two views with twice the
-/// assumed noise have a Brier score of .025 in place of .028.
+/// Number of first views that are merged jointly: a single one shows too little to align another
+/// with. From: chosen, names from two views with twice the assumed noise have a Brier score of .025
+/// in place of .028.
 const TOGETHER: usize = 2;
 /// Number of earlier views up to which all are merged together. From: chosen.
 const FEW: usize = 6;
@@ -91,8 +92,8 @@ impl Merger {
         })
     }
 
-    /// In a thread of its own, does with the views that were merged last what merging them with a further one would have to do first. What is
-    /// merged is the same without it, but later.
+    /// Starts, in a thread of its own, the part of the next merge that depends on the present views
+    /// alone. The result is the same without it, only later.
     pub fn go_ahead(&mut self, views: Vec<View>) {
         let kept = self.kept();
         if kept.base.is_none() && kept.digests.len() == views.len() {
@@ -378,7 +379,8 @@ fn digest(view: &View) -> u64 {
     parts.into_iter().fold(0, |digest, bytes| mixed(digest, digest_of(bytes)))
 }
 
-/// Bytes in one number. Four parts of them are read side by side, and their words mixed in lanes: no memory and no product is waited for.
+/// Hash of bytes in one number: four parts are read side by side and mixed in independent lanes, to
+/// keep the processor busy.
 fn digest_of(bytes: &[u8]) -> u64 {
     /// Words that are mixed in side by side. From: work.
     const LANES: usize = 4;

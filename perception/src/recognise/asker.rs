@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 const SAME_SIDE: f64 = 0.9;
 /// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;
-/// A camera that looks through this share of what others see of a body, of what it has in view, is placed wrongly there.
-/// From: chosen.
+/// Share of a body's points in view that a camera must see through, against the others, to count as
+/// misregistered there. From: chosen.
 const ASTRAY: f64 = 0.5;
 
 /// Maximum distance of a place from a measured surface to count as seen, where only whether a body is in view
@@ -65,8 +65,9 @@ impl<'a> Lying<'a> {
 }
 
 impl<'a> Asker<'a> {
-    /// The cameras asked about a body (its points in the surface's frame) but those that look through it where others, that measure as
-    /// well together, see it: a view that lies wrongly there says nothing of it.
+    /// Cameras that are used as witnesses of a body (points in the surface's frame). A camera that
+    /// sees through the body while others with the same accuracy see it is misregistered there and
+    /// left out.
     pub fn of(
         seen: &'a Visibility,
         world_from_surface: Isometry3<f64>,

@@ -30,7 +30,7 @@ const THROUGH: usize = 3;
 pub(super) const UNSEEN: f64 = 0.08;
 /// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
 const ROOT: f64 = 0.35;
-/// An inside is said to be seen, or not to be there, where it is so much likelier, log. From: chosen.
+/// Log likelihood ratio from which an inside is reported as seen or absent. From: chosen.
 const SAID: f64 = 1.5;
 /// Number of body points for each point that a visible handle has, far and near, with lower and
 /// upper limit of the expected count. From: chosen.

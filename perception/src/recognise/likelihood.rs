@@ -197,7 +197,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     miss_log(miss, m)
 }
 
-/// Log likelihood of a side that misses a form by so much, metres.
+/// Log likelihood of the side's misfit to a form, metres.
 fn miss_log(miss_m: f64, m: &Measured) -> f64 {
     /// Least error of a form, as a share of the spread of a measurement. From: chosen.
     const OF_SIGMA: f64 = 0.7;

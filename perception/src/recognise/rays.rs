@@ -26,8 +26,8 @@ const ANYWHERE_M: f64 = 1.0;
 pub(super) const MOST: f64 = 10.0;
 /// Chance that a view says nothing of a body. From: chosen.
 pub(super) const BAD_VIEW: f64 = 0.05;
-/// A block of pixels says no more than so many looks, however little neighbours err together: what is left of errors of pose is theirs
-/// in common. From: chosen.
+/// Maximum number of independent measurements that a block of pixels counts for: errors of the pose
+/// are common to all. From: chosen.
 const MOST_LOOKS: f64 = 2.3;
 /// Offsets of a wandering ray, in spreads across the ray: columns and rows. From: derived, three directions
 /// that balance each other.
@@ -69,7 +69,7 @@ pub struct Around {
     pub reach_m: f64,
     pub base_m: f64,
     pub top_m: f64,
-    /// About so many of a view.
+    /// Approximate number of sampled pixels of a view.
     pub pixels: f64,
 }
 
@@ -195,7 +195,8 @@ impl ViewRays {
 
 /// Log of the product of ratios, each of which says no more than [`MOST`]: the log of a few at once.
 fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
-    /// A product beyond these could not take one more, e to the power of so many times [`MOST`]. From: rounding.
+    /// Exponent, in units of [`MOST`], beyond which one more factor could overflow a product.
+    /// From: rounding.
     const WITHIN: f64 = 40.0;
     let (least, most) = ((-MOST).exp(), MOST.exp());
     let (low, high) = ((-WITHIN * MOST).exp(), (WITHIN * MOST).exp());

@@ -13,7 +13,8 @@ use nalgebra::Point3;
 
 /// Side of a cell of the height map, metres. From: derived, no edge is known better than within a place.
 const CELL_M: f64 = PLACE_M;
-/// Heights drop by at least so much at the edge of a body's top, metres. From: derived, what is farther apart is in two places.
+/// Minimum drop of height at the edge of a body's top, metres. From: derived, two points farther
+/// apart are in two places.
 const DROP_M: f64 = APART_M;
 /// Share of a circle on which heights drop, for a body to be sought there. From: chosen, a single view shows half of a top.
 const CIRCLE: f64 = 0.5;
@@ -32,8 +33,8 @@ const BEARS: usize = 9;
 const NEARLY: f64 = 0.8;
 /// Spread of the height that it is found to have, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
-/// A body is borne if that is seen in so many directions; otherwise it stands in what is around it, if that is seen in so many.
-/// From: chosen.
+/// Number of directions in which the support must be seen for a body to rest on it; and in which an
+/// enclosing vessel must be seen for the body to stand in it. From: chosen.
 const BORNE: usize = 14;
 const ALL_AROUND: usize = 27;
 /// Share of the least height of a known body that tells its axis, below its top. From: chosen.
@@ -219,7 +220,8 @@ fn ring(radius_m: f64) -> Vec<(i32, i32)> {
     cells.filter(is_on).collect()
 }
 
-/// The body that a circle may be the top of, if it is no lower than another: on what is around it, or in a vessel around it.
+/// Finds the body below a circle that may be its rim: standing on what is around it, or in a vessel
+/// around it. `None` if it is lower than `least_m`.
 fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Option<Resting> {
     let outside_m = |p: &Point3<f64>| distance(p.x - circle.x, p.y - circle.y) - circle.radius_m;
     let mut beside = [false; SECTORS];

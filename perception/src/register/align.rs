@@ -100,7 +100,7 @@ struct Run<'a> {
     /// The source in the order of its tree, so that neighbours are searched for one after another.
     points: Vec<Point3<f32>>,
     source: &'a Prepared,
-    /// Every so many points are looked at.
+    /// Stride through the points.
     stride: usize,
     /// The partner of each of those points.
     partners: Vec<Partner>,

@@ -71,7 +71,7 @@ impl Side {
         [self.x[i], self.y[i]].map(f64::from)
     }
 
-    /// The same side with every so manieth point: so many at the most.
+    /// The side with every n-th point, at most `to` of them.
     pub fn thinned(&self, to: usize) -> Side {
         let stride = self.len.div_ceil(to).max(1);
         let len = self.len.div_ceil(stride);
@@ -84,7 +84,7 @@ impl Side {
         Side { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
-    /// Every so manieth point: so many at the most.
+    /// Every n-th point, at most `count` of them.
     pub fn judges(&self, count: usize) -> Judges {
         let stride = self.len.div_ceil(count).max(1);
         let pick = |column: &[f32]| column[..self.len].iter().step_by(stride).copied().collect();
@@ -128,7 +128,7 @@ impl Judges {
         const INSIDE: f32 = 0.15;
         /// Points after which a circle may be left. From: work.
         const BLOCK: usize = 16;
-        /// A score that is no more than this below the best may be it. From: rounding.
+        /// Difference of scores within which rounding may hide the better one. From: rounding.
         const ROUNDING: f32 = 1e-3;
         let ([x, y, r], per_m) = (circle.map(|c| c as f32), (1.0 / tolerance) as f32);
         let claim = |x_m: f32, y_m: f32| {

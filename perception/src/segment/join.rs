@@ -109,7 +109,7 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
     /// Share of a neighbour's points below which a voxel has far fewer points than that neighbour.
     /// From: chosen.
     const SHARE: f64 = 0.25;
-    /// Share of those around that must be so much fuller. From: chosen.
+    /// Share of the surrounding cells that must be fuller by that factor. From: chosen.
     const MOST: f64 = 0.75;
     let is_thin = |i: usize| {
         let own = f64::from(voxels.counts[i]);

@@ -12,9 +12,10 @@ use std::sync::OnceLock;
 
 /// A part smaller than this share of its neighbour is no object of its own. From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
-/// A part of so many voxels is no crumb. From: chosen.
+/// Minimum number of voxels of a part that is no fragment. From: chosen.
 const CRUMB_VOXELS: usize = 40;
-/// A part whose base is lifted and which is smaller than this share of what it hangs on belongs to it (a handle, a spout). From: chosen.
+/// Relative size below which a part without contact to the surface belongs to the body it is
+/// attached to (a handle, a spout). From: chosen.
 const HANGING_SHARE: f64 = 0.25;
 
 /// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.

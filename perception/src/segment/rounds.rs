@@ -204,7 +204,7 @@ impl Axis {
         const MOST: usize = 8;
         /// A place and radius has more votes of its own than this. From: chosen.
         const FEW: u16 = 3;
-        /// Axes are apart by more than so many steps. From: chosen.
+        /// Minimum distance between axes, in steps. From: chosen.
         const APART: f64 = 3.0;
         let mut cells = votes.peaks(FEW, SIDE_VOXELS as u32);
         cells.sort_unstable_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));

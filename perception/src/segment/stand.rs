@@ -14,7 +14,8 @@ pub const BOTTOM_M: (f64, f64) = (0.005, 0.006);
 
 /// Maximum distance between a thing's lower edge and the measured top of its support, metres. From: chosen.
 const MEETS_M: f64 = 0.03;
-/// Fewest directions from a place in which an enclosing thing is seen, and a bearing one. From: chosen.
+/// Minimum number of directions in which an enclosing object is seen around a place, and a
+/// supporting one. From: chosen.
 const AROUND: usize = 27;
 const BEARS: usize = 15;
 

@@ -80,7 +80,8 @@ pub(crate) fn dominant_planes(
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
-/// Tells of so many large planes at most, one after another, each without the points of those before it.
+/// Calls back for at most this many large planes, one after another, each fitted without the points
+/// of those before.
 pub(super) fn large_planes(
     samples: &[Sample],
     (seed, rounds): (u64, usize),

@@ -101,8 +101,8 @@ impl fmt::Display for Sign {
 
 /// Rays that are looked at for each camera. From: chosen.
 const RAYS: usize = 5000;
-/// Returns lie lower than a surface if they do by so much, metres, and by so much more per metre from its middle: sensors bend what is far.
-/// From: chosen.
+/// Distance below a surface from which returns count as lower, metres, and its growth with the
+/// distance from the surface's middle, metres a metre: sensors bend distant surfaces. From: chosen.
 const LOWER_M: f64 = 0.06;
 const LOWER_PER_M: f64 = 0.03;
 /// Fewest rays past the edge, and least share of all returning rays, that are no accident. From: chosen.

@@ -65,7 +65,7 @@ pub(super) fn up(
     seen: &Visibility,
     seed: u64,
 ) -> Result<(Unit<Vector3<f64>>, f64), Doubt> {
-    /// One sample in so many is looked at: large planes need no more. From: work.
+    /// Stride through the samples: large planes need no more. From: work.
     const STRIDE: usize = 4;
     let samples: Vec<Sample> = samples.iter().step_by(STRIDE).copied().collect();
     let (faces, rest) = faces(&samples, seen, seed);
@@ -149,7 +149,8 @@ impl Face {
     /// Marks the places of things that would stand on the plane, were it level: they begin near it and are no
     /// higher than things are.
     fn carries(&self, places: &[Point3<f64>]) -> Vec<bool> {
-        /// Side of the cells in which things are told apart, and how near to the plane one begins, metres. From: chosen.
+        /// Side of the cells that separate objects, and height above the plane at which an object
+        /// begins, metres. From: chosen.
         const CELL_M: f64 = 0.04;
         const FOOT_M: f64 = 0.06;
         let Plane { normal, offset } = self.plane;

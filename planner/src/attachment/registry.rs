@@ -1,4 +1,4 @@
-//! Attachments by name: who is asked, what is known already, and how often that was.
+//! Attachments by name: the function that answers, its cached answers, and the number of calls.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -289,7 +289,7 @@ impl Numbers {
     }
 }
 
-/// More repetitions than this are not told apart.
+/// Number of repetitions beyond which the exact number no longer matters.
 const MOST_TIMES: f64 = 1.0e6;
 /// Part of a repetition that is left to rounding.
 const SLACK: f64 = 1.0e-9;

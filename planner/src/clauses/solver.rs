@@ -79,7 +79,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// No clauses over so many variables.
+    /// A solver without clauses over this many variables.
     pub fn new(variables: usize) -> Solver {
         Solver {
             arena: Vec::new(),
@@ -278,7 +278,7 @@ impl Solver {
         }
     }
 
-    /// Searches until so much work is done in all, or `stop` says true.
+    /// Searches until the total work reaches `work`, or `stop` returns true.
     pub fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Answer {
         if self.contradiction {
             return Answer::Unsatisfiable;

@@ -273,7 +273,7 @@ fn mark_always(
     Ok(())
 }
 
-/// The same effect whatever holds.
+/// The effect without its condition.
 fn unconditional(effect: &Effect_) -> Effect_ {
     let nothing = || Formula::And(Vec::new());
     Effect_ {

@@ -14,7 +14,8 @@ pub(super) struct Costs {
     pub read: Vec<u32>,
 }
 
-/// The weights of numeric fluents, of which there are so many, and of the time in an expression that is linear in them.
+/// Coefficients of the numeric fluents (`count` of them) and of the total time in a linear
+/// expression.
 pub(crate) fn weights(expression: &Expression, count: usize) -> Option<(Vec<f64>, f64)> {
     let (mut weights, mut time) = (vec![0.0; count], 0.0);
     linear(expression, 1.0, &mut weights, &mut time).then_some((weights, time))

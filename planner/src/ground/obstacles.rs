@@ -5,7 +5,7 @@ use super::normal::{Action_, Change_, Formula, Normal, Pattern, Term};
 
 /// Most links that are told.
 const MOST_OBSTACLES: usize = 24;
-/// Atoms that fulfil a condition, at most, of each of which is told what an action lacks with it.
+/// Maximum number of candidate atoms for a condition whose missing preconditions are reported.
 const MOST_MATCHES: usize = 4;
 
 /// An atom that no state has, and what stands in the way of all that could bring it about.

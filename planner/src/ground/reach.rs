@@ -69,7 +69,7 @@ pub(super) struct Reach<'a, P: Possible> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// The stop signal is asked once for so many objects that are tried.
+/// Number of tried objects between two queries of the stop signal.
 const TRIED_AT_ONCE: usize = 1 << 14;
 
 /// Scratch space of one join.

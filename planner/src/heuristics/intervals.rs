@@ -123,7 +123,7 @@ impl Near {
         Near { first: range, range, by: [NONE; 2], moves: 0 }
     }
 
-    /// Notes what a node makes of it; tells whether that is new.
+    /// Adds what a node contributes to a number's interval; true if the interval grew.
     fn reach(&mut self, node: u32, reached: Range) -> bool {
         let Range { low, high } = self.range;
         let after = Range { low: low.min(reached.low), high: high.max(reached.high) };

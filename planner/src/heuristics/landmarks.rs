@@ -13,7 +13,8 @@ use crate::memory::Rows;
 const MOST_ALTERNATIVES: usize = 4;
 /// Most landmarks.
 const MOST_LANDMARKS: usize = 20_000;
-/// Once so many operators have been looked at, first achievers are no longer told from later ones.
+/// Number of examined operators after which first achievers are no longer distinguished from later
+/// ones.
 const EXPLORATION_WORK: usize = 40_000_000;
 
 /// One landmark: one of the facts (a single one unless it is disjunctive).

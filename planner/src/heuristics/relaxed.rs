@@ -57,7 +57,7 @@ pub struct Relevant {
     pub until: u32,
 }
 
-/// The sum of two estimates; however much it is, what it takes so much to reach can be reached.
+/// Sum of two estimates, capped so that a reachable fact never looks unreachable.
 fn reached(cost: u32, more: u32) -> u32 {
     cost.saturating_add(more).min(NONE - 1)
 }

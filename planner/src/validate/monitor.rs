@@ -23,7 +23,7 @@ pub struct Broken {
     pub cause: Cause,
     /// Its span in the task's texts.
     pub span: Span,
-    /// The same, to be drawn under the text of the task.
+    /// Findings about the unmet condition, to be drawn under the text of the task.
     #[serde(skip)]
     pub findings: Findings,
 }

@@ -20,7 +20,7 @@ pub fn solve(task: &Task, options: &Options) -> (Outcome, Option<Verdict>) {
     (outcome, verdict)
 }
 
-/// The same of runs on two texts, which must come to the same plan, and with more threads in the same way.
+/// Plans a task read from two texts, again with one to three threads: all must give the same plan.
 pub fn solve_twice(domain: &str, problem: &str, options: &Options) -> (Outcome, Option<Verdict>) {
     let task = read(domain, problem);
     let (outcome, verdict) = solve(&task, options);

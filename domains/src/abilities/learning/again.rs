@@ -23,7 +23,8 @@ const GUESSES: usize = 12;
 const SAME: (f64, f64) = (0.03, 0.35);
 /// Less probability than this says nothing.
 const LEAST: f64 = 0.05;
-/// Points nearer than this to a thing's surface are of it, metres: views lie on each other to half of it.
+/// Distance from a learned object's surface within which points belong to it, metres: alignment of
+/// views leaves half of that.
 const OF_IT_M: f32 = 0.015;
 /// An object of which this share of the points is of a thing is that thing.
 const SHARE: f64 = 0.6;
@@ -35,10 +36,12 @@ const ABOVE_M: (f64, f64) = (-0.02, 0.6);
 /// which is 1 of 2.5.
 const PRIOR: f64 = 0.3;
 const MISSED: f64 = 0.4;
-/// A thing of which less of its sides was seen may be larger than its model.
+/// Share of an object's sides below which its model may lack a part, so that the object may be
+/// larger.
 const HALF: f64 = 0.5;
-/// An object that is longer than a thing by more than this is not it, metres, nor one that is well seen and, with all that stands so near that it may be
-/// a part of it, has less than this share of its length; what stays of the probability then.
+/// An object longer than the learned one by this margin, metres, is another one; so is a well seen
+/// object that, with all neighbours that may be parts of it, has less than this share of the
+/// length. Probability that remains in those cases.
 const LONGER_M: f64 = 0.03;
 const SHORTER: f64 = 0.6;
 const BESIDE_IT_M: f64 = 0.04;

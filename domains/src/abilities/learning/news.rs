@@ -277,7 +277,8 @@ impl Models {
 
 /// Object model of a learned thing for visibility questions: a body of its size.
 pub(crate) fn model(thing: &LearnedThing) -> ObjectModel {
-    /// A thing may stand on another side, and its edges were measured to so much.
+    /// Tolerance of a size comparison: the object may rest on another side, and edges are measured
+    /// this accurately.
     const OFF: f64 = 0.1;
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let size: Vector3<f64> = (high - low).cast();
@@ -297,7 +298,7 @@ pub(crate) fn model(thing: &LearnedThing) -> ObjectModel {
     }
 }
 
-/// The symbol of a name as people say it: an article before it is no part of it.
+/// Symbol of a name as people say it, without a leading article.
 pub fn called(name: &str) -> String {
     symbol(crate::goal::without_article(&name.to_lowercase()))
 }

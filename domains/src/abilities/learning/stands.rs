@@ -113,7 +113,8 @@ fn left(s: &Situation, novelty: &Novelty) -> Vec<Option<String>> {
     novelty.stands.iter().map(|stand| stand.as_ref().filter(can_go).cloned()).collect()
 }
 
-/// Stands strung together as far as the way between neighbours is no detour.
+/// Poses around the object, joined into sequences whose successive poses are reachable without a
+/// detour.
 fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
     let left = left(s, novelty);
     let places: Vec<Option<Point2<f64>>> =

@@ -50,14 +50,15 @@ const SURE: f64 = 0.8;
 const EXPLAINED: f64 = 0.5;
 /// A thing of which less of its sides was seen is looked at from around again when it is met.
 const KNOWN_ROUND: f64 = 0.8;
-/// A model that is along any axis longer than this many times what was noticed, and so much more (metres), has taken in what it stands on or beside.
+/// Ratio, and margin in metres, between the model's and the noticed size above which the model
+/// includes something it stands on or beside.
 const GROWN: f64 = 2.0;
 const GROWN_M: f64 = 0.1;
 /// Minimum share of an object's points that a view looked through, and minimum number of points
 /// that it looked at, for the object to count as gone.
 const THROUGH: f64 = 0.6;
 const LOOKED_AT: u32 = 50;
-/// A depth so much beyond a point has looked through it, metres.
+/// Distance behind a point from which a depth reading counts as looking through it, metres.
 const BEYOND_M: f64 = 0.03;
 
 /// Records a view of something that is learned from, and reads it back by its time.

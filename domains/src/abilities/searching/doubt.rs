@@ -26,7 +26,7 @@ const SMALL_M: (f64, f64) = (0.10, 0.07);
 /// A possibility that a look can settle.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {
-    /// The probability that hangs on it.
+    /// Probability of the hypothesis.
     pub weight: f64,
     /// The surface on which it stands.
     pub on: usize,
@@ -47,7 +47,7 @@ pub enum Ground {
     NotSeen,
     /// Something was measured there that no object explains.
     Measured,
-    /// An object was seen that may be it.
+    /// An object that was seen and may be the requested one.
     Object,
 }
 
@@ -98,7 +98,7 @@ pub struct Taken<'a> {
     pub moved: Option<usize>,
 }
 
-/// The probability that hangs on what looks can settle.
+/// Probability mass that looks can still settle.
 #[derive(Debug, Clone, Copy, Default)]
 struct Reach {
     weight: f64,
@@ -214,8 +214,8 @@ impl Doubt {
         settled / total.as_told
     }
 
-    /// The probability that hangs on what a look would settle beyond what the plan does before it, as far as any look that can be taken
-    /// tells it.
+    /// Probability mass that a look would settle beyond the earlier looks of the plan, as far as
+    /// any possible look can.
     pub fn settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         let all = if self.anywhere { 1.0 } else { self.within_reach(situation, before.moved).weight };
         self.share_settled(situation, look, before) * all.min(1.0)
@@ -263,7 +263,7 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// The probability that hangs on what the best look at a surface would settle, of those that can be taken and have not been.
+    /// Largest probability mass that one possible look at a surface would settle.
     pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
         if self.anywhere {
             return self.hidden;
@@ -276,7 +276,7 @@ impl Doubt {
         self.looks_at(situation, on, &open, None).map(settled).fold(0.0, f64::max)
     }
 
-    /// The probability that hangs on what looks from some candidates at a surface settle together.
+    /// Probability mass that looks from several viewpoints at a surface settle together.
     pub(crate) fn settled_by(&self, situation: &Situation, from: &[usize], on: usize) -> f64 {
         let Some(part) = self.parts.get(&on) else { return 0.0 };
         let told: Vec<Arc<[f64]>> = from.iter().map(|&from| self.told(situation, (from, on), None)).collect();
@@ -300,13 +300,13 @@ impl Doubt {
         (places.iter().map(|h| h.weight).sum(), measured.map(|h| h.weight).sum())
     }
 
-    /// The probability that hangs on all that is in doubt.
+    /// Probability mass that is still unsettled.
     pub fn remaining(&self) -> f64 {
         let all: f64 = self.hypotheses.iter().map(|h| h.weight).sum();
         if self.anywhere { self.hidden } else { all.min(1.0) }
     }
 
-    /// The probability that hangs on hidden places that no look shows, and those places.
+    /// Probability mass in hidden places that no look can show, and those places.
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
         let shown = self.shown(situation, None);
         let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
@@ -441,7 +441,7 @@ fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
     if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
 }
 
-/// As of a body as high and as wide.
+/// Volume of a cylinder of the object's height and diameter, cubic metres.
 fn volume_m3((height_m, diameter_m): &(f64, f64)) -> f64 {
     height_m * diameter_m * diameter_m
 }
@@ -452,7 +452,7 @@ fn size_m(model: &ObjectModel) -> (f64, f64) {
     (model.height_m.middle(), across)
 }
 
-/// The sides of an object that no view has shown, each with its part of what hangs on the object.
+/// Sides of an object that no view has shown, each with its share of the object's weight.
 fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let Some(on) = situation.surface_of(track) else { return Vec::new() };
     let centre = middle(&situation.surfaces[on], track);

@@ -15,7 +15,8 @@ const GRIP_M: f64 = 0.02;
 const MOST_M: f64 = 0.5;
 /// Margin around an object within which voxels may be its own, metres.
 const MARGIN_M: f64 = 0.03;
-/// A push goes across the line of sight and so much towards the body (tangent of the angle): out of what it stands among.
+/// Sideways push with this component towards the body (tangent of the angle), so that the object
+/// leaves its neighbours.
 const OUTWARDS: f64 = 0.5;
 /// Distance between the places along a push at which it is asked whether they are free, metres.
 const STEP_M: f64 = 0.02;

@@ -42,7 +42,8 @@ pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
 const SAME_M: f64 = 0.10;
 /// Points this near to a surface lie on it.
 pub(super) const ON_SURFACE_M: f64 = 0.012;
-/// A view may be moved by so many standard deviations of localisation; more is an error of what moved it.
+/// Maximum correction of a view in standard deviations of localisation; a larger one is an error of
+/// the alignment.
 const ASTRAY: f64 = 4.0;
 
 /// Perception context: all that perceiving needs besides the world model.
@@ -223,7 +224,7 @@ fn keep_placed(looks: &mut Vec<Look>) -> bool {
 /// Margin around a surface within which the centre of an object on it must lie, metres; an object farther out
 /// stands beside it.
 const OVER_M: f64 = 0.06;
-/// A view whose noise is so many times that of another blurs it.
+/// Ratio of noise above which a view blurs a better one.
 const BLURRED: f64 = 2.0;
 
 /// A view as it lies on the outline that the map has of a surface; as localisation has it where there is none, or nothing of it is seen.

@@ -166,7 +166,8 @@ fn open_kind(s: &Situation) -> Option<usize> {
     (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))
 }
 
-/// The object of which it is least sure whether it is of a kind, and how likely it is; none if all are sure enough.
+/// The object whose membership of a kind is least certain, and its probability; none if all are
+/// certain enough.
 fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
     let sure = |p: f64| p.max(1.0 - p);
     let tracks = s.belief.tracks.iter().map(|track| (track, s.kinds[of].probability(track, &s.surfaces)));

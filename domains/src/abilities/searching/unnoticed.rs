@@ -12,7 +12,8 @@ const GRID_M: f64 = 0.05;
 const BEYOND_M: f64 = 0.3;
 /// Share of an object's volume that must be unseen for it to stand there unnoticed.
 const UNSEEN_SHARE: f64 = 0.6;
-/// Share of an object's volume that may have been seen free, for noise, if it stands there.
+/// Share of an object's volume that may have been seen free by noise although the object stands
+/// there.
 const FREE_SHARE: f64 = 0.15;
 /// Number of an object's five sample columns that may fall into a solid body by error, if the
 /// object only stands close to it.
@@ -29,7 +30,7 @@ const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
 /// Probability above which an object is not mistaken for two that blur into each other.
 const SURE: f64 = 0.8;
-/// An object that is longer than so many diameters of a thing may be more than one where it is not known what it is.
+/// Length, in diameters of the requested object, above which an unidentified object may be several.
 const LARGE: f64 = 2.0;
 /// Height above an unseen place in which the top of a body that fills it is searched for, metres.
 const ROOF_M: f64 = 0.5;

@@ -134,7 +134,7 @@ fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
 }
 
-/// A scan is worth its way if it promises to lessen by so much how far a thing may reach beyond what was met of it, metres.
+/// Minimum expected reduction of an outline's looseness for a scan to be worth its drive, metres.
 const WORTH_M: f64 = 0.001;
 
 /// The quickest of the single scans and alignments that promise anything for what is asked.

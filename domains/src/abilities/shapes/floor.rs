@@ -140,7 +140,7 @@ impl Thing {
         }
     }
 
-    /// Confidence in the shape that it is taken for, 0 to 1.
+    /// Confidence in the assigned shape, 0 to 1.
     pub fn sureness(&self, known: usize) -> f64 {
         match self.taken_for.as_ref().map(|r| &r.verdict) {
             None | Some(Verdict::OneOf(_)) => 0.0,

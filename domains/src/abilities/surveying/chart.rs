@@ -37,7 +37,8 @@ const WEIGHED: usize = 7;
 pub(super) const LOOK_S: f64 = 2.0;
 /// Floor that counts as unknown before the first look, square metres.
 pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
-/// A level surface is one that was there before if it is level with it and holds its middle.
+/// Height difference up to which two level surfaces are one, if one holds the other's middle,
+/// metres.
 const SAME_HEIGHT_M: f64 = 0.08;
 
 /// The map that the body makes itself.

@@ -35,7 +35,7 @@ pub struct Ground {
 pub struct Footing {
     /// Passable by all that is known, with a margin.
     pub stand: Vec<bool>,
-    /// The same without a margin: where it may go if no other way leads on.
+    /// Positions passable without the safety margin: used where no other route leads on.
     pub pass: Vec<bool>,
     /// Passable by looks and drives alone, without a margin.
     pub shown: Vec<bool>,

@@ -105,14 +105,15 @@ impl Judge {
 const TURNED_AS: f32 = 0.6;
 /// Farthest scene point that a point of the model explains, metres.
 pub(super) const NEAR_M: f32 = 0.012;
-/// Colours that differ by so much (CIE 1976, lightness counts half) are as unlike as not, and points told apart by colour.
+/// Colour difference (CIE 1976, lightness counts half) at which colours no longer speak for a
+/// match.
 const UNLIKE: f32 = 14.0;
 /// Distance beyond the explained points at which the scene is tested for carrying on, metres, where no point
 /// of the model lies within this distance; and the least cosine between normals for it to do so.
 const BEYOND_M: f32 = 0.018;
 const WITHIN_M: f32 = 0.010;
 const SMOOTH: f32 = 0.94;
-/// A border of few places says little: as if so many more were no border of anything larger.
+/// Number of border points that are added as neutral evidence: a short border says little.
 const LEAST_BORDER: usize = 10;
 
 /// Evidence, and the scene's points that are explained.

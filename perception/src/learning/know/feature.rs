@@ -269,7 +269,7 @@ fn local_frame(
     frame.iter().all(|v| v.is_finite()).then_some(frame)
 }
 
-/// A pattern is read on a square of so many cells, of this side, metres.
+/// A colour pattern is sampled on a square of this many cells a side, and this side length, metres.
 const CELLS: usize = 8;
 const CELL_M: f32 = 0.006;
 /// Least change of lightness from the middle to the border of a pattern that gives it a direction, in units of L*.

@@ -10,7 +10,8 @@ use std::f32::consts::TAU;
 const TILTED_RAD: f64 = 0.35;
 /// Points no higher above the lowest are of the foot, metres.
 const FOOT_M: f32 = 0.015;
-/// In so many directions around the foot, so far beside it, it is looked whether there is something to stand on, metres.
+/// Number of directions around the foot, and distance from it in metres, in which a support is
+/// looked for.
 const AROUND: u16 = 24;
 const BESIDE_M: f32 = 0.02;
 /// Maximum height difference between a level surface and the foot that it carries, metres: of a model the

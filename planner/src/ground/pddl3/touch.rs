@@ -15,7 +15,7 @@ use super::conditions::{all, any};
 #[derive(Debug, Default)]
 pub(super) struct Mentioned {
     atoms: Vec<Atom>,
-    /// Predicates of which any atom may matter: those that derived ones depend on.
+    /// Predicates of which every atom may matter, because derived predicates depend on them.
     predicates: FxHashSet<PredicateId>,
     functions: FxHashSet<FunctionId>,
     /// Attachments are asked, or the duration, and nothing tells when they change their minds.

@@ -61,7 +61,7 @@ impl Page {
         self.line.indent + self.line.text.chars().count()
     }
 
-    /// A node at the end of the line, behind which stand so many closing signs.
+    /// Lays out a node at the end of a line that must leave room for `closing` parentheses.
     fn node(&mut self, node: &Node<'_>, closing: usize) {
         match &node.what {
             What::Word(word) => self.line.text.push_str(word),

@@ -178,7 +178,7 @@ impl Form {
         }
     }
 
-    /// The clauses for plans of so many steps.
+    /// Clauses for plans of `horizon` steps.
     pub(super) fn solver(&self, task: &Compiled, horizon: usize) -> Solver {
         let mut solver = Solver::new(horizon * self.stride + self.facts);
         let mut unit = |variable: u32, positive: bool| solver.add(&[Literal::new(variable, positive)]);

@@ -28,7 +28,7 @@ const MOST_LITERALS: usize = 4_000_000;
 const LITERAL_WORK: u64 = 4;
 const LITERAL_BYTES: usize = 16;
 
-/// Plans of so many steps.
+/// Solver for plans with a fixed number of steps.
 struct Horizon {
     steps: usize,
     solver: Solver,

@@ -174,7 +174,7 @@ impl Kept {
         self.digests = digests;
     }
 
-    /// The base on which a view after the first prepared ones is aligned, from the kept state.
+    /// Merged base that the next view is aligned with, from the kept state.
     fn base_of(&mut self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
         let anew = together(views.len());
         let is_begun = |base: &Base| {

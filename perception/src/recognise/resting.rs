@@ -248,8 +248,8 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
     parted.filter(|parted| parted.rest.indices.len() >= FEWEST_LEFT)
 }
 
-/// Numbers of directions in which something no lower is seen around the foot of a body, and in which
-/// something as high as the foot is seen right beside it.
+/// Evidence of a support below a body: number of directions in which the surroundings of its foot
+/// are seen, and in which something as high as the foot is seen right beside it.
 struct Bearing {
     around: usize,
     level: usize,

@@ -306,7 +306,7 @@ impl Compiled {
             && (self.contested.is_empty() || self.agrees(operator, state))
     }
 
-    /// True if some operators are not possible wherever their preconditions hold.
+    /// True if some operators may be inapplicable although their preconditions hold.
     pub(crate) fn some_impossible(&self) -> bool {
         !self.numbers.is_empty() || !self.contested.is_empty()
     }

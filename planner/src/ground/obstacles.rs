@@ -3,7 +3,7 @@
 use super::atoms::{Atoms, NONE};
 use super::normal::{Action_, Change_, Formula, Normal, Pattern, Term};
 
-/// Most links that are told.
+/// Maximum number of atoms in the reported chain of causes.
 const MOST_OBSTACLES: usize = 24;
 /// Maximum number of candidate atoms for a condition whose missing preconditions are reported.
 const MOST_MATCHES: usize = 4;

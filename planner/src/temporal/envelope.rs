@@ -90,7 +90,8 @@ fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
             .all(|when| when.at_start.is_empty() && when.over_all.is_empty())
 }
 
-/// True if the end of an action may as well follow its start at once: it only moves locked variables on.
+/// True if the end of an action may follow right after its start without loss, because the end only
+/// advances locked variables.
 fn ends_early(locked: &[bool], act: &Act) -> bool {
     act.at_end.comparisons.is_empty()
         && act.at_end.calls.is_empty()

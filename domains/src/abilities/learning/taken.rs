@@ -26,7 +26,7 @@ use crate::world::WorldError;
 /// Search radius for the localisation error between two visits, metres: localisation errs by centimetres and
 /// by degrees, which at a distance of two metres are centimetres, too.
 const SEARCH_M: f32 = 0.15;
-/// A visit of which so large a share differs from what was there before does not fit it: the body is not where it believes to be.
+/// Share of differences above which a visit is rejected: the body is elsewhere than it believes.
 const STRANGE: f64 = 0.3;
 /// Limits for an object on a surface: the height of its lowest point above the surface, and the distance of
 /// its centre beside the surface, metres.

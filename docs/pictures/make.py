@@ -116,7 +116,7 @@ def picture(page: pathlib.Path, scheme: str, folder: str) -> None:
          "--virtual-time-budget=4000", f"--window-size={WIDTH},{HEIGHT}", f"--screenshot={png}", f"file://{page}"],
         check=True, capture_output=True,
     )
-    Image.open(png).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(HERE / f"run-{scheme}.png", optimize=True)
+    Image.open(png).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(HERE / f"run-{scheme}.png", optimize=True)
 
 
 def main() -> None:

@@ -80,7 +80,7 @@ pub enum Event {
         unkept: Option<String>,
         /// The conclusion drawn from the failure, in a sentence.
         therefore: String,
-        /// The same as a value; records of earlier versions do not have it.
+        /// The lesson as a value; absent in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         lesson: Option<Lesson>,
     },

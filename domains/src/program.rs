@@ -113,13 +113,13 @@ impl ProgramAttachment {
         Self { program, folder, function: None, tape: None, running: Mutex::new(None) }
     }
 
-    /// The same with its answers on a tape.
+    /// Reads and writes the program's answers on a tape.
     #[must_use]
     pub fn on(self, tape: Option<Arc<dyn Tape>>) -> Self {
         Self { tape, ..self }
     }
 
-    /// The same with a function that answers instead of the program.
+    /// Replaces the program by a function.
     #[must_use]
     pub fn answered_by(self, function: Option<Arc<dyn Function>>) -> Self {
         Self { function, ..self }

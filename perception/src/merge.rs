@@ -116,7 +116,7 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// The same in another frame: cloud, poses and what was seen.
+    /// The result in another frame: cloud, poses and visibility.
     pub fn moved(mut self, there_from_world: &Isometry3<f64>) -> Merged {
         self.cloud = self.cloud.transformed(there_from_world);
         for fit in &mut self.fits {

@@ -242,7 +242,7 @@ impl Surface {
         low < APART_M && high > -APART_M && hull::area(&common()) > COMMON * self.area_m2
     }
 
-    /// The same in another frame.
+    /// The surface in another frame.
     pub fn moved(&self, there_from_world: &Isometry3<f64>) -> Surface {
         let up = there_from_world.rotation * self.up;
         let hull: Vec<Point3<f64>> = self.hull.iter().map(|p| there_from_world * p).collect();

@@ -179,7 +179,7 @@ fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &Rec
     }
 }
 
-/// The same for plans that are cut to what both show.
+/// Aligns two plans that are already cut to their common field of view.
 pub(super) fn fit_cut(
     seen: &[Spot],
     moved: &[Spot],

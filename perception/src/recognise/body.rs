@@ -44,7 +44,7 @@ pub trait Body {
     /// The least depth at which a ray meets it, infinite if it passes by, metres.
     fn depth_m(&self, ray: &Ray) -> f64;
 
-    /// The same so far beside, along both axes of the surface, metres.
+    /// The body moved along both axes of the surface, metres.
     fn moved(&self, shift_m: [f64; 2]) -> Self;
 }
 
@@ -133,7 +133,7 @@ impl Cuboid {
         self.high[end / 2] - self.low[end / 2]
     }
 
-    /// The same turned about what its sides are told from.
+    /// The box rotated about the point that its sides are measured from.
     pub fn turned(&self, by_rad: f64) -> Cuboid {
         let ((sin, cos), (sin_by, cos_by)) = (self.turn, by_rad.sin_cos());
         Cuboid { turn: (sin * cos_by + cos * sin_by, cos * cos_by - sin * sin_by), ..*self }

@@ -95,7 +95,7 @@ impl Rays {
         Rays { views: asker.views.iter().filter_map(view).collect() }
     }
 
-    /// The same in another frame.
+    /// The rays in another frame.
     pub fn moved(&self, there_from_surface: &Isometry3<f64>) -> Rays {
         let turn = |way: &[f64; 3]| (there_from_surface.rotation * Vector3::from(*way)).into();
         let pixel = |pixel: &Pixel| Pixel { along: turn(&pixel.along), ..*pixel };

@@ -22,7 +22,7 @@ pub struct LyingRound {
 }
 
 impl LyingRound {
-    /// The same with its other end down.
+    /// The body with its other end down.
     pub fn over(&self) -> LyingRound {
         let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
         let LyingRound { turned, round, ends_m: [foot, rim] } = *self;

@@ -148,7 +148,7 @@ impl Counts {
     }
 }
 
-/// Memory is looked at after so many entries, of which a round counts for some.
+/// Number of queue entries between two checks of the memory limit; an iteration counts for several.
 pub const MOST_UNSEEN: usize = 4096;
 pub const UNSEEN_A_ROUND: usize = 16;
 /// A fixed price of making and storing a state, in units of [`Relaxed::work`].

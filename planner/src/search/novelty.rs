@@ -15,7 +15,7 @@ use super::lazy::{Allowed, Counts, End, MOST_UNSEEN, Shared, UNSEEN_A_ROUND};
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
-/// Pairs of facts are told apart only where their tables stay below this.
+/// Maximum size of the novelty tables for pairs of facts, bytes; larger tasks use single facts.
 const PAIR_TABLE_BYTES: usize = 256 << 20;
 /// Words of facts of a relaxed plan that are followed, at least and at most.
 const FOLLOWED_WORDS: [usize; 2] = [2, 8];

@@ -308,7 +308,8 @@ impl<'a, 's> Run<'a, 's> {
         turn..turn + threads.min(round - turn % round)
     }
 
-    /// Lets searches for a first plan go on side by side, for so much work each; what they come to, up to the first plan.
+    /// Runs searches for a first plan in parallel, with a work limit for each; returns their
+    /// results up to the first plan.
     fn take_turns(
         &self,
         kept: &mut [Option<Kept<'a, 's>>; PORTFOLIO.len()],

@@ -35,7 +35,7 @@ impl Semantics<'_> {
         Ok(())
     }
 
-    /// The same of all instances of the rules of derived predicates.
+    /// Differences in all instances of the rules of derived predicates.
     pub(crate) fn rule_differences(&self, state: &State, found: &mut Vec<f64>) -> Result<(), CallFailure> {
         for rule in self.task.rules.iter().filter(|rule| compares(rule)) {
             let slots = (0..).map(Slot).zip(&rule.parameters);

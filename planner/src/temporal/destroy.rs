@@ -8,7 +8,7 @@ use super::space::Space;
 use super::touch::Touched;
 use super::world::World;
 
-/// A small generator of chance, the same for the same seed (SplitMix64).
+/// Pseudorandom generator with a seed (SplitMix64).
 #[derive(Debug, Clone)]
 pub(crate) struct Chance(u64);
 

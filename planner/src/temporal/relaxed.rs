@@ -96,9 +96,9 @@ pub(super) struct Waiter {
 /// Least duration of an operator, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Seconds {
-    /// The same in every state; infinite where it can never be applied.
+    /// Constant, seconds; infinite if the action can never be applied.
     Known(f64),
-    /// The same in every state: once an attachment has been asked.
+    /// Constant, but an attachment must be asked first.
     Settled,
     /// Depends on the state.
     Depends,

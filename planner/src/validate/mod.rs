@@ -78,7 +78,7 @@ pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict 
     said(&Semantics::new(task, attachments), plan)
 }
 
-/// The same; none once `stop` has said true.
+/// Validates a plan; `None` once `stop` returns true.
 pub fn validate_until(
     task: &Task,
     attachments: &Attachments,

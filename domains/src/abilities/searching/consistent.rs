@@ -30,7 +30,7 @@ pub enum Contradiction {
 }
 
 impl Contradiction {
-    /// The same in a sentence, of a surface by name.
+    /// The contradiction in a sentence, with the surface by name.
     pub fn told(&self, surface: &str) -> String {
         match self {
             Contradiction::Fault(fault) => {

@@ -198,7 +198,7 @@ fn aligned(
     Ok(format!("{said}: {:.2} sure{contradict}", thing.sureness(known)))
 }
 
-/// The same, and it is kept under a name.
+/// Outcome of learning: the aligned shape, stored under a name.
 fn learned(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -44,7 +44,7 @@ fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number((1.0 - s.confidence(what)) * share_shown(s, call)?))
 }
 
-/// The same of all of a kind.
+/// Expected gain of completeness for a kind.
 fn expected_discoveries(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let of = s.kind(argument(call, 1)?)?;
     Ok(Answer::Number((1.0 - s.completeness(of)) * share_shown(s, call)?))

@@ -15,7 +15,7 @@ const MOST_TOGETHER: u32 = 6;
 /// Words of all the states along a plan, at most.
 const MOST_WORDS: usize = 1 << 24;
 
-/// An operator that cancels out with another one: so many of one against so many of the other.
+/// An operator that cancels another one, with the number of applications of each.
 #[derive(Clone, Copy)]
 struct Opposite {
     operator: u32,

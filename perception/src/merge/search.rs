@@ -97,7 +97,7 @@ impl Cells {
     /// Mean score (1 for a hit) of the points for all shifts of up to `reach` cells along x and y,
     /// row by row of x.
     fn scores(&self, points: &[(Point3<f64>, usize)], reach: i32) -> Vec<f64> {
-        /// Shifts along y are summed up by as many at once. From: work.
+        /// Number of shifts along y that are summed at once (SIMD lanes). From: work.
         const LANES: usize = 8;
         let across = (2 * reach + 1) as usize;
         let wide = across.next_multiple_of(LANES);

@@ -253,8 +253,8 @@ impl Hypothesis {
 
 /// Log of how likely cameras are held so that this is up, all of them alike, against the likeliest way.
 fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
-    /// Spread of how far cameras are rolled, radians, and how likely one is turned by a quarter or a half instead, each, or any other way.
-    /// From: chosen.
+    /// Standard deviation of a camera's roll, radians; and probability that it is rotated by a
+    /// quarter or a half turn, for each, or by any other angle. From: chosen.
     const ROLLED_RAD: f64 = 0.2;
     const TURNED: f64 = 0.003;
     const ANY_WAY: f64 = 0.0003;

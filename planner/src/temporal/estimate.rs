@@ -92,7 +92,8 @@ impl Work {
         }
     }
 
-    /// Notes that one of the `needs` of an operator has this label; the label of all of them once that was the last.
+    /// Counts one more reached precondition of an operator with its label; returns the label of all
+    /// preconditions once the last is reached.
     fn meet(&mut self, operator: u32, needs: u32, label: f64, timed: bool) -> Option<f64> {
         if needs == 1 {
             return Some(label);

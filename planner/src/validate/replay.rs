@@ -387,8 +387,8 @@ impl Replay<'_, '_> {
         Ok(())
     }
 
-    /// Conditions over all of what is running hold in the present state, right after a happening. What has begun just now has
-    /// to hold from now on alone: where numbers flow, that is told on the way.
+    /// Checks the invariants of all running actions in the state right after a happening. An action
+    /// that has just begun is checked from here on; continuous changes are checked along the way.
     fn after_happening(&mut self) -> Outcome<()> {
         let flows = self.running.iter().any(|running| self.flows(running));
         let begun_s = if flows { self.now_s } else { f64::INFINITY };

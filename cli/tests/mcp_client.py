@@ -1,4 +1,4 @@
-"""The official Python client (`pip install mcp`) drives every tool of `descry mcp`.
+"""The official Python client (`pip install mcp`) drives every tool of `descry mcp`, and mends a domain by its findings.
 
     DESCRY=target/release/descry python cli/tests/mcp_client.py
 """
@@ -18,6 +18,14 @@ PROBLEM = """(define (problem home) (:domain errands) (:objects shop park home -
 CLOUD = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 900\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 900\nDATA ascii\n"
 
 
+def said(result):
+    """What a tool answered; both generations of the client are read."""
+    answer = getattr(result, "structured_content", None) or result.structuredContent
+    is_error = result.is_error if hasattr(result, "is_error") else result.isError
+    assert not is_error, answer
+    return answer
+
+
 async def drive(session, folder):
     greeted = await session.initialize()
     listed = await session.list_tools()
@@ -27,10 +35,7 @@ async def drive(session, folder):
     async def call(tool, progress=None, **arguments):
         left.discard(tool)
         result = await session.call_tool(tool, arguments, progress_callback=progress)
-        said = getattr(result, "structured_content", None) or result.structuredContent
-        is_error = getattr(result, "is_error", None) if hasattr(result, "is_error") else result.isError
-        assert not is_error, said
-        return said
+        return said(result)
 
     both = {"domain": DOMAIN, "problem": PROBLEM}
     assert (await call("check", **both))["findings"] == []
@@ -55,11 +60,36 @@ async def drive(session, folder):
     print(f"every tool answered; {len(steps)} steps were told")
 
 
+FAULTS = {"(not (at ?a))": "(not (att ?a))", "(?a ?b - place) :pre": "(?a ?b - plase) :pre", "(way ?a ?b))\n": "(wya ?a ?b))\n"}
+
+
+async def mend(session):
+    """A domain with three faults, each mended at the place of its finding with the text that the finding suggests."""
+    domain = DOMAIN
+    for right, wrong in FAULTS.items():
+        assert right in domain, right
+        domain = domain.replace(right, wrong)
+    mended = 0
+    while True:
+        findings = said(await session.call_tool("check", {"domain": domain, "problem": PROBLEM}))["findings"]
+        errors = [finding for finding in findings if finding["severity"] == "error"]
+        if not errors:
+            break
+        place, mend = errors[0]["labels"][0], errors[0]["help"].split("`")[1]
+        text = domain.encode()
+        domain = (text[: place["start"]] + mend.encode() + text[place["end"] :]).decode()
+        mended += 1
+        assert mended <= len(FAULTS), domain
+    assert said(await session.call_tool("plan", {"domain": domain, "problem": PROBLEM}))["status"] == "solved", domain
+    print(f"{mended} faults were mended by their findings")
+
+
 async def main():
     with tempfile.TemporaryDirectory() as folder:
         server = StdioServerParameters(command=os.path.realpath(os.environ["DESCRY"]), args=["mcp", "--folder", folder])
         async with stdio_client(server) as (read, write), ClientSession(read, write) as session:
             await drive(session, folder)
+            await mend(session)
 
 
 asyncio.run(main())

@@ -349,7 +349,7 @@ def recognise(
     """
 
 def read_cloud(path: _Path) -> Tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """The points of a PCD or PLY file, N x 3 or height x width x 3, and where its sensor stood, metres."""
+    """The points of a PCD, PLY, NPY, LAS, XYZ, CSV or PTS file, N x 3 or height x width x 3, and where its sensor stood, metres."""
 
 @final
 class Document:

@@ -206,12 +206,16 @@ fn models(py: Python<'_>, folder: Option<PathBuf>) -> PyResult<Vec<ObjectModel>>
 /// The points of a file, and the position of its sensor.
 type Loaded<'py> = (Bound<'py, PyArrayDyn<f32>>, Bound<'py, PyArray1<f64>>);
 
-/// Reads a PCD or PLY file: its points, and the position of its sensor.
+/// Reads a cloud file (PCD, PLY, NPY, LAS, XYZ, CSV, PTS): its points, and the position of its sensor.
 #[pyfunction]
 pub fn read_cloud<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Loaded<'py>> {
     let shown = path.display();
-    let refused =
-        |error: String| failure::input(py, &format!("{shown}: {error}\n  expected a PCD or PLY file"));
+    let refused = |error: String| {
+        failure::input(
+            py,
+            &format!("{shown}: {error}\n  expected a point cloud: PCD, PLY, NPY, LAS, XYZ, CSV or PTS"),
+        )
+    };
     let bytes = std::fs::read(&path).map_err(|e| refused(e.to_string()))?;
     let loaded = py.detach(|| read(&bytes)).map_err(|e| refused(e.to_string()))?;
     let viewpoint = arrays::vector(py, &loaded.viewpoint.translation.vector);

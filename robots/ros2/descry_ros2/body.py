@@ -60,6 +60,7 @@ class Body(descry.Robot):
         for topic, qos, is_fixed in (("/tf", TF, False), ("/tf_static", LATCHED_TF, True)):
             self.node.create_subscription(TFMessage, topic, lambda m, fixed=is_fixed: self._told(m, fixed), qos)
         self.navigation = ActionClient(self.node, NavigateToPose, settings["navigation"]["action"])
+        self.hand_of(settings["hand"])
         head = settings["head"]
         self.neck = self.node.create_publisher(JointTrajectory, head["trajectory"], TF) if head else None
         self.executor = rclpy.executors.SingleThreadedExecutor()
@@ -80,8 +81,8 @@ class Body(descry.Robot):
 
     # What is heard.
 
-    def _hear(self, name, kind, qos):
-        topic = self.settings["topics"][name]
+    def _hear(self, name, kind, qos, topic=None):
+        topic = topic or self.settings["topics"][name]
         if topic:
             self.node.create_subscription(kind, topic, lambda message: self._keep(name, message), qos)
 
@@ -154,6 +155,7 @@ class Body(descry.Robot):
             try:
                 camera, _ = self.transforms.newest(frames["base"], frames["camera"])
                 self.transforms.newest(frames["map"], frames["base"])
+                laser = self._laser(self._first("scan")) if s["topics"]["scan"] else None
                 break
             except tf.Missing as why:
                 if time.monotonic() > until:
@@ -175,8 +177,10 @@ class Body(descry.Robot):
             hello["head"] = {k: s["head"][k] for k in ("base_from_head", "pan_limit_rad", "tilt_down_rad", "tilt_up_rad")}
         else:
             hello["camera"]["base_from_camera"] = tf.said(camera)
-        if s["topics"]["scan"]:
-            hello["laser"] = self._laser(self._first("scan"))
+        if s["hand"]:
+            hello["arm"] = {"reach_m": s["hand"]["reach_m"], "hand_opening_m": s["hand"]["opening_m"]}
+        if laser:
+            hello["laser"] = laser
         grid = self._first("map")
         hello["map"], cells = self._map(grid)
         return hello, cells
@@ -200,16 +204,20 @@ class Body(descry.Robot):
     # What it is asked.
 
     def _base_at(self, at_ns=None):
-        """Where the base is now, or was at a stamp."""
-        frames = self.settings["frames"]
+        """Where the base is now, or was at a stamp; what is late is waited for as long again."""
+        frames, waits = self.settings["frames"], self.settings["waits"]
         try:
-            if at_ns is None:
+            if at_ns is not None:
+                return self.transforms.wait(frames["map"], frames["base"], at_ns, waits["transform_s"], time.monotonic)
+            until = time.monotonic() + waits["late_s"]
+            while True:
                 here, stamp = self.transforms.newest(frames["map"], frames["base"])
                 late_s = (self.now_ns() - stamp) * 1e-9
-                if late_s > self.settings["waits"]["late_s"]:
+                if late_s <= waits["late_s"]:
+                    return here
+                if time.monotonic() > until:
                     raise tf.Missing(f"the newest transform from {frames['map']} to {frames['base']} is {late_s:.1f} s old")
-                return here
-            return self.transforms.wait(frames["map"], frames["base"], at_ns, self.settings["waits"]["transform_s"], time.monotonic)
+                time.sleep(POLL_S)
         except tf.Missing as why:
             raise descry.Failure("lost", str(why)) from None
 
@@ -225,21 +233,13 @@ class Body(descry.Robot):
     def drive_to(self, request, to, route_m):
         wanted, navigation = to["pose"], self.settings["navigation"]
         self._is_ticking()
-        if not self.navigation.wait_for_server(timeout_sec=2.0):
-            raise descry.Failure("broken", f"nobody answers the action {navigation['action']}")
         goal = NavigateToPose.Goal()
         goal.pose.header.frame_id = self.settings["frames"]["map"]
         goal.pose.header.stamp = self.node.get_clock().now().to_msg()
         goal.pose.pose.position.x, goal.pose.pose.position.y = wanted["x_m"], wanted["y_m"]
         goal.pose.pose.orientation.z, goal.pose.pose.orientation.w = math.sin(wanted["yaw_rad"] / 2), math.cos(wanted["yaw_rad"] / 2)
-        began = self._base_at()
-        handle = self._until(self.navigation.send_goal_async(goal), request, None)
-        if not handle.accepted:
-            raise descry.Failure("blocked", f"{navigation['action']} refused the goal")
-        self.goal = handle
-        track = Track(began, wanted)
-        result = self._until(handle.get_result_async(), request, lambda: track.on(self._base_at()))
-        self.goal = None
+        track = Track(self._base_at(), wanted)
+        result = self._carried_out(self.navigation, navigation["action"], goal, request, lambda: track.on(self._base_at()))
         here = self._base_at(self.now_ns())
         track.on(here)
         off_m, off_rad = track.off(here)
@@ -251,6 +251,18 @@ class Body(descry.Robot):
         if off_m > navigation["arrived_m"] or off_rad > navigation["arrived_rad"]:
             raise descry.Failure("blocked", f"{navigation['action']} says it has arrived, by tf it is {off_m:.2f} m and {off_rad:.2f} rad off")
         return {"distance_m": track.driven_m, "map_from_base": tf.said(here)}
+
+    def _carried_out(self, client, name, goal, request, progress=None):
+        """The result of an action's goal, stopped when the request is stopped."""
+        if not client.wait_for_server(timeout_sec=2.0):
+            raise descry.Failure("broken", f"nobody answers the action {name}")
+        handle = self._until(client.send_goal_async(goal), request, None)
+        if not handle.accepted:
+            raise descry.Failure("blocked", f"{name} refused the goal")
+        self.goal = handle
+        result = self._until(handle.get_result_async(), request, progress)
+        self.goal = None
+        return result
 
     def _until(self, future, request, progress):
         """What comes of a future; says how far it is, and stops when the request is stopped or the clock stands still."""
@@ -311,6 +323,60 @@ class Body(descry.Robot):
             data += rgb(self._after("colour", request.began_ns, request)).tobytes()
         return {"map_from_base": tf.said(base), "base_from_camera": tf.said(camera), "stamp_ns": at_ns}, data
 
+    # The hand.
+
+    def hand_of(self, hand):
+        """Hears what the hand holds, and knows its actions; the package `descry_msgs` is needed with a hand alone."""
+        if hand is None:
+            return
+        from descry_msgs.action import Grasp, Place
+        from std_msgs.msg import Bool
+
+        self.hand_actions = {kind: (action, ActionClient(self.node, action, hand[kind])) for kind, action in (("grasp", Grasp), ("place", Place))}
+        self._hear("holding", Bool, LATCHED, hand["holding"])
+
+    def _by_hand(self, kind, point, request, **more):
+        """The result of one of the hand's actions at a point of the map."""
+        action, client = self.hand_actions[kind]
+        goal = action.Goal(**more)
+        stamped = goal.object if kind == "grasp" else goal.foot
+        stamped.header.frame_id, stamped.header.stamp = self.settings["frames"]["map"], self.node.get_clock().now().to_msg()
+        stamped.point.x, stamped.point.y, stamped.point.z = (float(x) for x in point)
+        self._is_ticking()
+        done = self._carried_out(client, self.settings["hand"][kind], goal, request)
+        if done.status == GoalStatus.STATUS_SUCCEEDED:
+            return done.result
+        result = done.result
+        why = result.why or f"{self.settings['hand'][kind]} ended with status {done.status}"
+        kinds = {result.UNREACHABLE: "unreachable", result.SLIPPED: "slipped", result.BLOCKED: "blocked", result.UNABLE: "unable"}
+        failure = "cancelled" if done.status == GoalStatus.STATUS_CANCELED else kinds.get(result.failure, "blocked")
+        raise descry.Failure(failure, why, **({"moved_m": 0.0} if failure == "slipped" else {}))
+
+    def grasp(self, request, object, width_m):
+        width_m = self._by_hand("grasp", object, request, width_m=float(width_m)).width_m
+        if not self._holds(True):
+            raise descry.Failure("slipped", f"{self.settings['hand']['grasp']} says that it has it, the hand holds nothing", moved_m=0.0)
+        return {"width_m": width_m}
+
+    def place(self, request, foot):
+        self._by_hand("place", foot, request)
+        return {}
+
+    def hand(self, request):
+        """Whether it holds something, as the robot publishes it."""
+        holds = self._holds()
+        if holds is None:
+            topic = self.settings["hand"]["holding"]
+            raise descry.Failure("sensor_dropped", f"nothing was published on {topic}", stamp_ns=self.now_ns())
+        return {"holds": holds}
+
+    def _holds(self, wanted=None):
+        """What the hand is said to hold; what is wanted is waited for, since it may come after the end of an action."""
+        told = lambda: "holding" in self.latest and wanted in (None, self.latest["holding"].data)
+        with self.heard:
+            self.heard.wait_for(told, self.settings["waits"]["frame_s"])
+            return self.latest["holding"].data if "holding" in self.latest else None
+
     def _unit_m(self, image):
         """Metres of a step of depth: what the encoding says, if the file does not."""
         own = self.settings["camera"]["metres_per_unit"]
@@ -370,7 +436,7 @@ class Track:
     """How far a drive has got."""
 
     def __init__(self, began, wanted):
-        self.last, self.wanted, self.driven_m = began, wanted, 0.0
+        self.last, self.wanted, self.driven_m, self.share = began, wanted, 0.0, 0.0
         self.whole_m = max(self.off(began)[0], 1e-3)
 
     def off(self, here):
@@ -378,7 +444,7 @@ class Track:
         return math.hypot(here[0][0] - self.wanted["x_m"], here[0][1] - self.wanted["y_m"]), abs(turned)
 
     def on(self, here):
-        """The share of the way that is behind, and the metres."""
+        """The greatest share of the way that was behind, and the metres."""
         self.driven_m += math.dist(here[0][:2], self.last[0][:2])
-        self.last = here
-        return 1.0 - min(self.off(here)[0] / self.whole_m, 1.0), self.driven_m
+        self.last, self.share = here, max(self.share, 1.0 - min(self.off(here)[0] / self.whole_m, 1.0))
+        return self.share, self.driven_m

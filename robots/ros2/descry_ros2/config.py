@@ -21,13 +21,14 @@ KEYS = {
     "navigation": {"action": "navigate_to_pose", "arrived_m": 0.25, "arrived_rad": 0.35},
     "head": {"trajectory": REQUIRED, "pan": REQUIRED, "tilt": REQUIRED, "base_from_head": REQUIRED, "pan_limit_rad": 2.6,
              "tilt_down_rad": 1.2, "tilt_up_rad": 0.8},
+    "hand": {"grasp": REQUIRED, "place": REQUIRED, "holding": REQUIRED, "reach_m": REQUIRED, "opening_m": REQUIRED},
     "waits": {"start_s": 30.0, "frame_s": 3.0, "transform_s": 0.5, "late_s": 1.0, "head_s": 5.0},
     "surface": [],
     "room": [],
     "door": [],
 }
 # Parts that the robot lacks when their table is left out.
-PARTS = ("head",)
+PARTS = ("head", "hand")
 
 
 class Wrong(Exception):

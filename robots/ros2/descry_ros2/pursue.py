@@ -45,7 +45,8 @@ class Server:
         command = [self.descry, "do", "--json", *domain, *self.options, "--", asked.goal]
         run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         said, told = [], queue.Queue()
-        threading.Thread(target=lambda: said.append(run.stdout.read()), daemon=True).start()
+        listener = threading.Thread(target=lambda: said.append(run.stdout.read()), daemon=True)
+        listener.start()
         threading.Thread(target=lambda: [told.put(line) for line in run.stderr] + [told.put(None)], daemon=True).start()
         is_stopped = False
         while True:
@@ -62,6 +63,7 @@ class Server:
                 run.send_signal(signal.SIGINT)
                 threading.Timer(HALT_S, run.kill).start()
         run.wait()
+        listener.join()
         if is_stopped:
             handle.canceled()
             return Pursue.Result(verdict="cancelled", why="it was stopped")

@@ -3,58 +3,24 @@
     tests/venv.sh /tmp/ros && DESCRY=target/release/descry /tmp/ros/bin/python -m pytest robots/ros2/tests
 """
 
-import json
 import os
-import pathlib
-import shutil
 import subprocess
 import sys
 import time
 
 import pytest
+from conftest import BODY, DESCRY, ENVIRONMENT, HERE, Robot, descry, pursued
 
-HERE = pathlib.Path(__file__).resolve().parent
-DESCRY = os.environ.get("DESCRY") or shutil.which("descry")
 rclpy = pytest.importorskip("rclpy")
 if not DESCRY:
     pytest.skip("DESCRY names no descry", allow_module_level=True)
-
-VENV = os.path.dirname(os.path.dirname(sys.executable))
-ENVIRONMENT = {
-    **os.environ,
-    "AMENT_PREFIX_PATH": os.environ.get("AMENT_PREFIX_PATH", VENV),
-    "LD_LIBRARY_PATH": f"{VENV}/lib:{os.environ.get('LD_LIBRARY_PATH', '')}",
-    "PYTHONPATH": f"{HERE.parent}:{HERE.parents[1] / 'python'}",
-}
-BODY = f"program:AMENT_PREFIX_PATH={ENVIRONMENT['AMENT_PREFIX_PATH']} {sys.executable} -m descry_ros2"
-
-
-class Robot:
-    """The fake robot, for as long as a test asks it."""
-
-    def __init__(self, fault):
-        self.fault = fault
-
-    def __enter__(self):
-        command = [sys.executable, str(HERE / "fake_robot.py"), *([self.fault] if self.fault else [])]
-        self.process = subprocess.Popen(command, env=ENVIRONMENT)
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.wait()
-
-
-def descry(*arguments, timeout=170):
-    return subprocess.run([DESCRY, *arguments], env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
 
 
 def found(tmp_path, fault="", goal="cup A", more=""):
     settings = (HERE / "robot.toml").read_text().replace('name = "fake robot"', f'name = "fake robot"\n{more}')
     (tmp_path / "robot.toml").write_text(settings)
     with Robot(fault):
-        said = descry("find", goal, "--run", str(tmp_path / "run"), "--json", "--robot", f"{BODY} {tmp_path / 'robot.toml'}")
-    return json.loads(said.stdout), said
+        return pursued(f"find {goal}", tmp_path / "run", f"{BODY} {tmp_path / 'robot.toml'}")
 
 
 def test_it_keeps_the_promises_of_bodies():
@@ -117,7 +83,7 @@ def test_others_have_it_pursue_goals_and_cancel_them(tmp_path):
             result = wait(goal.get_result_async(), 60).result
             assert (result.verdict, result.found) == ("achieved", True), result
             assert abs(result.place.pose.position.x - 0.1) < 0.02 and result.place.header.frame_id == "map"
-            assert os.path.isdir(os.path.join(tmp_path, result.evidence)) and any("observe" in step for step in steps), steps
+            assert os.path.isdir(os.path.join(tmp_path, result.evidence)) and any("looking at" in step for step in steps), steps
             goal = wait(client.send_goal_async(Pursue.Goal(goal="identify all objects on the table")), 10)
             time.sleep(1.0)
             wait(goal.cancel_goal_async(), 10)

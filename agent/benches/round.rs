@@ -6,12 +6,15 @@
 use std::sync::Arc;
 
 use descry_agent::body::{self, Body};
-use descry_domains::abilities::searching::{candidates, perceive, policies};
+use descry_domains::abilities::searching::policies;
 use descry_domains::abilities::surveying::chart::Chart;
-use descry_domains::goal::{self, Goal};
+use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
-use descry_domains::world::{Round, Setting, World};
+use descry_domains::looking::{candidates, perceive};
+use descry_domains::objective::Goal;
+use descry_domains::round::Round;
+use descry_domains::world::{Setting, World};
 use descry_memory::{Meta, Options, Record, Sensing};
 use descry_perception::View;
 use descry_perception::merge::{Merged, merge};

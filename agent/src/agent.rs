@@ -4,12 +4,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use descry_domains::abilities::searching::reasons::one_then;
 use descry_domains::actions::Carried;
-use descry_domains::answer::{Conclusion, Ended};
+use descry_domains::conclusion::{Conclusion, Ended};
+use descry_domains::error::WorldError;
+use descry_domains::looking::looks::one_then;
 use descry_domains::note::Note;
+use descry_domains::round::Round;
 use descry_domains::saying::Saying;
-use descry_domains::world::{Choice, Job, Round, Setting, World, WorldError};
+use descry_domains::world::{Choice, Job, Setting, World};
 use descry_memory::{Blob, Draft, LogLevel, Meta, Record, RecordId, viewer};
 use descry_planner::{Outcome as Planned, Plan, Statistics, Step, Task};
 use descry_robots::Robot;

@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use descry_domains::world::WorldError;
+use descry_domains::error::WorldError;
 
 /// Exit of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,10 +6,10 @@ pub mod remote;
 use std::path::Path;
 
 use descry_memory::{Durability, Options, Record, Retention, free_bytes};
+pub use remote::{Address, is_address};
 use serde::{Deserialize, Serialize};
 
 use crate::exit::CommandError;
-pub use remote::{Address, is_address};
 
 /// Storage options of a record: part of the settings of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -149,7 +149,7 @@ fn found(place: &Path) -> Result<Record, CommandError> {
     if let Some(text) = place.to_str().filter(|_| is_address(place)) {
         return Address::read(text)?.read_only();
     }
-    if let Ok(header) = crate::run::header(place)
+    if let Ok(header) = crate::run::files::header(place)
         && let Some(address) = header.settings.keeping.address()?
     {
         return address.read_only();

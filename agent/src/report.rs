@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use descry_domains::answer::{Believed, Verdict};
-use descry_domains::goal::Goal;
+use descry_domains::conclusion::{Believed, Verdict};
 use descry_domains::lesson::Lesson;
 use descry_domains::note::Note;
+use descry_domains::objective::Goal;
 use descry_domains::saying::Saying;
 use descry_planner::Step;
 use descry_skills::Call;

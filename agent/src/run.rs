@@ -1,9 +1,10 @@
 //! One run from beginning to end: its folder, its record, its report.
 
 mod beginning;
-mod files;
+pub(crate) mod files;
 #[doc(hidden)]
 pub mod folder;
+mod header;
 pub mod programs;
 mod remembering;
 #[doc(hidden)]
@@ -13,71 +14,31 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use descry_domains::answer::{Conclusion, Verdict};
-use descry_domains::goal::{self, Goal};
+pub use beginning::Beginning;
+use descry_domains::conclusion::{Conclusion, Verdict};
+use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
-use descry_domains::situation::Past;
+use descry_domains::objective::Goal;
+use descry_domains::past::Past;
 use descry_domains::world::{Chooser, Setting};
 use descry_memory::remember::Remembered;
 use descry_memory::{Fault, Query, Record};
 use descry_robots::Robot;
 use descry_robots::recorded::TapedRobot;
-use serde::{Deserialize, Serialize};
+pub use files::{finish, has_ended, header, keep_header, lost_of_header, lost_of_record, report};
+pub use folder::Folder;
+pub use header::{Header, Resumed, Settings};
+pub use resumed::{GoingOn, Prepare, resume};
 use serde_json::Value;
 
 use crate::agent::{Agent, Totals};
 use crate::body::Body;
 use crate::body::tape::{self, RecordTape};
 use crate::exit::CommandError;
-use crate::keeping::Keeping;
 use crate::report::{Event, Report};
 use crate::shell;
 use crate::stop::Stop;
-pub use beginning::Beginning;
-pub use files::{finish, has_ended, header, keep_header, lost_of_header, lost_of_record, report};
-pub use folder::Folder;
-pub use resumed::{GoingOn, Prepare, Resumed, resume};
-
-/// Settings that a run was started with: enough to start it again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// The body, as on the command line.
-    pub robot: String,
-    /// The scene, if one was named.
-    pub scene: Option<String>,
-    /// The seed.
-    pub seed: u64,
-    /// The domain, as on the command line.
-    pub domain: String,
-    /// Name of the policy that chooses where to look next.
-    pub policy: String,
-    /// Storage options of the record.
-    #[serde(default)]
-    pub keeping: Keeping,
-    /// Store in which the last seen objects are remembered from run to run; none: nothing is remembered.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub remember: Option<String>,
-}
-
-/// `run.json` in a run's folder.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Header {
-    /// Version of descry.
-    pub version: String,
-    /// The goal in words.
-    pub goal: String,
-    /// The goal in PDDL.
-    pub pddl_goal: String,
-    /// Time at which it was started, seconds since 1970.
-    pub started_unix_s: u64,
-    /// The interruptions after which the run was resumed, in order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub resumed: Vec<Resumed>,
-    /// Settings that it was started with.
-    #[serde(flatten)]
-    pub settings: Settings,
-}
 
 /// The task of a run.
 #[derive(Clone, Copy)]

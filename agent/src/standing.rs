@@ -3,11 +3,11 @@
 //! each look can be told later.
 
 pub use descry_domains::abilities::searching::FirstLook;
-use descry_domains::abilities::searching::doubt::Doubt;
-use descry_domains::abilities::searching::reasons;
-use descry_domains::answer::Ended;
-use descry_domains::situation::KnownSurface;
-use descry_domains::world::Round;
+use descry_domains::belief::doubt::Doubt;
+use descry_domains::conclusion::Ended;
+use descry_domains::reasons;
+use descry_domains::round::Round;
+use descry_domains::surface::KnownSurface;
 use descry_memory::{Blob, Form};
 use descry_planner::NoPlan;
 use serde::{Deserialize, Serialize};

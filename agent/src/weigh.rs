@@ -8,7 +8,7 @@ pub mod steps;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use descry_domains::world::Round;
+use descry_domains::round::Round;
 use descry_memory::{Blob, Form};
 use descry_planner::semantics::{Binding, Changes, Pending};
 use descry_planner::task::{Action, Comparison, Effect, FunctionId, ObjectId};
@@ -16,12 +16,12 @@ use descry_planner::{Plan, SEPARATION_S, Semantics, State, Step, monitor};
 use descry_skills::Call;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use steps::{Instead, brought, joined, leads, words};
 
 use crate::compared::{self, Compared};
 use crate::exit::CommandError;
 use crate::reason::Break;
 use crate::written::{self, call_of};
-use steps::{Instead, brought, joined, leads, words};
 
 /// Name of the blob of the comparison beside the event of a plan.
 pub const BLOB: &str = "weighed";

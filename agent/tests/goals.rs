@@ -1,11 +1,12 @@
 //! Random goals over the words of a built-in domain, asked and pursued in a small simulated room: no answer without a look at what the
 //! goal speaks of, and none that the truth denies more often than the confidence says that it may.
 
+use descry_agent::body;
 use descry_agent::keeping::Keeping;
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
-use descry_agent::{body, stop::Stop};
+use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
-use descry_domains::answer::Verdict;
+use descry_domains::conclusion::Verdict;
 use descry_domains::config::GoalPhrase;
 use descry_domains::load::Domain;
 use descry_domains::vocabulary::Vocabulary;

@@ -1,7 +1,8 @@
 //! Findings about the folder of a domain, common to the command line and the language server.
 
 use descry_domains::check;
-use descry_domains::load::{Domain, LoadError};
+use descry_domains::load::Domain;
+use descry_domains::load::error::LoadError;
 use descry_planner::Findings;
 
 /// The findings in a domain's folder, and the grounding of each of its words.

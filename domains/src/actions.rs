@@ -7,7 +7,8 @@ use descry_planner::{Answer, Attachment, CallError, Read, Step, Task};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::{Value, json};
 
-use crate::abilities::{self, Deed, Meaning, SkillWord};
+use crate::abilities;
+use crate::ability::{Deed, Meaning, SkillWord};
 use crate::config::{ActionConfig, ActionKind, Config};
 use crate::load::Domain;
 use crate::situation::Situation;

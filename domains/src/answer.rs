@@ -6,109 +6,27 @@ mod own;
 use std::collections::BTreeMap;
 
 use descry_memory::belief::Track;
-use descry_memory::remember::Remembered;
 use descry_perception::nalgebra::Vector3;
 use descry_perception::recognise::ObjectModel;
-use descry_planner::{Attachments, NoPlan, Task};
+use descry_planner::{Attachments, Task};
 use descry_robots::Part;
-use serde::{Deserialize, Serialize};
 
 pub use self::own::changes;
-use crate::abilities;
-use crate::abilities::searching::adrift;
-use crate::abilities::searching::consistent::Contradiction;
-use crate::abilities::searching::doubt::Doubt;
-use crate::abilities::searching::reasons;
-use crate::culprit;
-use crate::goal::Goal;
+use crate::belief::adrift;
+use crate::belief::doubt::Doubt;
+use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
+use crate::english::{one, plural};
 use crate::judge::{Judgement, Truth};
-use crate::lexicon::{Lexicon, one, plural};
+use crate::known::{Thing, is_alike};
+use crate::lexicon::Lexicon;
 use crate::load::Domain;
+use crate::looking::contradiction::Contradiction;
 use crate::mind::{Mind, Region};
-use crate::no_plan;
+use crate::objective::Goal;
+use crate::round::Round;
 use crate::saying::Saying;
-use crate::situation::{Situation, Thing, is_alike};
-use crate::world::Round;
-
-/// The reason a run ended.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Ended {
-    /// The goal holds.
-    Reached,
-    /// There is no plan, and why.
-    NoPlan(Vec<NoPlan>),
-    /// The search for a plan came to no end, and no single step is surely worth it.
-    Undecided(String),
-    /// A limit of looks, plans or time was reached.
-    Limit(String),
-    /// A step fails for good, or steps change nothing.
-    Failed(String),
-}
-
-/// The verdict on a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Verdict {
-    /// The goal is reached with the confidence that was asked for.
-    Achieved,
-    /// Every useful pose has been tried: it is not there.
-    NotFound,
-    /// Nothing that the body can do would settle it.
-    CannotTell,
-    /// The requested facts are known, and nothing that the body can do brings about the goal.
-    Impossible,
-    /// The body or the store failed, or what is done changes nothing.
-    Failed,
-}
-
-/// An object, as believed at the end.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Believed {
-    /// The known object that it most likely is; none: unknown.
-    pub label: Option<String>,
-    /// Its kind.
-    pub kind: Option<String>,
-    /// Probability of that.
-    pub confidence: f64,
-    /// The middle of its body, in the map; none in the hand.
-    #[serde(default)]
-    pub position_m: Option<[f64; 3]>,
-    /// Standard deviation of that, in the direction in which it is known worst; none if nothing is known of it.
-    #[serde(default)]
-    pub position_sigma_m: Option<f64>,
-    /// Sides of its footprint and height.
-    pub size_m: [f64; 3],
-    /// The surface that it stands on, as people call it.
-    #[serde(default)]
-    pub on: Option<String>,
-    /// The room that this is in.
-    #[serde(default, rename = "in")]
-    pub room: Option<String>,
-    /// True if the goal asks about it.
-    #[serde(default)]
-    pub asked: bool,
-}
-
-/// The conclusion of a run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Conclusion {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// The answer with its reason, in a sentence.
-    pub why: String,
-    /// Confidence of the answer, 0 to 1.
-    pub confidence: f64,
-    /// Probability that what was looked for is there after all.
-    pub remaining: Option<f64>,
-    /// The requested object, if the goal is about a single one.
-    pub object: Option<String>,
-    /// The requested object as it is believed to stand, if it is.
-    pub found: Option<Believed>,
-    /// Everything that is believed.
-    pub objects: Vec<Believed>,
-    /// Persistent belief for later runs, if any.
-    pub remembered: Option<Remembered>,
-}
+use crate::situation::Situation;
+use crate::{abilities, culprit, no_plan, reasons};
 
 /// Draws the conclusion of a run that has ended.
 pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
@@ -118,7 +36,7 @@ pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
         // On a map that the body has made itself ways may be missing.
         Ended::NoPlan(why) => {
             let why = no_plan::told(why, &|call| abilities::meaning(config, call));
-            asker.gave_up(&why, !s.chart.has_ways())
+            asker.gave_up(&why, !s.own_map.has_ways())
         }
         Ended::Undecided(why) => asker.gave_up(why, false),
         Ended::Limit(why) => (Verdict::CannotTell, format!("it cannot be told: {why}")),
@@ -517,7 +435,7 @@ impl Asker<'_> {
 
     fn seen_of(&self, doubt: &Doubt, left: f64) -> String {
         let seen = reasons::seen_of(self.s, doubt, left, |on| self.mind.regions[on].taken);
-        match self.s.chart.goes_on(self.s.robot.description()) {
+        match self.s.own_map.goes_on(self.s.robot.description()) {
             Some(goes_on) => format!("{seen}; {goes_on}"),
             None => seen,
         }

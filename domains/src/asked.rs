@@ -8,25 +8,8 @@ use crate::declared;
 use crate::lexicon::Lexicon;
 use crate::load::Domain;
 use crate::mentions::mentions;
+use crate::objective::Asked;
 use crate::vocabulary::Vocabulary;
-
-/// The objects that a goal's condition speaks of.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Asked {
-    /// Things that are looked for, each with the surfaces, or rooms, on which it is asked about; none: wherever it is.
-    pub things: Vec<(String, Option<Vec<String>>)>,
-    /// Kinds of which all are asked for, each with the rooms in which it is asked about; none: wherever they are.
-    pub kinds: Vec<(String, Option<Vec<String>>)>,
-    /// Surfaces of which it is asked what stands there.
-    pub surfaces: Vec<String>,
-    /// True if the condition wants something of seen objects to be false, or a certainty about them to be
-    /// small.
-    pub denies: bool,
-    /// True if it asks for more than looking can tell.
-    pub more: bool,
-    /// Words of the condition with their objects, in its order; those behind derived words too. Variables are left as `?`.
-    pub words: Vec<(String, Vec<String>)>,
-}
 
 /// The function that says how sure it is that a thing is on a surface: a question about that surface alone.
 const PRESENCE: &str = "presence";
@@ -88,11 +71,6 @@ impl Asked {
             }
         }
         asked
-    }
-
-    /// The objects of a word, each time that the condition has it.
-    pub fn of_word<'a>(&'a self, word: &'a str) -> impl Iterator<Item = &'a [String]> {
-        self.words.iter().filter(move |(name, _)| name == word).map(|(_, objects)| objects.as_slice())
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use descry_planner::{Diagnostic, Findings, Source as Text, Span};
 use serde::Deserialize;
 
-use crate::load::LoadError;
+use crate::load::error::LoadError;
 
 /// `domain.toml`.
 #[derive(Debug, Clone, Deserialize)]
@@ -350,7 +350,7 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     let value = |key: &str, value: f64, holds: bool, expected: &'static str| {
         let path: Vec<&str> = key.split('.').collect();
         let error = || {
-            let place = crate::check::place::Places::of(&source.text).at(&path);
+            let place = crate::toml_place::TomlPlaces::of(&source.text).at(&path);
             let message = format!("{key} is {value}");
             let told = Diagnostic::error("value", message, Span { source: 0, ..place }, "here");
             let list = vec![told.with_help(format!("expected: {expected}"))];

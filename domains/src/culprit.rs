@@ -8,7 +8,7 @@ use descry_planner::{NoPlan, Semantics};
 use crate::actions;
 use crate::config::ActionKind;
 use crate::load::Domain;
-use crate::world::Round;
+use crate::round::Round;
 
 /// Drives that are looked at, at most.
 const DRIVES: usize = 20_000;

@@ -16,17 +16,17 @@ pub trait Function: std::fmt::Debug + Send + Sync {
 }
 
 /// Functions by the names of what they answer for.
-pub type Named = BTreeMap<String, Arc<dyn Function>>;
+pub type NamedFunctions = BTreeMap<String, Arc<dyn Function>>;
 
 /// The functions that stand in for programs of a domain.
 #[derive(Debug, Clone, Default)]
 pub struct Functions {
     /// Behind calls: `attachments.NAME` of `domain.toml`.
-    pub calls: Named,
+    pub calls: NamedFunctions,
     /// Behind facts: `word.NAME`.
-    pub facts: Named,
+    pub facts: NamedFunctions,
     /// Behind actions: `action.NAME`.
-    pub actions: Named,
+    pub actions: NamedFunctions,
 }
 
 impl Functions {

@@ -2,17 +2,16 @@
 //! that see each surface. Whatever changes, such as a surface that grows or a door that turns out shut, is
 //! worked out anew; all else is taken over.
 
-pub(crate) mod hidden;
-
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 use descry_perception::nalgebra::{Isometry3, Point3};
 use descry_robots::{Door, Place};
 
-use crate::situation::Known;
+use crate::states::Derived;
+use crate::surface::KnownSurface;
+use crate::viewpoint::Candidate;
 use crate::walls::Walls;
-use hidden::Places;
 
 /// Geometry of a map for one set of viewpoints, surfaces and shut doors.
 #[derive(Debug, Default)]
@@ -34,8 +33,8 @@ pub(crate) struct Sight {
     pub cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
     /// Viewpoints that see any of it, in order.
     pub viewers: OnceLock<Vec<usize>>,
-    /// Places on it where something may stand unseen.
-    pub places: Places,
+    /// Values worked out for it, kept as long as nothing here changes.
+    pub derived: Derived,
 }
 
 impl Geometry {
@@ -55,12 +54,18 @@ impl Geometry {
     }
 
     /// The same geometry for what is known now.
-    pub(crate) fn renewed(&self, known: &Known) -> Geometry {
-        let is_kept = self.viewpoints.len() == known.candidates.len()
-            && self.viewpoints.iter().zip(&known.candidates).all(|(kept, now)| *kept == now.place);
-        let same = is_kept && self.shut == known.shut;
-        let sights = known.surfaces.iter().enumerate().map(|(n, surface)| {
-            let is_charted = known.chart.has(&surface.symbol);
+    pub(crate) fn renewed(
+        &self,
+        viewpoints: &[Candidate],
+        surfaces: &[KnownSurface],
+        shut: &BTreeSet<usize>,
+        is_charted: &dyn Fn(&str) -> bool,
+    ) -> Geometry {
+        let is_kept = self.viewpoints.len() == viewpoints.len()
+            && self.viewpoints.iter().zip(viewpoints).all(|(kept, now)| *kept == now.place);
+        let same = is_kept && self.shut == *shut;
+        let sights = surfaces.iter().enumerate().map(|(n, surface)| {
+            let is_charted = is_charted(&surface.symbol);
             let fits = |sight: &&Arc<Sight>| {
                 same && !is_charted
                     && !sight.is_charted
@@ -72,16 +77,16 @@ impl Geometry {
                     outline: surface.outline.clone(),
                     is_whole: surface.whole,
                     is_charted,
-                    cameras: known.candidates.iter().map(|_| OnceLock::new()).collect(),
+                    cameras: viewpoints.iter().map(|_| OnceLock::new()).collect(),
                     viewers: OnceLock::new(),
-                    places: Places::default(),
+                    derived: Derived::default(),
                 })
             };
             self.sights.get(n).filter(fits).cloned().unwrap_or_else(fresh)
         });
         let sights = sights.collect();
-        let places = || known.candidates.iter().map(|c| c.place.clone()).collect();
-        let viewpoints = if is_kept { Arc::clone(&self.viewpoints) } else { places() };
-        Geometry { walls: Arc::clone(&self.walls), viewpoints, shut: known.shut.clone(), sights }
+        let places = || viewpoints.iter().map(|c| c.place.clone()).collect();
+        let kept = if is_kept { Arc::clone(&self.viewpoints) } else { places() };
+        Geometry { walls: Arc::clone(&self.walls), viewpoints: kept, shut: shut.clone(), sights }
     }
 }

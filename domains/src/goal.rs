@@ -1,54 +1,20 @@
 //! Translation of a person's words into a PDDL goal, by the phrases of the domain.
 
 mod ending;
-mod english;
 mod nearest;
 mod sentence;
 
-use crate::asked::{Asked, parsed};
-use crate::config::Answers;
-use crate::lexicon::Lexicon;
-use crate::load::Domain;
 use ending::Wanted;
 pub(crate) use ending::{CONFIDENCE, DEADLINE};
-pub(crate) use english::is_function_word;
 use sentence::{Clause, Joint, Miss, Reader, Sentence};
 
-/// A goal that a person gave, with what it means in the planner's language.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Goal {
-    /// The words as they were given.
-    pub said: String,
-    /// The phrase of `domain.toml` that they matched.
-    pub phrase: String,
-    /// The goal condition in PDDL.
-    pub pddl: String,
-    /// Subjects of the condition.
-    pub asked: Asked,
-    /// Values of the slots.
-    pub slots: Vec<Filled>,
-    /// True if the answer is yes or no.
-    pub question: bool,
-    /// Answers of the phrase.
-    pub answer: Answers,
-    /// The confidence that ends the search, 0 to 1.
-    pub threshold: f64,
-    /// Seconds on the body's clock after which it must be over.
-    pub deadline_s: Option<f64>,
-}
-
-/// A slot of a phrase and what fills it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Filled {
-    /// As it stands in the phrase: `thing`, or `first:thing`.
-    pub slot: String,
-    /// Index among several slots of the same name, from 0.
-    pub number: usize,
-    /// The PDDL symbol.
-    pub symbol: String,
-    /// The usual name.
-    pub name: String,
-}
+use crate::asked::parsed;
+use crate::config::Answers;
+use crate::english::{self, bare};
+use crate::lexicon::Lexicon;
+use crate::load::Domain;
+use crate::objective::{Asked, Filled, Goal};
+use crate::slots::{put_in, slots_of, type_of_slot};
 
 /// The reason a goal was not understood, with suggestions.
 #[derive(Debug, thiserror::Error)]
@@ -187,61 +153,6 @@ fn not_understood(said: &str, plain: &[String], reader: Reader<'_>) -> GoalError
     }
 }
 
-/// The type that fills a slot: `thing` of `thing` and of `first:thing`.
-pub fn type_of_slot(slot: &str) -> &str {
-    slot.rsplit(':').next().unwrap_or(slot)
-}
-
-/// The slots of a text in their order.
-pub fn slots_of(text: &str) -> Vec<&str> {
-    let mut slots = Vec::new();
-    let mut rest = text;
-    while let Some((_, behind)) = rest.split_once('<') {
-        let Some((slot, after)) = behind.split_once('>') else { break };
-        // A comparison is no slot.
-        if !slot.is_empty() && slot.chars().all(|c| c.is_alphanumeric() || "-_:".contains(c)) {
-            slots.push(slot);
-        }
-        rest = if slots.last() == Some(&slot) { after } else { behind };
-    }
-    slots
-}
-
-/// Puts what fills the slots into a text: the first of a name in the place of its first mention, and so on; where the text mentions
-/// it more or less often than the phrase has it, each mention stands for the only one.
-///
-/// # Errors
-/// A slot that the phrase does not have, or of which it has several and the text not as many.
-pub fn put_in(text: &str, slots: &[Filled], with: impl Fn(&Filled) -> String) -> Result<String, String> {
-    let mut out = text.to_string();
-    let mentioned = slots_of(text);
-    for (n, slot) in mentioned.iter().enumerate().filter(|(n, slot)| !mentioned[..*n].contains(slot)) {
-        let fitting: Vec<&Filled> = slots.iter().filter(|f| f.slot == *slot).collect();
-        let mentions = mentioned[n..].iter().filter(|m| *m == slot).count();
-        let tag = format!("<{slot}>");
-        match fitting.as_slice() {
-            [] => {
-                let known: Vec<String> = slots.iter().map(|f| format!("<{}>", f.slot)).collect();
-                let known = if known.is_empty() { "none".into() } else { known.join(", ") };
-                return Err(format!("there is no slot {tag}; it has {known}"));
-            }
-            [only] => out = out.replace(&tag, &with(only)),
-            several if several.len() == mentions => {
-                for one in several {
-                    out = out.replacen(&tag, &with(one), 1);
-                }
-            }
-            several => {
-                return Err(format!(
-                    "it says {tag} {} times and \"{text}\" {mentions} times; name them, as <first:{slot}> and <second:{slot}>",
-                    several.len()
-                ));
-            }
-        }
-    }
-    Ok(out)
-}
-
 fn goal_of(
     said: &str,
     sentence: &Sentence<'_>,
@@ -333,11 +244,6 @@ fn answer_of(text: &str, slots: &[Filled]) -> Result<String, String> {
     Ok(out + &put_in(rest, slots, |f| f.name.clone())?)
 }
 
-/// A word without the signs around it.
-pub(crate) fn bare(word: &str) -> &str {
-    word.trim_matches(|c: char| "\"'.,!?".contains(c))
-}
-
 /// The ways in which words fit a pattern with slots, each slot with what it holds; a slot takes one word or more.
 pub fn fits<'a>(
     pattern: &[&'a str],
@@ -364,10 +270,6 @@ pub fn fits<'a>(
 /// The words and slots of a phrase, without the signs around them.
 pub fn pattern(say: &str) -> Vec<&str> {
     say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect()
-}
-
-pub(crate) fn without_article(name: &str) -> &str {
-    ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
 /// The types that the phrases of a domain speak of, things first; the kinds are the things, in the plural.

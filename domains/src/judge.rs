@@ -16,9 +16,10 @@ use descry_planner::{Attachments, Semantics};
 use crate::actions;
 use crate::config::ActionKind;
 use crate::load::Domain;
+use crate::origin::{self, Origin};
 use crate::range::{Bounds, Range, Referent};
 use crate::situation::Situation;
-use crate::vocabulary::{Ground, Word};
+use crate::vocabulary::Word;
 use crate::words::Words;
 
 /// Truth of a condition.
@@ -369,8 +370,8 @@ impl<'a> Judge<'a> {
     /// Bounds that looks give for a word; none where looks do not tell it.
     fn bounds(&self, name: &str) -> Option<Bounds> {
         let word = self.vocabulary.iter().find(|word| word.name == name)?;
-        match self.domain.vocabulary.ground(word, &self.domain.config) {
-            Ground::Sensed(fact) => fact.bounds,
+        match origin::of(self.domain, word) {
+            Origin::Sensed(fact) => fact.bounds,
             _ => None,
         }
     }
@@ -378,7 +379,7 @@ impl<'a> Judge<'a> {
     /// True if a word that is not stated to hold is known to be false.
     fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
-        if !matches!(self.domain.vocabulary.ground(word, &self.domain.config), Ground::Remembered) {
+        if !matches!(origin::of(self.domain, word), Origin::Remembered) {
             return true;
         }
         let objects: Option<Vec<String>> = arguments.iter().map(|held| self.shown(held)).collect();

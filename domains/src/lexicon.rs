@@ -6,23 +6,10 @@ use descry_perception::recognise::ObjectModel;
 use descry_robots::Robot;
 use descry_robots::sim::SceneSpec;
 
+use crate::english::plural;
 use crate::load::Domain;
-use crate::situation::Past;
-
-/// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
-pub fn symbol(name: &str) -> String {
-    let words: Vec<String> = name
-        .split(|c: char| !c.is_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .map(str::to_lowercase)
-        .collect();
-    let symbol = words.join("-");
-    // A PDDL symbol must not begin with a digit.
-    if symbol.starts_with(|c: char| c.is_ascii_digit()) { format!("n-{symbol}") } else { symbol }
-}
-
-/// The type of the body's senses.
-pub const SENSE: &str = "sense";
+use crate::past::Past;
+use crate::symbol::{SENSE, symbol};
 
 /// Types whose objects have names in every domain: their symbols are these names.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
@@ -211,23 +198,6 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
         }
     }
     things
-}
-
-/// One of something, with its article: a cup, an apple.
-pub fn one(name: &str) -> String {
-    let is_vowel = name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']);
-    format!("{} {name}", if is_vowel { "an" } else { "a" })
-}
-
-/// Several of something: cups, boxes, berries.
-pub fn plural(name: &str) -> String {
-    const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];
-    let before_y = name.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
-    match before_y.filter(|stem| !stem.is_empty()) {
-        Some(stem) => format!("{stem}ies"),
-        None if HISSING.iter().any(|end| name.ends_with(end)) => format!("{name}es"),
-        None => format!("{name}s"),
-    }
 }
 
 /// The names of a thing, each in the plural too.

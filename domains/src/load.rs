@@ -1,5 +1,6 @@
 //! A domain's folder: the PDDL text, what may be said, the known objects and the scenes.
 
+pub mod error;
 #[doc(hidden)]
 pub mod names;
 mod program_texts;
@@ -10,17 +11,17 @@ use std::sync::Arc;
 
 use descry_perception::laser::KnownShape;
 use descry_perception::recognise::ObjectModel;
-use descry_planner::{Findings, Source};
+use descry_planner::Source;
 use descry_robots::input::{clipped, read_text};
 use include_dir::{Dir, include_dir};
+pub use program_texts::program_texts;
 use serde::Deserialize;
 
 use crate::config::{self, Config};
 use crate::function::Functions;
+use crate::load::error::LoadError;
 use crate::program::Tape;
 use crate::vocabulary::Vocabulary;
-
-pub use program_texts::program_texts;
 
 /// The domains that come with the program.
 static BUILT_IN: [(&str, Dir<'_>); 5] = [
@@ -59,45 +60,6 @@ pub struct Domain {
     pub functions: Functions,
     /// Recording of its programs' answers, for writing and for replay.
     pub tape: Option<Arc<dyn Tape>>,
-}
-
-/// The reason a domain's folder could not be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum LoadError {
-    /// Neither a built-in name nor a folder.
-    #[error(
-        "there is no domain \"{name}\"\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
-    )]
-    NoDomain {
-        /// The requested domain.
-        name: String,
-        /// The built-in domains.
-        known: String,
-    },
-    /// A file could not be read.
-    #[error("{path}: {because}\n  expected: {expected}")]
-    File {
-        /// The file.
-        path: String,
-        /// Error of the operating system.
-        because: String,
-        /// Expected content.
-        expected: &'static str,
-    },
-    /// A TOML file says what cannot be understood; the drawing points at the place.
-    #[error("{path}\n{drawn}")]
-    Toml {
-        /// The file.
-        path: String,
-        /// The error under the text.
-        drawn: String,
-    },
-    /// The PDDL text has faults, or a value of `domain.toml` lies outside what makes sense.
-    #[error("{}", .findings.render(false))]
-    Findings {
-        /// Each with its place.
-        findings: Findings,
-    },
 }
 
 impl Domain {

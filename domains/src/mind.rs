@@ -4,14 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use descry_memory::RecordId;
 use descry_memory::belief::Track;
-use descry_perception::merge::Merger;
+use descry_perception::View;
+use descry_perception::merge::{MergeOptions, Merged, Merger};
 use descry_perception::nalgebra::Isometry3;
 
-use crate::abilities::learning::again::Glances;
-use crate::abilities::searching::change::Change;
-use crate::abilities::searching::consistent::Contradiction;
-use crate::abilities::searching::merging::LastMerged;
-use crate::situation::Known;
+use crate::known::Known;
+use crate::looking::change::Change;
+use crate::looking::contradiction::Contradiction;
 use crate::words::Words;
 
 /// Everything that a world has come to know.
@@ -28,10 +27,10 @@ pub struct Mind {
     pub views: usize,
     /// Pushes tried so far.
     pub pushes: usize,
+    /// How often what was seen has become void, as something moved.
+    pub disturbed: usize,
     /// Driven so far, metres.
     pub distance_m: f64,
-    /// Recognition results of learned things in single views.
-    pub glances: Glances,
     /// Last reading of each sense of the body, by its symbol.
     pub readings: BTreeMap<String, serde_json::Value>,
 }
@@ -40,7 +39,7 @@ pub struct Mind {
 #[derive(Debug, Default)]
 pub struct Region {
     /// Views that still hold.
-    pub looks: Vec<Look>,
+    pub looks: Vec<RecordedView>,
     /// State of their last merge, reused by the next one.
     pub merger: Merger,
     /// The views that its space holds, by their times, and from where they saw it.
@@ -61,7 +60,7 @@ pub struct Region {
 
 /// A view that was taken and recorded.
 #[derive(Debug, Clone, Copy)]
-pub struct Look {
+pub struct RecordedView {
     /// When.
     pub stamp_ns: i64,
     /// Its record.
@@ -84,6 +83,16 @@ pub enum Laid {
 }
 
 impl Mind {
+    /// Knowledge before anything was done or seen.
+    pub(crate) fn new(known: Known, words: Words) -> Self {
+        let regions = known.surfaces.iter().map(|_| Region::default()).collect();
+        let (merged, readings) = (None, BTreeMap::new());
+        let (views, pushes, disturbed, distance_m) = (0, 0, 0, 0.0);
+        let mut mind = Self { known, words, regions, merged, views, pushes, disturbed, distance_m, readings };
+        mind.attend();
+        mind
+    }
+
     /// Takes from the remembered words what rounds are grounded in.
     pub fn attend(&mut self) {
         let (known, words) = (&mut self.known, &self.words);
@@ -112,5 +121,30 @@ impl Mind {
             }
         }
         self.attend();
+    }
+}
+
+/// Last merge of views of a surface without an outline on the map.
+pub struct LastMerged {
+    pub(crate) options: MergeOptions,
+    /// When its views were taken, and from where.
+    pub(crate) views: Vec<(i64, Isometry3<f64>)>,
+    pub(crate) merged: Merged,
+}
+
+impl RecordedView {
+    /// Localised camera pose of a view that may have been aligned with the outline of its surface.
+    pub(crate) fn localised(&self, view: &View) -> Isometry3<f64> {
+        match self.laid {
+            Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,
+            Laid::AsLocalised | Laid::Nowhere => view.world_from_camera,
+        }
+    }
+}
+
+impl Mind {
+    /// The records of all views that still hold.
+    pub(crate) fn views_held(&self) -> Vec<RecordId> {
+        self.regions.iter().flat_map(|r| &r.looks).map(|look| look.record).collect()
     }
 }

@@ -80,34 +80,3 @@ impl Range {
         Range { believed: least, least, greatest }
     }
 }
-
-impl Situation {
-    /// Probability that a thing is on a surface: as one of the objects that were seen, or hidden.
-    pub(crate) fn chance_on(&self, what: usize, on: usize) -> f64 {
-        let name = &self.things[what].name;
-        let none_is = self.on_surface(on).map(|t| 1.0 - t.probability_of(name)).product::<f64>();
-        (1.0 - none_is + self.doubt_about_on(what, on).hidden).min(1.0)
-    }
-
-    /// True if the objects on a surface are known with the requested confidence.
-    pub(crate) fn is_clear(&self, on: usize) -> bool {
-        self.is_looked_at(on) && self.clarity(on) >= self.threshold
-    }
-
-    /// True if a view of a surface was taken in this run.
-    pub(crate) fn is_looked_at(&self, on: usize) -> bool {
-        !self.spaces[on].seen_from().is_empty()
-    }
-
-    /// Objects that were seen and are none of the things of the problem.
-    pub(crate) fn strangers(&self) -> impl Iterator<Item = &Track> {
-        let is_thing = |track: &Track| {
-            let is_it = |thing: &crate::situation::Thing| match thing.track {
-                Some(id) => id == track.id,
-                None => track.probability_of(&thing.name) >= self.threshold,
-            };
-            self.things.iter().any(is_it)
-        };
-        self.belief.tracks.iter().filter(move |track| !is_thing(track))
-    }
-}

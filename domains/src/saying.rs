@@ -3,8 +3,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::english::one;
 use crate::goal::spoken_types;
-use crate::lexicon::{Lexicon, NAMED, Places, one};
+use crate::lexicon::{Lexicon, NAMED, Places};
 use crate::load::Domain;
 
 /// A line of `[said]`: the parameters, in their order, with their types; and the text.

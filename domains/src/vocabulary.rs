@@ -7,9 +7,6 @@ use descry_planner::task::{
 };
 use descry_planner::{Findings, Source, Span};
 
-use crate::abilities::{self, Fact};
-use crate::config::{Config, Source as Kept};
-
 /// Declarations of a domain's PDDL text.
 #[derive(Debug, Clone)]
 pub struct Vocabulary {
@@ -32,23 +29,6 @@ pub struct Word {
     pub is_derived: bool,
     /// Span of its declaration.
     pub span: Span,
-}
-
-/// The source of a word's value in a run.
-#[derive(Debug, Clone, Copy)]
-pub enum Ground {
-    /// A fact of an ability states it, from what is known now.
-    Sensed(&'static Fact),
-    /// A program states it.
-    SensedByProgram,
-    /// It starts as the domain or the store says and changes as the effects of carried-out actions say.
-    Remembered,
-    /// It never changes.
-    Fixed,
-    /// It changes within a plan alone.
-    Planned,
-    /// The domain's own rules derive it.
-    Derived,
 }
 
 impl Vocabulary {
@@ -127,28 +107,6 @@ impl Vocabulary {
     pub fn constants(&self, of: &str) -> Vec<String> {
         let is = |types: &[TypeId]| types.iter().any(|id| self.is_a(&self.task.type_of(*id).name, of));
         self.task.objects.iter().filter(|o| is(&o.types)).map(|o| o.name.clone()).collect()
-    }
-
-    /// The source of a word's value.
-    pub fn ground(&self, word: &Word, config: &Config) -> Ground {
-        let configured = config.word.get(&word.name);
-        if word.is_derived {
-            return Ground::Derived;
-        }
-        if configured.is_some_and(|c| c.program.is_some()) {
-            return Ground::SensedByProgram;
-        }
-        match (configured.and_then(|c| c.is), abilities::fact(&config.uses, &word.name)) {
-            (Some(Kept::Remembered), _) => Ground::Remembered,
-            (Some(Kept::Fixed), _) => Ground::Fixed,
-            (Some(Kept::Planned), _) => Ground::Planned,
-            (None, Some(fact)) => Ground::Sensed(fact),
-            (None, None) if self.changed.contains(&word.name) => Ground::Remembered,
-            (None, None) if config.action.values().any(|a| a.taught().any(|t| t == word.name)) => {
-                Ground::Remembered
-            }
-            (None, None) => Ground::Fixed,
-        }
     }
 
     /// True if an action's effects change a word.

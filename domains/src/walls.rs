@@ -5,8 +5,6 @@ use std::collections::BTreeSet;
 use descry_robots::nalgebra::{Point2, Vector2};
 use descry_robots::{Door, Room};
 
-use crate::situation::Situation;
-
 /// Distance from the end of a line of sight within which a point stands before the wall behind it, metres.
 const BEFORE_M: f64 = 0.05;
 /// Maximum thickness of a wall, metres: the outlines of two rooms lie at most this far from the middle of
@@ -15,13 +13,6 @@ const THICK_M: f64 = 0.3;
 /// Least side of a cell of the index, metres, and the maximum number of cells along a side.
 const CELL_M: f64 = 2.0;
 const MOST_CELLS: f64 = 256.0;
-
-impl Situation {
-    /// True if a wall of the map, or a door that is believed to be shut, stands between two places.
-    pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
-        self.geometry.walls().stand_between(&self.shut, from, to)
-    }
-}
 
 /// Walls of a map, found by place: the cost of a line of sight depends on its length, not on the size of
 /// the map.

@@ -7,7 +7,7 @@ use descry_planner::{FactValue, Reading, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::load::Domain;
-use crate::vocabulary::{Ground, Vocabulary};
+use crate::vocabulary::{Vocabulary, Word};
 
 /// The instances of remembered and fixed words that hold or have a value, each word by itself.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -27,18 +27,13 @@ impl Words {
     ///
     /// # Errors
     /// Why a line of `init` cannot be read.
-    pub fn begin(domain: &Domain) -> Result<Self, String> {
+    pub fn begin(domain: &Domain, is_sensed: &dyn Fn(&Word) -> bool) -> Result<Self, String> {
         let mut words = Self::default();
         for line in &domain.config.init {
             for (name, arguments, value) in read(line).map_err(|e| format!("init: \"{line}\": {e}"))? {
                 match domain.vocabulary.word(&name) {
                     None => return Err(format!("init: \"{line}\": no word is called {name}")),
-                    Some(word)
-                        if matches!(
-                            domain.vocabulary.ground(&word, &domain.config),
-                            Ground::Sensed(_) | Ground::SensedByProgram
-                        ) =>
-                    {
+                    Some(word) if is_sensed(&word) => {
                         return Err(format!(
                             "init: \"{line}\": {name} is sensed; only what is remembered or fixed can be said to begin so"
                         ));
@@ -136,14 +131,6 @@ impl Words {
 
 fn names(reading: &Reading) -> Vec<String> {
     reading.arguments.iter().map(ToString::to_string).collect()
-}
-
-/// The names of the words of a domain that are remembered, and of those that are fixed.
-pub fn remembered(domain: &Domain) -> Vec<String> {
-    let vocabulary = &domain.vocabulary;
-    let is_remembered =
-        |w: &crate::vocabulary::Word| matches!(vocabulary.ground(w, &domain.config), Ground::Remembered);
-    vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
 }
 
 /// An instance of a word: its name, its arguments, and its value (none: it does not hold).

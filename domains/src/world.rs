@@ -2,45 +2,49 @@
 //! answered. It is all that the loop sees of a domain.
 
 mod end;
-mod error;
 mod fallback;
 mod focus;
 mod grounds;
 mod steps;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Instant;
 
-use descry_memory::{Record, RecordId};
+use descry_memory::Record;
 use descry_perception::recognise::Recogniser;
 use descry_planner::{Attachments, Cause, Plan, Source, Task, after, monitor};
 use descry_robots::{PoseEstimate, Robot};
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
+use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled, things};
 use serde_json::json;
 
-use crate::abilities::learning::news::News;
-use crate::abilities::searching::candidates;
-use crate::abilities::searching::perceive::{self, Eyes};
 pub use crate::abilities::searching::policies::Chooser;
 use crate::abilities::searching::policies::{self, By, Look};
-use crate::abilities::searching::reasons;
-use crate::abilities::surveying::chart::Chart;
-use crate::abilities::{self, Deed};
+use crate::ability::{Deed, MOVE};
 use crate::actions::{self, Carried, Grounded};
-use crate::declared;
+use crate::error::WorldError;
+use crate::eyes::{self, Eyes, KnowsAgain};
 use crate::geometry::Geometry;
-use crate::goal::Goal;
+use crate::known::{Known, Thing};
 use crate::lesson::Lesson;
-use crate::lexicon::{Lexicon, Places, symbol};
+use crate::lexicon::{Lexicon, Places};
 use crate::load::Domain;
-use crate::mind::{Mind, Region};
+use crate::looking::{candidates, looks};
+use crate::mind::Mind;
 use crate::note::Note;
+use crate::objective::Goal;
+use crate::origin::{self, Origin};
+use crate::own_map::NoMap;
+use crate::past::Past;
 use crate::programs::Programs;
-use crate::situation::{Candidate, Known, Past, Situation, Thing};
+use crate::round::Round;
+use crate::situation::Situation;
+use crate::states::States;
+use crate::symbol::symbol;
+use crate::viewpoint::Candidate;
 use crate::words::{self, Words};
-pub use error::WorldError;
-use grounds::{doors, expected, kinds, known_by_map, members, no_surface, objects, recalled, things};
+use crate::{abilities, declared};
 
 /// Message where there is nothing to choose.
 const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
@@ -83,20 +87,6 @@ pub struct World<'a> {
     barred: BTreeSet<Deed>,
 }
 
-/// The planning problem of one round, and what its calls are bound to.
-pub struct Round {
-    /// Snapshot from which the calls are answered.
-    pub situation: Arc<Situation>,
-    /// The problem.
-    pub task: Task,
-    /// Its calls, bound.
-    pub attachments: Attachments,
-    /// The problem's text.
-    pub problem: Source,
-    /// Its record.
-    pub record: RecordId,
-}
-
 /// Who says what to do next.
 pub enum Choice {
     /// The planner.
@@ -127,16 +117,18 @@ impl<'a> World<'a> {
             return Err(WorldError::Domain(format!("{unclear}\n  {}", crate::lexicon::TOLD_APART)));
         }
         known_by_map(domain, &surfaces)?;
-        let chart = Chart::begin(domain, setting.past.as_ref(), &**robot);
-        surfaces.extend(chart.known_surfaces());
+        let mut states = States::default();
+        let recalls = abilities::ALL.iter().filter_map(|ability| ability.recalls);
+        let maps = recalls.filter_map(|recall| recall(domain, setting.past.as_ref(), &**robot, &mut states));
+        let own_map = maps.last().unwrap_or_else(|| Arc::new(NoMap));
+        surfaces.extend(own_map.surfaces());
         let index = |name: &String| {
             surfaces.iter().position(|s| s.symbol == *name).ok_or_else(|| no_surface(name, &surfaces))
         };
-        let news = News::of_past(setting.past.as_ref());
         let lexicon = Lexicon::new(domain, &Places::of_body(&**robot)).remembering(setting.past.as_ref());
-        let asked = things(domain, goal, &news, lexicon.of_type("room"), &surfaces)?;
+        let asked = things(domain, goal, &states, lexicon.of_type("room"), &surfaces)?;
         let ring = &domain.config.candidates;
-        let (mut poses, at) = candidates::candidates(&**robot, &chart, &surfaces, ring, here);
+        let (mut poses, at) = candidates::candidates(&**robot, &*own_map, &surfaces, ring, here);
         let doors = doors(&**robot, here, &mut poses);
         let known = Known {
             robot: Arc::clone(robot),
@@ -160,20 +152,15 @@ impl<'a> World<'a> {
             shut: Default::default(),
             held: None,
             past: setting.past.clone(),
-            floor: Arc::default(),
-            chart: Arc::new(chart),
-            news: Arc::new(news),
+            own_map,
+            states,
             expected: Vec::new(),
             geometry: Arc::new(Geometry::of_map(robot.rooms(), robot.doors())),
             surfaces,
         };
-        let regions = known.surfaces.iter().map(|_| Region::default()).collect();
-        let words = Words::begin(domain).map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
-        let (merged, glances) = Default::default();
-        let readings = Default::default();
-        let mut mind =
-            Mind { known, words, regions, merged, views: 0, pushes: 0, distance_m: 0.0, glances, readings };
-        mind.attend();
+        let words = Words::begin(domain, &|word| origin::is_sensed(domain, word))
+            .map_err(|e| WorldError::Domain(format!("domain.toml: {e}")))?;
+        let mut mind = Mind::new(known, words);
         abilities::used(&domain.config.uses)
             .filter_map(|a| a.begins)
             .for_each(|begins| begins(&mut mind, domain, goal));
@@ -221,7 +208,7 @@ impl<'a> World<'a> {
         }
         let attachments = self.bind(&situation);
         let said = json!({ "name": problem.name, "pddl": problem.text });
-        let record = perceive::put(self.setting.record, "problem", self.setting.robot.now_ns(), &said)?;
+        let record = eyes::put(self.setting.record, "problem", self.setting.robot.now_ns(), &said)?;
         Ok(Round { situation, task, attachments, problem, record })
     }
 
@@ -236,8 +223,9 @@ impl<'a> World<'a> {
         self.mind.known.things = self.asked.iter().cloned().chain(members).collect();
         self.mind.known.expected = expected(domain, &self.mind.known);
         self.mind.known.surfaces.iter().for_each(|surface| self.lexicon.learn("surface", &surface.name));
-        self.mind.known.floor.names.iter().for_each(|(_, name)| self.lexicon.learn("shape", name));
-        self.mind.known.news.things.iter().for_each(|thing| self.lexicon.learn("thing", &thing.name));
+        let names = abilities::ALL.iter().filter_map(|ability| ability.names);
+        let names = names.flat_map(|names| names(&self.mind.known));
+        names.for_each(|(of, name)| self.lexicon.learn(of, &name));
         self.mind.attend();
     }
 
@@ -258,9 +246,9 @@ impl<'a> World<'a> {
         text += "  )\n  (:init\n";
         let mut lines: Vec<String> = Vec::new();
         for word in vocabulary.words() {
-            match vocabulary.ground(&word, &domain.config) {
-                crate::vocabulary::Ground::Sensed(fact) => lines.extend((fact.states)(s)),
-                crate::vocabulary::Ground::SensedByProgram => {
+            match origin::of(domain, &word) {
+                Origin::Sensed(fact) => lines.extend((fact.states)(s)),
+                Origin::SensedByProgram => {
                     let said = self
                         .programs
                         .state(&word, &symbols, &self.mind.readings)
@@ -330,14 +318,14 @@ impl<'a> World<'a> {
         if self.chooser.first_look_here
             && self.mind.views == 0
             && let Some(look) = policies::here(s)
-            && let Some(plan) = self.directly(round, &[reasons::look(s, look.from, look.on)], true)
+            && let Some(plan) = self.directly(round, &[looks::look(s, look.from, look.on)], true)
         {
             return Ok(Choice::Steps(plan));
         }
         let is_asked = policies::is_asked(s);
         loop {
             let barred = &self.barred;
-            let is_barred = |look: &Look| barred.contains(&reasons::look(s, look.from, look.on));
+            let is_barred = |look: &Look| barred.contains(&looks::look(s, look.from, look.on));
             let policy = match &mut self.chooser.by {
                 By::Policy(policy) if is_asked => policy,
                 _ => return Ok(Choice::Planner),
@@ -345,7 +333,7 @@ impl<'a> World<'a> {
             let Some(look) = policies::next(&mut **policy, s, &is_barred) else {
                 return Ok(Choice::Nothing(NOTHING_LEFT.into()));
             };
-            let (deed, looks_at_all) = (reasons::look(s, look.from, look.on), policy.looks_at_all());
+            let (deed, looks_at_all) = (looks::look(s, look.from, look.on), policy.looks_at_all());
             if let Some(choice) = self.head_for(round, deed, look.from, looks_at_all) {
                 return Ok(choice);
             }
@@ -412,15 +400,20 @@ impl<'a> World<'a> {
     ) -> Result<String, WorldError> {
         let said = json!({ "call": call.to_string(), "outcome": actions::outcome(outcome) });
         // With what it brings about: a look that came to its end is not in the record without its view.
-        self.setting.record.put_soon(perceive::draft("skill", self.setting.robot.now_ns(), &said)?)?;
+        self.setting.record.put_soon(eyes::draft("skill", self.setting.robot.now_ns(), &said)?)?;
         if let Outcome::Told(word) = outcome {
             return Ok(word.clone());
         }
         let Some(grounded) = self.grounded(call, step) else { return Ok(String::new()) };
         let s = Situation::new(self.mind.known.clone(), self.setting.domain.config.thresholds);
         let robot = Arc::clone(&self.setting.robot);
-        let eyes = eyes(&self.setting, &*robot);
-        (grounded.word.learn)(&mut self.mind, eyes, &s, &grounded.arguments(), outcome, notes)
+        let eyes = context(&self.setting, &*robot);
+        let said = (grounded.word.learn)(&mut self.mind, eyes, &s, &grounded.arguments(), outcome, notes)?;
+        if matches!(outcome, Outcome::Driven(_)) {
+            let hear = abilities::ALL.iter().filter_map(|ability| ability.has_driven);
+            hear.for_each(|has_driven| has_driven(&mut self.mind, &s));
+        }
+        Ok(said)
     }
 
     /// Calls were carried out whole: what they promise of remembered words comes about, and what they must bring about is asked
@@ -430,7 +423,7 @@ impl<'a> World<'a> {
     /// [`WorldError`] as for [`World::round`].
     pub fn done(&mut self, round: &Round, done: &[Carried]) -> Result<Vec<(Call, SkillFailure)>, WorldError> {
         let domain = self.setting.domain;
-        let names = words::remembered(domain);
+        let names = origin::remembered(domain);
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let before = self.mind.words.clone();
         let steps = Plan { steps: done.iter().map(|d| d.step.clone()).collect(), ..Plan::default() };
@@ -493,14 +486,20 @@ impl<'a> World<'a> {
     ) -> Result<Lesson, WorldError> {
         let domain = self.setting.domain;
         let said = json!({ "call": call.to_string(), "failure": failure.to_string() });
-        perceive::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
+        eyes::put(self.setting.record, "skill", self.setting.robot.now_ns(), &said)?;
         if let Some(grounded) = self.grounded(call, step) {
             let robot = Arc::clone(&self.setting.robot);
-            let eyes = eyes(&self.setting, &*robot);
-            let failed = grounded.word.failed;
-            if let Some(therefore) =
-                failed(&mut self.mind, eyes, &round.situation, &grounded.arguments(), failure)?
-            {
+            let eyes = context(&self.setting, &*robot);
+            let (failed, arguments, s) = (grounded.word.failed, grounded.arguments(), &round.situation);
+            let mut therefore = failed(&mut self.mind, eyes, s, &arguments, failure)?;
+            if grounded.word.name == MOVE {
+                let hear = abilities::ALL.iter().filter_map(|ability| ability.drive_failed);
+                for drive_failed in hear {
+                    let said = drive_failed(&mut self.mind, &*robot, s, arguments[1], failure);
+                    therefore = therefore.or(said);
+                }
+            }
+            if let Some(therefore) = therefore {
                 return Ok(Lesson::Said { text: therefore });
             }
         }
@@ -561,14 +560,19 @@ impl<'a> World<'a> {
     }
 }
 
+/// Recognition among percepts by every ability that has one.
+static KNOWS_AGAIN: LazyLock<Vec<KnowsAgain>> =
+    LazyLock::new(|| abilities::ALL.iter().filter_map(|ability| ability.again).collect());
+
 /// Perception context of a world.
-fn eyes<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
+fn context<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
     Eyes {
         record: setting.record,
         recogniser: setting.recogniser,
         objects: &setting.domain.objects,
         robot,
         thresholds: setting.domain.config.thresholds,
+        again: KNOWS_AGAIN.as_slice(),
     }
 }
 

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use descry_domains::goal::{self, Goal, GoalError};
+use descry_domains::goal::{self, GoalError};
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
+use descry_domains::objective::Goal;
 use serde::Deserialize;
 
 /// `phrases.toml`: by domain, what is said and what it comes to.

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 
 use descry_agent::shell;
 
-use super::{ExperimentError, Kind, Source, kinds};
+use super::kinds;
+use crate::error::ExperimentError;
+use crate::kinds::kind::Kind;
+use crate::source::Source;
 
 /// Experiment to run on a cluster: number of shards, threads and folder of results.
 #[derive(Debug, Clone)]

@@ -8,25 +8,14 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{ExperimentError, Finished};
+use crate::error::ExperimentError;
+use crate::header::Header;
+use crate::job::Finished;
 
 /// Name of the file in an experiment's folder.
 pub const FILE: &str = "jobs.jsonl";
-
-/// First line: identity of the experiment.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Header {
-    /// The experiment's name.
-    pub experiment: String,
-    /// Hash of the experiment file and of every file that it names.
-    pub hash: String,
-    /// Version of descry.
-    pub version: String,
-    /// Number of jobs in all shards.
-    pub jobs: usize,
-}
 
 /// A journal open for writing, locked against other processes.
 #[derive(Debug)]

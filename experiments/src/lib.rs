@@ -1,7 +1,10 @@
 #![doc = include_str!("../README.md")]
 
 pub mod cluster;
+pub mod error;
 pub mod hash;
+pub mod header;
+pub mod job;
 pub mod journal;
 pub mod kinds;
 mod live;
@@ -9,135 +12,24 @@ mod overrides;
 pub mod page;
 pub mod plot;
 mod runner;
+pub mod source;
 pub mod statistics;
 pub mod table;
 #[doc(hidden)]
 pub mod write;
 
-use descry_agent::stop::Stop;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
-
-use journal::{Done, Header, Journal};
-pub use kinds::Kind;
+use descry_agent::stop::Stop;
+pub use error::ExperimentError;
+use header::Header;
+pub use job::{Finished, Job, Numbered, Outcome, Row};
+use journal::{Done, Journal};
+pub use kinds::kind::Kind;
 pub use live::Batch;
+pub use source::Source;
 pub use write::Results;
-
-/// Named values, in display order.
-pub type Row = Map<String, Value>;
-
-/// One combination of the variables.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Job {
-    /// Unique in the experiment, the same on every machine, such as `scene=0012 poses=8 policy=plan`.
-    pub id: String,
-    /// Factors of the experiment, with their values in this job.
-    pub factors: Row,
-}
-
-impl Job {
-    /// A job from its factors, which make up its ID.
-    pub fn new<const N: usize>(factors: [(&str, Value); N]) -> Self {
-        let shown = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_string);
-        let id: Vec<String> =
-            factors.iter().map(|(name, value)| format!("{name}={}", shown(value))).collect();
-        Self {
-            id: id.join(" "),
-            factors: factors.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
-        }
-    }
-}
-
-/// Result of a job: rows of measurements, the same on every machine, and wall-clock times.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Outcome {
-    /// Measurements; usually one row.
-    pub rows: Vec<Row>,
-    /// Wall-clock times, which differ between runs and are reported separately.
-    pub clock: Row,
-}
-
-/// A line of the journal: a finished job.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Finished {
-    /// The job's id.
-    pub job: String,
-    /// Its factors with its measurements.
-    pub rows: Vec<Row>,
-    /// Wall-clock times.
-    #[serde(default)]
-    pub clock: Row,
-    /// Error, if there are no measurements.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub error: Option<String>,
-}
-
-impl Finished {
-    fn new(job: &Job, outcome: Result<Outcome, String>) -> Self {
-        let with_factors = |row: Row| job.factors.clone().into_iter().chain(row).collect();
-        let (outcome, error) = match outcome {
-            Ok(outcome) => (outcome, None),
-            Err(error) => (Outcome { rows: vec![Row::new()], clock: Row::new() }, Some(error)),
-        };
-        let rows = outcome.rows.into_iter().map(with_factors).collect();
-        Self { job: job.id.clone(), rows, clock: outcome.clock, error }
-    }
-}
-
-/// A finished job, with its number among all jobs.
-pub type Numbered<'a> = (usize, &'a Finished);
-
-/// An experiment file as it was read.
-#[derive(Debug, Clone)]
-pub struct Source {
-    /// Its path, as given.
-    pub path: PathBuf,
-    /// Its text.
-    pub text: String,
-}
-
-impl Source {
-    /// Reads an experiment file.
-    ///
-    /// # Errors
-    /// [`ExperimentError::File`] if it is missing or not a text.
-    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
-        let text = descry_robots::input::read_text(path).map_err(|e| {
-            ExperimentError::file(
-                path,
-                &format!("{e}\n  expected an experiment: a TOML file, as those in domains/*/experiments"),
-            )
-        })?;
-        Ok(Self { path: path.to_path_buf(), text })
-    }
-
-    /// Replaces one value of the file by an assignment `KEY=VALUE`: a path of keys and numbers, and a TOML
-    /// value.
-    ///
-    /// # Errors
-    /// [`ExperimentError::Input`] if the file has no such key, or the text is not an assignment.
-    pub fn set(&mut self, assignment: &str) -> Result<(), ExperimentError> {
-        let refused = |problem: &str, mend: String| {
-            ExperimentError::Input(format!("--set {assignment}: {problem}\n  {mend}"))
-        };
-        let expected = || "expected KEY=VALUE, such as first_seed=7 or set.1.arrangements=10".to_owned();
-        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("no value", expected()))?;
-        if toml::from_str::<toml::Table>(&format!("value = {value}")).map_or(true, |one| one.len() != 1) {
-            return Err(refused("this is no TOML value", expected()));
-        }
-        match overrides::value_at(&self.text, key.trim()) {
-            Ok(span) => self.text.replace_range(span, value.trim()),
-            Err(known) => {
-                let mend = format!("{} has: {}", self.path.display(), known.join(", "));
-                return Err(refused("the file has no such key", mend));
-            }
-        }
-        Ok(())
-    }
-}
 
 /// A shard: every `of`-th job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,99 +86,6 @@ pub enum Ended {
         /// The shard's folder.
         folder: PathBuf,
     },
-}
-
-/// Error that keeps an experiment from being carried out.
-#[derive(Debug, thiserror::Error)]
-pub enum ExperimentError {
-    /// The experiment file cannot be understood or carried out; the text gives the place and a remedy.
-    #[error("{0}")]
-    Input(String),
-    /// A file or folder cannot be read or written.
-    #[error("{path}: {because}")]
-    File {
-        /// Path of the file.
-        path: String,
-        /// Message of the system.
-        because: String,
-    },
-    /// The folder holds another experiment.
-    #[error(
-        "{path} belongs to another experiment\n  found: {} with hash {}, {} jobs, version {}\n  expected: {} with hash {}, {} jobs, version {}\n  name another folder with --out, or remove this one",
-        found.experiment, found.hash, found.jobs, found.version, expected.experiment, expected.hash, expected.jobs, expected.version
-    )]
-    Another {
-        /// The journal.
-        path: String,
-        /// First line of the journal.
-        found: Box<Header>,
-        /// Expected first line.
-        expected: Box<Header>,
-    },
-    /// A file with the name of a journal but another content.
-    #[error("{path}: this is no journal of an experiment\n  name another folder with --out")]
-    NoJournal {
-        /// The file.
-        path: String,
-    },
-    /// Another process is working in the folder.
-    #[error(
-        "{folder}: another process is at work on this experiment\n  wait for it, or give each its own --shard"
-    )]
-    Busy {
-        /// The folder.
-        folder: String,
-    },
-    /// Two jobs have the same ID.
-    #[error("the job \"{id}\" is there twice\n  remove what the file lists twice")]
-    Twice {
-        /// Their ID.
-        id: String,
-    },
-    /// Shards are missing.
-    #[error(
-        "{missing} of {all} jobs are in none of the folders, the first of them \"{first}\"\n  do the missing shards, or leave --merge out to do them here"
-    )]
-    Missing {
-        /// Number of missing jobs.
-        missing: usize,
-        /// Number of all jobs.
-        all: usize,
-        /// The first of them.
-        first: String,
-    },
-    /// The disk is full; journalled jobs are kept.
-    #[error(
-        "{folder}: the disk is full, and {job} failed: {because}\n  free some room and run it again: what is done is not done again"
-    )]
-    NoRoom {
-        /// The folder of the results.
-        folder: String,
-        /// The job that failed and does not count.
-        job: String,
-        /// Error of the job.
-        because: String,
-    },
-    /// More shards than jobs, or no shards.
-    #[error("{jobs} jobs cannot be divided into {shards} shards\n  name from 1 to {jobs} with --shards")]
-    Shards {
-        /// Requested number of shards.
-        shards: usize,
-        /// Number of jobs.
-        jobs: usize,
-    },
-    /// The system cannot start a thread.
-    #[error("no thread could be started: {because}\n  try a smaller --jobs")]
-    Threads {
-        /// Message of the system.
-        because: String,
-    },
-}
-
-impl ExperimentError {
-    fn file(path: &Path, because: &dyn std::fmt::Display) -> Self {
-        Self::File { path: path.display().to_string(), because: because.to_string() }
-    }
 }
 
 /// Runs the unfinished jobs of an experiment, and writes the results once every job is finished.

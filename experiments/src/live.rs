@@ -4,11 +4,16 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::journal::{self, Header};
-use super::page::{Facts, Progress, Section, html};
-use super::{ExperimentError, Job, Kind, Numbered, Source, gather, header, kinds, write};
 use descry_agent::exit::CommandError;
 use descry_pages::live::{Found, Shown};
+
+use super::page::{Facts, Progress, Section, html};
+use super::{gather, header, journal, kinds, write};
+use crate::error::ExperimentError;
+use crate::header::Header;
+use crate::job::{Job, Numbered};
+use crate::kinds::kind::Kind;
+use crate::source::Source;
 
 /// A batch under way.
 pub struct Batch {

@@ -1,10 +1,11 @@
 //! Self-contained HTML page of the results: tables, plots, the experiment's text, and how to reproduce it.
 
-use super::plot::Plot;
-use super::table::Table;
 use descry_pages::escaped;
 use descry_pages::live::FOLLOW;
 use descry_pages::page::COLOURS;
+
+use super::plot::Plot;
+use super::table::Table;
 
 const SCRIPT: &str = include_str!("live.js");
 

@@ -1,6 +1,5 @@
 //! Parallel execution of jobs. The result of a job does not depend on the thread or the time.
 
-use descry_agent::stop::Stop;
 use std::any::Any;
 use std::io::IsTerminal;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,10 +8,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
+use descry_agent::stop::Stop;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::journal::Journal;
-use super::{ExperimentError, Finished, Job, Kind};
+use crate::error::ExperimentError;
+use crate::job::{Finished, Job};
+use crate::kinds::kind::Kind;
 
 /// Stack size of worker threads, bytes: planning and rendering recurse deeper than the default allows.
 const STACK_BYTES: usize = 16 << 20;

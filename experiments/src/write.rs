@@ -9,11 +9,14 @@ use std::path::Path;
 use descry_agent::shell;
 use serde_json::{Value, json};
 
-use super::journal::Header;
 use super::page::{self, Facts, Section};
 use super::statistics::{Observation, mean, median};
 use super::table::{Table, number};
-use super::{ExperimentError, Finished, Kind, Numbered, Row, Source};
+use crate::error::ExperimentError;
+use crate::header::Header;
+use crate::job::{Finished, Numbered, Row};
+use crate::kinds::kind::Kind;
+use crate::source::Source;
 
 /// The results of an experiment.
 #[derive(Debug, Clone)]

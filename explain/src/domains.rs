@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 
+use descry_agent::weigh::Expected;
 use descry_domains::abilities;
 use descry_domains::load::Domain;
-use descry_domains::vocabulary::Ground;
+use descry_domains::origin::{self, Origin};
+use descry_domains::saying::Saying;
 use descry_planner::task::{Action, Call, Change, Expression};
 
 use super::chapters::Chapter;
 use super::wording::listed;
-use descry_agent::weigh::Expected;
-use descry_domains::saying::Saying;
 
 /// The domain of a run, its wording, and the run's plans.
 pub struct Words<'a> {
@@ -103,11 +103,10 @@ impl Words<'_> {
         let expected = || chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
         let names = expected().filter_map(|n| n.name.trim_matches(['(', ')']).split(' ').next());
         let names: BTreeSet<&str> = names.collect();
-        let sensed =
-            |name: &&str| match domain.vocabulary.ground(&domain.vocabulary.word(name)?, &domain.config) {
-                Ground::Sensed(fact) => Some((name.to_string(), fact.about)),
-                _ => None,
-            };
+        let sensed = |name: &&str| match origin::of(domain, &domain.vocabulary.word(name)?) {
+            Origin::Sensed(fact) => Some((name.to_string(), fact.about)),
+            _ => None,
+        };
         let all: Vec<(String, &str)> = names.iter().filter_map(sensed).collect();
         let (said, raw): (Vec<_>, Vec<_>) = all.into_iter().partition(|(name, _)| saying.has(name));
         let raw: Vec<String> = raw.iter().map(|(name, about)| format!("({name} …) is {about}")).collect();

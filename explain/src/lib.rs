@@ -125,7 +125,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     let negligible = domain.as_ref().map(|domain| domain.config.thresholds.remaining);
     let is_used = |call: &str| words.as_ref().is_none_or(|words| words.is_used(call));
     let stood: Vec<&standings::Standing> = chapters.iter().flat_map(chapters::Chapter::stood).collect();
-    let known = verdict::Words {
+    let known = verdict::Wording {
         meanings: &meanings,
         is_used: &is_used,
         saying: &saying,

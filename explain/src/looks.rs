@@ -1,16 +1,17 @@
 //! Outcome of a look: the certainty reached, the reasons for remaining doubt, and the share seen of each
 //! place.
 
-use descry_domains::lexicon::{self, plural, symbol};
+use descry_agent::standing::{InDoubt, Of, Seen};
+use descry_agent::weigh::Expected;
+use descry_domains::english::{self, plural};
 use descry_domains::note::{LeftOut, Note};
 use descry_domains::saying::Saying;
+use descry_domains::symbol::symbol;
 use descry_memory::belief::Track;
 
 use super::numbers::{self, Sure};
 use super::standings::Standing;
 use super::wording::{by_share, listed, place, share, share_of};
-use descry_agent::standing::{InDoubt, Of, Seen};
-use descry_agent::weigh::Expected;
 
 /// Probabilities up to this are not mentioned.
 pub const HARDLY: f64 = 0.005;
@@ -28,7 +29,7 @@ const MOST_DOUBTS: usize = 3;
 const MOST_PLACES: usize = 4;
 
 /// The goal, and the expectations of the plan.
-pub struct Asked<'a> {
+pub struct Hopes<'a> {
     /// The goal in PDDL.
     pub goal: &'a str,
     /// The numbers that the plan was expected to improve.
@@ -38,7 +39,7 @@ pub struct Asked<'a> {
 }
 
 /// Sentences on each doubt after some looks.
-pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Asked<'_>) -> Vec<String> {
+pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Hopes<'_>) -> Vec<String> {
     let told = |doubt: &InDoubt| {
         let was = before.and_then(|before| before.same(doubt));
         let sure = numbers::of(doubt, before, after, asked.goal, asked.hoped);
@@ -255,7 +256,7 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Strin
     let one = format!(
         "what stands {} is {} with {}",
         where_it_is(least, saying),
-        lexicon::one(kind),
+        english::one(kind),
         share(p(least))
     );
     (all < SURELY).then(|| match unsure.len() {

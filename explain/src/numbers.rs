@@ -1,12 +1,12 @@
 //! Numbers of a domain that express certainty of the answer: those that the goal compares, under the names
 //! used by the plans.
 
-use descry_domains::lexicon::symbol;
-
-use super::standings::{Standing, certainty};
 use descry_agent::compared::{self, words};
 use descry_agent::standing::InDoubt;
 use descry_agent::weigh::Expected;
+use descry_domains::symbol::symbol;
+
+use super::standings::{Standing, certainty};
 
 /// Values below this carry no information about the position of an object.
 const NEXT_TO_NOTHING: f64 = 0.05;

@@ -23,7 +23,7 @@ pub struct Outcome {
 /// Outcomes of a plan's steps in their order, with the state of the run after each look. `goal` is in PDDL.
 pub fn of(chapter: &Chapter, goal: &str, saying: &Saying) -> Vec<Outcome> {
     let hoped: &[Expected] = chapter.weighed.as_ref().map_or(&[], |weighed| &weighed.numbers);
-    let asked = looks::Asked { goal, hoped, saying };
+    let asked = looks::Hopes { goal, hoped, saying };
     let mut said = Vec::new();
     let mut before: Option<&Standing> = chapter.before.as_ref();
     let mut noted: Vec<&Note> = Vec::new();

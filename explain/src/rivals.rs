@@ -1,16 +1,15 @@
 //! Comparison of a plan with its alternatives: gain of each, its total time to the goal, or the obstacle that
 //! keeps the rest of the plan from following it.
 
-use descry_domains::lexicon::symbol;
-
+use descry_agent::reason::Break;
+use descry_agent::standing::{FirstLook, Seen};
+use descry_agent::weigh::{MOST_STEPS, Way, Weighed};
+use descry_domains::symbol::symbol;
 use descry_skills::Call;
 
 use super::Asked;
 use super::chapters::Chapter;
 use super::wording::{listed, share};
-use descry_agent::reason::Break;
-use descry_agent::standing::{FirstLook, Seen};
-use descry_agent::weigh::{MOST_STEPS, Way, Weighed};
 
 /// Relative difference below which two rates of gain are equal.
 const ALIKE: f64 = 0.02;

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use descry_domains::lexicon::{plural, symbol};
+use descry_agent::exit::CommandError;
+use descry_agent::standing::{self, InDoubt, Of};
+use descry_domains::english::plural;
+use descry_domains::symbol::symbol;
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record, RecordId};
 
 use super::states::States;
-use descry_agent::exit::CommandError;
-use descry_agent::standing::{self, InDoubt, Of};
 
 /// State of a run at one moment.
 #[derive(Debug, Clone, Default)]

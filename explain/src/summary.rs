@@ -1,7 +1,10 @@
 //! Summary of a run in a few sentences: the goal, the answer, its evidence, and the worst failure.
 
-use descry_domains::answer::{Believed, Verdict};
-use descry_domains::lexicon::plural;
+use descry_agent::report::{self, Report};
+use descry_agent::run::Header;
+use descry_agent::standing::{InDoubt, Of};
+use descry_domains::conclusion::{Believed, Verdict};
+use descry_domains::english::plural;
 use descry_domains::note::Note;
 use descry_domains::saying::Saying;
 
@@ -9,9 +12,6 @@ use super::chapters::{Chapter, Deed};
 use super::looks;
 use super::standings::Standing;
 use super::wording::{count, listed, place, share, share_of};
-use descry_agent::report::{self, Report};
-use descry_agent::run::Header;
-use descry_agent::standing::{InDoubt, Of};
 
 /// Maximum number of failures listed by name; the rest are counted.
 const MOST_FAILURES: usize = 4;

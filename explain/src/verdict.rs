@@ -3,10 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use descry_domains::answer::Verdict;
-use descry_domains::lexicon::{self, symbol};
-use descry_domains::no_plan;
+use descry_agent::exit::CommandError;
+use descry_agent::report::{self, Report};
+use descry_agent::standing::{self, End, InDoubt, Of, Rests, Seen};
+use descry_domains::conclusion::Verdict;
 use descry_domains::saying::Saying;
+use descry_domains::symbol::symbol;
+use descry_domains::{english, no_plan};
 use descry_memory::belief::{Belief, Track};
 use descry_memory::{Document, Query, Record};
 use descry_planner::NoPlan;
@@ -15,15 +18,12 @@ use super::looks::HARDLY;
 use super::standings::Standing;
 use super::states::{Difference, States};
 use super::wording::{count, listed, place, share};
-use descry_agent::exit::CommandError;
-use descry_agent::report::{self, Report};
-use descry_agent::standing::{self, End, InDoubt, Of, Rests, Seen};
 
 /// Maximum number of objects described one by one; the rest are counted.
 const MOST_NAMED: usize = 12;
 
 /// Wording of a run's domain.
-pub struct Words<'a> {
+pub struct Wording<'a> {
     /// Descriptions of calls.
     pub meanings: no_plan::Meanings<'a>,
     /// True for a call that an action of the run's plans makes.
@@ -46,7 +46,7 @@ pub fn rests_on(
     record: &Record,
     report: Option<&Report>,
     states: &States,
-    words: &Words<'_>,
+    words: &Wording<'_>,
     lost: &mut Vec<String>,
 ) -> Result<Vec<String>, CommandError> {
     let Some(report) = report else {
@@ -119,7 +119,7 @@ impl Looks {
 
 /// Belief about the requested object; about every object, least certain first, if the request was not for one
 /// object.
-fn believed(belief: &Belief, report: &Report, words: &Words<'_>) -> Vec<String> {
+fn believed(belief: &Belief, report: &Report, words: &Wording<'_>) -> Vec<String> {
     let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
     let Some(name) = &report.object else {
         let (strange, mut tracks): (Vec<&Track>, Vec<&Track>) =
@@ -168,7 +168,7 @@ fn several(tracks: &[&Track]) -> Option<String> {
 }
 
 /// Count of the objects that are certainly unknown, by surface.
-fn surely_none(strange: &[&Track], words: &Words<'_>) -> Option<String> {
+fn surely_none(strange: &[&Track], words: &Wording<'_>) -> Option<String> {
     let mut on: BTreeMap<&str, usize> = BTreeMap::new();
     strange.iter().for_each(|track| *on.entry(&track.on).or_default() += 1);
     let one = |(on, many): (&&str, &usize)| match *on {
@@ -181,7 +181,7 @@ fn surely_none(strange: &[&Track], words: &Words<'_>) -> Option<String> {
 }
 
 /// Description of an object: its probable identities, and the evidence for them.
-fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
+fn object(track: &Track, asked: Option<&str>, words: &Wording<'_>) -> String {
     let mut names: Vec<(&str, f64)> = track.probabilities.iter().map(|(n, p)| (n.as_str(), *p)).collect();
     names.push(("none of the known objects", track.unknown));
     names.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -207,7 +207,7 @@ fn object(track: &Track, asked: Option<&str>, words: &Words<'_>) -> String {
 }
 
 /// The reason for which the run ended, and the remaining probability.
-fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) -> Vec<String> {
+fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Wording<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
         said.push(format!(
@@ -256,7 +256,7 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Words<'_>) 
 
 /// The reason for which there is no plan. Refusals of calls that no plan uses are left out if there are
 /// others.
-fn why_no_plan(rests: &Rests, words: &Words<'_>) -> String {
+fn why_no_plan(rests: &Rests, words: &Wording<'_>) -> String {
     if rests.no_plan.is_empty() {
         return rests.said.clone();
     }
@@ -303,7 +303,7 @@ fn seen(doubt: &InDoubt, stood: &[&Standing], looks: &Looks) -> String {
     };
     let about = match doubt.of {
         Of::Thing => format!("of where {} may be", doubt.about),
-        Of::Kind => format!("of where {} may be", lexicon::one(&doubt.about)),
+        Of::Kind => format!("of where {} may be", english::one(&doubt.about)),
         Of::Surface => "in all".into(),
     };
     match looked_at.into_iter().map(one).collect::<Vec<_>>().as_slice() {

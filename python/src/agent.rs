@@ -14,7 +14,8 @@ use descry_agent::stop::Stop;
 use descry_agent::template::write_domain;
 use descry_domains::abilities::searching::policies;
 use descry_domains::check;
-use descry_domains::load::{DEFAULT, Domain, LoadError};
+use descry_domains::load::error::LoadError;
+use descry_domains::load::{DEFAULT, Domain};
 use descry_robots::conformance;
 use pyo3::prelude::*;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use descry_domains::function::{Function, Functions, Named};
+use descry_domains::function::{Function, Functions, NamedFunctions};
 use descry_domains::load::Domain;
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -135,8 +135,8 @@ fn named(
     known: &[&str],
     hear: fn(&Map<String, Value>) -> Vec<Value>,
     raised: &Arc<Raised>,
-) -> PyResult<Named> {
-    let mut named = Named::new();
+) -> PyResult<NamedFunctions> {
+    let mut named = NamedFunctions::new();
     for (name, function) in given.into_iter().flatten() {
         if !known.contains(&name.as_str()) {
             let known = if known.is_empty() { "none".into() } else { known.join(", ") };

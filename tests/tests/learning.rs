@@ -4,13 +4,14 @@
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use descry_agent::body;
 use descry_agent::exit::CommandError;
 use descry_agent::keeping::Keeping;
 use descry_agent::report::Report;
 use descry_agent::run::{self, Folder, Settings, Task, Watcher};
-use descry_agent::{body, stop::Stop};
+use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
-use descry_domains::answer::Verdict;
+use descry_domains::conclusion::Verdict;
 use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;

@@ -28,7 +28,7 @@ const FORMATS: &[&str] = &[
     "robots/src/recorded/settings.rs",
     "robots/src/program/hello.rs",
     "robots/src/program/message.rs",
-    "experiments/src/kinds/mod.rs",
+    "experiments/src/kinds/kind.rs",
     "experiments/src/kinds/figure_4.rs",
     "experiments/src/kinds/where_to_look.rs",
     "experiments/src/kinds/faults.rs",

@@ -68,7 +68,7 @@ pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> 
 
 /// True if a folder is that of a run, or holds a record.
 pub fn is_record(folder: &Path) -> bool {
-    crate::run::header(folder).is_ok()
+    crate::run::files::header(folder).is_ok()
         || [folder.to_owned(), folder.join("record")].iter().any(|f| f.join("segments").is_dir())
 }
 

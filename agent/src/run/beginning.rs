@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use descry_domains::load::{Domain, Files, from_files};
-use descry_domains::situation::Past;
+use descry_domains::past::Past;
 use descry_memory::{Draft, Query, Record};
 use serde::{Deserialize, Serialize};
 
-use super::Header;
+use super::header::Header;
 use crate::exit::CommandError;
 
 /// Beginning of a run.

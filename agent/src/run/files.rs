@@ -8,7 +8,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::{Beginning, Header};
+use super::beginning::Beginning;
+use super::header::Header;
 use crate::exit::CommandError;
 use crate::keeping::{self, RECORD};
 use crate::report::Report;

@@ -4,8 +4,8 @@ use std::fs::{File, TryLockError, create_dir, create_dir_all};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use descry_domains::goal::Goal;
-use descry_domains::lexicon::symbol;
+use descry_domains::objective::Goal;
+use descry_domains::symbol::symbol;
 
 use super::files::is_run;
 use crate::exit::CommandError;

@@ -35,13 +35,13 @@ struct Programs {
 }
 
 /// A domain whose programs' answers are on record.
-pub struct Kept {
+pub struct OnRecord {
     /// The domain.
     pub domain: Domain,
     programs: Option<Arc<Programs>>,
 }
 
-impl Kept {
+impl OnRecord {
     /// Reason for which a replay could go no further: the record has no answer to a program's
     /// question. None if it could.
     pub fn ended(&self) -> Option<String> {
@@ -99,10 +99,10 @@ pub fn on_record(
     from: Option<&Record>,
     robot: &Arc<TapedRobot>,
     run: bool,
-) -> Result<Kept, CommandError> {
+) -> Result<OnRecord, CommandError> {
     let mut domain = domain.clone();
     if domain.programs().is_empty() {
-        return Ok(Kept { domain, programs: None });
+        return Ok(OnRecord { domain, programs: None });
     }
     let mut played = VecDeque::new();
     let earlier = from.map_or(Ok(Vec::new()), |from| from.find(&from.own(PROGRAM)));
@@ -119,7 +119,7 @@ pub fn on_record(
         ended: Mutex::default(),
     });
     domain.tape = Some(Arc::clone(&programs) as Arc<dyn Tape>);
-    Ok(Kept { domain, programs: Some(programs) })
+    Ok(OnRecord { domain, programs: Some(programs) })
 }
 
 /// Checks that the programs named by a record may be run here.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use descry_domains::situation::Past;
+use descry_domains::past::Past;
 use descry_memory::remember::Remembered;
 use descry_memory::{Error, Options, Record};
 

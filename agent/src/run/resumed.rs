@@ -6,24 +6,13 @@ use std::time::Instant;
 use descry_domains::abilities::searching::policies;
 use descry_domains::load::Domain;
 use descry_memory::Record;
-use serde::{Deserialize, Serialize};
 
 use super::{
-    Beginning, Folder, Header, Task, Watcher, files, go_on, now_unix_s, programs, recall, understood,
+    Beginning, Folder, Header, Resumed, Task, Watcher, files, go_on, now_unix_s, programs, recall, understood,
 };
 use crate::body;
 use crate::exit::CommandError;
 use crate::report::Report;
-
-/// Note that a run was cut off and gone on with. It stands beside the record, which is the same as
-/// without a cut.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Resumed {
-    /// When, seconds since 1970.
-    pub unix_s: u64,
-    /// The last event that was recorded before, by its number; none: nothing had happened.
-    pub after: Option<u64>,
-}
 
 /// Prepares a domain from a record for use.
 pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 'a;

@@ -4,22 +4,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use descry_domains::lexicon::Places;
-use descry_domains::load::DEFAULT;
-use descry_domains::saying::Saying;
-
-use crate::commands::keeping::KeepingArguments;
-use crate::commands::live::Window;
-use crate::commands::{input, live};
 use descry_agent::body;
 use descry_agent::exit::{CommandError, Exit};
-use descry_domains::abilities::searching::policies;
-use descry_domains::answer::Verdict;
-
 use descry_agent::report::{Event, Report};
 use descry_agent::run::{self, Folder, GoingOn, Settings, Task, Watcher};
 use descry_agent::stop::Stop;
+use descry_domains::abilities::searching::policies;
+use descry_domains::conclusion::Verdict;
+use descry_domains::lexicon::Places;
+use descry_domains::load::DEFAULT;
+use descry_domains::saying::Saying;
 use descry_pages::page::Running;
+
+use crate::commands::input;
+use crate::commands::keeping::KeepingArguments;
+use crate::commands::live::{self, Window};
 
 /// Arguments of `descry find`.
 #[derive(clap::Args)]

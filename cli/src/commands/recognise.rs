@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use descry_domains::abilities::searching::perceive;
+use descry_agent::exit::{CommandError, Exit};
 use descry_domains::load::{DEFAULT, Domain};
+use descry_domains::looking::perceive;
 use descry_perception::files::read_cloud;
 use descry_perception::nalgebra::{Point3, Unit, Vector3};
 use descry_perception::recognise::{Descry, ObjectModel, Percept, Published, Recogniser};
@@ -12,7 +13,6 @@ use descry_perception::{Cloud, View, Visibility};
 use serde_json::{Value, json};
 
 use crate::commands::input;
-use descry_agent::exit::{CommandError, Exit};
 
 /// Arguments of `descry recognise`.
 #[derive(clap::Args)]

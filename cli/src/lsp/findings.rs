@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use descry_domains::load::{LoadError, from_files};
+use descry_domains::load::error::LoadError;
+use descry_domains::load::from_files;
 use descry_planner::pddl::lex::Symbols;
 use descry_planner::pddl::parse;
 use descry_planner::{Diagnostic, Findings, Plan, Severity, Span};

@@ -3,20 +3,16 @@
 use descry_skills::{Outcome, Read};
 use serde_json::json;
 
-use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
-use crate::lexicon::{SENSE, symbol};
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::error::WorldError;
 use crate::situation::Situation;
-use crate::world::WorldError;
+use crate::symbol::{SENSE, symbol};
 
 /// The kind under which a reading is recorded.
 const READING: &str = "reading";
 
 /// The ability *reading*.
 pub const ABILITY: Ability = Ability {
-    name: "reading",
-    about: "reads the body's sensors that are neither camera nor laser, for facts by programs",
-    facts: &[],
-    calls: &[],
     skills: &[SkillWord {
         name: "read",
         kind: ActionKind::Sensing,
@@ -38,10 +34,10 @@ pub const ABILITY: Ability = Ability {
         },
         failed: NOTHING_MORE,
     }],
-    needs: &[],
-    begins: None,
-    fallback: None,
-    answers: None,
+    ..Ability::named(
+        "reading",
+        "reads the body's sensors that are neither camera nor laser, for facts by programs",
+    )
 };
 
 /// The sense of a symbol.

@@ -2,12 +2,13 @@
 
 use descry_memory::belief::Track;
 
-use super::{Asker, Verdict};
-use crate::abilities::searching::reasons;
+use super::Asker;
+use crate::conclusion::Verdict;
+use crate::english::plural;
 use crate::judge::{Decisive, Judge, Judgement, Truth};
-use crate::lexicon::plural;
-use crate::situation::Thing;
-use crate::vocabulary::Ground;
+use crate::known::Thing;
+use crate::origin::{self, Origin};
+use crate::reasons;
 
 impl Asker<'_> {
     /// Truth of the goal in the last round; unknown where an attachment fails.
@@ -142,9 +143,9 @@ impl Asker<'_> {
         let Some(word) = self.domain.vocabulary.word(name) else { return "" };
         let objects: Vec<String> = decisive.objects.iter().flatten().cloned().collect();
         let words = &self.mind.words;
-        match self.domain.vocabulary.ground(&word, &self.domain.config) {
-            Ground::Fixed => ", as the domain says",
-            Ground::Remembered if words.is_spoken_of(name) && !words.is_told(name, &objects) => {
+        match origin::of(self.domain, &word) {
+            Origin::Fixed => ", as the domain says",
+            Origin::Remembered if words.is_spoken_of(name) && !words.is_told(name, &objects) => {
                 ", as the domain says in the beginning"
             }
             _ => "",

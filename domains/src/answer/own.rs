@@ -6,10 +6,12 @@ use descry_memory::belief::Track;
 use descry_memory::remember::Remembered;
 use descry_planner::{FactValue, Plan, after};
 
-use super::{Asker, CHANGES, Verdict};
-use crate::abilities::searching::reasons;
+use super::{Asker, CHANGES};
+use crate::conclusion::Verdict;
 use crate::config::Answers;
-use crate::lexicon::{plural, symbol};
+use crate::english::plural;
+use crate::reasons;
+use crate::symbol::symbol;
 
 /// An object nearer than this to where one was is that one, metres.
 const SAME_M: f64 = 0.10;

@@ -4,10 +4,11 @@ use descry_planner::{Diagnostic, Span};
 use descry_skills::Call;
 
 use super::Check;
-use crate::abilities::{self, SkillWord};
+use crate::abilities;
+use crate::ability::SkillWord;
 use crate::actions::substituted;
 use crate::config::ActionConfig;
-use crate::vocabulary::Ground;
+use crate::origin::{self, Origin};
 
 /// The kinds of failure that may teach something.
 const FAILURES: [&str; 12] = [
@@ -170,7 +171,7 @@ impl Check<'_> {
         if let Some(fault) = self.condition(path, &condition, &objects) {
             return Some(fault);
         }
-        let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
+        let vocabulary = &self.domain.vocabulary;
         let read = crate::words::read(&condition);
         let Ok(instances) = read else {
             let help = "expected (word ?variables), (not (word ?variables)) or (= (word ?variables) 3)";
@@ -182,8 +183,8 @@ impl Check<'_> {
             ));
         };
         let is_remembered = |word: &str| {
-            let ground = vocabulary.word(word).map(|w| vocabulary.ground(&w, config));
-            matches!(ground, Some(Ground::Remembered))
+            let ground = vocabulary.word(word).map(|w| origin::of(self.domain, &w));
+            matches!(ground, Some(Origin::Remembered))
         };
         let (word, ..) = instances.iter().find(|(word, ..)| !is_remembered(word))?;
         let message =

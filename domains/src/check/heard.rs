@@ -5,8 +5,9 @@ use descry_planner::{Diagnostic, Span};
 
 use super::Check;
 use crate::config::GoalPhrase;
-use crate::goal::{CONFIDENCE, DEADLINE, pattern, slots_of, type_of_slot};
+use crate::goal::{CONFIDENCE, DEADLINE, pattern};
 use crate::mentions::mentions;
+use crate::slots::{slots_of, type_of_slot};
 
 impl Check<'_> {
     /// Faults of the `n`-th phrase that make parts of it unheard.

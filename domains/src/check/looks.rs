@@ -4,15 +4,15 @@
 use descry_planner::{Diagnostic, Source, Span};
 
 use super::Check;
-use crate::abilities::searching::OBSERVE;
-use crate::actions;
-use crate::asked::{Asked, parsed};
+use crate::ability::OBSERVE;
+use crate::asked::parsed;
 use crate::config::GoalPhrase;
-use crate::goal::{Filled, put_in};
-use crate::judge;
+use crate::known::is_alike;
 use crate::load::Domain;
-use crate::situation::is_alike;
-use crate::vocabulary::Ground;
+use crate::objective::{Asked, Filled};
+use crate::origin::{self, Origin};
+use crate::slots::put_in;
+use crate::{actions, judge};
 
 /// The object files as sources of findings.
 pub(super) fn objects(domain: &Domain) -> Vec<Source> {
@@ -83,7 +83,7 @@ impl Check<'_> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let is_told = |name: &String| {
             let Some(word) = vocabulary.word(name) else { return true };
-            let is_remembered = matches!(vocabulary.ground(&word, config), Ground::Remembered);
+            let is_remembered = matches!(origin::of(self.domain, &word), Origin::Remembered);
             let is_taught =
                 config.action.values().any(|action| action.taught().any(|taught| taught == *name));
             !is_remembered || judge::is_own(self.domain, name) || is_taught || self.begins(&word)

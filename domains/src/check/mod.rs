@@ -6,8 +6,6 @@ mod conditions;
 mod heard;
 mod looks;
 mod phrases;
-#[doc(hidden)]
-pub mod place;
 mod scenes;
 mod words;
 
@@ -16,7 +14,8 @@ use descry_planner::{Diagnostic, Findings, Severity, Span};
 use crate::abilities;
 use crate::lexicon::{Lexicon, Places};
 use crate::load::Domain;
-use crate::vocabulary::Ground;
+use crate::origin::{self, Origin};
+use crate::toml_place::TomlPlaces;
 
 /// Checks that a domain can be run.
 ///
@@ -32,7 +31,7 @@ pub fn runnable(domain: &Domain) -> Result<(), Findings> {
 pub fn findings(domain: &Domain) -> Findings {
     let places = Places::of_scene(domain);
     let lexicon = Lexicon::new(domain, &places);
-    let check = Check { domain, toml: place::Places::of(&domain.toml.text), places, lexicon };
+    let check = Check { domain, toml: TomlPlaces::of(&domain.toml.text), places, lexicon };
     let mut list = check.actions();
     list.extend(check.calls());
     list.extend(check.words());
@@ -53,13 +52,13 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let mut lines = vec!["words:".to_string()];
     for word in vocabulary.words() {
-        let how = match vocabulary.ground(&word, &domain.config) {
-            Ground::Sensed(fact) => format!("sensed: {}", fact.about),
-            Ground::SensedByProgram => "sensed: by a program".into(),
-            Ground::Remembered => "remembered: changes as carried-out actions say".into(),
-            Ground::Fixed => "fixed: as domain.toml says in init".into(),
-            Ground::Planned => "planned: changes within a plan alone".into(),
-            Ground::Derived => "derived by the domain's rules".into(),
+        let how = match origin::of(domain, &word) {
+            Origin::Sensed(fact) => format!("sensed: {}", fact.about),
+            Origin::SensedByProgram => "sensed: by a program".into(),
+            Origin::Remembered => "remembered: changes as carried-out actions say".into(),
+            Origin::Fixed => "fixed: as domain.toml says in init".into(),
+            Origin::Planned => "planned: changes within a plan alone".into(),
+            Origin::Derived => "derived by the domain's rules".into(),
         };
         let types: String = word.types.iter().map(|t| format!(" {t}")).collect();
         lines.push(format!("  {:32} {how}", format!("({}{types})", word.name)));
@@ -99,7 +98,7 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
 /// Context of the checks.
 struct Check<'a> {
     domain: &'a Domain,
-    toml: place::Places<'a>,
+    toml: TomlPlaces<'a>,
     places: Places,
     lexicon: Lexicon,
 }

@@ -6,9 +6,10 @@ use super::Check;
 use crate::abilities::{self, learning};
 use crate::answer::CHANGES;
 use crate::config::GoalPhrase;
-use crate::goal::{Filled, put_in, slots_of, type_of_slot};
-use crate::lexicon::SENSE;
 use crate::mentions::mentions;
+use crate::objective::Filled;
+use crate::slots::{put_in, slots_of, type_of_slot};
+use crate::symbol::SENSE;
 
 impl Check<'_> {
     /// Every phrase.
@@ -87,7 +88,7 @@ impl Check<'_> {
                 let message = format!("the slot {tag} wants a type `{of}`, which there is not");
                 faults.push(self.error("unknown-slot", message, place(&tag), self.known(of, types)));
             }
-            if !phrase.say.split_whitespace().any(|word| crate::goal::bare(word) == tag) {
+            if !phrase.say.split_whitespace().any(|word| crate::english::bare(word) == tag) {
                 let message = format!("the slot {tag} is a part of a word");
                 let help = "leave a space before and behind it";
                 faults.push(self.error("glued-slot", message, place(&tag), help));

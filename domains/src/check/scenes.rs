@@ -4,8 +4,9 @@ use descry_planner::{Diagnostic, Source, Span};
 use descry_robots::sim::SceneSpec;
 
 use super::Check;
-use crate::lexicon::{TOLD_APART, symbol};
+use crate::lexicon::TOLD_APART;
 use crate::load::Domain;
+use crate::symbol::symbol;
 
 /// The number of the first scene among the sources of the findings, behind `domain.pddl` and `domain.toml`.
 const FIRST_SCENE: usize = 2;

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use descry_planner::Diagnostic;
 
 use super::Check;
-use crate::abilities;
-use crate::lexicon::{SENSE, symbol};
-use crate::vocabulary::{Ground, Word};
-use crate::words;
+use crate::origin::{self, Origin};
+use crate::symbol::{SENSE, symbol};
+use crate::vocabulary::Word;
+use crate::{abilities, words};
 
 /// Types whose objects come from the body's map, from `objects/` and from what is seen.
 const GIVEN: [&str; 8] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle", SENSE];
@@ -20,8 +20,8 @@ impl Check<'_> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
         for word in vocabulary.words() {
-            match vocabulary.ground(&word, config) {
-                Ground::Sensed(fact) => {
+            match origin::of(self.domain, &word) {
+                Origin::Sensed(fact) => {
                     let fits = word.types.len() == fact.types.len()
                         && word.types.iter().zip(fact.types).all(|(own, of)| vocabulary.is_a(own, of));
                     if !fits {
@@ -39,11 +39,11 @@ impl Check<'_> {
                         );
                     }
                 }
-                Ground::Fixed | Ground::Remembered | Ground::Planned if self.stays_undefined(&word) => {
+                Origin::Fixed | Origin::Remembered | Origin::Planned if self.stays_undefined(&word) => {
                     list.push(never_defined(&word));
                 }
-                Ground::Remembered if self.is_compared_unset(&word) => list.push(not_begun(&word)),
-                Ground::Fixed if !self.begins(&word) => {
+                Origin::Remembered if self.is_compared_unset(&word) => list.push(not_begun(&word)),
+                Origin::Fixed if !self.begins(&word) => {
                     let name = &word.name;
                     let message =
                         format!("nothing states `{name}`, and no action changes it: it never holds");
@@ -171,8 +171,8 @@ impl Check<'_> {
                 continue;
             }
             let is_sensed = |(name, ..): &&(String, Vec<String>, Option<f64>)| {
-                let ground = vocabulary.word(name).map(|w| vocabulary.ground(&w, config));
-                matches!(ground, Some(Ground::Sensed(_) | Ground::SensedByProgram | Ground::Derived))
+                let ground = vocabulary.word(name).map(|w| origin::of(self.domain, &w));
+                matches!(ground, Some(Origin::Sensed(_) | Origin::SensedByProgram | Origin::Derived))
             };
             if let Some((name, ..)) = instances.iter().find(is_sensed) {
                 let message = format!("`{name}` is sensed: nothing can be said of how it begins");

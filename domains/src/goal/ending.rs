@@ -1,6 +1,7 @@
 //! "with confidence 0.9" and "within 60 seconds" at the end of a goal.
 
-use super::{GoalError, english};
+use super::GoalError;
+use crate::english;
 
 /// Confidence and deadline requested at the end of a goal.
 #[derive(Clone, Copy)]

@@ -1,9 +1,11 @@
 //! Suggestions for words that are no goal: the phrases of the domain that are nearest to the words, with the
 //! names that were given.
 
-use super::{english, pattern, sentence, spoken_types, type_of_slot};
+use super::{pattern, sentence, spoken_types};
+use crate::english;
 use crate::lexicon::Lexicon;
 use crate::load::Domain;
+use crate::slots::type_of_slot;
 
 /// Suggestions at most.
 const SHOWN: usize = 2;

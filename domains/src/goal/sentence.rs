@@ -3,10 +3,14 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-use super::{Filled, GoalError, english, fits, pattern, type_of_slot};
+use super::{GoalError, fits, pattern};
 use crate::config::GoalPhrase;
-use crate::lexicon::{Lexicon, Named, symbol};
+use crate::english;
+use crate::lexicon::{Lexicon, Named};
 use crate::load::Domain;
+use crate::objective::Filled;
+use crate::slots::type_of_slot;
+use crate::symbol::symbol;
 
 /// Words of a name at most; more are a clause.
 pub(super) const NAME_WORDS: usize = 4;
@@ -284,7 +288,7 @@ impl<'a> Reader<'a> {
             let name = self.lexicon.name_of(&named.symbol).to_string();
             return Some(Noun { symbol: named.symbol.clone(), name, within: None });
         }
-        let name = super::without_article(&words.join(" ")).to_string();
+        let name = crate::english::without_article(&words.join(" ")).to_string();
         let is_open = self.domain.config.open.iter().any(|of| of == of_type);
         let is_free = is_open && self.lexicon.is_free(&symbol(&name));
         is_free.then(|| Noun { symbol: symbol(&name), name, within: None })

@@ -4,10 +4,10 @@
 use descry_perception::recognise::{ModelError, ObjectModel};
 use descry_planner::{Diagnostic, Findings, Source, Span};
 
-use super::LoadError;
-use crate::check::place::Places;
-use crate::goal::is_function_word;
-use crate::lexicon::{plural, symbol};
+use crate::english::{is_function_word, plural};
+use crate::load::error::LoadError;
+use crate::symbol::symbol;
+use crate::toml_place::TomlPlaces;
 
 /// An object's file and what it says.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
@@ -19,7 +19,7 @@ pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
 pub fn check(objects: &[Read<'_>]) -> Result<(), LoadError> {
     let mut list = Vec::new();
     for (n, ((_, text), object)) in objects.iter().enumerate() {
-        let place = |key: &[&str]| Span { source: n as u32, ..Places::of(text).at(key) };
+        let place = |key: &[&str]| Span { source: n as u32, ..TomlPlaces::of(text).at(key) };
         for (key, name) in names(object) {
             let fault = unsayable(name)
                 .or_else(|| another(&objects[..n], name))

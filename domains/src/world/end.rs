@@ -5,17 +5,19 @@ use std::sync::Arc;
 
 use descry_memory::remember::Remembered;
 use descry_planner::Task;
-use descry_robots::Place;
 
 use super::grounds::expected;
-use super::{Round, Setting, World};
+use super::{Setting, World};
 use crate::abilities;
-use crate::answer::{self, Asker, Conclusion, Ended, Listed};
+use crate::answer::{self, Asker, Listed};
+use crate::conclusion::{Conclusion, Ended};
 use crate::config::Answers;
-use crate::lexicon::symbol;
+use crate::known::{Thing, thing};
 use crate::mind::Region;
+use crate::round::Round;
 use crate::saying::Saying;
-use crate::situation::{Situation, Thing, thing};
+use crate::situation::Situation;
+use crate::symbol::symbol;
 
 impl World<'_> {
     /// The reason the run cannot go on, if it cannot: a limit is reached, or steps fail for good or change
@@ -60,14 +62,10 @@ impl World<'_> {
             .map(|on| known.surfaces[on].symbol.clone())
             .collect();
         let mut before = Remembered::clone(&past.remembered);
-        before.shapes.extend(known.floor.learned.iter().cloned());
-        before.surveyed = known.chart.kept().or(before.surveyed);
-        before.things.clone_from(&known.news.things);
-        let pose = |waypoint: &str| match &known.candidates.iter().find(|c| c.symbol == waypoint)?.place {
-            Place::Pose(pose) => Some([pose.x_m, pose.y_m, pose.yaw_rad]),
-            Place::Station(_) => Some([0.0; 3]),
-        };
-        before.visited = known.news.visited(std::mem::take(&mut before.visited), pose, past.now_unix_s);
+        abilities::ALL
+            .iter()
+            .filter_map(|ability| ability.keeps)
+            .for_each(|keeps| keeps(known, past, &mut before));
         Some(before.after(&known.belief, &looked_at, past.now_unix_s))
     }
 

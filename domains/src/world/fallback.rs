@@ -2,12 +2,13 @@
 
 use descry_planner::NoPlan;
 
-use super::{Choice, NOTHING_LEFT, Round, World, WorldError};
-use crate::abilities;
+use super::{Choice, NOTHING_LEFT, World};
 use crate::abilities::searching::policies::{self, Look};
-use crate::abilities::searching::reasons;
-use crate::culprit;
+use crate::error::WorldError;
 use crate::judge::{Judge, Judgement};
+use crate::looking::looks;
+use crate::round::Round;
+use crate::{abilities, culprit};
 
 impl World<'_> {
     /// Step that is surely useful, for when the planner has reached its limit of states; or else a look
@@ -22,7 +23,7 @@ impl World<'_> {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
         let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
-        let all = own.map_or_else(|| reasons::look_deeds(s), |fallback| fallback(s));
+        let all = own.map_or_else(|| looks::look_deeds(s), |fallback| fallback(s));
         match self.first_of(round, &all) {
             Some(choice) => Ok(choice),
             None => self.behind(round),
@@ -34,11 +35,11 @@ impl World<'_> {
         let s = &round.situation;
         loop {
             let barred = &self.barred;
-            let is_barred = |look: &Look| barred.contains(&reasons::look(s, look.from, look.on));
+            let is_barred = |look: &Look| barred.contains(&looks::look(s, look.from, look.on));
             let Some(look) = policies::behind(s, &is_barred).filter(|_| s.held.is_none()) else {
                 return Ok(Choice::Nothing(NOTHING_LEFT.into()));
             };
-            let deed = reasons::look(s, look.from, look.on);
+            let deed = looks::look(s, look.from, look.on);
             if let Some(choice) = self.head_for(round, deed, look.from, false) {
                 return Ok(choice);
             }
@@ -78,7 +79,7 @@ impl World<'_> {
         if s.held.is_some() || !self.is_open_to_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
-        match self.first_of(round, &reasons::look_deeds(s)) {
+        match self.first_of(round, &looks::look_deeds(s)) {
             Some(choice) => Ok(choice),
             None => self.behind(round),
         }
@@ -95,7 +96,7 @@ impl World<'_> {
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
         let is_asked = self.setting.goal.question && self.is_open_to_looks(round);
         let may_look = (s.time_left_s.is_some() || is_asked) && s.held.is_none() && is_searching;
-        let looks = if may_look { reasons::look_deeds(s) } else { Vec::new() };
+        let looks = if may_look { looks::look_deeds(s) } else { Vec::new() };
         Ok(self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into())))
     }
 }

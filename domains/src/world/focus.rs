@@ -10,8 +10,9 @@ use std::collections::BTreeSet;
 use descry_planner::Task;
 use descry_planner::task::{Action, ObjectId};
 
-use super::{Round, World};
-use crate::abilities::searching::doubt::Doubt;
+use super::World;
+use crate::belief::doubt::Doubt;
+use crate::round::Round;
 use crate::situation::Situation;
 
 /// Maximum number of viewpoints, by stage; a map with no more than the first is planned on as a whole.

@@ -3,12 +3,18 @@
 use descry_memory::belief::Belief;
 use descry_robots::{PoseEstimate, Robot};
 
-use super::WorldError;
-use crate::abilities::learning::news::{self, News};
-use crate::goal::Goal;
-use crate::lexicon::{Lexicon, Named, SENSE, symbol};
+use crate::abilities;
+use crate::error::WorldError;
+use crate::known::{self, Known, KnownDoor, Thing};
+use crate::lexicon::{Lexicon, Named};
 use crate::load::Domain;
-use crate::situation::{self, Candidate, Known, KnownDoor, Past, Situation, Thing};
+use crate::objective::Goal;
+use crate::past::Past;
+use crate::situation::Situation;
+use crate::states::States;
+use crate::surface::KnownSurface;
+use crate::symbol::{SENSE, symbol};
+use crate::viewpoint::Candidate;
 
 /// Maximum probability of a remembered object, as a share of the required confidence.
 const RECALLED: f64 = 0.9;
@@ -22,14 +28,14 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
         ("surface".into(), s.surfaces.iter().map(|k| k.symbol.clone()).collect()),
         ("thing".into(), s.things.iter().map(|t| t.symbol.clone()).collect()),
         ("kind".into(), s.kinds.iter().map(|t| t.symbol.clone()).collect()),
-        ("obstacle".into(), s.obstacles().iter().map(|o| o.symbol.clone()).collect()),
-        ("spot".into(), s.floor.things.iter().map(|t| t.symbol.clone()).collect()),
-        ("shape".into(), s.floor.names.iter().map(|(symbol, _)| symbol.clone()).collect()),
-        ("novelty".into(), s.news.novelties.iter().map(|n| n.symbol.clone()).collect()),
+    ];
+    let own = abilities::ALL.iter().filter_map(|ability| ability.objects).flat_map(|objects| objects(s));
+    objects.extend(own.map(|(of, symbols)| (of.to_string(), symbols)));
+    objects.extend([
         ("door".into(), s.doors.iter().map(|d| d.symbol.clone()).collect()),
         (SENSE.into(), lexicon.of_type(SENSE).iter().map(|n| n.symbol.clone()).collect()),
         ("room".into(), lexicon.of_type("room").iter().map(|n| n.symbol.clone()).collect()),
-    ];
+    ]);
     for (of, names) in &domain.config.objects {
         objects.push((of.clone(), names.iter().map(|n| symbol(n)).collect()));
     }
@@ -40,25 +46,24 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
 pub(super) fn things(
     domain: &Domain,
     goal: &Goal,
-    news: &News,
+    states: &States,
     rooms: &[Named],
-    surfaces: &[situation::KnownSurface],
+    surfaces: &[KnownSurface],
 ) -> Result<Vec<Thing>, WorldError> {
     let of = |(name, on): &(String, Option<Vec<String>>)| {
         let on = on.as_ref().map(|places| places_of(places, rooms, surfaces)).transpose()?;
-        Ok(Thing { on, ..asked_for(domain, news, name)? })
+        Ok(Thing { on, ..asked_for(domain, states, name)? })
     };
     goal.asked.things.iter().map(of).collect()
 }
 
 /// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
-fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldError> {
-    let known = situation::thing(domain, name);
-    match news.thing(name) {
+fn asked_for(domain: &Domain, states: &States, name: &str) -> Result<Thing, WorldError> {
+    let known = known::thing(domain, name);
+    let learned = abilities::ALL.iter().filter_map(|ability| ability.thing).find_map(|of| of(states, name));
+    match learned {
         None => Ok(known),
-        Some(learned) if known.models.is_empty() => {
-            Ok(Thing { name: learned.name.clone(), models: vec![news::model(learned)], ..known })
-        }
+        Some(learned) if known.models.is_empty() => Ok(learned),
         Some(_) => Err(WorldError::Domain(format!(
             "\"{name}\" is an object of the domain {}, and something that was learned is called so\n  give that another name: descry name STORE \"{name}\" \"…\"",
             domain.config.name
@@ -68,7 +73,7 @@ fn asked_for(domain: &Domain, news: &News, name: &str) -> Result<Thing, WorldErr
 
 /// Remembered objects of earlier runs that may still stand where they were seen: their probability is below
 /// certainty, so that they are looked at again.
-pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Belief {
+pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[KnownSurface]) -> Belief {
     let mut belief = Belief::default();
     if let Some(past) = past {
         let aged = past.remembered.aged(past.now_unix_s, RECALLED * goal.threshold);
@@ -81,7 +86,7 @@ pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[situation::
 fn places_of(
     places: &[String],
     rooms: &[Named],
-    surfaces: &[situation::KnownSurface],
+    surfaces: &[KnownSurface],
 ) -> Result<Vec<usize>, WorldError> {
     let mut on = Vec::new();
     for place in places {
@@ -97,12 +102,12 @@ fn places_of(
 }
 
 /// The kinds of which all are asked for, each on the surfaces of the rooms in which it is asked about.
-pub(super) fn kinds(domain: &Domain, goal: &Goal, surfaces: &[situation::KnownSurface]) -> Vec<Thing> {
+pub(super) fn kinds(domain: &Domain, goal: &Goal, surfaces: &[KnownSurface]) -> Vec<Thing> {
     let of = |(kind, rooms): &(String, Option<Vec<String>>)| {
         let of_rooms =
             |rooms: &Vec<String>| (0..surfaces.len()).filter(|&n| surfaces[n].is_in(rooms)).collect();
         let on = rooms.as_ref().map(of_rooms);
-        Thing { on, ..situation::thing(domain, kind) }
+        Thing { on, ..known::thing(domain, kind) }
     };
     goal.asked.kinds.iter().map(of).collect()
 }
@@ -144,7 +149,7 @@ pub(super) fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
 }
 
 /// A surface that the domain names and the map, which knows others, does not have.
-pub(super) fn known_by_map(domain: &Domain, surfaces: &[situation::KnownSurface]) -> Result<(), WorldError> {
+pub(super) fn known_by_map(domain: &Domain, surfaces: &[KnownSurface]) -> Result<(), WorldError> {
     if let [first, second, ..] = surfaces
         && surfaces.iter().all(|s| !s.whole)
     {
@@ -161,7 +166,7 @@ pub(super) fn known_by_map(domain: &Domain, surfaces: &[situation::KnownSurface]
     })
 }
 
-pub(super) fn no_surface(name: &str, surfaces: &[situation::KnownSurface]) -> WorldError {
+pub(super) fn no_surface(name: &str, surfaces: &[KnownSurface]) -> WorldError {
     let known: Vec<&str> = surfaces.iter().map(|s| s.name.as_str()).collect();
     let known = if known.is_empty() { "none".into() } else { known.join(", ") };
     WorldError::Domain(format!(

@@ -4,9 +4,11 @@ use descry_planner::semantics::Binding;
 use descry_planner::task::{Action, Comparison, Condition, Quantified, Scoped, Slot, When};
 use descry_planner::{Plan, Semantics, Step, Task, after};
 
-use super::{Choice, Round, World};
-use crate::abilities::{self, Deed};
+use super::{Choice, World};
+use crate::abilities;
+use crate::ability::Deed;
 use crate::actions::{self, Performer};
+use crate::round::Round;
 
 /// Between the end of a step and the begin of the next, seconds.
 const GAP_S: f64 = 0.001;

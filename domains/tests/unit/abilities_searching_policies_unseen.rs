@@ -1,7 +1,7 @@
 //! Tests of `abilities::searching::policies::unseen`.
 
 use descry_domains::abilities::searching::policies::unseen::*;
-use descry_domains::situation::KnownSurface;
+use descry_domains::surface::KnownSurface;
 use descry_perception::nalgebra::{Point3, Vector3};
 
 #[test]

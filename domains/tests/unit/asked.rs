@@ -1,8 +1,9 @@
 //! Tests of `asked`.
 
-use descry_domains::asked::{Asked, parsed};
+use descry_domains::asked::parsed;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
+use descry_domains::objective::Asked;
 use descry_domains::vocabulary::Vocabulary;
 
 /// Subjects of a condition over the words of a domain and a few derived ones.

@@ -1,13 +1,13 @@
 //! Faults put into the template, each with what is found and under which text.
 
-use descry_domains::check::*;
-use descry_domains::load::Domain;
-use descry_domains::load::{Files, from_files};
-use descry_domains::template;
 use std::path::Path;
 
+use descry_domains::check::*;
+use descry_domains::load::{Domain, Files, from_files};
+use descry_domains::template;
+
 /// The template with one text of a file replaced by another.
-fn changed(file: &str, from: &str, to: &str) -> Result<Domain, descry_domains::load::LoadError> {
+fn changed(file: &str, from: &str, to: &str) -> Result<Domain, descry_domains::load::error::LoadError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("template");
     let mut files = Files::new();
     for (path, text) in template::files("mine") {
@@ -27,7 +27,7 @@ fn changed(file: &str, from: &str, to: &str) -> Result<Domain, descry_domains::l
 fn check(file: &str, (from, to): (&str, &str), code: &str, place: &str, words: &[&str]) {
     let found = match changed(file, from, to) {
         Ok(domain) => findings(&domain),
-        Err(descry_domains::load::LoadError::Findings { findings }) => findings,
+        Err(descry_domains::load::error::LoadError::Findings { findings }) => findings,
         Err(other) => panic!("{to}: {other}"),
     };
     let codes: Vec<&str> = found.list.iter().map(|d| d.code).collect();

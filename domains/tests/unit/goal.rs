@@ -3,6 +3,8 @@
 use descry_domains::goal::*;
 use descry_domains::lexicon::Lexicon;
 use descry_domains::load::Domain;
+use descry_domains::objective::Filled;
+use descry_domains::slots::*;
 
 fn filled(slots: &[(&str, &str)]) -> Vec<Filled> {
     let mut all: Vec<Filled> = Vec::new();

@@ -1,5 +1,6 @@
 //! Tests of `lexicon`.
 
+use descry_domains::english::*;
 use descry_domains::lexicon::*;
 
 #[test]

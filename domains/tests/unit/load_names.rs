@@ -1,6 +1,6 @@
 //! Tests of `load::names`.
 
-use descry_domains::load::LoadError;
+use descry_domains::load::error::LoadError;
 use descry_domains::load::{Files, parse_objects};
 
 #[test]

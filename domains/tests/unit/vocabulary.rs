@@ -1,6 +1,7 @@
 //! Tests of `vocabulary`.
 
 use descry_domains::load::Domain;
+use descry_domains::origin;
 use descry_domains::vocabulary::*;
 use descry_planner::Source;
 
@@ -15,13 +16,13 @@ fn every_word_has_its_value_from_somewhere() {
         (:derived (known ?w - person) (told ?w))
         (:action tell :parameters (?w - person) :precondition (open)
           :effect (and (told ?w) (increase (calls ?w) 1))))";
-    let vocabulary = Vocabulary::read(&Source::new("d.pddl", pddl)).unwrap();
-    let mut config = Domain::load("tabletop").unwrap().config;
-    config.word = toml::from_str("rain.program = [\"sh\"]\nopen.is = \"planned\"").unwrap();
-    config.action = toml::from_str("tell.gives_up = [\"(shut)\"]").unwrap();
+    let mut domain = Domain::load("tabletop").unwrap();
+    domain.vocabulary = Vocabulary::read(&Source::new("d.pddl", pddl)).unwrap();
+    domain.config.word = toml::from_str("rain.program = [\"sh\"]\nopen.is = \"planned\"").unwrap();
+    domain.config.action = toml::from_str("tell.gives_up = [\"(shut)\"]").unwrap();
     let check = |name: &str, expected: &str| {
-        let ground = vocabulary.ground(&vocabulary.word(name).unwrap(), &config);
-        assert!(format!("{ground:?}").starts_with(expected), "{name}: {ground:?}");
+        let origin = origin::of(&domain, &domain.vocabulary.word(name).unwrap());
+        assert!(format!("{origin:?}").starts_with(expected), "{name}: {origin:?}");
     };
     check("at", "Sensed(");
     check("told", "Remembered");
@@ -31,6 +32,7 @@ fn every_word_has_its_value_from_somewhere() {
     check("rain", "SensedByProgram");
     check("size", "Fixed");
     check("known", "Derived");
+    let vocabulary = &domain.vocabulary;
     assert!(vocabulary.is_a("poet", "person") && !vocabulary.is_a("person", "poet"));
     assert_eq!(vocabulary.constants("person"), ["anna"]);
     assert_eq!(vocabulary.action("tell"), Some(vec![("?w".to_string(), "person".to_string())]));

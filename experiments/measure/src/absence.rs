@@ -10,8 +10,8 @@ mod searching;
 use std::process::ExitCode;
 
 use descry_agent::body::scene_spec;
-use descry_domains::abilities::searching::reasons;
 use descry_domains::load::Domain;
+use descry_domains::reasons;
 use descry_domains::situation::Situation;
 use descry_experiments::plot::{Axis, Plot, Point, Series};
 use descry_perception::calibration::{Bin, Claim, Reliability, reliability};

@@ -1,24 +1,27 @@
 //! Fault injection: runs with injected faults, which must all end, with the right verdict.
 
-use descry_agent::stop::Stop;
 use std::path::Path;
 
-use descry_domains::goal::{self, Goal};
+use descry_agent::body;
+use descry_agent::stop::Stop;
+use descry_domains::abilities::searching::policies;
+use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
+use descry_domains::objective::Goal;
 use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::trial::{self, Measured, Trial};
-use super::{Head, Kind, Summary, inputs_of, parse, refuse};
+use crate::error::ExperimentError;
+use crate::job::{Job, Numbered, Outcome};
+use crate::kinds::kind::{Head, Kind, Summary, inputs_of, parse, refuse};
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
+use crate::source::Source;
 use crate::statistics::{self, Observation};
 use crate::table::{Table, shown};
-use crate::{ExperimentError, Job, Numbered, Outcome, Source};
-use descry_agent::body;
-use descry_domains::abilities::searching::policies;
 
 /// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]

@@ -6,10 +6,11 @@
 //! at the true position of an object of the kind, each object counted once. Recall is over all objects of the
 //! kind, hidden or not.
 
-use descry_agent::stop::Stop;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use descry_agent::body::{self, program};
+use descry_agent::stop::Stop;
 use descry_domains::load::{DEFAULT, Domain};
 use descry_perception::ObjectModel;
 use descry_perception::recognise::{Descry, Published, Recogniser};
@@ -17,9 +18,10 @@ use descry_robots::sim::SceneSpec;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::{Head, Kind, OtherBody, Summary, parse, refuse};
-use crate::{ExperimentError, Job, Numbered, Outcome, Row, Source};
-use descry_agent::body::{self, program};
+use crate::error::ExperimentError;
+use crate::job::{Job, Numbered, Outcome, Row};
+use crate::kinds::kind::{Head, Kind, OtherBody, Summary, parse, refuse};
+use crate::source::Source;
 
 mod score;
 mod summary;

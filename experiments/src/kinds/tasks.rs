@@ -1,21 +1,26 @@
 //! Tasks in a place with several surfaces: any goals of a domain, by several policies, with and without
 //! faults. Answers and actions are compared with the true final state.
 
-use descry_agent::stop::Stop;
 use std::path::Path;
 
+use descry_agent::body;
+use descry_agent::stop::Stop;
 use descry_domains::abilities::searching::policies;
-use descry_domains::goal::{self, Goal, type_of_slot};
-use descry_domains::lexicon::{Lexicon, Places, symbol};
+use descry_domains::goal;
+use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
+use descry_domains::objective::Goal;
+use descry_domains::slots::type_of_slot;
+use descry_domains::symbol::symbol;
 use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
 use serde::Deserialize;
 use serde_json::json;
 
 use super::trial::{self, Trial};
-use super::{Head, Kind, OtherBody, Summary, inputs_of, parse, refuse};
-use crate::{ExperimentError, Job, Numbered, Outcome, Source};
-use descry_agent::body;
+use crate::error::ExperimentError;
+use crate::job::{Job, Numbered, Outcome};
+use crate::kinds::kind::{Head, Kind, OtherBody, Summary, inputs_of, parse, refuse};
+use crate::source::Source;
 
 mod score;
 mod summary;

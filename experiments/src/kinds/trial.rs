@@ -1,27 +1,27 @@
 //! One run of the agent in a simulated world, built-in or a program's, compared with the truth.
 
-use descry_agent::stop::Stop;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-use descry_domains::goal::{self, Goal};
+use descry_agent::body::{Body, program};
+use descry_agent::keeping::{Keeping, Kept};
+use descry_agent::report::{Event, Report};
+use descry_agent::run::{self, Folder, Settings, Task, Watcher};
+use descry_agent::stop::Stop;
+use descry_domains::abilities::searching::policies::{self, Foresight};
+use descry_domains::conclusion::Verdict;
+use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::Domain;
+use descry_domains::objective::Goal;
 use descry_robots::Place;
 use descry_robots::sim::{FaultPlan, SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::{TrueObject, Truth};
 use serde_json::{Value, json};
 
-use super::runtime;
-use crate::{Outcome, Row};
-use descry_agent::body::{Body, program};
-use descry_agent::keeping::{Keeping, Kept};
-use descry_domains::abilities::searching::policies::{self, Foresight};
-use descry_domains::answer::Verdict;
-
-use descry_agent::report::{Event, Report};
-use descry_agent::run::{self, Folder, Settings, Task, Watcher};
+use crate::job::{Outcome, Row};
+use crate::kinds::kind::runtime;
 
 /// Maximum number of seeds tried for an arrangement with the requested occlusion.
 const ARRANGEMENTS: u64 = 20;

@@ -1,21 +1,24 @@
 //! Comparison of policies: views, metres and seconds until the right verdict on a target that is more or less
 //! hidden, or absent, with more or fewer viewpoints.
 
-use descry_agent::stop::Stop;
 use std::path::Path;
 
-use descry_domains::goal::{self, Goal};
+use descry_agent::body;
+use descry_agent::stop::Stop;
+use descry_domains::abilities::searching::policies;
+use descry_domains::goal;
 use descry_domains::lexicon::{Lexicon, Places};
 use descry_domains::load::{DEFAULT, Domain};
+use descry_domains::objective::Goal;
 use descry_robots::sim::{FaultPlan, SceneSpec};
 use serde::Deserialize;
 use serde_json::json;
 
 use super::trial::{self, Trial};
-use super::{Head, Kind, Summary, inputs_of, parse, refuse};
-use crate::{ExperimentError, Job, Numbered, Outcome, Source};
-use descry_agent::body;
-use descry_domains::abilities::searching::policies;
+use crate::error::ExperimentError;
+use crate::job::{Job, Numbered, Outcome};
+use crate::kinds::kind::{Head, Kind, Summary, inputs_of, parse, refuse};
+use crate::source::Source;
 
 mod summary;
 

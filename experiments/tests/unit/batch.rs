@@ -1,8 +1,7 @@
 //! A complete batch from kind to results, with a kind that only counts.
 
 use descry_agent::stop::Stop;
-use descry_experiments::kinds::Kind;
-use descry_experiments::kinds::{Head, Summary};
+use descry_experiments::kinds::kind::{Head, Kind, Summary};
 use descry_experiments::*;
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -1,5 +1,6 @@
 //! Tests of `journal`.
 
+use descry_experiments::header::Header;
 use descry_experiments::journal::*;
 use descry_experiments::{ExperimentError, Finished};
 

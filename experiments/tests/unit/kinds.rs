@@ -2,6 +2,7 @@
 
 use descry_agent::stop::Stop;
 use descry_domains::load::{Domain, program_texts};
+use descry_experiments::kinds::kind::inputs_of;
 use descry_experiments::kinds::*;
 use descry_experiments::{Row, Source};
 use std::path::Path;

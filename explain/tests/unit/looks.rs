@@ -54,7 +54,7 @@ fn perceived(left_out: &[(usize, &str)]) -> Note {
 fn why_it_is_no_surer_is_said() {
     let begin = standing(Vec::new(), 0.0, 0.75, 0.0);
     let check = |before: &Standing, after: &Standing, note: Note, words: &[&str], not: &str| {
-        let asked = Asked { goal: "(found the-ring)", hoped: &[], saying: &Saying::default() };
+        let asked = Hopes { goal: "(found the-ring)", hoped: &[], saying: &Saying::default() };
         let said = told(Some(before), after, &[&note], &asked).join(" ");
         words.iter().for_each(|word| assert!(said.contains(word), "{word:?} is not in {said}"));
         assert!(not.is_empty() || !said.contains(not), "{not:?} is in {said}");

@@ -10,14 +10,15 @@ use descry_planner::{Answer, Call, CallError};
 use descry_robots::{Description, Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
-use super::{Ability, ActionKind, Deed, Fact, Meaning, SkillWord, argument, quickest_first};
-use crate::abilities::searching::change::Change;
-use crate::abilities::searching::perceive::{self, Eyes};
-use crate::abilities::searching::reasons;
+use crate::ability::{Ability, ActionKind, Deed, Fact, Meaning, SkillWord, argument, quickest_first};
+use crate::error::WorldError;
+use crate::eyes::Eyes;
+use crate::known::{Held, Thing};
+use crate::looking::change::Change;
+use crate::looking::{looks, perceive};
 use crate::mind::Mind;
 use crate::note::Note;
-use crate::situation::{Held, Situation, Thing};
-use crate::world::WorldError;
+use crate::situation::Situation;
 
 /// Distance within which the hand may touch what stands beside the object that it takes, metres.
 const TOUCHED_M: f64 = 0.03;
@@ -33,8 +34,6 @@ const PUT_DOWN: &str = "put-down";
 
 /// The ability *carrying*.
 pub const ABILITY: Ability = Ability {
-    name: "carrying",
-    about: "takes one thing into the hand and puts it down elsewhere",
     facts: &[
         Fact {
             name: "holding",
@@ -102,14 +101,13 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     needs: &[Part::Hand],
-    begins: None,
     fallback: Some(fallback),
-    answers: None,
+    ..Ability::named("carrying", "takes one thing into the hand and puts it down elsewhere")
 };
 
 /// The look that tells most a second; with something in the hand, it is put down first, where that takes least.
 fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
-    let Some(track) = held(s) else { return reasons::look_deeds(s) };
+    let Some(track) = held(s) else { return looks::look_deeds(s) };
     let Some(thing) = s.things.iter().find(|thing| is_held(s, thing, track)) else { return Vec::new() };
     let poses = (0..s.candidates.len()).filter(|&from| s.can_drive_to(from));
     let spots = poses.flat_map(|from| (0..s.surfaces.len()).map(move |on| (from, on)));

@@ -6,12 +6,15 @@ use std::sync::Arc;
 
 use descry_memory::learned::LearnedThing;
 use descry_perception::learning::{Glance, Guess, Judged, KnowOptions};
+use descry_perception::merge::Merged;
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::recognise::Percept;
 use descry_perception::{Cloud, Neighbours, View};
 
 use super::news::{Models, News};
-use crate::situation::KnownSurface;
+use crate::mind::Mind;
+use crate::states::state;
+use crate::surface::KnownSurface;
 
 /// Returns farther than this tell nothing, metres.
 const RANGE_M: f64 = 3.0;
@@ -48,7 +51,28 @@ const BESIDE_IT_M: f64 = 0.04;
 pub const NOT_IT: f64 = 0.002;
 
 /// Recognition results of views, by their times.
-pub type Glances = BTreeMap<i64, Arc<Glance>>;
+#[derive(Clone, Default)]
+struct Glances {
+    by_time: BTreeMap<i64, Arc<Glance>>,
+    /// How often something had moved when they were taken.
+    disturbed: usize,
+}
+
+state!(Glances);
+
+/// Forgets recognition results: what is known has changed.
+pub(super) fn forget(mind: &mut Mind) {
+    mind.known.states.get_mut::<Glances>().by_time.clear();
+}
+
+/// Recognition results that still hold; those are void that were taken before something moved.
+fn glances(mind: &mut Mind) -> BTreeMap<i64, Arc<Glance>> {
+    let disturbed = mind.disturbed;
+    let kept: &mut Glances = mind.known.states.get_mut();
+    let held = std::mem::take(&mut kept.by_time);
+    let still_hold = std::mem::replace(&mut kept.disturbed, disturbed) == disturbed;
+    if still_hold { held } else { BTreeMap::new() }
+}
 
 /// A learned thing somewhere.
 pub struct Found {
@@ -78,13 +102,13 @@ type Placed = (Guess, Isometry3<f64>);
 /// Learned things that views show, each with the pose of its camera, the surest first; no place holds two.
 /// Candidates are those of each view and those `suggested` by all of them; `holds` tells where things may be.
 pub(super) fn find(
-    news: &News,
-    glances: &mut Glances,
+    mind: &mut Mind,
     (views, up): Shown<'_>,
     suggested: Vec<Placed>,
     holds: impl Fn(&Point3<f64>) -> bool,
 ) -> Vec<Found> {
-    let Some(models) = news.models.clone() else { return Vec::new() };
+    let Some(models) = mind.known.news().models.clone() else { return Vec::new() };
+    let mut glances = glances(mind);
     let options = options(up);
     let looks: Vec<(Arc<Glance>, Isometry3<f64>)> = views
         .iter()
@@ -97,6 +121,8 @@ pub(super) fn find(
             Some((glance, *pose))
         })
         .collect();
+    mind.known.states.get_mut::<Glances>().by_time = glances;
+    let news = mind.known.news();
     let looks: Vec<(&Glance, Isometry3<f64>)> = looks.iter().map(|(g, pose)| (&**g, *pose)).collect();
     let mut guesses: Vec<Placed> = Vec::new();
     let mut all: Vec<Placed> = looks.iter().flat_map(|(glance, pose)| placed(glance, pose)).collect();
@@ -188,18 +214,21 @@ pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
 
 /// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `merged` is the cloud of all views, which
 /// the percepts index.
-pub(crate) fn explain(
-    news: &News,
-    glances: &mut Glances,
-    surface: &KnownSurface,
-    views: &[(&View, Isometry3<f64>)],
-    merged: &Cloud,
+pub(super) fn explain(
+    mind: &mut Mind,
+    on: usize,
+    (views, merged): (&[View], &Merged),
     percepts: Vec<Percept>,
 ) -> Vec<Percept> {
-    let Some(models) = &news.models else { return percepts };
-    let suggested = together(models, surface, views, merged);
-    let found =
-        find(news, glances, (views, Some(surface.up)), suggested, |middle| stands_on(surface, middle));
+    let Some(models) = mind.known.news().models.clone() else { return percepts };
+    let placed = views.iter().zip(&merged.fits).filter(|(_, fit)| fit.used);
+    let views: Vec<(&View, Isometry3<f64>)> =
+        placed.map(|(view, fit)| (view, fit.world_from_camera)).collect();
+    let surface = &mind.known.surfaces[on].clone();
+    let merged = &merged.cloud;
+    let suggested = together(&models, surface, &views, merged);
+    let found = find(mind, (&views, Some(surface.up)), suggested, |middle| stands_on(surface, middle));
+    let news = mind.known.news();
     let shares: Vec<Vec<f64>> = percepts
         .iter()
         .map(|p| {

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use descry_planner::{Answer, Call, CallError};
 
 use super::news::{DIRECTIONS, Fate, Novelty};
-use crate::abilities::searching::reasons;
-use crate::abilities::{Deed, Meaning, Reads, argument, quickest_first};
+use crate::ability::{Deed, Meaning, Reads, argument, quickest_first};
+use crate::looking::looks;
 use crate::situation::{Situation, holding};
 
 /// Every call.
@@ -21,7 +21,7 @@ pub(super) const ALL: &[Meaning] = &[Meaning {
 fn expected_sides(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, what) = (argument(call, 0)?, argument(call, 1)?);
     let novelty =
-        s.news.novelty(what).ok_or_else(|| CallError::Failed(format!("`{what}` is nothing new")))?;
+        s.news().novelty(what).ok_or_else(|| CallError::Failed(format!("`{what}` is nothing new")))?;
     let before: Vec<&str> = holding(call, "faced")
         .filter(|r| r.arguments.get(1).is_some_and(|of| **of == *what))
         .filter_map(|r| r.arguments.first().map(|pose| &**pose))
@@ -39,7 +39,7 @@ fn gain(s: &Situation, novelty: &Novelty, from: &str, before: &[&str]) -> f64 {
 
 /// The reason for a look from there.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
-    let Some(novelty) = s.news.novelty(arguments[1]) else { return String::new() };
+    let Some(novelty) = s.news().novelty(arguments[1]) else { return String::new() };
     format!(
         "{:.0} % of its sides were seen; this shows {:.0} % more",
         100.0 * novelty.seen().len() as f64 / DIRECTIONS as f64,
@@ -50,8 +50,8 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
 /// Choices without a plan, best first: useful visits and looks by travel time, then modelling an
 /// open novelty, then search looks.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
-    let visits = s.news.places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), None));
-    let open = s.news.novelties.iter().filter(|n| n.fate == Fate::Open);
+    let visits = s.news().places.iter().filter(|p| !p.is_visited).map(|p| (p.waypoint.clone(), None));
+    let open = s.news().novelties.iter().filter(|n| n.fate == Fate::Open);
     let looks = open.flat_map(|n| n.open_stands(s).map(move |pose| (pose.clone(), Some(n))));
     let promising = looks.filter(|(pose, n)| n.is_some_and(|n| gain(s, n, pose, &[]) > 0.0));
     let reached = visits.chain(promising).filter_map(|(pose, of)| {
@@ -67,8 +67,8 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     if !nearest.is_empty() {
         return nearest;
     }
-    match s.news.novelties.iter().find(|n| n.fate == Fate::Open) {
+    match s.news().novelties.iter().find(|n| n.fate == Fate::Open) {
         Some(ready) => vec![vec![Deed::new("model", [&ready.symbol])]],
-        None => reasons::look_deeds(s),
+        None => looks::look_deeds(s),
     }
 }

@@ -2,7 +2,7 @@
 
 use super::news::{Fate, Novelty};
 use super::stands;
-use crate::abilities::Fact;
+use crate::ability::Fact;
 use crate::situation::Situation;
 
 /// Every fact.
@@ -59,12 +59,12 @@ pub(super) const ALL: &[Fact] = &[
 ];
 
 fn waypoint(s: &Situation) -> Vec<String> {
-    s.news.places.iter().map(|p| format!("(waypoint {})", p.waypoint)).collect()
+    s.news().places.iter().map(|p| format!("(waypoint {})", p.waypoint)).collect()
 }
 
 /// Novel objects that are still to be learned.
 fn open(s: &Situation) -> impl Iterator<Item = &Novelty> {
-    s.news.novelties.iter().filter(|n| n.fate == Fate::Open)
+    s.news().novelties.iter().filter(|n| n.fate == Fate::Open)
 }
 
 fn stand(s: &Situation) -> Vec<String> {
@@ -76,7 +76,7 @@ fn stand(s: &Situation) -> Vec<String> {
 
 fn way_in(s: &Situation) -> Vec<String> {
     let around =
-        |pose: &String| s.news.novelties.iter().any(|n| n.stands.iter().flatten().any(|p| p == pose));
+        |pose: &String| s.news().novelties.iter().any(|n| n.stands.iter().flatten().any(|p| p == pose));
     let free = s.candidates.iter().map(|c| &c.symbol).filter(|pose| !around(pose)).cloned();
     let first = open(s).next().map(|n| n.symbol.as_str());
     let in_turn = open(s).flat_map(|n| stands::ways_in(s, n, Some(n.symbol.as_str()) == first));
@@ -96,10 +96,10 @@ fn before(s: &Situation) -> Vec<String> {
 }
 
 fn unfaced(s: &Situation) -> Vec<String> {
-    s.news.novelties.iter().map(|n| format!("(= (unfaced {}) {:.5})", n.symbol, n.unfaced(s))).collect()
+    s.news().novelties.iter().map(|n| format!("(= (unfaced {}) {:.5})", n.symbol, n.unfaced(s))).collect()
 }
 
 fn settled(s: &Situation) -> Vec<String> {
-    let done = s.news.novelties.iter().filter(|n| n.fate != Fate::Open);
+    let done = s.news().novelties.iter().filter(|n| n.fate != Fate::Open);
     done.map(|n| format!("(settled {})", n.symbol)).collect()
 }

@@ -17,24 +17,23 @@ use descry_perception::learning::LearnOptions;
 use descry_perception::nalgebra::Unit;
 use descry_robots::{Part, Place as Where};
 use descry_skills::{Model, Observe, Outcome};
+use news::{News, Place};
 
-use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
-use crate::abilities::searching::perceive::Eyes;
-use crate::goal::Goal;
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::error::WorldError;
+use crate::eyes::Eyes;
 use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
-use crate::situation::{Candidate, Situation};
-use crate::world::WorldError;
-use news::Place;
+use crate::objective::Goal;
+use crate::situation::Situation;
+use crate::viewpoint::Candidate;
 
 /// Returns farther than this are not learned from, metres.
 const RANGE_M: f64 = 2.5;
 
 /// The ability *learning*.
 pub const ABILITY: Ability = Ability {
-    name: "learning",
-    about: "visits places, notices what is new there, looks at it from all around and learns it",
     facts: facts::ALL,
     calls: calls::ALL,
     skills: &[
@@ -44,12 +43,12 @@ pub const ABILITY: Ability = Ability {
             types: &["pose"],
             about: "looks at a place from its waypoint, and compares with how it was before",
             ground: |s, arguments| {
-                let place = s.news.places.iter().find(|p| p.waypoint == arguments[0]);
+                let place = s.news().places.iter().find(|p| p.waypoint == arguments[0]);
                 let place = place.ok_or_else(|| format!("{} is no waypoint", arguments[0]))?;
                 let on = s.surface(&place.on).map_err(|e| e.to_string())?;
                 Ok(Box::new(Observe { at: s.surfaces[on].centre() }))
             },
-            because: |s, arguments| match s.news.places.iter().find(|p| p.waypoint == arguments[0]) {
+            because: |s, arguments| match s.news().places.iter().find(|p| p.waypoint == arguments[0]) {
                 Some(Place { room: Some(room), .. }) => format!("{} visits are remembered", room.visits),
                 _ => "no visit is remembered".into(),
             },
@@ -62,7 +61,7 @@ pub const ABILITY: Ability = Ability {
             types: &["pose", "novelty"],
             about: "looks at something new from a pose around it",
             ground: |s, arguments| {
-                let novelty = s.news.novelty(arguments[1]).ok_or("it is not known where that stands")?;
+                let novelty = s.news().novelty(arguments[1]).ok_or("it is not known where that stands")?;
                 Ok(Box::new(Observe { at: Some(novelty.centre) }))
             },
             because: calls::hope,
@@ -75,7 +74,7 @@ pub const ABILITY: Ability = Ability {
             types: &["novelty"],
             about: "brings all looks at something new together, and learns it",
             ground: |s, arguments| Ok(Box::new(modelling(s, arguments[0])?)),
-            because: |s, arguments| match s.news.novelty(arguments[0]) {
+            because: |s, arguments| match s.news().novelty(arguments[0]) {
                 Some(novelty) => format!("{} looks show it", novelty.looks.len()),
                 None => String::new(),
             },
@@ -87,6 +86,19 @@ pub const ABILITY: Ability = Ability {
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),
+    recalls: Some(|_, past, _, states| {
+        *states.get_mut() = News::of_past(past);
+        None
+    }),
+    keeps: Some(News::keep),
+    objects: Some(|s| vec![("novelty", s.news().novelties.iter().map(|n| n.symbol.clone()).collect())]),
+    names: Some(|known| known.news().things.iter().map(|thing| ("thing", thing.name.clone())).collect()),
+    thing: Some(news::thing),
+    again: Some(again::explain),
+    ..Ability::named(
+        "learning",
+        "visits places, notices what is new there, looks at it from all around and learns it",
+    )
 };
 
 /// Two waypoints a surface, on opposite sides of it: what one look hides the other shows.
@@ -132,7 +144,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
             });
         }
     }
-    Arc::make_mut(&mut mind.known.news).places = places;
+    mind.known.news_mut().places = places;
 }
 
 /// The word for a place that was visited, by which a goal asks for visits.
@@ -142,7 +154,7 @@ const SAME_PLACE_M: f64 = 0.02;
 
 /// Modelling task for a novel object; its first look is the one that noticed it.
 fn modelling(s: &Situation, what: &str) -> Result<Model, String> {
-    let novelty = s.news.novelty(what).ok_or_else(|| format!("`{what}` is nothing new"))?;
+    let novelty = s.news().novelty(what).ok_or_else(|| format!("`{what}` is nothing new"))?;
     Ok(Model {
         views: novelty.looks.iter().map(|l| Arc::clone(&l.view)).collect(),
         mask: novelty.mask.to_vec(),

@@ -6,13 +6,18 @@ use std::sync::Arc;
 
 use descry_memory::RecordId;
 use descry_memory::learned::{LearnedThing, Visited};
+use descry_memory::remember::Remembered;
 use descry_perception::View;
 use descry_perception::learning::{KnowOptions, Library, MetaRoom};
 use descry_perception::nalgebra::{Point3, Vector3};
 use descry_perception::recognise::{Handle, ObjectModel, Range, Shape, Top};
+use descry_robots::Place as Where;
 
-use crate::lexicon::symbol;
-use crate::situation::{Past, Situation};
+use crate::known::{Known, Thing};
+use crate::past::Past;
+use crate::situation::Situation;
+use crate::states::{States, state};
+use crate::symbol::symbol;
 
 /// Number of viewing directions around an object that are distinguished.
 pub(super) const DIRECTIONS: usize = 36;
@@ -27,7 +32,7 @@ pub struct News {
     /// Novel objects that are no learned things.
     pub novelties: Vec<Novelty>,
     /// Changes in which there is nothing to be learned.
-    pub changes: Vec<Change>,
+    pub changes: Vec<Difference>,
     /// Things that were learned, the oldest first: those of earlier runs, then those of this one.
     pub things: Vec<LearnedThing>,
     /// The number of things that this run has learned.
@@ -65,7 +70,7 @@ pub struct Novelty {
     /// Sides of the box around what was noticed of it, metres.
     pub size_m: [f64; 3],
     /// Looks at the object; the first one noticed it.
-    pub looks: Vec<Look>,
+    pub looks: Vec<NoveltyView>,
     /// Its pixels in that.
     pub mask: Arc<Vec<bool>>,
     /// On each line around it where to stand, by the symbol of the pose; none where the body does not fit.
@@ -81,7 +86,7 @@ pub struct Novelty {
 
 /// A look at something new.
 #[derive(Clone)]
-pub struct Look {
+pub struct NoveltyView {
     /// The symbol of the pose that it was taken from.
     pub from: String,
     /// The view that shows it.
@@ -117,7 +122,7 @@ pub enum Fate {
 
 /// A change in which there is nothing to be learned.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Change {
+pub enum Difference {
     /// Something that was learned has come or has been moved.
     Came {
         /// Its name.
@@ -157,6 +162,17 @@ impl News {
         News { models: Models::of(&things), things, ..News::default() }
     }
 
+    /// Adds what was learned and visited to what later runs remember.
+    pub(super) fn keep(known: &Known, past: &Past, later: &mut Remembered) {
+        let news = known.news();
+        later.things.clone_from(&news.things);
+        let pose = |waypoint: &str| match &known.candidates.iter().find(|c| c.symbol == waypoint)?.place {
+            Where::Pose(pose) => Some([pose.x_m, pose.y_m, pose.yaw_rad]),
+            Where::Station(_) => Some([0.0; 3]),
+        };
+        later.visited = news.visited(std::mem::take(&mut later.visited), pose, past.now_unix_s);
+    }
+
     /// The thing of a symbol that was learned.
     pub fn thing(&self, of: &str) -> Option<&LearnedThing> {
         self.things.iter().find(|t| called(&t.name) == of)
@@ -176,12 +192,7 @@ impl News {
 
     /// Visits for a later run to remember: places visited in this run as they are now, the others as they
     /// were.
-    pub(crate) fn visited(
-        &self,
-        before: Vec<Visited>,
-        at: impl Fn(&str) -> Option<[f64; 3]>,
-        now: f64,
-    ) -> Vec<Visited> {
+    fn visited(&self, before: Vec<Visited>, at: impl Fn(&str) -> Option<[f64; 3]>, now: f64) -> Vec<Visited> {
         let seen: Vec<Visited> = self
             .places
             .iter()
@@ -225,7 +236,7 @@ impl Novelty {
 
     /// The directions from which it was seen.
     pub(super) fn seen(&self) -> BTreeSet<usize> {
-        let eye = |l: &Look| Point3::from(l.view.world_from_camera.translation.vector);
+        let eye = |l: &NoveltyView| Point3::from(l.view.world_from_camera.translation.vector);
         self.looks.iter().map(eye).flat_map(|eye| self.shown(&eye)).collect()
     }
 
@@ -276,7 +287,7 @@ impl Models {
 }
 
 /// Object model of a learned thing for visibility questions: a body of its size.
-pub(crate) fn model(thing: &LearnedThing) -> ObjectModel {
+fn model(thing: &LearnedThing) -> ObjectModel {
     /// Tolerance of a size comparison: the object may rest on another side, and edges are measured
     /// this accurately.
     const OFF: f64 = 0.1;
@@ -300,5 +311,26 @@ pub(crate) fn model(thing: &LearnedThing) -> ObjectModel {
 
 /// Symbol of a name as people say it, without a leading article.
 pub fn called(name: &str) -> String {
-    symbol(crate::goal::without_article(&name.to_lowercase()))
+    symbol(crate::english::without_article(&name.to_lowercase()))
+}
+
+state!(News);
+
+impl Known {
+    /// Novel objects and learned things.
+    pub(super) fn news(&self) -> &News {
+        self.states.get()
+    }
+
+    /// The same, to be changed.
+    pub(super) fn news_mut(&mut self) -> &mut News {
+        self.states.get_mut()
+    }
+}
+
+/// The learned thing of a symbol, to be looked for.
+pub(super) fn thing(states: &States, symbol: &str) -> Option<Thing> {
+    let learned = states.get::<News>().thing(symbol)?;
+    let (name, models) = (learned.name.clone(), vec![model(learned)]);
+    Some(Thing { symbol: symbol.into(), name, models, ..Thing::default() })
 }

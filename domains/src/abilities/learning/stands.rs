@@ -8,7 +8,8 @@ use descry_robots::{Place, Pose2, Robot};
 
 use super::news::Novelty;
 use crate::mind::Mind;
-use crate::situation::{Candidate, Situation};
+use crate::situation::Situation;
+use crate::viewpoint::Candidate;
 
 /// Lines around something, on each of which a stand is looked for: 30 degrees from each to the next (paper: 20 lines, and a look every 15 degrees).
 const LINES: usize = 12;
@@ -40,7 +41,7 @@ pub(super) fn make(
     let place = |p: &Point2<f64>| Place::Pose(Pose2::facing(p.x, p.y, &centre.xy()));
     let places: Vec<Vec<Place>> = found.iter().map(|line| line.iter().map(place).collect()).collect();
     let here = &mind.known.candidates[mind.known.at].place;
-    let mut ways = mind.known.chart.travel(robot, here, &places.concat(), &[]).into_iter();
+    let mut ways = mind.known.own_map.travel(robot, here, &places.concat(), &[]).into_iter();
     // Of each line all ways are taken off, also those behind the first that leads there.
     let mut reached = |line: Vec<Place>| -> Vec<Place> {
         line.into_iter().filter(|_| ways.next().is_some_and(|way| way.is_ok())).collect()
@@ -57,7 +58,7 @@ pub(super) fn make(
         let (a, b) = (poses[line].as_ref()?, poses[(line + 1) % poses.len()].as_ref()?);
         let straight_m = (at(&a.place)? - at(&b.place)?).norm();
         let way =
-            mind.known.chart.travel(robot, &a.place, std::slice::from_ref(&b.place), &[]).pop()?.ok()?;
+            mind.known.own_map.travel(robot, &a.place, std::slice::from_ref(&b.place), &[]).pop()?.ok()?;
         Some(way.distance_m <= options.detour * straight_m)
     };
     let joined = (0..poses.len()).map(|line| joined(line).unwrap_or(false)).collect();

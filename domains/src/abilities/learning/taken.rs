@@ -14,14 +14,15 @@ use descry_robots::{Description, Sensed};
 use descry_skills::Modelled;
 
 use super::again::{self, Found};
-use super::news::{Change, DIRECTIONS, Fate, Look, Models, Novelty};
+use super::news::{DIRECTIONS, Fate, Models, Novelty};
 use super::stands;
-use crate::abilities::searching::perceive::{self, Eyes};
-use crate::abilities::searching::remember;
+use crate::abilities::learning::news::{Difference, NoveltyView};
+use crate::error::WorldError;
+use crate::eyes::Eyes;
+use crate::looking::{placing, recording};
 use crate::mind::Mind;
 use crate::note::Note;
-use crate::situation::KnownSurface;
-use crate::world::WorldError;
+use crate::surface::KnownSurface;
 
 /// Search radius for the localisation error between two visits, metres: localisation errs by centimetres and
 /// by degrees, which at a distance of two metres are centimetres, too.
@@ -63,8 +64,8 @@ const BEYOND_M: f64 = 0.03;
 
 /// Records a view of something that is learned from, and reads it back by its time.
 fn remember(mind: &mut Mind, eyes: Eyes<'_>, sensed: &Sensed) -> Result<View, WorldError> {
-    let id = remember::view(mind, eyes, &[], sensed)?;
-    let news = Arc::make_mut(&mut mind.known.news);
+    let id = recording::view(mind, eyes, &[], sensed)?;
+    let news = mind.known.news_mut();
     news.records.push(id);
     let records: &[RecordId] = &news.records;
     eyes.record.hold(records, "news")?;
@@ -79,15 +80,15 @@ pub(super) fn visit(
     sensed: &Sensed,
 ) -> Result<Note, WorldError> {
     let view = remember(mind, eyes, sensed)?;
-    let at = mind.known.news.places.iter().position(|p| p.waypoint == waypoint);
+    let at = mind.known.news().places.iter().position(|p| p.waypoint == waypoint);
     let at = at.ok_or_else(|| WorldError::Bug(format!("`{waypoint}` is no place to visit")))?;
-    let place = mind.known.news.places[at].clone();
+    let place = mind.known.news().places[at].clone();
     let options = NoticeOptions { search_m: SEARCH_M, ..NoticeOptions::default() };
     let strange = |e: descry_perception::learning::LearningError| WorldError::Bug(format!("a visit: {e}"));
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == place.on);
     let localised = view.world_from_camera;
     let views = [match surface {
-        Some(surface) => perceive::laid(eyes, surface, view),
+        Some(surface) => placing::laid(eyes, surface, view),
         None => view,
     }];
     let views_pose = views[0].world_from_camera;
@@ -105,7 +106,7 @@ pub(super) fn visit(
             told.strange.is_none().then_some((room, Some(visit)))
         }
     };
-    let place = &mut Arc::make_mut(&mut mind.known.news).places[at];
+    let place = &mut mind.known.news_mut().places[at];
     place.is_visited = true;
     place.strange.clone_from(&told.strange);
     let on = place.on.clone();
@@ -129,7 +130,7 @@ pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, vie
     const LAID: (f64, f64) = (0.005, 0.005);
     let [sigma_m, sigma_rad] = [body.pose_sigma_m.max(LAID.0), body.pose_sigma_rad.max(LAID.1)];
     let body = &Description { pose_sigma_m: sigma_m, pose_sigma_rad: sigma_rad, ..body.clone() };
-    let astray = visit.poses.first().filter(|laid| perceive::is_astray(body, localised, laid));
+    let astray = visit.poses.first().filter(|laid| placing::is_astray(body, localised, laid));
     if astray.is_some() {
         return Some("it would fit what was there only farther off than localisation errs".into());
     }
@@ -177,19 +178,18 @@ fn take_in(
     let seen = view.cloud.finite().transformed(&pose);
     let up = eyes.robot.description().up;
     let shown = [(&*view, pose)];
-    let mut found =
-        again::find(&mind.known.news.clone(), &mut mind.glances, (&shown[..], up), Vec::new(), |_| true);
+    let mut found = again::find(mind, (&shown[..], up), Vec::new(), |_| true);
     found.retain(|f| f.judged.confidence >= SURE);
     for appeared in &whole(&mind.known.surfaces, visit.appeared) {
         let surface = mind.known.surfaces.iter().find(|s| is_on(s, &appeared.cloud)).cloned();
         let Some(surface) = surface else {
             let (at, size_m) = extent(&appeared.cloud);
             let is_of = |n: &Novelty| (n.centre - at).xy().norm() < n.radius_m() + OF_IT_M;
-            if !appeared.apart || mind.known.news.novelties.iter().any(is_of) {
+            if !appeared.apart || mind.known.news().novelties.iter().any(is_of) {
                 continue;
             }
             told.came.push(format!("something on no surface, {}", size(&size_m, &at)));
-            change(mind, Change::Beside { at, size_m });
+            change(mind, Difference::Beside { at, size_m });
             continue;
         };
         let known = found.iter().find(|f| f.share_of(&appeared.cloud.points) >= EXPLAINED);
@@ -197,7 +197,7 @@ fn take_in(
         match known {
             Some(f) => {
                 told.came.push(known_again(mind, &surface, f));
-                let thing = &mind.known.news.things[f.thing];
+                let thing = &mind.known.news().things[f.thing];
                 if thing.sides < KNOWN_ROUND {
                     let (name, sides) = (thing.name.clone(), 1e2 * thing.sides);
                     let symbol =
@@ -220,7 +220,7 @@ fn take_in(
     for gone in visit.gone.iter().filter(|gone| !is_sliver(gone)) {
         let (at, size_m) = extent(gone);
         told.gone.push(size(&size_m, &at));
-        change(mind, Change::Gone { at, size_m });
+        change(mind, Difference::Gone { at, size_m });
     }
     if let Some(map) = DepthMap::from_view(&view, &pose) {
         told.gone.extend(left(mind, on, &map));
@@ -285,15 +285,15 @@ fn is_on(surface: &KnownSurface, cloud: &Cloud) -> bool {
 }
 
 /// Keeps a change unless it is known.
-fn change(mind: &mut Mind, change: Change) {
-    let at = |c: &Change| match c {
-        Change::Came { at, .. }
-        | Change::Left { at, .. }
-        | Change::Gone { at, .. }
-        | Change::Beside { at, .. } => *at,
+fn change(mind: &mut Mind, change: Difference) {
+    let at = |c: &Difference| match c {
+        Difference::Came { at, .. }
+        | Difference::Left { at, .. }
+        | Difference::Gone { at, .. }
+        | Difference::Beside { at, .. } => *at,
     };
-    let news = Arc::make_mut(&mut mind.known.news);
-    let is_one = |c: &Change| {
+    let news = mind.known.news_mut();
+    let is_one = |c: &Difference| {
         std::mem::discriminant(c) == std::mem::discriminant(&change)
             && (at(c) - at(&change)).norm() < 2.0 * SAME_M
     };
@@ -307,30 +307,26 @@ fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let (at, size_m) = extent(cloud);
     let near_m = SAME_M.max(0.5 * size_m[0].hypot(size_m[1]));
-    mind.known.news.things.iter().any(|t| t.seen.unix_s == now_unix_s && (t.seen.at_m - at).norm() < near_m)
+    mind.known.news().things.iter().any(|t| t.seen.unix_s == now_unix_s && (t.seen.at_m - at).norm() < near_m)
 }
 
 /// Something that was learned stands there. Nothing that was noticed there before is new.
 fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     let at = Point3::from(f.judged.world_from_model.translation.vector);
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
-    let thing = &mut Arc::make_mut(&mut mind.known.news).things[f.thing];
+    let thing = &mut mind.known.news_mut().things[f.thing];
     let before =
         std::mem::replace(&mut thing.seen, Seen { unix_s: now_unix_s, at_m: at, on: surface.symbol.clone() });
     let name = thing.name.clone();
     let p = f.judged.confidence;
     let is_it = |n: &&mut Novelty| n.fate == Fate::Open && (n.centre - at).norm() < SAME_M.max(n.radius_m());
-    let noticed = Arc::make_mut(&mut mind.known.news)
-        .novelties
-        .iter_mut()
-        .filter(|n| n.taken_for.is_none())
-        .find(is_it);
+    let noticed = mind.known.news_mut().novelties.iter_mut().filter(|n| n.taken_for.is_none()).find(is_it);
     if let Some(novelty) = noticed {
         novelty.fate = Fate::Known { name: name.clone(), confidence: p, model: None };
     }
     let is_moved = (before.at_m - at).norm() > SAME_M;
     if is_moved {
-        change(mind, Change::Came { name: name.clone(), at, before: before.at_m });
+        change(mind, Difference::Came { name: name.clone(), at, before: before.at_m });
     }
     let there = if is_moved { "which stood elsewhere" } else { "as before" };
     format!("{name} ({p:.2}), {there}, at ({:.2}, {:.2}) m", at.x, at.y)
@@ -347,8 +343,8 @@ pub fn new(
     taken_for: Option<usize>,
 ) -> Option<String> {
     let (centre, size_m) = extent(&appeared.cloud);
-    let look = Look { from: waypoint.into(), view: Arc::clone(view) };
-    let news = Arc::make_mut(&mut mind.known.news);
+    let look = NoveltyView { from: waypoint.into(), view: Arc::clone(view) };
+    let news = mind.known.news_mut();
     let is_one = |n: &&mut Novelty| (n.centre - centre).norm() < SAME_M.max(n.radius_m());
     if let Some(known) = news.novelties.iter_mut().find(is_one) {
         if known.fate == Fate::Open {
@@ -358,7 +354,7 @@ pub fn new(
     }
     let symbol = format!("new-{}", news.novelties.len() + 1);
     let (stands, joined) = stands::make(mind, eyes.robot, &symbol, &centre, seen);
-    Arc::make_mut(&mut mind.known.news).novelties.push(Novelty {
+    mind.known.news_mut().novelties.push(Novelty {
         symbol: symbol.clone(),
         on: on.into(),
         centre,
@@ -377,7 +373,7 @@ pub fn new(
 fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
     let is_there = |t: &&LearnedThing| t.seen.on == on;
     let of = |t: &LearnedThing| (t.name.clone(), t.seen.at_m, t.cloud.clone());
-    let here: Vec<_> = mind.known.news.things.iter().filter(is_there).map(of).collect();
+    let here: Vec<_> = mind.known.news().things.iter().filter(is_there).map(of).collect();
     let mut said = Vec::new();
     for (name, at, cloud) in here {
         let (mut through, mut looked_at) = (0_u32, 0_u32);
@@ -390,7 +386,7 @@ fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
         }
         if looked_at >= LOOKED_AT && f64::from(through) / f64::from(looked_at) > THROUGH {
             said.push(format!("{name}, which stood at ({:.2}, {:.2}) m", at.x, at.y));
-            change(mind, Change::Left { name, at });
+            change(mind, Difference::Left { name, at });
         }
     }
     said
@@ -406,13 +402,13 @@ pub(super) fn face(
 ) -> Result<String, WorldError> {
     let view = Arc::new(remember(mind, eyes, sensed)?);
     let novelty = novelty(mind, what)?;
-    novelty.looks.push(Look { from: from.into(), view });
+    novelty.looks.push(NoveltyView { from: from.into(), view });
     let sides = novelty.seen().len() as f64 / DIRECTIONS as f64;
     Ok(format!("{:.0} % of its sides were seen in {} looks", 1e2 * sides, novelty.looks.len()))
 }
 
 fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldError> {
-    let news = Arc::make_mut(&mut mind.known.news);
+    let news = mind.known.news_mut();
     let found = news.novelties.iter_mut().find(|n| n.symbol == what);
     found.ok_or_else(|| WorldError::Bug(format!("`{what}` is gone")))
 }
@@ -420,7 +416,7 @@ fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldE
 /// Improves the model of a known thing by looks from around it, where both match in one surface. Returns a
 /// sentence about the result.
 fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -> String {
-    let news = Arc::make_mut(&mut mind.known.news);
+    let news = mind.known.news_mut();
     let thing = &mut news.things[f.thing];
     let known_from_more = f.judged.world_from_model.inverse() * model.world_from_model;
     let cube_m = LearnOptions::default().cube_m;
@@ -461,9 +457,9 @@ fn given_up(mind: &mut Mind, what: &str, because: String) -> Result<String, Worl
 
 /// Things that are known have changed: they are made ready to be known again.
 fn make_ready(mind: &mut Mind) {
-    let news = Arc::make_mut(&mut mind.known.news);
+    let news = mind.known.news_mut();
     news.models = Models::of(&news.things);
-    mind.glances.clear();
+    again::forget(mind);
 }
 
 /// Looks were brought together: something was learned, or is known after all, or cannot be learned.
@@ -481,9 +477,9 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     let near = |p: &Point3<f64>| (p - of.centre).norm() < SAME_M.max(of.radius_m());
     let surface = mind.known.surfaces.iter().find(|s| s.symbol == of.on).cloned();
     let up = surface.as_ref().map(|s| s.up);
-    let before = again::find(&mind.known.news.clone(), &mut mind.glances, (&views[..], up), Vec::new(), near);
+    let before = again::find(mind, (&views[..], up), Vec::new(), near);
     if let Some((f, surface)) = before.iter().find(|f| f.judged.confidence >= SURE).zip(surface) {
-        let (name, confidence) = (mind.known.news.things[f.thing].name.clone(), f.judged.confidence);
+        let (name, confidence) = (mind.known.news().things[f.thing].name.clone(), f.judged.confidence);
         let said = known_again(mind, &surface, f);
         let model = modelled.model.as_ref().ok().map(|model| improved(mind, f, &seen, model));
         let improved = model.as_ref().map(|model| format!("; {model}")).unwrap_or_default();
@@ -491,7 +487,7 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
         return Ok(format!("it is known: {said}{improved}"));
     }
     if let Some(thing) = of.taken_for {
-        let name = &mind.known.news.things[thing].name;
+        let name = &mind.known.news().things[thing].name;
         let because = format!("it was taken for {name}, which looks from around do not confirm");
         return given_up(mind, what, because);
     }
@@ -525,7 +521,7 @@ fn keep(
     let sides = f64::from(directions.count_ones()) / DIRECTIONS as f64;
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let at_m = Point3::from(model.world_from_model.translation.vector);
-    let news = Arc::make_mut(&mut mind.known.news);
+    let news = mind.known.news_mut();
     let name = news.free_name();
     news.things.push(LearnedThing {
         name: name.clone(),

@@ -1,11 +1,12 @@
 //! Final answers to the questions "what is new" and "what has changed".
 
-use super::news::{Change, Fate, Novelty, Place};
+use super::PATROLLED;
+use super::news::{DIRECTIONS, Fate, Novelty, Place};
 use super::taken::size;
-use super::{PATROLLED, news::DIRECTIONS};
-use crate::answer::{Believed, Conclusion, Ended, Verdict};
-use crate::goal::Goal;
+use crate::abilities::learning::news::Difference;
+use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
 use crate::mind::Mind;
+use crate::objective::Goal;
 use crate::situation::Situation;
 
 /// A thing of which less was seen is not known from all sides.
@@ -16,7 +17,7 @@ pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> 
     goal.asked.of_word(PATROLLED).next()?;
     let is_to_learn = goal.asked.of_word("settled").next().is_some();
     let (verdict, why) = told(mind, s, ended, is_to_learn);
-    let objects: Vec<Believed> = mind.known.news.novelties.iter().map(|n| believed(mind, n)).collect();
+    let objects: Vec<Believed> = mind.known.news().novelties.iter().map(|n| believed(mind, n)).collect();
     Some(Conclusion {
         verdict,
         why,
@@ -30,7 +31,7 @@ pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> 
 }
 
 fn told(mind: &Mind, s: &Situation, ended: &Ended, is_to_learn: bool) -> (Verdict, String) {
-    let news = &mind.known.news;
+    let news = mind.known.news();
     if s.past.is_none() {
         let text = "no earlier visit is known to compare with: name a store with --remember, and come again";
         return (Verdict::CannotTell, text.into());
@@ -88,7 +89,7 @@ fn open<'a>(
     };
     let mut open: Vec<String> = places.filter_map(left).collect();
     let seen: std::collections::BTreeSet<&str> =
-        s.news.places.iter().filter(|p| p.is_visited).map(|p| p.on.as_str()).collect();
+        s.news().places.iter().filter(|p| p.is_visited).map(|p| p.on.as_str()).collect();
     let unseen = s.surfaces.iter().filter(|k| !seen.contains(k.symbol.as_str()));
     open.extend(unseen.map(|k| format!("the {} was not looked at", k.name)));
     if is_to_learn {
@@ -128,17 +129,17 @@ fn fate(mind: &Mind, n: &Novelty, is_to_learn: bool) -> String {
     }
 }
 
-fn changed(change: &Change) -> String {
+fn changed(change: &Difference) -> String {
     match change {
-        Change::Came { name, at, before } => format!(
+        Difference::Came { name, at, before } => format!(
             "{name} stands at ({:.2}, {:.2}) m now, and was seen at ({:.2}, {:.2}) m before",
             at.x, at.y, before.x, before.y
         ),
-        Change::Left { name, at } => format!("{name} is no longer at ({:.2}, {:.2}) m", at.x, at.y),
-        Change::Gone { at, size_m } => {
+        Difference::Left { name, at } => format!("{name} is no longer at ({:.2}, {:.2}) m", at.x, at.y),
+        Difference::Gone { at, size_m } => {
             format!("something that always stood there is gone, {}", size(size_m, at))
         }
-        Change::Beside { at, size_m } => {
+        Difference::Beside { at, size_m } => {
             format!("something stands on no surface where nothing stood before, {}", size(size_m, at))
         }
     }

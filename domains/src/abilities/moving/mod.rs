@@ -6,21 +6,13 @@ mod time_left;
 
 use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
-use super::{Ability, ActionKind, Fact, Meaning, NOTHING_MORE, Reads, SkillWord};
-use crate::abilities::searching::perceive::Eyes;
-use crate::abilities::surveying::ground;
-use crate::mind::Mind;
-use crate::note::Note;
+use crate::ability::{Ability, ActionKind, Fact, MOVE, Meaning, NOTHING_MORE, Reads, SkillWord};
+use crate::drive;
+use crate::error::WorldError;
 use crate::situation::Situation;
-use crate::world::WorldError;
-
-/// The skill that drives from one pose to another.
-pub(crate) const MOVE: &str = "move";
 
 /// The ability *moving*.
 pub const ABILITY: Ability = Ability {
-    name: "moving",
-    about: "drives on the map, opens doors",
     facts: &[
         Fact {
             name: "at",
@@ -67,7 +59,7 @@ pub const ABILITY: Ability = Ability {
             ground: |s, arguments| {
                 let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
                 let to = s.candidates[to].place.clone();
-                Ok(match s.chart.way(&s.candidates[s.at].place, &to) {
+                Ok(match s.own_map.way(&s.candidates[s.at].place, &to) {
                     Some(way) => Box::new(Circle { way }),
                     None => Box::new(Move { to }),
                 })
@@ -78,10 +70,8 @@ pub const ABILITY: Ability = Ability {
                 }
                 _ => String::new(),
             },
-            learn: driven,
-            failed: |mind, eyes, s, arguments, failure| {
-                Ok(ground::drive_failed(mind, eyes.robot, s, arguments[1], failure))
-            },
+            learn: drive::has_driven,
+            failed: NOTHING_MORE,
         },
         SkillWord {
             name: "open-door",
@@ -100,33 +90,12 @@ pub const ABILITY: Ability = Ability {
             failed: NOTHING_MORE,
         },
     ],
-    needs: &[],
-    begins: None,
-    fallback: None,
-    answers: None,
+    ..Ability::named("moving", "drives on the map, opens doors")
 };
-
-/// A drive ended: the body stands where it was to go.
-pub(super) fn driven(
-    mind: &mut Mind,
-    _: Eyes<'_>,
-    situation: &Situation,
-    arguments: &[&str],
-    outcome: &Outcome,
-    _: &mut Vec<Note>,
-) -> Result<String, WorldError> {
-    let Outcome::Driven(driven) = outcome else { return Err(WorldError::strange(outcome)) };
-    let to = situation.candidate(arguments[1]).map_err(|e| WorldError::Bug(e.to_string()))?;
-    ground::drove(mind, situation, to);
-    mind.known.at = to;
-    mind.known.has_moved();
-    mind.distance_m += driven.distance_m;
-    Ok(format!("drove {:.2} m in {:.1} s", driven.distance_m, driven.duration_s))
-}
 
 /// `(beside ?pose ?door)`: the poses before each door.
 fn beside(s: &Situation) -> Vec<String> {
-    let symbols = |d: &crate::situation::KnownDoor| {
+    let symbols = |d: &crate::known::KnownDoor| {
         let own = format!("{}-side-", d.symbol);
         let poses = s.candidates.iter().filter(|c| c.symbol.starts_with(&own));
         poses.map(|c| format!("(beside {} {})", c.symbol, d.symbol)).collect::<Vec<_>>()
@@ -138,9 +107,9 @@ fn beside(s: &Situation) -> Vec<String> {
 fn in_room(s: &Situation) -> Vec<String> {
     // Of a room that the map does not have nothing can be said.
     let has = |name: &&String| s.robot.rooms().iter().any(|room| room.name == **name);
-    let room = |k: &crate::situation::KnownSurface| {
+    let room = |k: &crate::surface::KnownSurface| {
         let room = k.room.as_ref().filter(has)?;
-        Some(format!("(in {} {})", k.symbol, crate::lexicon::symbol(room)))
+        Some(format!("(in {} {})", k.symbol, crate::symbol::symbol(room)))
     };
     s.surfaces.iter().filter_map(room).collect()
 }

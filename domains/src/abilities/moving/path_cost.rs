@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use descry_planner::{Answer, Call, CallError};
 
-use crate::abilities::argument;
+use crate::ability::argument;
 use crate::situation::{Situation, holding};
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {

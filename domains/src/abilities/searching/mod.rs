@@ -1,44 +1,25 @@
 //! *searching*: poses to look from, looks, what is in doubt and what a look would settle, pushing aside what hides it.
 
-pub(crate) mod adrift;
 mod calls;
-pub mod candidates;
-pub mod change;
-pub mod consistent;
-mod discover;
-pub mod doubt;
 mod facts;
-pub(crate) mod merging;
-pub mod obstacle;
-pub mod perceive;
-mod placing;
 pub mod policies;
-pub mod reasons;
-#[doc(hidden)]
-pub mod remember;
-pub mod unnoticed;
-#[doc(hidden)]
-pub mod vanished;
 
 pub use calls::FirstLook;
-
 use descry_robots::Part;
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 
-use super::{Ability, ActionKind, SkillWord};
+use crate::ability::{Ability, ActionKind, OBSERVE, SkillWord};
+use crate::belief::doubt::{Doubt, Taken};
+use crate::belief::obstacle;
+use crate::error::WorldError;
+use crate::eyes::Eyes;
+use crate::looking::{perceive, recording};
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
-use crate::world::WorldError;
-use perceive::Eyes;
-
-/// The skill that looks at a surface.
-pub(crate) const OBSERVE: &str = "observe";
 
 /// The ability *searching*.
 pub const ABILITY: Ability = Ability {
-    name: "searching",
-    about: "looks for things on surfaces until it is sure, pushes aside what hides them",
     facts: facts::ALL,
     calls: calls::ALL,
     skills: &[
@@ -52,7 +33,7 @@ pub const ABILITY: Ability = Ability {
                 Ok(Box::new(Observe { at: s.surfaces[on].centre() }))
             },
             because: |s, arguments| match (s.candidate(arguments[0]), s.surface(arguments[1])) {
-                (Ok(from), Ok(on)) => reasons::hope(s, from, on),
+                (Ok(from), Ok(on)) => hope(s, from, on),
                 _ => String::new(),
             },
             learn: seen,
@@ -81,9 +62,11 @@ pub const ABILITY: Ability = Ability {
         },
     ],
     needs: &[Part::Camera],
-    begins: None,
-    fallback: None,
-    answers: None,
+    objects: Some(|s| vec![("obstacle", s.obstacles().iter().map(|o| o.symbol.clone()).collect())]),
+    ..Ability::named(
+        "searching",
+        "looks for things on surfaces until it is sure, pushes aside what hides them",
+    )
 };
 
 /// A look ended: record the view, and believe what it shows with the others.
@@ -100,10 +83,10 @@ fn seen(
     let on = on.ok_or_else(|| WorldError::Bug(format!("`{}` is no surface", arguments[1])))?;
     // Without a map a view is one of every surface in it.
     let at = mind.known.at;
-    let is_mapped = |n: usize| s.surfaces[n].whole || s.chart.has(&s.surfaces[n].symbol);
+    let is_mapped = |n: usize| s.surfaces[n].whole || s.own_map.has(&s.surfaces[n].symbol);
     let is_shown = |&n: &usize| n == on || !is_mapped(on) && !is_mapped(n) && s.sees(at, n);
     let shown: Vec<usize> = (0..s.surfaces.len()).filter(is_shown).collect();
-    remember::view(mind, eyes, &shown, sensed)?;
+    recording::view(mind, eyes, &shown, sensed)?;
     let here = mind.known.candidates[at].symbol.clone();
     let shown: Vec<String> = shown.into_iter().map(|n| s.surfaces[n].symbol.clone()).collect();
     for surface in &shown {
@@ -148,4 +131,25 @@ fn push_failed(
     };
     perceive::pushed(mind, eyes, situation, arguments[1], moved_m)?;
     Ok(Some(format!("{} is not pushed from there again", arguments[1])))
+}
+
+/// Expected gain of a look, in words.
+fn hope(s: &Situation, from: usize, on: usize) -> String {
+    let own = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
+    let own = own.map(|(what, t)| (t.name.as_str(), s.doubt_about(what)));
+    let kinds = s.kinds.iter().enumerate().map(|(of, kind)| (kind.name.as_str(), s.doubt_of(of)));
+    let surface = |on: usize| (s.surfaces[on].name.as_str(), s.doubt_on(on));
+    let mut doubts: Vec<(&str, &Doubt)> =
+        own.chain(kinds).chain(s.asked.iter().map(|&on| surface(on))).collect();
+    if doubts.is_empty() {
+        doubts = (0..s.surfaces.len()).map(surface).collect();
+    }
+    let said = |(name, doubt): (&str, &Doubt)| {
+        if doubt.anywhere {
+            return format!("nothing is known yet of where {name} could be");
+        }
+        let share = doubt.share_settled(s, (from, on), Taken::default()) * 100.0;
+        format!("would settle {share:.0} % of the doubt about {name} ({:.2} left)", doubt.remaining())
+    };
+    doubts.into_iter().map(said).collect::<Vec<_>>().join(", ")
 }

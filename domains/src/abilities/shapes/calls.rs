@@ -2,10 +2,10 @@
 
 use descry_planner::{Answer, Call, CallError};
 
-use super::floor::{NOTHING_KNOWN_M, THIS, Thing, thing};
+use super::floor::{NOTHING_KNOWN_M, THIS, thing};
 use super::poses;
-use crate::abilities::moving::MOVE;
-use crate::abilities::{Deed, Meaning, Reads, argument, quickest_first};
+use crate::abilities::shapes::floor::FloorThing;
+use crate::ability::{Deed, MOVE, Meaning, Reads, argument, quickest_first};
 use crate::situation::{Situation, holding};
 
 const SCANS: &[Reads] = &[Reads::all("scanned")];
@@ -56,7 +56,7 @@ pub(super) const ALL: &[Meaning] = &[
     },
 ];
 
-fn named<'a>(s: &'a Situation, call: &Call, n: usize) -> Result<Option<&'a Thing>, CallError> {
+fn named<'a>(s: &'a Situation, call: &Call, n: usize) -> Result<Option<&'a FloorThing>, CallError> {
     thing(s, argument(call, n)?).map_err(CallError::Failed)
 }
 
@@ -71,13 +71,13 @@ fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let pose = argument(call, 0)?;
     Ok(Answer::Truth(match named(s, call, 1)? {
         Some(thing) => thing.ring.iter().any(|p| p == pose),
-        None => s.floor.sweeps.is_empty() && s.candidate(pose)? == s.at,
+        None => s.floor().sweeps.is_empty() && s.candidate(pose)? == s.at,
     }))
 }
 
 /// Numbers of the poses around a thing from which the plan scans it before a call.
-fn planned(s: &Situation, call: &Call, thing: &Thing) -> Vec<usize> {
-    let taken = |pose: &str| s.floor.sweeps.iter().any(|(_, from)| from == pose);
+fn planned(s: &Situation, call: &Call, thing: &FloorThing) -> Vec<usize> {
+    let taken = |pose: &str| s.floor().sweeps.iter().any(|(_, from)| from == pose);
     let poses = holding(call, "scanned").filter_map(|r| r.arguments.first());
     poses
         .filter(|pose| !taken(pose))
@@ -102,8 +102,8 @@ fn expected_sureness(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 }
 
 /// Expected gain in confidence about a thing from the scans of a plan.
-fn hope(s: &Situation, call: &Call, thing: &Thing) -> f64 {
-    let (known, scans) = (s.floor.known.len(), planned(s, call, thing));
+fn hope(s: &Situation, call: &Call, thing: &FloorThing) -> f64 {
+    let (known, scans) = (s.floor().known.len(), planned(s, call, thing));
     if scans.is_empty() && thing.taken_for.is_some() {
         return 0.0;
     }
@@ -113,7 +113,7 @@ fn hope(s: &Situation, call: &Call, thing: &Thing) -> f64 {
 fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let shape = argument(call, 1)?;
     let Some(thing) = named(s, call, 0)? else { return Ok(Answer::Number(0.0)) };
-    if !thing.may_have(shape, s.floor.known.len(), s.threshold) || !s.floor.knows(shape) {
+    if !thing.may_have(shape, s.floor().known.len(), s.threshold) || !s.floor().knows(shape) {
         return Ok(Answer::Number(0.0));
     }
     let scans = planned(s, call, thing);
@@ -121,16 +121,16 @@ fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
         None => 1.0,
         Some(_) if scans.is_empty() && thing.taken_for.is_some() => 0.0,
         // Whatever else it is taken for now.
-        Some(_) => thing.hoped_of_name(&scans, s.floor.known.len()) - s.floor.surest(shape),
+        Some(_) => thing.hoped_of_name(&scans, s.floor().known.len()) - s.floor().surest(shape),
     };
     Ok(Answer::Number(hope.max(0.0)))
 }
 
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, shape) = (s.candidate(argument(call, 0)?)?, argument(call, 1)?);
-    let passes = s.floor.sought.as_deref() == Some(shape)
-        && s.floor.knows(shape)
-        && s.floor.promising.contains(&s.candidates[from].symbol);
+    let passes = s.floor().sought.as_deref() == Some(shape)
+        && s.floor().knows(shape)
+        && s.floor().promising.contains(&s.candidates[from].symbol);
     Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
 }
 
@@ -140,32 +140,32 @@ const WORTH_M: f64 = 0.001;
 /// The quickest of the single scans and alignments that promise anything for what is asked.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     // What nobody has learned is known by no scan.
-    if s.floor.sought.as_ref().is_some_and(|shape| !s.floor.knows(shape)) {
+    if s.floor().sought.as_ref().is_some_and(|shape| !s.floor().knows(shape)) {
         return Vec::new();
     }
-    let is_open = |t: &&Thing| match &s.floor.sought {
-        Some(shape) => t.may_have(shape, s.floor.known.len(), s.threshold),
+    let is_open = |t: &&FloorThing| match &s.floor().sought {
+        Some(shape) => t.may_have(shape, s.floor().known.len(), s.threshold),
         None => t.symbol == THIS,
     };
-    let open: Vec<&Thing> = s.floor.things.iter().filter(is_open).collect();
+    let open: Vec<&FloorThing> = s.floor().things.iter().filter(is_open).collect();
     if let Some(thing) = open.iter().find(|t| t.outline.is_some() && t.taken_for.is_none()) {
         return vec![vec![Deed::new("align", [&thing.symbol])]];
     }
     let pose = |n: usize| s.candidates[n].symbol.clone();
     let here = pose(s.at);
-    let untried = |p: &String| s.floor.sweeps.iter().all(|(_, from)| from != p);
+    let untried = |p: &String| s.floor().sweeps.iter().all(|(_, from)| from != p);
     let scans = open.iter().flat_map(|t| (0..t.ring.len()).map(move |k| (*t, k))).filter_map(|(t, k)| {
         let to = s.candidate(&t.ring[k]).ok().filter(|to| !s.out_of_reach.contains(to))?;
         let promises = t.outline.is_none() || t.looseness_m() - t.hoped_looseness_m(&[k]) > WORTH_M;
         let way_s = if to == s.at { 0.0 } else { poses::seconds(s, s.at, &poses::way(s, s.at, to, t)?) };
         (promises && untried(&t.ring[k]) && way_s.is_finite()).then_some((way_s, to, Some(t)))
     });
-    let surveys = s.floor.promising.iter().filter_map(|p| {
+    let surveys = s.floor().promising.iter().filter_map(|p| {
         let to = s.candidate(p).ok()?;
-        let is_around = s.floor.things.iter().any(|t| t.ring.contains(p));
+        let is_around = s.floor().things.iter().any(|t| t.ring.contains(p));
         (!is_around && untried(p) && s.can_drive_to(to)).then(|| (s.travel_s(s.at, to), to, None))
     });
-    let deeds = |(way_s, to, thing): (f64, usize, Option<&Thing>)| {
+    let deeds = |(way_s, to, thing): (f64, usize, Option<&FloorThing>)| {
         let there = pose(to);
         let all = match thing {
             Some(t) => {

@@ -1,9 +1,9 @@
 //! The words that *shapes* states.
 
 use super::floor::{NOTHING_KNOWN_M, THIS};
-use crate::abilities::Fact;
-use crate::lexicon::symbol;
+use crate::ability::Fact;
 use crate::situation::Situation;
+use crate::symbol::symbol;
 
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[
@@ -66,63 +66,63 @@ pub(super) const ALL: &[Fact] = &[
 ];
 
 fn around(s: &Situation) -> Vec<String> {
-    let of = |t: &super::floor::Thing| {
+    let of = |t: &super::floor::FloorThing| {
         t.ring.iter().map(|pose| format!("(around {pose} {})", t.symbol)).collect::<Vec<_>>()
     };
-    s.floor.things.iter().flat_map(of).collect()
+    s.floor().things.iter().flat_map(of).collect()
 }
 
 fn on_floor(s: &Situation) -> Vec<String> {
-    let is_around = |pose: &String| s.floor.things.iter().any(|t| t.ring.contains(pose));
+    let is_around = |pose: &String| s.floor().things.iter().any(|t| t.ring.contains(pose));
     let open = s.candidates.iter().filter(|c| !is_around(&c.symbol));
     open.map(|c| format!("(on-floor {})", c.symbol)).collect()
 }
 
 fn looseness(s: &Situation) -> Vec<String> {
     let mut lines: Vec<String> = s
-        .floor
+        .floor()
         .things
         .iter()
         .map(|t| format!("(= (looseness {}) {:.5})", t.symbol, t.looseness_m()))
         .collect();
-    if s.floor.thing(THIS).is_none() {
+    if s.floor().thing(THIS).is_none() {
         lines.push(format!("(= (looseness {THIS}) {NOTHING_KNOWN_M})"));
     }
     lines
 }
 
 fn aligned(s: &Situation) -> Vec<String> {
-    let aligned = s.floor.things.iter().filter(|t| t.taken_for.is_some());
+    let aligned = s.floor().things.iter().filter(|t| t.taken_for.is_some());
     aligned.map(|t| format!("(aligned {})", t.symbol)).collect()
 }
 
 fn sureness(s: &Situation) -> Vec<String> {
-    let known = s.floor.known.len();
+    let known = s.floor().known.len();
     let mut lines: Vec<String> = s
-        .floor
+        .floor()
         .things
         .iter()
         .map(|t| format!("(= (sureness {}) {:.5})", t.symbol, t.sureness(known)))
         .collect();
-    if s.floor.thing(THIS).is_none() {
+    if s.floor().thing(THIS).is_none() {
         lines.push(format!("(= (sureness {THIS}) 0)"));
     }
     lines
 }
 
 fn may_be(s: &Situation) -> Vec<String> {
-    let of = |t: &super::floor::Thing| {
+    let of = |t: &super::floor::FloorThing| {
         let names = t.may_be().unwrap_or_default();
         names.iter().map(|name| format!("(may-be {} {})", t.symbol, symbol(name))).collect::<Vec<_>>()
     };
-    s.floor.things.iter().flat_map(of).collect()
+    s.floor().things.iter().flat_map(of).collect()
 }
 
 fn found(s: &Situation) -> Vec<String> {
-    let line = |name: &String| format!("(= (found {name}) {:.5})", s.floor.surest(name));
-    s.floor.names.iter().map(|(name, _)| line(name)).collect()
+    let line = |name: &String| format!("(= (found {name}) {:.5})", s.floor().surest(name));
+    s.floor().names.iter().map(|(name, _)| line(name)).collect()
 }
 
 fn learned(s: &Situation) -> Vec<String> {
-    s.floor.learned.iter().map(|k| format!("(learned {})", symbol(&k.name))).collect()
+    s.floor().learned.iter().map(|k| format!("(learned {})", symbol(&k.name))).collect()
 }

@@ -6,10 +6,12 @@ use std::sync::Arc;
 use descry_perception::laser::{Alignment, Ignored, KnownShape, Outlook, PosedScan, Recognition, Verdict};
 use descry_perception::nalgebra::{Point2, Vector2};
 
-use super::unseen::Unseen;
+use crate::abilities::shapes::unseen::UnseenFloor;
 use crate::config::Candidates;
-use crate::lexicon::symbol;
+use crate::known::Known;
 use crate::situation::Situation;
+use crate::states::state;
+use crate::symbol::symbol;
 
 /// The symbol of what stands nearest before the body when it first scans.
 pub const THIS: &str = "this";
@@ -35,13 +37,13 @@ pub struct Floor {
     /// Those that were learned in this run.
     pub learned: Vec<KnownShape>,
     /// Objects that were found.
-    pub things: Vec<Thing>,
+    pub things: Vec<FloorThing>,
     /// When each sweep was taken, and the pose.
     pub sweeps: Vec<(i64, String)>,
     /// Records of the sweeps.
     pub records: Vec<descry_memory::RecordId>,
     /// The floor that no sweep has passed over.
-    pub unseen: Unseen,
+    pub unseen: UnseenFloor,
     /// The shape whose place is asked for, by its symbol; none: it is about [`THIS`].
     pub sought: Option<String>,
     /// Names of shapes, by their symbols.
@@ -56,7 +58,7 @@ pub struct Floor {
 
 /// A thing on the floor.
 #[derive(Clone)]
-pub struct Thing {
+pub struct FloorThing {
     /// Its PDDL symbol.
     pub symbol: String,
     /// About where its middle is, in the map.
@@ -83,7 +85,7 @@ pub struct Outline {
 
 impl Floor {
     /// The thing of a symbol.
-    pub fn thing(&self, name: &str) -> Option<&Thing> {
+    pub fn thing(&self, name: &str) -> Option<&FloorThing> {
         self.things.iter().find(|t| t.symbol == name)
     }
 
@@ -99,7 +101,7 @@ impl Floor {
     }
 }
 
-impl Thing {
+impl FloorThing {
     /// Mean distance that it may reach beyond its measured outline, metres.
     pub fn looseness_m(&self) -> f64 {
         let known = |outline: &Arc<Outline>| outline.outlook.looseness_m(&[]).min(0.9 * NOTHING_KNOWN_M);
@@ -180,8 +182,8 @@ fn up_to(bins: &[(f64, f64)], loose_m: f64) -> f64 {
 }
 
 /// A thing on the floor of a situation.
-pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a Thing>, String> {
-    match s.floor.thing(name) {
+pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a FloorThing>, String> {
+    match s.floor().thing(name) {
         None if name != THIS => Err(format!("`{name}` is nothing that was found on the floor")),
         found => Ok(found),
     }
@@ -189,7 +191,7 @@ pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a Thing
 
 /// Centre of a thing in the map, and its greatest width, metres: from the fitted shape if it has a name, else
 /// from its measured outline.
-pub(super) fn place(floor: &Floor, thing: &Thing) -> (Point2<f64>, f64) {
+pub(super) fn place(floor: &Floor, thing: &FloorThing) -> (Point2<f64>, f64) {
     let fitted = thing.taken_for.as_ref().filter(|_| thing.is().is_some()).and_then(|r| r.candidates.first());
     if let Some(candidate) = fitted {
         let shape = &floor.known[candidate.index];
@@ -219,4 +221,18 @@ pub(super) fn least_width_m(corners: &[Point2<f64>]) -> f64 {
         corners.iter().map(|c| side.perp(&(c - corners[i])).abs()).fold(0.0, f64::max)
     };
     (0..n).map(across).fold(f64::INFINITY, f64::min)
+}
+
+state!(Floor);
+
+impl Known {
+    /// The floor as the laser has found it.
+    pub(super) fn floor(&self) -> &Floor {
+        self.states.get()
+    }
+
+    /// The same, to be changed.
+    pub(super) fn floor_mut(&mut self) -> &mut Floor {
+        self.states.get_mut()
+    }
 }

@@ -15,23 +15,23 @@ use std::sync::Arc;
 use descry_perception::laser::{KnownShape, Verdict};
 use descry_robots::Part;
 use descry_skills::{Align, Circle, Outcome, Scan};
+use floor::{Floor, Outline, thing};
+use unseen::UnseenFloor;
 
-use super::{Ability, ActionKind, NOTHING_MORE, SkillWord, moving};
-use crate::abilities::searching::perceive::Eyes;
-use crate::goal::{Goal, type_of_slot};
-use crate::lexicon::symbol;
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::drive;
+use crate::error::WorldError;
+use crate::eyes::Eyes;
 use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
+use crate::objective::Goal;
 use crate::situation::Situation;
-use crate::world::WorldError;
-use floor::{Floor, Outline, thing};
-use unseen::Unseen;
+use crate::slots::type_of_slot;
+use crate::symbol::symbol;
 
 /// The ability *shapes*.
 pub const ABILITY: Ability = Ability {
-    name: "shapes",
-    about: "scans what stands on the floor with a laser, learns its shape, names it by its shape",
     facts: facts::ALL,
     calls: calls::ALL,
     skills: &[
@@ -51,7 +51,7 @@ pub const ABILITY: Ability = Ability {
             types: &["pose"],
             about: "sweeps the laser over floor that was not seen yet",
             ground: |_, _| Ok(Box::new(Scan)),
-            because: |s, _| format!("there are {} places left where it may stand", s.floor.room.len()),
+            because: |s, _| format!("there are {} places left where it may stand", s.floor().room.len()),
             learn: scanned,
             failed: NOTHING_MORE,
         },
@@ -65,7 +65,7 @@ pub const ABILITY: Ability = Ability {
                 Ok(way) => format!("around {}, by {} of the poses there", arguments[2], way.len()),
                 Err(because) => because,
             },
-            learn: moving::driven,
+            learn: drive::has_driven,
             failed: NOTHING_MORE,
         },
         SkillWord {
@@ -74,7 +74,7 @@ pub const ABILITY: Ability = Ability {
             types: &["spot"],
             about: "brings all scans of it together, and takes the shape for one of those known, or for none",
             ground: |s, arguments| Ok(Box::new(aligning(s, arguments[0])?)),
-            because: |s, _| format!("{} shapes are known", s.floor.known.len()),
+            because: |s, _| format!("{} shapes are known", s.floor().known.len()),
             learn: aligned,
             failed: NOTHING_MORE,
         },
@@ -93,6 +93,16 @@ pub const ABILITY: Ability = Ability {
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),
+    keeps: Some(|known, _, later| later.shapes.extend(known.floor().learned.iter().cloned())),
+    objects: Some(|s| {
+        let spots = s.floor().things.iter().map(|t| t.symbol.clone()).collect();
+        vec![("spot", spots), (SHAPE, s.floor().names.iter().map(|(symbol, _)| symbol.clone()).collect())]
+    }),
+    names: Some(|known| known.floor().names.iter().map(|(_, name)| (SHAPE, name.clone())).collect()),
+    ..Ability::named(
+        "shapes",
+        "scans what stands on the floor with a laser, learns its shape, names it by its shape",
+    )
 };
 
 /// The type of names of shapes.
@@ -115,10 +125,10 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     if sought.is_some() {
         poses::survey(mind, &*robot);
     }
-    mind.known.floor = Arc::new(Floor {
+    *mind.known.floor_mut() = Floor {
         known,
         names,
-        unseen: robot.map().map(Unseen::of).unwrap_or_default(),
+        unseen: robot.map().map(UnseenFloor::of).unwrap_or_default(),
         promising: mind
             .known
             .candidates
@@ -129,7 +139,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
         sought,
         poses: domain.config.candidates,
         ..Floor::default()
-    });
+    };
 }
 
 /// The places on the way around a thing.
@@ -176,10 +186,10 @@ fn aligned(
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
     let Outcome::Aligned(alignment) = outcome else { return Err(WorldError::strange(outcome)) };
-    let loose_m = s.floor.thing(arguments[0]).map_or(floor::NOTHING_KNOWN_M, |t| t.looseness_m());
+    let loose_m = s.floor().thing(arguments[0]).map_or(floor::NOTHING_KNOWN_M, |t| t.looseness_m());
     let recognition = taken::recognise(s, alignment, loose_m);
-    let known = s.floor.known.len();
-    let of = Arc::make_mut(&mut mind.known.floor).things.iter_mut().find(|t| t.symbol == arguments[0]);
+    let known = s.floor().known.len();
+    let of = mind.known.floor_mut().things.iter_mut().find(|t| t.symbol == arguments[0]);
     let thing = of.ok_or_else(|| WorldError::Bug(format!("`{}` is gone", arguments[0])))?;
     let best = recognition.candidates.first().map(|c| c.fit.between.per_pair_m());
     let fits =
@@ -209,7 +219,7 @@ fn learned(
 ) -> Result<String, WorldError> {
     let Outcome::Aligned(alignment) = outcome else { return Err(WorldError::strange(outcome)) };
     let before = aligned(mind, eyes, s, arguments, outcome, notes)?;
-    let floor = Arc::make_mut(&mut mind.known.floor);
+    let floor = mind.known.floor_mut();
     let name = floor.names.iter().find(|(symbol, _)| symbol == arguments[1]);
     let name = name.map_or(arguments[1], |(_, name)| name.as_str());
     let shape = KnownShape::new(name, alignment.model.clone());

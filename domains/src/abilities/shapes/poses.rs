@@ -3,11 +3,12 @@
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_robots::{Place, Pose2, Robot};
 
-use super::floor::Thing;
-use crate::abilities::searching::candidates::ring;
+use crate::abilities::shapes::floor::FloorThing;
 use crate::config::Candidates;
+use crate::looking::candidates::ring;
 use crate::mind::Mind;
-use crate::situation::{Candidate, Situation};
+use crate::situation::Situation;
+use crate::viewpoint::Candidate;
 
 /// Poses from which the floor is surveyed lie so far from each other, metres.
 const SURVEY_M: f64 = 3.0;
@@ -21,7 +22,7 @@ pub(super) fn around(
     middle: &Point2<f64>,
 ) -> Vec<String> {
     let from = mind.known.candidates[mind.known.at].place.clone();
-    let found = ring(robot, &mind.known.chart, &from, &middle.coords.push(0.0).into(), config);
+    let found = ring(robot, &*mind.known.own_map, &from, &middle.coords.push(0.0).into(), config);
     let poses = found.into_iter().map(|(k, place)| Candidate { symbol: format!("{name}-{k}"), place });
     let first = mind.known.candidates.len();
     mind.known.candidates.extend(poses);
@@ -51,7 +52,7 @@ pub(super) fn survey(mind: &mut Mind, robot: &dyn Robot) {
 
 /// The way around a thing to one of the poses around it: first to that of them nearest to where it begins, then from neighbour to neighbour, the shorter
 /// way round that is open. Numbers of candidates; none if there is no such way.
-pub(super) fn way(s: &Situation, from: usize, to: usize, thing: &Thing) -> Option<Vec<usize>> {
+pub(super) fn way(s: &Situation, from: usize, to: usize, thing: &FloorThing) -> Option<Vec<usize>> {
     let ring: Vec<usize> = thing.ring.iter().filter_map(|p| s.candidate(p).ok()).collect();
     let n = ring.len();
     let end = ring.iter().position(|&c| c == to)?;

@@ -13,14 +13,15 @@ use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use descry_robots::{Description, OccupancyGrid, Place, Scanned};
 use serde_json::json;
 
-use super::floor::{Floor, Outline, THIS, Thing, least_width_m, place};
+use super::floor::{Floor, Outline, THIS, least_width_m, place};
 use super::poses;
-use crate::abilities::searching::perceive::Eyes;
-use crate::lexicon::symbol;
+use crate::abilities::shapes::floor::FloorThing;
+use crate::error::WorldError;
+use crate::eyes::Eyes;
 use crate::mind::Mind;
 use crate::note::{Note, OnTheFloor};
 use crate::situation::Situation;
-use crate::world::WorldError;
+use crate::symbol::symbol;
 
 /// A reading is of a thing if it ended so far before what the map shows, and twice as far as localisation may be off besides, metres.
 const BEFORE_MAP_M: f64 = 0.1;
@@ -62,7 +63,7 @@ pub(super) fn take(
     let clusters = things(&scan, is_background, &options).map_err(strange)?;
     let mut changed: Vec<usize> = Vec::new();
     for cluster in nearest_first(clusters, &laser) {
-        let index = assign(&mut mind.known.floor, &cluster, &laser);
+        let index = assign(mind.known.floor_mut(), &cluster, &laser);
         if make_ring(mind, eyes, index) {
             changed.push(index);
         }
@@ -72,7 +73,7 @@ pub(super) fn take(
         let only = ObserveOptions { within_m: 1e-3, ..options };
         let seen =
             observe(std::slice::from_ref(&scan), &cluster.middle, is_background, &only).map_err(strange)?;
-        let thing = &mut Arc::make_mut(&mut mind.known.floor).things[index];
+        let thing = &mut mind.known.floor_mut().things[index];
         thing.ignored.extend(seen.ignored.into_iter().map(|(_, why)| (from.to_string(), why)));
         for posed in seen.scans {
             thing.scans.push((from.to_string(), posed));
@@ -84,7 +85,7 @@ pub(super) fn take(
         bring_together(mind, eyes, index);
     }
     look_over_floor(mind, eyes, &scan);
-    Ok(note(&mind.known.floor, from))
+    Ok(note(mind.known.floor(), from))
 }
 
 /// Puts a sweep into the record together with its transforms, and reads it back by its timestamp.
@@ -99,7 +100,7 @@ fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> R
         Meta { seen_from_m: Some([at.x, at.y, 0.0]), body: json!({ "from": from }), ..Meta::default() };
     let id = record.put_scan(scanned.stamp_ns, frame, &scanned.scan, meta)?;
     mind.views += 1;
-    let floor = Arc::make_mut(&mut mind.known.floor);
+    let floor = mind.known.floor_mut();
     floor.sweeps.push((scanned.stamp_ns, from.into()));
     floor.records.push(id);
     let records: &[RecordId] = &floor.records;
@@ -130,8 +131,8 @@ fn nearest_first(mut clusters: Vec<Cluster>, laser: &Vector2<f64>) -> Vec<Cluste
 }
 
 /// The thing that readings are of: one that was found there before, or a new one.
-fn assign(floor: &mut Arc<Floor>, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
-    let off_m = |t: &Thing| {
+fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
+    let off_m = |t: &FloorThing| {
         let (middle, width_m) = place(floor, t);
         (middle - cluster.middle).norm() - 0.5 * width_m
     };
@@ -139,10 +140,9 @@ fn assign(floor: &mut Arc<Floor>, cluster: &Cluster, laser: &Vector2<f64>) -> us
     if let Some((n, _)) = nearest.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, off_m)| *off_m <= SAME_M) {
         return n;
     }
-    let floor = Arc::make_mut(floor);
     let behind = (cluster.middle.coords - laser).try_normalize(1e-9).unwrap_or_default() * USUAL_RADIUS_M;
     let number = floor.things.len() + 1;
-    floor.things.push(Thing {
+    floor.things.push(FloorThing {
         symbol: if number == 1 { THIS.into() } else { format!("thing-{number}") },
         near: cluster.middle + behind,
         scans: Vec::new(),
@@ -156,20 +156,20 @@ fn assign(floor: &mut Arc<Floor>, cluster: &Cluster, laser: &Vector2<f64>) -> us
 
 /// Makes poses around a thing, if it is asked about and there are none yet.
 fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
-    let thing = &mind.known.floor.things[index];
-    let is_asked = mind.known.floor.sought.is_some() || thing.symbol == THIS;
+    let thing = &mind.known.floor().things[index];
+    let is_asked = mind.known.floor().sought.is_some() || thing.symbol == THIS;
     if !is_asked || !thing.ring.is_empty() {
         return false;
     }
-    let (name, near, config) = (thing.symbol.clone(), thing.near, mind.known.floor.poses);
+    let (name, near, config) = (thing.symbol.clone(), thing.near, mind.known.floor().poses);
     let ring = poses::around(mind, eyes.robot, &config, &name, &near);
-    Arc::make_mut(&mut mind.known.floor).things[index].ring = ring;
+    mind.known.floor_mut().things[index].ring = ring;
     true
 }
 
 /// Brings the scans of a thing together, and asks what scans from around it would settle.
 fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
-    let thing = &mind.known.floor.things[index];
+    let thing = &mind.known.floor().things[index];
     let scans: Vec<_> = thing.scans.iter().map(|(_, posed)| posed.clone()).collect();
     let Ok(alignment) = align_consistent(&scans, LONGEST_M, &solver(eyes.robot.description())) else {
         return;
@@ -185,7 +185,7 @@ fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
         })
         .collect();
     let outlook = Outlook::new(&alignment.model, &lasers, &NextOptions::default());
-    let thing = &mut Arc::make_mut(&mut mind.known.floor).things[index];
+    let thing = &mut mind.known.floor_mut().things[index];
     thing.outline = Some(Arc::new(Outline { alignment, outlook }));
 }
 
@@ -197,11 +197,11 @@ pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> R
     };
     if alignment.longest_m() > LONGEST_M {
         // What contradicts itself is nothing that anybody has learned: more scans must tell.
-        let may_be: Vec<String> = s.floor.known.iter().map(|k| k.name.clone()).collect();
+        let may_be: Vec<String> = s.floor().known.iter().map(|k| k.name.clone()).collect();
         let verdict = Verdict::OneOf(may_be.clone());
         return Recognition { verdict, candidates: Vec::new(), ruled_out: 0, may_be };
     }
-    recognise_scans(&alignment.model, loose_m, &s.floor.known, &options)
+    recognise_scans(&alignment.model, loose_m, &s.floor().known, &options)
 }
 
 /// Sentence part about scans that contradict the others.
@@ -221,7 +221,7 @@ pub(super) fn contradict(alignment: &Alignment) -> String {
 fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
     let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);
     let known = &mut mind.known;
-    let floor = Arc::make_mut(&mut known.floor);
+    let floor: &mut Floor = known.states.get_mut();
     floor.unseen.pass(scan, reach_m);
     let places: Vec<(Point2<f64>, f64)> = floor.things.iter().map(|t| place(floor, t)).collect();
     for (middle, width_m) in &places {
@@ -252,12 +252,12 @@ impl Floor {
 }
 
 fn note(floor: &Floor, from: &str) -> Note {
-    let scans = |t: &Thing| match t.scans.len() {
+    let scans = |t: &FloorThing| match t.scans.len() {
         0 => "seen from afar".into(),
         1 => "1 scan".to_string(),
         n => format!("{n} scans"),
     };
-    let line = |t: &Thing| {
+    let line = |t: &FloorThing| {
         let (middle, _) = place(floor, t);
         let why = t.ignored.iter().filter(|(pose, _)| pose == from);
         let why: String = why.map(|(_, why)| format!("; this one is left out: {why}")).collect();

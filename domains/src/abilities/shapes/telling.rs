@@ -2,13 +2,14 @@
 
 use descry_perception::laser::Verdict as Taken;
 
-use super::floor::{THIS, Thing, place};
+use super::floor::{THIS, place};
 use super::taken::contradict;
-use crate::answer::{Believed, Conclusion, Ended, Verdict};
-use crate::goal::Goal;
-use crate::lexicon::symbol;
+use crate::abilities::shapes::floor::FloorThing;
+use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
 use crate::mind::Mind;
+use crate::objective::Goal;
 use crate::situation::Situation;
+use crate::symbol::symbol;
 
 /// So much of an outline may be open before it is said, metres.
 const OPEN_M: f64 = 0.02;
@@ -17,21 +18,21 @@ const OPEN_M: f64 = 0.02;
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     let teller = Teller { mind, s };
     let is_to_learn = goal.asked.of_word("learned").next().is_some();
-    let (verdict, why, thing) = match &s.floor.sought {
+    let (verdict, why, thing) = match &s.floor().sought {
         Some(shape) => teller.where_is(shape, ended),
         None if is_to_learn => teller.learned(ended),
         None => teller.which(ended),
     };
-    let believed: Vec<Believed> = s.floor.things.iter().map(|t| teller.believed(t)).collect();
-    let found = thing.and_then(|t| s.floor.things.iter().position(|o| o.symbol == t.symbol));
+    let believed: Vec<Believed> = s.floor().things.iter().map(|t| teller.believed(t)).collect();
+    let found = thing.and_then(|t| s.floor().things.iter().position(|o| o.symbol == t.symbol));
     let found = found.map(|n| believed[n].clone());
     // What is learned may have another name already.
     let is_learned = is_to_learn && verdict == Verdict::Achieved;
-    let learned = s.floor.learned.last().filter(|_| is_learned).map(|shape| shape.name.clone());
+    let learned = s.floor().learned.last().filter(|_| is_learned).map(|shape| shape.name.clone());
     Some(Conclusion {
         verdict,
         why,
-        confidence: thing.map_or(0.0, |t| t.sureness(s.floor.known.len())),
+        confidence: thing.map_or(0.0, |t| t.sureness(s.floor().known.len())),
         remaining: None,
         object: learned.or_else(|| found.as_ref().and_then(|b| b.label.clone())),
         found,
@@ -45,11 +46,11 @@ struct Teller<'a> {
     s: &'a Situation,
 }
 
-type Told<'a> = (Verdict, String, Option<&'a Thing>);
+type Told<'a> = (Verdict, String, Option<&'a FloorThing>);
 
 impl<'a> Teller<'a> {
     fn name(&self, shape: &str) -> String {
-        let floor = &self.s.floor;
+        let floor = self.s.floor();
         let known = floor.names.iter().find(|(symbol, _)| symbol == shape).map(|(_, name)| name.clone());
         known.unwrap_or_else(|| shape.into())
     }
@@ -75,8 +76,8 @@ impl<'a> Teller<'a> {
     }
 
     fn which(&self, ended: &Ended) -> Told<'a> {
-        let known = self.s.floor.known.len();
-        let Some(thing) = self.s.floor.thing(THIS) else { return self.nothing() };
+        let known = self.s.floor().known.len();
+        let Some(thing) = self.s.floor().thing(THIS) else { return self.nothing() };
         let scans = self.scans(thing);
         if let Some((verdict, why)) = self.cut(ended) {
             return (verdict, format!("it cannot be told what this is: {why}; {scans}"), Some(thing));
@@ -106,9 +107,9 @@ impl<'a> Teller<'a> {
     }
 
     fn learned(&self, ended: &Ended) -> Told<'a> {
-        let Some(thing) = self.s.floor.thing(THIS) else { return self.nothing() };
+        let Some(thing) = self.s.floor().thing(THIS) else { return self.nothing() };
         let scans = self.scans(thing);
-        let told = match (ended, self.s.floor.learned.last()) {
+        let told = match (ended, self.s.floor().learned.last()) {
             (Ended::Reached, Some(shape)) => {
                 let f = shape.features();
                 let size = format!("{:.0} cm², {:.0} cm around", 1e4 * f.area_m2, 1e2 * f.perimeter_m);
@@ -126,7 +127,7 @@ impl<'a> Teller<'a> {
     }
 
     fn where_is(&self, shape: &str, ended: &Ended) -> Told<'a> {
-        let (floor, name) = (&self.s.floor, self.name(shape));
+        let (floor, name) = (self.s.floor(), self.name(shape));
         if !floor.knows(shape) {
             let known: Vec<&str> = floor.known.iter().map(|k| k.name.as_str()).collect();
             let text = format!(
@@ -136,15 +137,15 @@ impl<'a> Teller<'a> {
             );
             return (Verdict::CannotTell, text, None);
         }
-        let found: Vec<&Thing> =
+        let found: Vec<&FloorThing> =
             floor.things.iter().filter(|t| t.is().is_some_and(|is| symbol(is) == shape)).collect();
-        let sure = |t: &Thing| t.sureness(floor.known.len());
+        let sure = |t: &FloorThing| t.sureness(floor.known.len());
         let best = found.iter().copied().max_by(|a, b| sure(a).total_cmp(&sure(b)));
         if let (Ended::Reached, Some(thing)) = (ended, best) {
             let text = format!("{} stands {}; {}", article(&name), self.at(thing), self.scans(thing));
             return (Verdict::Achieved, text, Some(thing));
         }
-        let open: Vec<&Thing> =
+        let open: Vec<&FloorThing> =
             floor.things.iter().filter(|t| t.may_have(shape, floor.known.len(), self.s.threshold)).collect();
         let others = floor.things.len() - open.len();
         let seen = format!("{others} things on the floor are something else");
@@ -175,19 +176,19 @@ impl<'a> Teller<'a> {
         (Verdict::NotFound, text, None)
     }
 
-    fn at(&self, thing: &Thing) -> String {
-        let (middle, _) = place(&self.s.floor, thing);
+    fn at(&self, thing: &FloorThing) -> String {
+        let (middle, _) = place(self.s.floor(), thing);
         format!("at ({:.2}, {:.2}) m", middle.x, middle.y)
     }
 
     /// The scans that a shape rests on, and those that failed.
-    fn scans(&self, thing: &Thing) -> String {
+    fn scans(&self, thing: &FloorThing) -> String {
         let used = thing.outline.as_ref().map_or(0, |o| o.alignment.model.scans().len());
         let mut parts = vec![format!("from {used} scans")];
         for (pose, why) in &thing.ignored {
             parts.push(format!("the one from {pose} is left out: {why}"));
         }
-        let poses = self.s.floor.poses.poses;
+        let poses = self.s.floor().poses.poses;
         if thing.ring.len() < poses {
             parts.push(format!("{} of {poses} poses around it cannot be reached", poses - thing.ring.len()));
         }
@@ -201,19 +202,19 @@ impl<'a> Teller<'a> {
         parts.join("; ") + &thing.outline.as_ref().map_or(String::new(), |o| contradict(&o.alignment))
     }
 
-    fn believed(&self, thing: &Thing) -> Believed {
+    fn believed(&self, thing: &FloorThing) -> Believed {
         let s = self.s;
-        let (middle, width_m) = place(&s.floor, thing);
+        let (middle, width_m) = place(s.floor(), thing);
         let label = thing.is().map(str::to_string);
         let room = s.robot.rooms().iter().find(|r| within(&r.outline_m, &middle)).map(|r| r.name.clone());
         Believed {
-            asked: match &s.floor.sought {
+            asked: match &s.floor().sought {
                 Some(shape) => label.as_ref().is_some_and(|l| symbol(l) == *shape),
                 None => thing.symbol == THIS,
             },
             kind: label.clone(),
             label,
-            confidence: thing.sureness(s.floor.known.len()),
+            confidence: thing.sureness(s.floor().known.len()),
             position_m: Some([middle.x, middle.y, 0.0]),
             position_sigma_m: None,
             size_m: [width_m, width_m, 0.0],

@@ -11,16 +11,16 @@ const ASKED: usize = 200;
 
 /// Floor that no sweep has passed over.
 #[derive(Clone, Default)]
-pub struct Unseen {
+pub struct UnseenFloor {
     grid: Option<OccupancyGrid>,
     /// Cells of the grid that are free by the map and were not passed over.
     open: Vec<bool>,
 }
 
-impl Unseen {
+impl UnseenFloor {
     /// All of the floor that the map has free.
     pub fn of(map: &OccupancyGrid) -> Self {
-        Unseen { open: map.occupied.iter().map(|taken| !taken).collect(), grid: Some(map.clone()) }
+        UnseenFloor { open: map.occupied.iter().map(|taken| !taken).collect(), grid: Some(map.clone()) }
     }
 
     /// A sweep passed over some of it.

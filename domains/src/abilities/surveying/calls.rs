@@ -5,8 +5,8 @@ use descry_planner::{Answer, Call, CallError};
 
 use super::CHART;
 use super::chart::{LOOK_S, NOTHING_SEEN_M2};
-use crate::abilities::searching::reasons;
-use crate::abilities::{Deed, Meaning, Reads, argument, best_first};
+use crate::ability::{Deed, Meaning, Reads, argument, best_first};
+use crate::looking::looks;
 use crate::situation::{Situation, holding};
 
 /// Every call.
@@ -51,18 +51,18 @@ fn expected_discoveries(s: &Situation, call: &Call) -> Result<Answer, CallError>
 }
 
 fn share_shown(s: &Situation, call: &Call) -> Result<f64, CallError> {
-    let all_m2 = s.chart.unseen_m2();
+    let all_m2 = s.chart().unseen_m2();
     Ok(if all_m2 > 0.0 { (gain_m2(s, call)? / all_m2).min(1.0) } else { 0.0 })
 }
 
 fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
     let from = argument(call, 0)?;
-    if s.chart.map.is_none() {
+    if s.chart().map.is_none() {
         return Ok(if from == s.candidates[s.at].symbol { NOTHING_SEEN_M2 } else { 0.0 });
     }
-    let Some(look) = s.chart.outlook(from) else { return Ok(0.0) };
+    let Some(look) = s.chart().outlook(from) else { return Ok(0.0) };
     let mut unseen = Unseen::default();
-    for earlier in holding(call, "charted").filter_map(|r| s.chart.outlook(r.arguments.first()?)) {
+    for earlier in holding(call, "charted").filter_map(|r| s.chart().outlook(r.arguments.first()?)) {
         unseen.look(earlier);
     }
     Ok(unseen.gain_m2(look))
@@ -70,11 +70,11 @@ fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
 
 /// The reason for a look from there.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
-    match s.chart.outlook(arguments[0]) {
+    match s.chart().outlook(arguments[0]) {
         Some(look) => format!(
             "{:.1} m² of floor that is unknown may be seen from there, of {:.1}",
             Unseen::default().gain_m2(look),
-            s.chart.unseen_m2()
+            s.chart().unseen_m2()
         ),
         None => "nothing was seen yet".into(),
     }
@@ -90,6 +90,6 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
             Deed::new(CHART, [symbol]).after_drive(s, to),
         ))
     };
-    let all = best_first(s.chart.open.iter().filter_map(rate).collect());
-    if all.is_empty() { reasons::look_deeds(s) } else { all }
+    let all = best_first(s.chart().open.iter().filter_map(rate).collect());
+    if all.is_empty() { looks::look_deeds(s) } else { all }
 }

@@ -16,10 +16,17 @@ use descry_robots::{Camera, Description, Failure, OccupancyGrid, Place, Pose2, R
 
 use super::ground::{self, Footing, Ground};
 use crate::config::Candidates;
-use crate::lexicon::symbol;
+use crate::known::Known;
 use crate::load::Domain;
-use crate::situation::{Candidate, KnownSurface, Past};
+use crate::own_map::{NoMap, OwnMap};
+use crate::past::Past;
+use crate::states::{States, state};
+use crate::surface::KnownSurface;
+use crate::symbol::symbol;
+use crate::viewpoint::Candidate;
 
+/// Name of the ability.
+pub(super) const NAME: &str = "surveying";
 /// Edge of the cells in which what was seen is kept, metres.
 const CELL_M: f64 = 0.1;
 /// Depths beyond this are not used for the map, metres: the noise of a stereo camera grows with their square.
@@ -76,7 +83,7 @@ pub struct Chart {
 impl Chart {
     /// The map with which a run begins: what an earlier one has left, if the domain uses it and the body has none of its own.
     pub fn begin(domain: &Domain, past: Option<&Past>, robot: &dyn Robot) -> Self {
-        let is_used = domain.config.uses.iter().any(|name| name == super::ABILITY.name);
+        let is_used = domain.config.uses.iter().any(|name| name == NAME);
         let mut chart = Chart { poses: domain.config.candidates, ..Chart::default() };
         let kept = past.and_then(|p| p.remembered.surveyed.as_ref());
         if let Some(kept) = kept.filter(|_| is_used && robot.map().is_none()) {
@@ -256,19 +263,6 @@ impl Chart {
         self.open.iter().map(gain).sum::<f64>() + self.cut_off_m2
     }
 
-    /// Sentence about frontiers of the map, where unseen floor begins without a wall; none if there is no
-    /// frontier, or nothing was mapped.
-    pub(crate) fn goes_on(&self, body: &Description) -> Option<String> {
-        let floor = self.floor(body)?;
-        let ends = frontiers(&floor, &explore(body)?);
-        let length_m = ends.iter().map(|f| f.squares.len()).sum::<usize>() as f64 * floor.cell_m;
-        let near = self.map_from_chart * ends.first()?.middle;
-        Some(format!(
-            "{length_m:.1} m of open floor border on what could not be seen, as near ({:.2}, {:.2}) m",
-            near.x, near.y
-        ))
-    }
-
     /// Floor that is known to be open, square metres.
     pub(super) fn open_m2(&self) -> f64 {
         let grid = self.map.as_ref().and_then(|m| m.grid.as_ref());
@@ -277,99 +271,10 @@ impl Chart {
         })
     }
 
-    /// Travel from one place to each of the others: on this map if there is one, else on the body's own.
-    ///
-    /// # Errors
-    /// Each entry by itself, as [`Robot::travel`].
-    pub(crate) fn travel(
-        &self,
-        robot: &dyn Robot,
-        from: &Place,
-        to: &[Place],
-        shut: &[String],
-    ) -> Vec<Result<Travel, Failure>> {
-        let (Some(router), Place::Pose(from)) = (&self.router, from) else {
-            return robot.travel(from, to, shut);
-        };
-        let chart_from_map = self.map_from_chart.inverse();
-        let pose = |place: &Place| match place {
-            Place::Pose(pose) => put(&chart_from_map, pose),
-            Place::Station(_) => Pose2::new(f64::NAN, f64::NAN, f64::NAN),
-        };
-        let (from, to) = (&put(&chart_from_map, from), to.iter().map(pose).collect::<Vec<Pose2>>());
-        let mut found = router.travel_to_each(from, &to);
-        for (travel, to) in found.iter_mut().zip(&to) {
-            if let (Err(_), Some(narrow)) = (&*travel, self.narrow_to(to)) {
-                *travel = narrow.travel(from, to);
-            }
-            // To turn where it stands needs no floor.
-            if travel.is_err() && (to.point() - from.point()).norm() < 1e-9 {
-                *travel = Ok(Travel { distance_m: 0.0, duration_s: turn_s(robot, from, to) });
-            }
-        }
-        found
-    }
-
     /// Ways without a margin, to where the body stands with one.
     fn narrow_to(&self, to: &Pose2) -> Option<&Router> {
         let fits = self.router.as_ref().is_some_and(|router| router.fits(&to.point()).is_ok());
         self.narrow.as_deref().filter(|_| fits)
-    }
-
-    /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
-    pub(crate) fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
-        let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
-        let chart_from_map = self.map_from_chart.inverse();
-        let (start, end) = (put(&chart_from_map, from), put(&chart_from_map, to));
-        let narrow = || self.narrow_to(&end)?.route(&start, &end).ok();
-        let route = self.router.as_ref()?.route(&start, &end).ok().or_else(narrow)?;
-        let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
-        let turns =
-            route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
-        let mut way: Vec<Place> = turns.map(|pose| Place::Pose(put(&self.map_from_chart, &pose))).collect();
-        way.pop();
-        way.push(Place::Pose(*to));
-        Some(way)
-    }
-
-    /// True if routes are planned on the floor of this map.
-    pub(crate) fn has_ways(&self) -> bool {
-        self.router.is_some()
-    }
-
-    /// True if a surface is one of this map.
-    pub(crate) fn has(&self, surface: &str) -> bool {
-        self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
-    }
-
-    /// True if a wall or a pillar of this map stands between two places.
-    pub(crate) fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
-        let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
-        let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
-        let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
-            side(a, b, from) * side(a, b, to) < 0.0 && side(from, to, a) * side(from, to, b) < 0.0
-        };
-        self.map.as_ref().is_some_and(|m| m.feet().any(|(a, b)| crosses(&a, &b)))
-    }
-
-    /// The surfaces as searching takes them: as far as they were seen.
-    pub(crate) fn known_surfaces(&self) -> impl Iterator<Item = KnownSurface> + '_ {
-        self.surfaces.iter().map(|(name, level)| KnownSurface {
-            symbol: symbol(name),
-            name: name.clone(),
-            room: None,
-            floor: Vec::new(),
-            outline: level
-                .outline
-                .iter()
-                .map(|p| (self.map_from_chart * p).coords.push(level.height_m).into())
-                .collect(),
-            up: Vector3::z(),
-            whole: false,
-            doubtful: None,
-            placed: None,
-            displaced_m: 0.0,
-        })
     }
 }
 
@@ -450,4 +355,139 @@ pub(super) fn rectify(body: &Description, camera: &Camera) -> RectifyOptions {
         turn_sigma_rad: body.pose_sigma_rad.max(1e-3),
         ..RectifyOptions::default()
     }
+}
+
+state!(Arc<Chart>);
+
+impl Known {
+    /// The map that the body has made itself.
+    pub(super) fn chart(&self) -> &Chart {
+        self.states.get::<Arc<Chart>>()
+    }
+
+    /// Changes the map that the body has made itself; ways are those of the changed one.
+    pub(super) fn change_chart<R>(&mut self, change: impl FnOnce(&mut Chart) -> R) -> R {
+        self.own_map = Arc::new(NoMap);
+        let chart: &mut Arc<Chart> = self.states.get_mut();
+        let changed = change(Arc::make_mut(chart));
+        self.own_map = Arc::<Chart>::clone(chart);
+        changed
+    }
+}
+
+impl OwnMap for Chart {
+    /// The surfaces as searching takes them: as far as they were seen.
+    fn surfaces(&self) -> Vec<KnownSurface> {
+        let known = self.surfaces.iter().map(|(name, level)| KnownSurface {
+            symbol: symbol(name),
+            name: name.clone(),
+            room: None,
+            floor: Vec::new(),
+            outline: level
+                .outline
+                .iter()
+                .map(|p| (self.map_from_chart * p).coords.push(level.height_m).into())
+                .collect(),
+            up: Vector3::z(),
+            whole: false,
+            doubtful: None,
+            placed: None,
+            displaced_m: 0.0,
+        });
+        known.collect()
+    }
+
+    /// Travel from one place to each of the others: on this map if there is one, else on the body's own.
+    ///
+    /// # Errors
+    /// Each entry by itself, as [`Robot::travel`].
+    fn travel(
+        &self,
+        robot: &dyn Robot,
+        from: &Place,
+        to: &[Place],
+        shut: &[String],
+    ) -> Vec<Result<Travel, Failure>> {
+        let (Some(router), Place::Pose(from)) = (&self.router, from) else {
+            return robot.travel(from, to, shut);
+        };
+        let chart_from_map = self.map_from_chart.inverse();
+        let pose = |place: &Place| match place {
+            Place::Pose(pose) => put(&chart_from_map, pose),
+            Place::Station(_) => Pose2::new(f64::NAN, f64::NAN, f64::NAN),
+        };
+        let (from, to) = (&put(&chart_from_map, from), to.iter().map(pose).collect::<Vec<Pose2>>());
+        let mut found = router.travel_to_each(from, &to);
+        for (travel, to) in found.iter_mut().zip(&to) {
+            if let (Err(_), Some(narrow)) = (&*travel, self.narrow_to(to)) {
+                *travel = narrow.travel(from, to);
+            }
+            // To turn where it stands needs no floor.
+            if travel.is_err() && (to.point() - from.point()).norm() < 1e-9 {
+                *travel = Ok(Travel { distance_m: 0.0, duration_s: turn_s(robot, from, to) });
+            }
+        }
+        found
+    }
+
+    /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
+    fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
+        let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
+        let chart_from_map = self.map_from_chart.inverse();
+        let (start, end) = (put(&chart_from_map, from), put(&chart_from_map, to));
+        let narrow = || self.narrow_to(&end)?.route(&start, &end).ok();
+        let route = self.router.as_ref()?.route(&start, &end).ok().or_else(narrow)?;
+        let heading = |a: &Point2<f64>, b: &Point2<f64>| (b.y - a.y).atan2(b.x - a.x);
+        let turns =
+            route.points_m.windows(2).map(|leg| Pose2::new(leg[1].x, leg[1].y, heading(&leg[0], &leg[1])));
+        let mut way: Vec<Place> = turns.map(|pose| Place::Pose(put(&self.map_from_chart, &pose))).collect();
+        way.pop();
+        way.push(Place::Pose(*to));
+        Some(way)
+    }
+
+    /// True if routes are planned on the floor of this map.
+    fn has_ways(&self) -> bool {
+        self.router.is_some()
+    }
+
+    /// True if a surface is one of this map.
+    fn has(&self, surface: &str) -> bool {
+        self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
+    }
+
+    /// True if a wall or a pillar of this map stands between two places.
+    fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
+        let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
+        let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
+            side(a, b, from) * side(a, b, to) < 0.0 && side(from, to, a) * side(from, to, b) < 0.0
+        };
+        self.map.as_ref().is_some_and(|m| m.feet().any(|(a, b)| crosses(&a, &b)))
+    }
+
+    /// Sentence about frontiers of the map, where unseen floor begins without a wall; none if there is no
+    /// frontier, or nothing was mapped.
+    fn goes_on(&self, body: &Description) -> Option<String> {
+        let floor = self.floor(body)?;
+        let ends = frontiers(&floor, &explore(body)?);
+        let length_m = ends.iter().map(|f| f.squares.len()).sum::<usize>() as f64 * floor.cell_m;
+        let near = self.map_from_chart * ends.first()?.middle;
+        Some(format!(
+            "{length_m:.1} m of open floor border on what could not be seen, as near ({:.2}, {:.2}) m",
+            near.x, near.y
+        ))
+    }
+}
+
+/// The map with which a run begins.
+pub(super) fn recall(
+    domain: &Domain,
+    past: Option<&Past>,
+    robot: &dyn Robot,
+    states: &mut States,
+) -> Option<Arc<dyn OwnMap>> {
+    let chart = Arc::new(Chart::begin(domain, past, robot));
+    *states.get_mut() = Arc::clone(&chart);
+    Some(chart)
 }

@@ -1,6 +1,6 @@
 //! The words that *surveying* states.
 
-use crate::abilities::Fact;
+use crate::ability::Fact;
 use crate::situation::Situation;
 
 /// Every fact.
@@ -22,12 +22,12 @@ pub(super) const ALL: &[Fact] = &[
 ];
 
 fn outlook(s: &Situation) -> Vec<String> {
-    if s.chart.map.is_none() {
+    if s.chart().map.is_none() {
         return vec![format!("(outlook {})", s.candidates[s.at].symbol)];
     }
-    s.chart.open.iter().map(|(symbol, _)| format!("(outlook {symbol})")).collect()
+    s.chart().open.iter().map(|(symbol, _)| format!("(outlook {symbol})")).collect()
 }
 
 fn unseen(s: &Situation) -> Vec<String> {
-    vec![format!("(= (unseen) {:.4})", s.chart.unseen_m2())]
+    vec![format!("(= (unseen) {:.4})", s.chart().unseen_m2())]
 }

@@ -4,8 +4,6 @@
 //! Both are in the body's own map. It errs there by centimetres, as the map that is read from looks does: at corners that are passed closely no
 //! margin is enough.
 
-use std::sync::Arc;
-
 use descry_memory::remember::Surveyed;
 use descry_perception::mapping::{ExploreOptions, Reach, standable};
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
@@ -15,6 +13,7 @@ use descry_skills::SkillFailure;
 
 use super::taken;
 use crate::mind::Mind;
+use crate::own_map::OwnMap;
 use crate::situation::Situation;
 
 /// After a failed drive the body is asked for the floor up to this far from where it stands and from the rest of its way, metres.
@@ -142,16 +141,16 @@ impl Ground {
 }
 
 /// A drive has come to its end: where it led over the map that the body has made itself, that floor is open.
-pub fn drove(mind: &mut Mind, s: &Situation, to: usize) {
-    let (from, to) = (&s.candidates[s.at].place, &s.candidates[to].place);
-    if let Some(way) = s.chart.way(from, to) {
-        Arc::make_mut(&mut mind.known.chart).ground.drove(from, &way, to);
+pub(super) fn has_driven(mind: &mut Mind, s: &Situation) {
+    let (from, to) = (&s.candidates[s.at].place, mind.known.candidates[mind.known.at].place.clone());
+    if let Some(way) = s.chart().way(from, &to) {
+        mind.known.change_chart(|chart| chart.ground.drove(from, &way, &to));
     }
 }
 
 /// A drive over the map that the body has made itself has ended early: what of its way was driven is open, and where the body says by now that it does
 /// not fit it does not try again. What is concluded from that; nothing if it has no such map or says nothing new.
-pub(in crate::abilities) fn drive_failed(
+pub(super) fn drive_failed(
     mind: &mut Mind,
     robot: &dyn Robot,
     s: &Situation,
@@ -159,19 +158,21 @@ pub(in crate::abilities) fn drive_failed(
     failure: &SkillFailure,
 ) -> Option<String> {
     let (from, to) = (&s.candidates[s.at].place, &s.candidates[s.candidate(to).ok()?].place);
-    let way = s.chart.way(from, to)?;
+    let way = s.chart().way(from, to)?;
     let here = mind.known.candidates[mind.known.at].place.clone();
-    let chart = Arc::make_mut(&mut mind.known.chart);
-    chart.ground.drove(from, &way, &here);
     let is_of_ways = matches!(
         failure,
         SkillFailure::Body(Failure::Blocked { by: None, .. } | Failure::Unreachable { .. })
     );
-    let seem = chart.passable();
-    let news = if is_of_ways { ask(&mut chart.ground, seem, robot, &here, &way) } else { 0 };
-    chart.find_ways(robot.description());
+    let news = mind.known.change_chart(|chart| {
+        chart.ground.drove(from, &way, &here);
+        let seem = chart.passable();
+        let news = if is_of_ways { ask(&mut chart.ground, seem, robot, &here, &way) } else { 0 };
+        chart.find_ways(robot.description());
+        news
+    });
     taken::look_out(mind, robot, "");
-    let square_m = mind.known.chart.map.as_ref()?.grid.as_ref()?.cell_m;
+    let square_m = mind.known.chart().map.as_ref()?.grid.as_ref()?.cell_m;
     (news > 0).then(|| {
         let news_m2 = news as f64 * square_m * square_m;
         format!("{news_m2:.2} m² of floor near there seem to be open and are not: ways lead around them")

@@ -16,14 +16,14 @@ use descry_robots::nalgebra::Point3;
 use descry_robots::{Part, Place};
 use descry_skills::{Observe, Outcome};
 
-use super::{Ability, ActionKind, NOTHING_MORE, SkillWord};
-use crate::abilities::searching::perceive::Eyes;
-use crate::goal::Goal;
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::error::WorldError;
+use crate::eyes::Eyes;
 use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
+use crate::objective::Goal;
 use crate::situation::Situation;
-use crate::world::WorldError;
 
 /// A look that maps goes to a place so far ahead and so high, metres: the floor begins near the body, and walls are seen up to the height of a man.
 const AHEAD_M: (f64, f64) = (3.0, 0.35);
@@ -33,8 +33,6 @@ const CHART: &str = "chart";
 
 /// The ability *surveying*.
 pub const ABILITY: Ability = Ability {
-    name: "surveying",
-    about: "maps the room that it is in: walls, surfaces and open floor, and drives on that map",
     facts: facts::ALL,
     calls: calls::ALL,
     skills: &[SkillWord {
@@ -51,6 +49,14 @@ pub const ABILITY: Ability = Ability {
     begins: Some(begins),
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),
+    recalls: Some(chart::recall),
+    keeps: Some(|known, _, later| later.surveyed = known.chart().kept().or(later.surveyed.take())),
+    has_driven: Some(ground::has_driven),
+    drive_failed: Some(ground::drive_failed),
+    ..Ability::named(
+        chart::NAME,
+        "maps the room that it is in: walls, surfaces and open floor, and drives on that map",
+    )
 };
 
 /// A run begins: with a map from an earlier one, what of it is left to be seen.

@@ -11,13 +11,14 @@ use serde_json::json;
 
 use super::chart::{BODY_M, Chart, far_m, rectify};
 use super::picture;
-use crate::abilities::searching::candidates::ring;
-use crate::abilities::searching::perceive::Eyes;
-use crate::abilities::searching::remember;
+use crate::error::WorldError;
+use crate::eyes::Eyes;
+use crate::looking::candidates::ring;
+use crate::looking::recording;
 use crate::mind::{Mind, Region};
 use crate::note::Note;
-use crate::situation::Candidate;
-use crate::world::WorldError;
+use crate::own_map::OwnMap;
+use crate::viewpoint::Candidate;
 
 /// The kind under which the map is recorded.
 const MAP: &str = "map";
@@ -27,32 +28,37 @@ const MOVED_M: f64 = 0.15;
 /// Takes a look in: it is in the record when this returns, and so is the map as it is then.
 pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
     let body = eyes.robot.description();
-    let id = remember::view(mind, eyes, &[], sensed)?;
+    let id = recording::view(mind, eyes, &[], sensed)?;
     let view = eyes.record.view_at(sensed.stamp_ns, &body.frames.map)?;
     let camera = body.camera.as_ref().ok_or_else(|| WorldError::Bug("a look without a camera".into()))?;
     let strange = |e: String| WorldError::Bug(format!("a look that maps: {e}"));
     let station = Station::of(&view).map_err(|e| strange(e.to_string()))?;
     let height_m = view.world_from_camera.translation.z;
-    let chart = Arc::make_mut(&mut mind.known.chart);
-    chart.records.push(id);
-    let believed = chart.map_from_chart.inv_mul(&station.odom_from_level);
-    let survey = chart.survey().map_err(strange)?;
-    let fit =
-        survey.locate(&station, &believed, &rectify(body, camera)).map_err(|e| strange(e.to_string()))?;
-    let at = fit.before_from_after;
-    survey.add(&station, &at, height_m, far_m(camera), &BODY_M).map_err(|e| strange(e.to_string()))?;
-    chart.stood.push(at);
-    chart.believed.push(station.odom_from_level);
-    chart.read(body);
+    let (fit, believed) = mind
+        .known
+        .change_chart(|chart| {
+            chart.records.push(id);
+            let believed = chart.map_from_chart.inv_mul(&station.odom_from_level);
+            let survey = chart.survey()?;
+            let fit =
+                survey.locate(&station, &believed, &rectify(body, camera)).map_err(|e| e.to_string())?;
+            let at = fit.before_from_after;
+            survey.add(&station, &at, height_m, far_m(camera), &BODY_M).map_err(|e| e.to_string())?;
+            chart.stood.push(at);
+            chart.believed.push(station.odom_from_level);
+            chart.read(body);
+            Ok((fit, believed))
+        })
+        .map_err(strange)?;
     meet_surfaces(mind, eyes.robot);
     look_out(mind, eyes.robot, from);
     keep(mind, eyes, sensed.stamp_ns)?;
-    Ok(note(&mind.known.chart, &fit, &believed))
+    Ok(note(mind.known.chart(), &fit, &believed))
 }
 
 /// Makes the surfaces of the map known, with poses around them if anything is looked for.
 fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
-    for fresh in mind.known.chart.known_surfaces().collect::<Vec<_>>() {
+    for fresh in mind.known.chart().surfaces() {
         let known = mind.known.surfaces.iter().position(|s| s.symbol == fresh.symbol);
         let moved = match known {
             Some(n) if mind.regions[n].taken > 0 => continue,
@@ -72,7 +78,7 @@ fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
         if let Some(centre) = fresh.centre().filter(|_| moved && is_sought) {
             let of = format!("{}-", fresh.symbol);
             let here = mind.known.candidates[mind.known.at].place.clone();
-            let found = ring(robot, &mind.known.chart, &here, &centre, &mind.known.chart.poses);
+            let found = ring(robot, &*mind.known.own_map, &here, &centre, &mind.known.chart().poses);
             let around = found.into_iter().map(|(k, place)| Candidate { symbol: format!("{of}{k}"), place });
             let around: Vec<Candidate> = around.collect();
             replace(mind, |symbol| symbol.starts_with(&of), around);
@@ -87,8 +93,8 @@ pub(super) fn look_out(mind: &mut Mind, robot: &dyn Robot, from: &str) {
     let given_up = |symbol: &str| {
         symbol == from || mind.words.instances("out-of-reach").any(|a| a.first().is_some_and(|s| s == symbol))
     };
-    Arc::make_mut(&mut mind.known.chart).look_out(&here, robot.description(), given_up);
-    let open: Vec<Candidate> = mind.known.chart.poses().collect();
+    mind.known.change_chart(|chart| chart.look_out(&here, robot.description(), given_up));
+    let open: Vec<Candidate> = mind.known.chart().poses().collect();
     replace(mind, |symbol| symbol.starts_with("view-"), open);
 }
 
@@ -107,7 +113,7 @@ fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
 
 /// Puts the map and a picture of it into the record.
 fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError> {
-    let chart = &mind.known.chart;
+    let chart = mind.known.chart();
     let Some(map) = &chart.map else { return Ok(()) };
     let body = json!({
         "rests_on": chart.records,

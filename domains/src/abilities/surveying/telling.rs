@@ -1,9 +1,9 @@
 //! Final answer where only the map was asked for.
 
-use crate::answer::{Conclusion, Ended, Verdict};
-use crate::goal::Goal;
+use crate::conclusion::{Conclusion, Ended, Verdict};
 use crate::mind::Mind;
 use crate::note::and_round;
+use crate::objective::Goal;
 use crate::situation::Situation;
 
 /// Answers a goal that is about the map alone; `None` for other goals.
@@ -11,7 +11,7 @@ pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Opt
     if !(s.things.is_empty() && s.kinds.is_empty() && s.asked.is_empty()) {
         return None;
     }
-    let chart = &s.chart;
+    let chart = s.chart();
     let (walls, cylinders) = chart.map.as_ref().map_or((0, 0), |m| (m.walls.len(), m.cylinders.len()));
     let known = format!(
         "{:.1} m² of open floor, {walls} walls{} and {} surfaces, after {} looks and {:.1} m",

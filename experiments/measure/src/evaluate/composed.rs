@@ -1,9 +1,8 @@
 //! Things that stand on or in others, upside down or made of parts: what a search says of them while they are there, and
 //! while something else is there instead.
 
-use super::searching::Search;
-use descry_domains::abilities::searching::reasons;
 use descry_domains::load::Domain;
+use descry_domains::reasons;
 use descry_domains::situation::Situation;
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::Point3;
@@ -11,6 +10,8 @@ use descry_perception::recognise::{Handle, ObjectModel, Range, Shape as Form, To
 use descry_robots::sim::composed::{Composed, Piece};
 use descry_robots::sim::shape::{Cuboid, Cup, Cylinder, Shape};
 use descry_robots::sim::{Object, SceneSpec, SimOptions, arrange};
+
+use super::searching::Search;
 
 /// Looks that a search may take; all poses of the ring but the start.
 const LOOKS: usize = 8;

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::views::Taken;
 use super::{Figure4, row};
-use crate::Row;
+use crate::job::Row;
 
 /// Maximum distance of a percept from its object, metres: less than the radius of the smallest cup plus the
 /// gap around it.

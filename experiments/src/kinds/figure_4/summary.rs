@@ -2,8 +2,9 @@
 
 use serde_json::{Value, json};
 
-use super::{Cell, Figure4, Summary, cells, row};
-use crate::Numbered;
+use super::{Cell, Figure4, cells, row};
+use crate::job::Numbered;
+use crate::kinds::kind::Summary;
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::statistics::{self, Estimate, Pair};

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use descry_agent::body::Body;
+use descry_domains::looking::perceive;
 use descry_perception::View;
 use descry_perception::merge::MergeOptions;
 use descry_perception::nalgebra::{Isometry3, Point3};
@@ -12,9 +14,7 @@ use descry_robots::sim::{SceneSpec, SimOptions, SimRobot, arrange};
 use descry_robots::truth::Truth;
 use descry_robots::{Place, Pose2, Robot, SurfaceHint, Watch};
 
-use crate::kinds::runtime;
-use descry_agent::body::Body;
-use descry_domains::abilities::searching::perceive;
+use crate::kinds::kind::runtime;
 
 /// Radial offsets tried in turn where the footprint does not fit, metres.
 const OUTWARDS_M: [f64; 6] = [0.0, 0.1, 0.2, -0.1, 0.3, 0.4];

@@ -1,14 +1,14 @@
 //! Scoring of runs against the ground truth: achievement of the goal, and truth of the answer.
 
-use descry_domains::answer::Verdict;
+use descry_agent::report::Report;
+use descry_domains::conclusion::Verdict;
 use descry_robots::truth::{TrueObject, Truth};
 use serde::Deserialize;
 use serde_json::json;
 
 use super::GoalText;
-use crate::Row;
+use crate::job::Row;
 use crate::kinds::trial::{Lived, is_among};
-use descry_agent::report::Report;
 
 /// Criterion by which a goal is truly achieved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

@@ -3,12 +3,13 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{Summary, Tasks};
+use super::Tasks;
+use crate::job::{Numbered, Row};
+use crate::kinds::kind::Summary;
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::statistics::{self, Estimate, Observation};
 use crate::table::{Table, shown};
-use crate::{Numbered, Row};
 
 const NOTE: &str = "Shares with Wilson's intervals, means with intervals bootstrapped over arrangements, 95 % each. A run that \
                     ended with an error counts as not right.";

@@ -2,8 +2,9 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{Setting, Summary, WhereToLook};
-use crate::Numbered;
+use super::{Setting, WhereToLook};
+use crate::job::Numbered;
+use crate::kinds::kind::Summary;
 use crate::kinds::trial::Measured;
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};

@@ -2,7 +2,7 @@
 
 use descry_planner::{Answer, Call, CallError};
 
-use crate::abilities::argument;
+use crate::ability::argument;
 use crate::situation::Situation;
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {

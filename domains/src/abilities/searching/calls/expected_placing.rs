@@ -3,8 +3,8 @@
 
 use descry_planner::{Answer, Call, CallError};
 
-use crate::abilities::argument;
-use crate::abilities::searching::adrift;
+use crate::ability::argument;
+use crate::belief::adrift;
 use crate::situation::Situation;
 
 pub(super) fn answer(situation: &Situation, call: &Call) -> Result<Answer, CallError> {

@@ -10,12 +10,11 @@ mod search_cost;
 mod worth_a_look;
 mod worth_a_push;
 
+use descry_planner::{Call, CallError};
 pub use search_cost::FirstLook;
 
-use descry_planner::{Call, CallError};
-
-use crate::abilities::searching::doubt::{Doubt, Taken};
-use crate::abilities::{Meaning, Reads, argument};
+use crate::ability::{Meaning, Reads, argument};
+use crate::belief::doubt::{Doubt, Taken};
 use crate::situation::Situation;
 
 /// The looks at the surface that the call is about; of a call that is about none, all.

@@ -6,7 +6,7 @@
 use descry_planner::{Answer, Call, CallError};
 use serde::{Deserialize, Serialize};
 
-use crate::abilities::argument;
+use crate::ability::argument;
 use crate::situation::Situation;
 
 /// Maximum penalty of a look in vain, seconds: with almost nothing left to find, all looks are

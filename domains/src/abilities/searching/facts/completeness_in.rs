@@ -2,9 +2,9 @@
 //! are asked about: of each it is at least as sure as of all of them together. Of any other no more is known than nothing.
 
 use super::completeness;
-use crate::lexicon::symbol;
 use crate::range::{Range, Referent};
 use crate::situation::Situation;
+use crate::symbol::symbol;
 
 pub(super) fn state(situation: &Situation) -> Vec<String> {
     let rooms: Vec<String> = situation.robot.rooms().iter().map(|room| symbol(&room.name)).collect();
@@ -26,7 +26,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(kind), Referent::Named(room)] = of else { return Range::UNKNOWN };
     let is_there = |n: &usize| s.surfaces[*n].is_in(&[(*room).to_string()]);
-    let is_asked = |kind: &crate::situation::Thing| {
+    let is_asked = |kind: &crate::known::Thing| {
         kind.on.as_ref().is_none_or(|on| (0..s.surfaces.len()).filter(is_there).all(|n| on.contains(&n)))
     };
     match s.kind(kind) {

@@ -11,7 +11,7 @@ mod placed;
 mod presence;
 mod sure;
 
-use crate::abilities::Fact;
+use crate::ability::Fact;
 
 /// Every fact.
 pub(super) const ALL: &[Fact] = &[

@@ -1,8 +1,8 @@
 //! `gain-per-second`: the look that is expected to settle most of the doubt for the time that it takes, one at a time.
 
+use super::policy::{Look, Policy, best};
+use crate::looking::looks::LOOK_S;
 use crate::situation::Situation;
-
-use super::{LOOK_S, Look, Policy, best};
 
 pub(super) struct GainPerSecond;
 

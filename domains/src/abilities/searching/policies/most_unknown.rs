@@ -1,8 +1,8 @@
 //! `most-unknown`: the look that shows most of the space above the surface that no view has shown.
 
+use super::policy::{Look, Policy, best};
+use super::unseen;
 use crate::situation::Situation;
-
-use super::{Look, Policy, best, unseen};
 
 pub(super) struct MostUnknown;
 

@@ -1,8 +1,7 @@
 //! `nearest`: from the nearest pose that has not been looked from.
 
+use super::policy::{Look, Policy, best};
 use crate::situation::Situation;
-
-use super::{Look, Policy, best};
 
 pub(super) struct Nearest;
 

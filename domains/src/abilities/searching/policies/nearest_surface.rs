@@ -1,9 +1,8 @@
 //! `nearest-surface`: optimistic, nearest first. It goes to the nearest surface where something is in doubt, looks there until no
 //! look there settles anything that is worth it, and then goes to the next.
 
+use super::policy::{Look, Policy, best};
 use crate::situation::Situation;
-
-use super::{Look, Policy, best};
 
 #[derive(Default)]
 pub(super) struct NearestSurface {

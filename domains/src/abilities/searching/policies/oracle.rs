@@ -1,9 +1,8 @@
 //! `oracle`: knows what each look would truly show of what is sought. It looks from where most of it can be seen; what is not
 //! there or has been seen from there it must still make sure of, by the look that settles most. For experiments only.
 
+use super::policy::{Foresight, Look, Policy, best};
 use crate::situation::Situation;
-
-use super::{Foresight, Look, Policy, best};
 
 pub(super) struct Oracle {
     foresight: Foresight,

@@ -1,10 +1,10 @@
 //! `random`: any look, by the seed of the run.
 
-use crate::situation::Situation;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Look, Policy};
+use super::policy::{Look, Policy};
+use crate::situation::Situation;
 
 pub(super) struct Random(ChaCha8Rng);
 

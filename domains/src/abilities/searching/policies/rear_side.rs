@@ -1,11 +1,12 @@
 //! `rear-side`: the look that shows most of the unseen space right behind what has been seen, where objects go on or hide
 //! (the rear side voxels of Delmerico et al., *A comparison of volumetric information gain metrics*, section III).
 
-use crate::situation::Situation;
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
 
-use super::{Look, Policy, best, unseen};
+use super::policy::{Look, Policy, best};
+use super::unseen;
+use crate::situation::Situation;
 
 /// Depth of the rear side behind a seen object, metres.
 const BEHIND_M: f64 = 0.04;

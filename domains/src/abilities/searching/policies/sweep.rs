@@ -1,9 +1,8 @@
 //! `sweep`: the fixed tour of paper 004. From the nearest pose of the ring all the way around, whatever is seen, until the
 //! goal is achieved or every pose has been looked from.
 
+use super::policy::{Look, Policy, best};
 use crate::situation::Situation;
-
-use super::{Look, Policy, best};
 
 pub(super) struct Sweep;
 

@@ -1,10 +1,11 @@
 //! The space above a surface that no view has shown, as points on a grid.
 
-use crate::situation::{KnownSurface, Situation};
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};
 
-use super::Look;
+use super::policy::Look;
+use crate::situation::Situation;
+use crate::surface::KnownSurface;
 
 /// Distance of the points.
 const GRID_M: f64 = 0.05;

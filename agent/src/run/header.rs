@@ -1,0 +1,55 @@
+//! Settings of a run, as its folder and its record hold them.
+
+use serde::{Deserialize, Serialize};
+
+use crate::keeping::Keeping;
+
+/// Settings that a run was started with: enough to start it again.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// The body, as on the command line.
+    pub robot: String,
+    /// The scene, if one was named.
+    pub scene: Option<String>,
+    /// The seed.
+    pub seed: u64,
+    /// The domain, as on the command line.
+    pub domain: String,
+    /// Name of the policy that chooses where to look next.
+    pub policy: String,
+    /// Storage options of the record.
+    #[serde(default)]
+    pub keeping: Keeping,
+    /// Store in which the last seen objects are remembered from run to run; none: nothing is remembered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remember: Option<String>,
+}
+
+/// `run.json` in a run's folder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Version of descry.
+    pub version: String,
+    /// The goal in words.
+    pub goal: String,
+    /// The goal in PDDL.
+    pub pddl_goal: String,
+    /// Time at which it was started, seconds since 1970.
+    pub started_unix_s: u64,
+    /// The interruptions after which the run was resumed, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resumed: Vec<Resumed>,
+    /// Settings that it was started with.
+    #[serde(flatten)]
+    pub settings: Settings,
+}
+
+/// Note that a run was cut off and gone on with. It stands beside the record, which is the same as
+/// without a cut.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resumed {
+    /// When, seconds since 1970.
+    pub unix_s: u64,
+    /// The last event that was recorded before, by its number; none: nothing had happened.
+    pub after: Option<u64>,
+}

@@ -1,0 +1,539 @@
+//! Remaining uncertainty, as hypotheses that a look could settle.
+//!
+//! A thing may stand where nothing has been seen yet, or be one of the objects that were seen from too few sides. Each
+//! such possibility is a [`Hypothesis`] with the probability that hangs on it; a look settles those that it shows.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use descry_memory::belief::{MISLAID_M, Track};
+use descry_perception::nalgebra::{Point3, Vector3};
+use descry_perception::recognise::ObjectModel;
+
+use crate::belief::adrift;
+use crate::belief::hidden::Hidden;
+use crate::belief::hypothesis::{Basis, Hypothesis};
+use crate::belief::unnoticed::across;
+use crate::known::Thing;
+use crate::situation::{Situation, cells};
+use crate::surface::KnownSurface;
+
+/// Sides from which an object is looked at.
+const SECTORS: usize = 8;
+/// An object that is believed less than this to be the thing is no longer asked about.
+const NEGLIGIBLE: f64 = 0.02;
+/// Size of an object of which nothing is known: a small cup, height and diameter.
+const SMALL_M: (f64, f64) = (0.10, 0.07);
+
+/// Everything that is in doubt about a thing or a surface.
+#[derive(Debug)]
+pub struct Doubt {
+    /// The possibilities.
+    pub hypotheses: Vec<Hypothesis>,
+    /// The probability that it, or anything, is where nothing has been seen.
+    pub hidden: f64,
+    /// Some surface is not known yet: every look may settle everything.
+    pub anywhere: bool,
+    /// Hypotheses by surface.
+    parts: BTreeMap<usize, Part>,
+    /// Settled shares with an obstacle moved, by obstacle, candidate and surface.
+    told_without: Mutex<BTreeMap<[usize; 3], Arc<[f64]>>>,
+    /// Total that all looks together can settle, by obstacle moved (0: none).
+    within_reach: Vec<OnceLock<Reach>>,
+}
+
+/// Hypotheses on one surface.
+#[derive(Debug, Default)]
+struct Part {
+    /// Places where it can stand at all, and those where it may stand unseen; none if it is not asked about
+    /// there.
+    hidden: Option<Arc<Hidden>>,
+    /// Indices of the hypotheses of hidden places.
+    places: Range<usize>,
+    /// Indices of the other hypotheses.
+    objects: Vec<usize>,
+    /// Settled shares of all of them, by viewer.
+    told: OnceLock<Vec<OnceLock<Arc<[f64]>>>>,
+}
+
+impl Part {
+    /// Indices of its hypotheses, in order.
+    fn all(&self) -> impl Iterator<Item = usize> + '_ {
+        self.places.clone().chain(self.objects.iter().copied())
+    }
+}
+
+/// Actions of a plan before a look.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Taken<'a> {
+    /// Looks: candidate and surface.
+    pub looks: &'a [(usize, usize)],
+    /// The obstacle that is pushed aside.
+    pub moved: Option<usize>,
+}
+
+/// Probability mass that looks can still settle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Reach {
+    weight: f64,
+    /// Each possibility counted only as far as the look tells it that shows it most clearly.
+    as_told: f64,
+}
+
+impl Doubt {
+    /// Uncertainty about a thing: where it may be hidden, and which objects may be it.
+    pub(crate) fn about(situation: &Situation, what: usize) -> Self {
+        let thing = &situation.things[what];
+        let p = |track: &Track| thing.probability(track, &situation.surfaces);
+        let best = situation.belief.tracks.iter().map(p).fold(0.0, f64::max);
+        let mut doubt = Self::hidden(situation, thing, &situation.expected[what]);
+        doubt.scale_hidden(1.0 - best);
+        for track in &situation.belief.tracks {
+            let p = thing.probability(track, &situation.surfaces);
+            if p > NEGLIGIBLE {
+                doubt.suppose(unseen_sides(situation, track, p));
+                doubt.suppose(adrift::ends_of(situation, track, p));
+            }
+        }
+        doubt
+    }
+
+    /// Uncertainty about a thing on one surface.
+    pub(crate) fn about_on(situation: &Situation, what: usize, on: usize) -> Self {
+        let thing = Thing { on: Some(vec![on]), ..situation.things[what].clone() };
+        let mut doubt = Self::hidden(situation, &thing, &situation.expected[what]);
+        doubt.scale_hidden(1.0 - situation.presence(what, on));
+        for track in situation.on_surface(on) {
+            let p = thing.probability(track, &situation.surfaces);
+            if p > NEGLIGIBLE {
+                doubt.suppose(unseen_sides(situation, track, p));
+            }
+        }
+        doubt
+    }
+
+    /// Uncertainty about which objects are of a kind: where more of it may be hidden, and which objects may
+    /// be of it.
+    pub(crate) fn of(situation: &Situation, of: usize) -> Self {
+        let kind = &situation.kinds[of];
+        let mut doubt = Self::hidden(situation, kind, &situation.expected[situation.things.len() + of]);
+        for track in &situation.belief.tracks {
+            let p = kind.probability(track, &situation.surfaces);
+            doubt.suppose(unseen_sides(situation, track, p.min(1.0 - p)));
+        }
+        doubt
+    }
+
+    /// Uncertainty about a surface: what may be hidden there, and what the objects on it are.
+    pub(crate) fn on(situation: &Situation, on: usize) -> Self {
+        let mut doubt = Self::hidden_on(situation, &[(on, 1.0)], SMALL_M);
+        for track in situation.on_surface(on) {
+            doubt.suppose(unseen_sides(situation, track, 1.0 - track.certainty()));
+        }
+        doubt
+    }
+
+    /// Hypotheses of places where a thing may be hidden, on the surfaces that it is asked about.
+    fn hidden(situation: &Situation, thing: &Thing, expected: &[f64]) -> Self {
+        // Of a kind the smallest may be where the largest has no room.
+        let sizes = thing.models.iter().map(size_m);
+        let size = sizes.min_by(|a, b| volume_m3(a).total_cmp(&volume_m3(b))).unwrap_or(SMALL_M);
+        let surfaces = (0..situation.surfaces.len()).filter(|&on| thing.may_be_on(on));
+        let weighted: Vec<(usize, f64)> = surfaces.map(|on| (on, expected[on])).collect();
+        let mut doubt = Self::hidden_on(situation, &weighted, size);
+        doubt.expect_again(situation, thing);
+        doubt
+    }
+
+    /// Shifts the hypotheses of a thing that was touched to the surroundings of its old place, until these
+    /// have been seen: with the probability that the touched object was the thing; with the rest all is as if
+    /// there were no such object. A thing lost out of the hand lies where no look at a surface shows it.
+    fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
+        for track in &situation.belief.mislaid {
+            let p = thing.probability(track, &situation.surfaces);
+            let is_near = |h: &Hypothesis| {
+                situation.surfaces[h.on].symbol == track.on
+                    && (h.centre - track.position_m).norm() < MISLAID_M
+            };
+            let near: f64 = self.hypotheses.iter().filter(|h| is_near(h)).map(|h| h.weight).sum();
+            let is_lost = track.on.is_empty();
+            if p <= NEGLIGIBLE || (near <= 0.0 && !is_lost) {
+                continue;
+            }
+            for h in &mut self.hypotheses {
+                let share = if is_near(h) { h.weight / near } else { 0.0 };
+                h.weight = p * share + (1.0 - p) * h.weight;
+            }
+            self.hidden = p + (1.0 - p) * self.hidden;
+        }
+    }
+
+    /// The share of the doubt that a look, a candidate and a surface, would settle beyond what the plan does before it, 0 to 1. Doubt that no
+    /// look can settle does not count; none is worth a look where what can be settled is negligible.
+    pub fn share_settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
+        if self.anywhere {
+            return if before.looks.is_empty() { 1.0 } else { 0.0 };
+        }
+        let total = self.within_reach(situation, before.moved);
+        if !self.is_worth_it(situation, total.weight, before.moved) {
+            return 0.0;
+        }
+        let Some(part) = self.parts.get(&look.1) else { return 0.0 };
+        let told = |look: (usize, usize)| self.told(situation, look, before.moved);
+        let earlier: Vec<Arc<[f64]>> =
+            before.looks.iter().filter(|earlier| earlier.1 == look.1).map(|&look| told(look)).collect();
+        let now = told(look);
+        let fresh = |i: usize| (now[i] - earlier.iter().map(|e| e[i]).fold(0.0, f64::max)).max(0.0);
+        let settled: f64 = part.all().enumerate().map(|(i, n)| self.hypotheses[n].weight * fresh(i)).sum();
+        settled / total.as_told
+    }
+
+    /// Probability mass that a look would settle beyond the earlier looks of the plan, as far as
+    /// any possible look can.
+    pub fn settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
+        let all = if self.anywhere { 1.0 } else { self.within_reach(situation, before.moved).weight };
+        self.share_settled(situation, look, before) * all.min(1.0)
+    }
+
+    /// Total weight that possible looks could settle; as long as nothing is moved, only looks not yet taken
+    /// count.
+    fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
+        *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
+            let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);
+            let mut best = vec![0.0_f64; self.hypotheses.len()];
+            for (&on, part) in &self.parts {
+                for told in self.looks_at(situation, on, &open, moved) {
+                    part.all().zip(&*told).for_each(|(n, told)| best[n] = best[n].max(*told));
+                }
+            }
+            let mut reach = Reach::default();
+            for (hypothesis, best) in self.hypotheses.iter().zip(best) {
+                reach.as_told += hypothesis.weight * best;
+                reach.weight += if best > 0.0 { hypothesis.weight } else { 0.0 };
+            }
+            reach
+        })
+    }
+
+    /// True if looking alone can settle anything that matters.
+    pub fn can_be_settled(&self, situation: &Situation) -> bool {
+        self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
+    }
+
+    /// True if looks that settle so much matter: by themselves, or because with them it could be said that
+    /// nothing is hidden.
+    fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
+        let t = &situation.thresholds;
+        let most = t.remaining + t.out_of_sight;
+        weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
+    }
+
+    /// True if looks would settle enough once an obstacle is moved, of all that no look shows now.
+    pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
+        let [before, after] = [None, Some(what)].map(|moved| self.shown(situation, moved));
+        let only_after = |n: &usize| after[*n] && !before[*n];
+        let uncovered: f64 =
+            (0..self.hypotheses.len()).filter(only_after).map(|n| self.hypotheses[n].weight).sum();
+        uncovered >= negligible(situation, Some(what))
+    }
+
+    /// Largest probability mass that one possible look at a surface would settle.
+    pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
+        if self.anywhere {
+            return self.hidden;
+        }
+        let Some(part) = self.parts.get(&on) else { return 0.0 };
+        let open = |look: &(usize, usize)| !situation.observed.contains(look);
+        let settled = |told: Arc<[f64]>| {
+            part.all().zip(&*told).map(|(n, told)| self.hypotheses[n].weight * told).sum::<f64>()
+        };
+        self.looks_at(situation, on, &open, None).map(settled).fold(0.0, f64::max)
+    }
+
+    /// Probability mass that looks from several viewpoints at a surface settle together.
+    pub(crate) fn settled_by(&self, situation: &Situation, from: &[usize], on: usize) -> f64 {
+        let Some(part) = self.parts.get(&on) else { return 0.0 };
+        let told: Vec<Arc<[f64]>> = from.iter().map(|&from| self.told(situation, (from, on), None)).collect();
+        let best = |i: usize| told.iter().map(|told| told[i]).fold(0.0, f64::max);
+        part.all().enumerate().map(|(i, n)| self.hypotheses[n].weight * best(i)).sum()
+    }
+
+    /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or
+    /// nothing is known of the surface.
+    pub fn share_seen(&self, on: usize) -> Option<f64> {
+        let part = self.parts.get(&on)?;
+        let places = part.hidden.as_ref()?.all;
+        Some(1.0 - part.places.len() as f64 / places.max(1) as f64)
+    }
+
+    /// The probability that it is on a surface where it was not seen, and the part of that where something was measured.
+    pub fn hidden_share(&self, on: usize) -> (f64, f64) {
+        let places = self.parts.get(&on).map(|part| part.places.clone()).unwrap_or_default();
+        let places = &self.hypotheses[places];
+        let measured = places.iter().filter(|h| h.ground == Basis::Measured);
+        (places.iter().map(|h| h.weight).sum(), measured.map(|h| h.weight).sum())
+    }
+
+    /// Probability mass that is still unsettled.
+    pub fn remaining(&self) -> f64 {
+        let all: f64 = self.hypotheses.iter().map(|h| h.weight).sum();
+        if self.anywhere { self.hidden } else { all.min(1.0) }
+    }
+
+    /// Probability mass in hidden places that no look can show, and those places.
+    pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
+        let shown = self.shown(situation, None);
+        let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
+        let unseeable: Vec<&Hypothesis> = hidden.filter(|(_, shown)| !shown).map(|(h, _)| h).collect();
+        (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
+    }
+
+    /// For each hypothesis, true if a look that can be reached settles any of it.
+    fn shown(&self, situation: &Situation, moved: Option<usize>) -> Vec<bool> {
+        let mut shown = vec![false; self.hypotheses.len()];
+        for (&on, part) in &self.parts {
+            for told in self.looks_at(situation, on, &|_| true, moved) {
+                part.all().zip(&*told).for_each(|(n, told)| shown[n] |= *told > 0.0);
+            }
+        }
+        shown
+    }
+
+    /// Settled shares of every look at a surface that is open, can be reached and sees it, in the order of the
+    /// part's hypotheses.
+    fn looks_at<'d>(
+        &'d self,
+        situation: &'d Situation,
+        on: usize,
+        open: &'d impl Fn(&(usize, usize)) -> bool,
+        moved: Option<usize>,
+    ) -> impl Iterator<Item = Arc<[f64]>> + 'd {
+        let looks = situation.viewers(on).iter().map(move |&from| (from, on));
+        looks
+            .filter(move |look| open(look) && situation.can_reach(look.0))
+            .map(move |look| self.told(situation, look, moved))
+    }
+
+    /// Share of each hypothesis of a surface that a look (a candidate and a surface) settles, in the order of
+    /// the part's hypotheses; a look that does not see the surface settles none.
+    fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> Arc<[f64]> {
+        let Some(part) = self.parts.get(&on) else { return Arc::default() };
+        let Ok(viewer) = situation.viewers(on).binary_search(&from) else {
+            return part.all().map(|_| 0.0).collect();
+        };
+        if let Some(obstacle) = moved {
+            return self.told_without(situation, part, (from, on), obstacle);
+        }
+        let told = part.told.get_or_init(|| situation.viewers(on).iter().map(|_| OnceLock::new()).collect());
+        let told = told[viewer].get_or_init(|| {
+            let hidden = part.hidden.as_ref().map(|hidden| hidden.told(situation, viewer, on));
+            let settled = |&n: &usize| situation.would_settle(from, on, &self.hypotheses[n], None);
+            match hidden {
+                Some(hidden) if part.objects.is_empty() => Arc::clone(hidden),
+                _ => {
+                    let hidden = hidden.into_iter().flat_map(|hidden| hidden.iter().copied());
+                    hidden.chain(part.objects.iter().map(settled)).collect()
+                }
+            }
+        });
+        Arc::clone(told)
+    }
+
+    /// The same once an obstacle is moved.
+    fn told_without(
+        &self,
+        situation: &Situation,
+        part: &Part,
+        (from, on): (usize, usize),
+        obstacle: usize,
+    ) -> Arc<[f64]> {
+        let kept = || self.told_without.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(told) = kept().get(&[obstacle, from, on]) {
+            return Arc::clone(told);
+        }
+        let moved = &situation.obstacles()[obstacle];
+        let settled = |n: usize| situation.would_settle(from, on, &self.hypotheses[n], Some(moved));
+        let told: Arc<[f64]> = part.all().map(settled).collect();
+        kept().insert([obstacle, from, on], Arc::clone(&told));
+        told
+    }
+
+    /// Hypotheses of a hidden body of a size on some surfaces, each surface with the factor by which it is
+    /// more likely than another, however large they are; uniform on each surface.
+    fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
+        let mut all = 0.0;
+        let mut anywhere = false;
+        let mut hypotheses: Vec<Hypothesis> = Vec::new();
+        let mut parts: BTreeMap<usize, Part> = BTreeMap::new();
+        for &(on, expected) in surfaces {
+            let hidden = Hidden::on(situation, on, size_m);
+            anywhere |= hidden.all == 0 && situation.surfaces[on].outline.is_empty();
+            if hidden.all == 0 {
+                continue;
+            }
+            all += expected;
+            let each = expected / hidden.all as f64;
+            let first = hypotheses.len();
+            let weighted = |h: &Hypothesis| Hypothesis { weight: each * h.weight, ..h.clone() };
+            hypotheses.extend(hidden.hypotheses.iter().map(weighted));
+            let places = first..hypotheses.len();
+            parts.insert(on, Part { hidden: Some(hidden), places, ..Part::default() });
+        }
+        let unseen: f64 = hypotheses.iter().map(|h| h.weight).sum();
+        let open = if anywhere || all == 0.0 { 1.0 } else { unseen / all };
+        let prior = situation.thresholds.prior;
+        let hidden = prior * open / (prior * open + 1.0 - prior);
+        hypotheses.iter_mut().for_each(|h| h.weight *= hidden / unseen);
+        let moves = 1 + situation.belief.tracks.len();
+        Self {
+            hypotheses,
+            hidden,
+            anywhere,
+            parts,
+            told_without: Mutex::default(),
+            within_reach: (0..moves).map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// Adds hypotheses about what was seen.
+    fn suppose(&mut self, more: Vec<Hypothesis>) {
+        for hypothesis in more {
+            self.parts.entry(hypothesis.on).or_default().objects.push(self.hypotheses.len());
+            self.hypotheses.push(hypothesis);
+        }
+    }
+
+    fn scale_hidden(&mut self, factor: f64) {
+        self.hidden *= factor;
+        self.hypotheses.iter_mut().for_each(|h| h.weight *= factor);
+    }
+}
+
+/// Probability below which what can be settled is not worth a look; what can be seen only by moving something asks for less,
+/// since it can be settled in no other way.
+fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
+    if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
+}
+
+/// Volume of a cylinder of the object's height and diameter, cubic metres.
+fn volume_m3((height_m, diameter_m): &(f64, f64)) -> f64 {
+    height_m * diameter_m * diameter_m
+}
+
+/// Height and diameter of a model, metres.
+fn size_m(model: &ObjectModel) -> (f64, f64) {
+    let across = model.diameter_m.or(model.depth_m).map_or(SMALL_M.1, |d| d.middle());
+    (model.height_m.middle(), across)
+}
+
+/// Sides of an object that no view has shown, each with its share of the object's weight.
+fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
+    let Some(on) = situation.surface_of(track) else { return Vec::new() };
+    let centre = middle(&situation.surfaces[on], track);
+    let radius = track.size_m[0].max(track.size_m[1]) / 2.0;
+    let open = open_sides(&situation.surfaces[on], track);
+    let each = weight / open.len().max(1) as f64;
+    let hypothesis = |side: &Vector3<f64>| Hypothesis {
+        weight: each,
+        on,
+        centre,
+        points: vec![centre + side * (radius + 0.02)],
+        facing: Some(*side),
+        ground: Basis::Object,
+    };
+    open.iter().map(hypothesis).collect()
+}
+
+/// Middle of the body of an object on a surface.
+fn middle(surface: &KnownSurface, track: &Track) -> Point3<f64> {
+    track.position_m + surface.up * (track.size_m[2] / 2.0)
+}
+
+/// Sides of an object that no view has shown, as unit vectors away from it.
+fn open_sides(surface: &KnownSurface, track: &Track) -> Vec<Vector3<f64>> {
+    let (e1, e2) = across(surface);
+    let centre = middle(surface, track);
+    let sides = (0..SECTORS).map(|k| {
+        let angle = std::f64::consts::TAU * k as f64 / SECTORS as f64;
+        e1 * angle.cos() + e2 * angle.sin()
+    });
+    let seen_from = |side: &Vector3<f64>| {
+        track
+            .viewpoints_m
+            .iter()
+            .any(|eye| (eye - centre).normalize().dot(side) > std::f64::consts::FRAC_1_SQRT_2)
+    };
+    sides.filter(|side| !seen_from(side)).collect()
+}
+
+/// True if an object was seen from all sides: looks tell no more of what it is.
+pub(crate) fn is_seen_around(situation: &Situation, track: &Track) -> bool {
+    situation.surface_of(track).is_some_and(|on| open_sides(&situation.surfaces[on], track).is_empty())
+}
+
+/// Doubts of a situation, worked out as they are asked for.
+struct Doubts {
+    about: Vec<OnceLock<Doubt>>,
+    on: Vec<OnceLock<Doubt>>,
+    of: Vec<OnceLock<Doubt>>,
+    about_on: Vec<OnceLock<Doubt>>,
+}
+
+impl Situation {
+    fn doubts_kept(&self) -> &Doubts {
+        let (things, surfaces) = (self.things.len(), self.surfaces.len());
+        self.derived.get(&|| Doubts {
+            about: cells(things),
+            on: cells(surfaces),
+            of: cells(self.kinds.len()),
+            about_on: cells(things * surfaces),
+        })
+    }
+
+    /// Everything that is in doubt about what is asked for: things, kinds and surfaces; where nothing is asked for, every surface.
+    pub fn doubts(&self) -> Vec<&Doubt> {
+        let things = (0..self.things.len()).map(|what| self.doubt_about(what));
+        let kinds = (0..self.kinds.len()).map(|of| self.doubt_of(of));
+        let mut doubts: Vec<&Doubt> = things.chain(kinds).collect();
+        doubts.extend(self.asked.iter().map(|&on| self.doubt_on(on)));
+        if doubts.is_empty() {
+            (0..self.surfaces.len()).map(|on| self.doubt_on(on)).collect()
+        } else {
+            doubts
+        }
+    }
+
+    /// Doubt about a thing.
+    pub fn doubt_about(&self, what: usize) -> &Doubt {
+        self.doubts_kept().about[what].get_or_init(|| Doubt::about(self, what))
+    }
+
+    /// Doubt about a thing on one surface.
+    pub fn doubt_about_on(&self, what: usize, on: usize) -> &Doubt {
+        self.doubts_kept().about_on[what * self.surfaces.len() + on]
+            .get_or_init(|| Doubt::about_on(self, what, on))
+    }
+
+    /// Doubt about the members of a kind.
+    pub fn doubt_of(&self, of: usize) -> &Doubt {
+        self.doubts_kept().of[of].get_or_init(|| Doubt::of(self, of))
+    }
+
+    /// Doubt about a surface.
+    pub fn doubt_on(&self, on: usize) -> &Doubt {
+        self.doubts_kept().on[on].get_or_init(|| Doubt::on(self, on))
+    }
+
+    /// True if a look from a candidate may settle a doubt about the requested objects, once an obstacle has
+    /// been moved out of the way.
+    pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
+        let taken = Taken { looks: &[], moved };
+        self.doubts().iter().any(|doubt| doubt.share_settled(self, (from, on), taken) > 0.0)
+    }
+
+    /// True if looks would settle enough doubt once an obstacle were out of the way.
+    pub(crate) fn would_uncover(&self, what: usize) -> bool {
+        self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
+    }
+}

@@ -1,0 +1,148 @@
+//! Objects that hide what no look can show, and how a push would move them.
+
+use std::sync::OnceLock;
+
+use descry_memory::belief::Track;
+use descry_memory::space::Cell;
+use descry_perception::nalgebra::{self, Point2, Point3, Vector3};
+use descry_planner::{Call, CallError};
+use descry_robots::{Place, Push};
+
+use crate::situation::{self, Situation, holding};
+
+/// Distance of a push, metres.
+const DISTANCE_M: f64 = 0.25;
+/// Depth inside its outline at which an object is touched, metres.
+const GRIP_M: f64 = 0.02;
+/// Width or height beyond which an object is not pushed, metres.
+const MOST_M: f64 = 0.5;
+/// Margin around an object within which voxels may be its own, metres.
+const MARGIN_M: f64 = 0.03;
+/// Sideways push with this component towards the body (tangent of the angle), so that the object
+/// leaves its neighbours.
+const OUTWARDS: f64 = 0.5;
+/// Distance between the places along a push at which it is asked whether they are free, metres.
+const STEP_M: f64 = 0.02;
+
+/// An object that may be pushed aside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its PDDL symbol.
+    pub symbol: String,
+    /// The number of its track.
+    pub track: u64,
+    /// The surface that it stands on.
+    pub on: usize,
+    /// Centre of its footprint.
+    pub at: Point3<f64>,
+    /// Unit normal of what it stands on.
+    pub up: Vector3<f64>,
+    /// Radius of the circle around its footprint, and its height, metres.
+    pub radius_m: f64,
+    /// See above.
+    pub height_m: f64,
+}
+
+impl Obstacle {
+    /// True if a point lies within the upright cylinder around it.
+    pub(crate) fn covers(&self, p: &Point3<f64>) -> bool {
+        let d = p - self.at;
+        let above = d.dot(&self.up);
+        above > -MARGIN_M
+            && above < self.height_m + MARGIN_M
+            && (d - self.up * above).norm() < self.radius_m + MARGIN_M
+    }
+
+    /// The radius and the height of the upright cylinder around it in which a push over a distance may change anything, metres.
+    pub fn reach_of_push(&self, distance_m: f64) -> (f64, f64) {
+        (self.radius_m + distance_m + MARGIN_M, self.height_m + MARGIN_M)
+    }
+}
+
+/// The objects behind which something may be hidden that matters and that no look alone can show; none while one can.
+pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
+    let alone = situation.doubts().into_iter().any(|doubt| doubt.can_be_settled(situation));
+    let body = situation.robot.description();
+    if alone || body.arm.is_none() || situation.pushes_left == 0 {
+        return Vec::new();
+    }
+    let small = |t: &&Track| t.size_m.iter().all(|&m| m < MOST_M);
+    let known = |t: &Track| {
+        let on = situation.surface_of(t)?;
+        Some(Obstacle {
+            symbol: format!("object-{}", t.id),
+            track: t.id,
+            on,
+            at: t.position_m,
+            up: situation.surfaces[on].up,
+            radius_m: 0.5 * t.size_m[0].max(t.size_m[1]),
+            height_m: t.size_m[2],
+        })
+    };
+    situation.belief.tracks.iter().filter(small).filter_map(known).collect()
+}
+
+/// The push with which a body at a candidate moves an obstacle aside: it touches the side that faces it and moves that
+/// across its line of sight and a little towards itself, to the side that is freer. None where the arm does not reach.
+pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<Push> {
+    let Place::Pose(base) = &situation.candidates[from].place else { return None };
+    if situation.stuck.contains(&(obstacle.track, from)) {
+        return None;
+    }
+    let towards =
+        Vector3::new(base.x_m - obstacle.at.x, base.y_m - obstacle.at.y, 0.0).try_normalize(1e-9)?;
+    let touched = obstacle.at + towards * (obstacle.radius_m - GRIP_M).max(0.0);
+    let object = touched + obstacle.up * (0.5 * obstacle.height_m);
+    let reach_m = situation.robot.description().reach_m()?;
+    if nalgebra::distance(&object.xy(), &Point2::new(base.x_m, base.y_m)) > reach_m {
+        return None;
+    }
+    let aside = obstacle.up.cross(&towards);
+    let ways = [1.0, -1.0].map(|side| (aside * side + towards * OUTWARDS).normalize());
+    let in_the_way = ways.map(|way| obstructions(situation, obstacle, &touched, &way));
+    let way = if in_the_way[1] < in_the_way[0] { ways[1] } else { ways[0] };
+    Some(Push { object, direction: way.xy(), distance_m: DISTANCE_M })
+}
+
+/// The number of places along a push that are beyond the surface or not known to be free.
+fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, way: &Vector3<f64>) -> usize {
+    let (surface, space) = (&situation.surfaces[obstacle.on], &situation.spaces[obstacle.on]);
+    let steps = ((DISTANCE_M + obstacle.radius_m) / STEP_M) as usize;
+    let blocked = |place: &Point3<f64>| {
+        let free = |level: f64| {
+            let p = place + obstacle.up * (level * obstacle.height_m);
+            obstacle.covers(&p) || space.cell(&p) == Cell::Free
+        };
+        !surface.covers(place, 0.0) || ![0.3, 0.6].into_iter().all(free)
+    };
+    (1..=steps).map(|k| from + way * (k as f64 * STEP_M)).filter(blocked).count()
+}
+
+impl Situation {
+    /// The objects that may be pushed aside to see what they hide; none while looking alone can settle anything.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        let obstacles: &Obstacles = self.derived.get(&Obstacles::default);
+        obstacles.0.get_or_init(|| all(self))
+    }
+
+    /// The obstacle of a symbol.
+    ///
+    /// # Errors
+    /// [`CallError::Failed`] if there is none.
+    pub fn obstacle(&self, name: &str) -> Result<usize, CallError> {
+        situation::find(
+            self.obstacles().iter().map(|o| &o.symbol),
+            name,
+            "something that may be pushed aside",
+        )
+    }
+
+    /// The obstacle that the plan pushes aside before a call, by the `pushed` facts that the call reads.
+    pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
+        holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
+    }
+}
+
+/// Obstacles of a situation.
+#[derive(Default)]
+struct Obstacles(OnceLock<Vec<Obstacle>>);

@@ -1,0 +1,134 @@
+//! Lines of sight: which looks show which surfaces, and how much of a hypothesis they settle.
+
+use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector3};
+use descry_perception::noise::axial_sigma_m;
+
+use crate::belief::hypothesis::Hypothesis;
+use crate::belief::obstacle::Obstacle;
+use crate::situation::Situation;
+
+/// Distance before the middle of a place that may hold something at which the line of sight to it ends,
+/// metres.
+const BEFORE_M: f64 = 0.05;
+/// Distance before it within which something unseen may stand in the way; and the mean free path of sight
+/// through unseen space among the things on a surface, metres.
+const UNSEEN_WITHIN_M: f64 = 0.4;
+const FREE_PATH_M: f64 = 0.5;
+/// A look at a known surface that shows things less clearly than this shows nothing of use: from over three metres for a Kinect.
+const CLEAR_ENOUGH: f64 = 0.1;
+/// Size of the smallest thing that tells objects apart, the wall of a cup's handle, metres.
+const SMALLEST_M: f64 = 0.01;
+/// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
+const SECTOR_COSINE: f64 = 0.5;
+
+impl Situation {
+    /// Pose of the camera if the body stood at a candidate and looked at a surface.
+    pub fn camera(&self, from: usize, on: usize) -> Option<Isometry3<f64>> {
+        *self.geometry.sight(on).cameras[from].get_or_init(|| {
+            let centre = self.surfaces[on].centre();
+            self.robot.camera_at(&self.candidates[from].place, centre.as_ref()).ok()
+        })
+    }
+
+    /// True if a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
+    pub fn sees(&self, from: usize, on: usize) -> bool {
+        self.viewers(on).binary_search(&from).is_ok()
+    }
+
+    /// Candidates from which a look shows any of a surface, in order.
+    pub fn viewers(&self, on: usize) -> &[usize] {
+        let all = || (0..self.candidates.len()).filter(|&from| self.shows(from, on)).collect();
+        self.geometry.sight(on).viewers.get_or_init(all)
+    }
+
+    /// Looks that show anything, each a candidate and a surface, in order.
+    pub fn all_looks(&self) -> Vec<(usize, usize)> {
+        let surfaces = 0..self.surfaces.len();
+        let mut looks: Vec<(usize, usize)> =
+            surfaces.flat_map(|on| self.viewers(on).iter().map(move |&from| (from, on))).collect();
+        looks.sort_unstable();
+        looks
+    }
+
+    fn shows(&self, from: usize, on: usize) -> bool {
+        let surface = &self.surfaces[on];
+        let Some(centre) = surface.centre() else { return true };
+        let Some(camera) = self.camera(from, on) else { return false };
+        let is_charted = self.own_map.has(&surface.symbol);
+        if (surface.whole || is_charted) && self.clearness(from, on) < CLEAR_ENOUGH {
+            return false;
+        }
+        let eye = Point3::from(camera.translation.vector).xy();
+        if is_charted && self.own_map.hides(&eye, &centre.xy()) {
+            return false;
+        }
+        let between = surface.outline.iter().map(|p| halfway(p, &centre));
+        std::iter::once(centre)
+            .chain(surface.outline.iter().copied())
+            .chain(between)
+            .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
+    }
+
+    /// Clearness of a look from a candidate at objects on a surface, 0 to 1: the weight that a depth of its
+    /// noise has (a Kalman gain) where it must tell half of the smallest thing that distinguishes objects.
+    pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
+        let middle = self.camera(from, on).zip(self.surfaces[on].centre());
+        let Some((camera, centre)) = middle else { return 1.0 };
+        let distance_m = (centre - Point3::from(camera.translation.vector)).norm();
+        let sigma_m = axial_sigma_m(distance_m, 0.0).unwrap_or_default();
+        1.0 / (1.0 + (sigma_m / (SMALLEST_M / 2.0)).powi(2))
+    }
+
+    /// True if a point lies in the camera's field of view and range.
+    pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
+        let camera = self.robot.description().camera.as_ref();
+        camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
+    }
+
+    /// Share of a hypothesis that a look from a candidate at a surface would settle, 0 to 1: zero unless most
+    /// of its points are in view and not behind known occupied space (except an obstacle that is moved
+    /// before); else the clearness of the look times the probability that nothing stands in unseen space
+    /// before them.
+    pub(crate) fn would_settle(
+        &self,
+        from: usize,
+        on: usize,
+        hypothesis: &Hypothesis,
+        moved: Option<&Obstacle>,
+    ) -> f64 {
+        let Some(camera) = self.camera(from, on) else { return 0.0 };
+        let eye = Point3::from(camera.translation.vector);
+        if let Some(facing) = &hypothesis.facing {
+            let towards = (eye - hypothesis.centre).normalize();
+            if facing.dot(&towards) < SECTOR_COSINE {
+                return 0.0;
+            }
+        }
+        let gone = |p: &Point3<f64>| moved.is_some_and(|o| o.covers(p));
+        let space = &self.spaces[on];
+        let visible = |p: &&Point3<f64>| {
+            self.in_view(&camera, p)
+                && space.line_of_sight(&eye, p, &gone)
+                && !self.is_walled_off(&eye.xy(), &p.xy())
+        };
+        if hypothesis.points.iter().filter(visible).count() * 2 <= hypothesis.points.len() {
+            return 0.0;
+        }
+        let sum = hypothesis.points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords);
+        let middle = Point3::from(sum / hypothesis.points.len() as f64);
+        let before = middle + (eye - middle).normalize() * BEFORE_M;
+        let unseen_m = space.unseen_m(&eye, &before, UNSEEN_WITHIN_M);
+        self.clearness(from, on) * (-unseen_m / FREE_PATH_M).exp()
+    }
+}
+
+fn halfway(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
+    Point3::from((a.coords + b.coords) / 2.0)
+}
+
+impl Situation {
+    /// True if a wall of the map, or a door that is believed to be shut, stands between two places.
+    pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
+        self.geometry.walls().stand_between(&self.shut, from, to)
+    }
+}

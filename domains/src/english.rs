@@ -1,0 +1,236 @@
+//! English around the words of a domain: courtesies, function words, and verbs that mean the same.
+
+/// Openings that ask, and add nothing to what is asked.
+const OPENINGS: [&str; 28] = [
+    "please",
+    "hey",
+    "hi",
+    "hello",
+    "ok",
+    "okay",
+    "robot",
+    "descry",
+    "now",
+    "could you",
+    "can you",
+    "would you",
+    "will you",
+    "i want you to",
+    "i would like you to",
+    "i need you to",
+    "you should",
+    "go and",
+    "try to",
+    "tell me",
+    "let me know",
+    "do you know",
+    "help me",
+    "help me to",
+    "i want to know",
+    "i would like to know",
+    "can you tell me",
+    "to",
+];
+
+/// Endings that add nothing to what is asked.
+const ENDINGS: [&str; 8] = ["please", "for me", "for us", "thanks", "thank you", "now", "right now", ","];
+
+/// Contractions that occur in requests and questions.
+const CONTRACTIONS: [(&str, &str); 8] = [
+    ("what's", "what is"),
+    ("where's", "where is"),
+    ("which's", "which is"),
+    ("there's", "there is"),
+    ("how's", "how is"),
+    ("i'd", "i would"),
+    ("you'd", "you would"),
+    ("let's", ""),
+];
+
+/// Words and fixed groups of words that request the same.
+const SAME: [&[&str]; 12] = [
+    &["find", "locate", "seek", "look for", "search for", "hunt for"],
+    &["pick up", "grab", "grasp", "take", "lift"],
+    &["bring", "put", "place", "move", "carry", "take", "deliver", "set"],
+    &["to", "on", "onto", "upon", "on top of"],
+    &["in", "inside"],
+    &["all", "every", "each", "all of"],
+    &["identify", "recognise", "recognize", "name"],
+    &["objects", "things", "items"],
+    &["which", "what"],
+    &["learn", "memorise", "memorize"],
+    &["map", "explore", "survey"],
+    &["is", "are"],
+];
+
+/// Words of one field: nearer to each other than to any other, though they request different things.
+const RELATED: [&[&str]; 2] = [
+    &["find", "see", "spot", "show", "locate", "seek", "where", "look for", "search for", "check"],
+    &[
+        "bring", "fetch", "get", "give", "hand", "put", "place", "move", "carry", "pick up", "grab", "take",
+        "drop", "hold", "clear",
+    ],
+];
+
+/// Words before a noun that do not tell which object is meant.
+const DETERMINERS: [&str; 10] = ["the", "any", "an", "a", "my", "our", "your", "some", "both", "either"];
+
+/// The words of a text in lower case, without the signs around them; a comma is a word of its own.
+pub(crate) fn words(said: &str) -> Vec<String> {
+    let mut all = Vec::new();
+    for word in said.split_whitespace() {
+        let plain = bare(word).to_lowercase();
+        all.extend((!plain.is_empty()).then_some(plain));
+        let is_listed = word.trim_end_matches(['"', '\'']).ends_with(',');
+        all.extend(is_listed.then(|| ",".to_string()));
+    }
+    all
+}
+
+/// Words without the commas between them.
+pub(crate) fn unlisted(words: &[String]) -> Vec<String> {
+    words.iter().filter(|word| *word != ",").cloned().collect()
+}
+
+/// A request in plain words: contractions written out, courtesies left out, fixed groups of words joined.
+pub(crate) fn plain(words: &[String]) -> Vec<String> {
+    let written_out = |word: &String| match CONTRACTIONS.iter().find(|(short, _)| short == word) {
+        Some((_, long)) => long.split_whitespace().map(str::to_string).collect(),
+        None => vec![word.clone()],
+    };
+    let words: Vec<String> = words.iter().flat_map(written_out).collect();
+    let mut rest = without_endings(&words);
+    while let Some(opening) = OPENINGS.iter().filter_map(|o| begins(rest, o)).max() {
+        rest = &rest[opening..];
+        while let Some((",", behind)) = rest.split_first().map(|(word, behind)| (word.as_str(), behind)) {
+            rest = behind;
+        }
+    }
+    let mut rest = rest.to_vec();
+    // "find me …", "bring us …"
+    if rest.get(1).is_some_and(|word| word == "me" || word == "us") && rest.len() > 2 {
+        rest.remove(1);
+    }
+    // "pick … up"
+    if rest.len() > 2 && rest[0] == "pick" && rest[rest.len() - 1] == "up" {
+        rest.rotate_right(1);
+        rest.swap(0, 1);
+    }
+    // "whether … is …" asks "is … …".
+    if let Some(at) = rest.iter().position(is_verb).filter(|_| rest[0] == "whether" || rest[0] == "if") {
+        rest[..=at].rotate_right(1);
+        rest.remove(1);
+    }
+    rest.retain(|word| word != "please");
+    joined(&rest)
+}
+
+fn is_verb(word: &String) -> bool {
+    word == "is" || word == "are"
+}
+
+/// Words without the courtesies at their end.
+pub(crate) fn without_endings(words: &[String]) -> &[String] {
+    let mut rest = words;
+    let ends = |rest: &[String], ending: &str| {
+        let ending: Vec<&str> = ending.split(' ').collect();
+        let is_end = rest.len() > ending.len() && rest[rest.len() - ending.len()..] == ending[..];
+        is_end.then_some(ending.len())
+    };
+    while let Some(ending) = ENDINGS.iter().find_map(|e| ends(rest, e)) {
+        rest = &rest[..rest.len() - ending];
+    }
+    rest
+}
+
+fn begins(words: &[String], opening: &str) -> Option<usize> {
+    let opening: Vec<&str> = opening.split(' ').collect();
+    (words.len() > opening.len() && words[..opening.len()] == opening[..]).then_some(opening.len())
+}
+
+/// Fixed groups of words as one word each, the longest first.
+pub(crate) fn joined(words: &[String]) -> Vec<String> {
+    let groups = || SAME.iter().chain(&RELATED).flat_map(|list| list.iter()).filter(|w| w.contains(' '));
+    let mut out: Vec<String> = Vec::new();
+    let mut rest = words;
+    while let Some((first, behind)) = rest.split_first() {
+        let longest = groups().filter_map(|group| begins(rest, group)).max();
+        match longest {
+            Some(n) => {
+                out.push(rest[..n].join(" "));
+                rest = &rest[n..];
+            }
+            None => {
+                out.push(first.clone());
+                rest = behind;
+            }
+        }
+    }
+    out
+}
+
+/// True if two words request the same.
+pub(crate) fn is_same(one: &str, other: &str) -> bool {
+    one == other || in_one(&SAME, one, other)
+}
+
+/// True if two words are of one field.
+pub(crate) fn is_related(one: &str, other: &str) -> bool {
+    is_same(one, other) || in_one(&RELATED, one, other)
+}
+
+fn in_one(lists: &[&[&str]], one: &str, other: &str) -> bool {
+    lists.iter().any(|list| list.contains(&one) && list.contains(&other))
+}
+
+/// A name without the determiners before it.
+pub(crate) fn without_determiners(words: &[String]) -> &[String] {
+    let mut rest = words;
+    while let Some((_, behind)) = rest.split_first().filter(|(word, behind)| {
+        !behind.is_empty() && (DETERMINERS.contains(&word.as_str()) || *word == "the" || *word == "of")
+    }) {
+        rest = behind;
+    }
+    rest
+}
+
+/// True if a name is made of words alone that join and end what is said.
+pub(crate) fn is_function_word(name: &str) -> bool {
+    words(name).iter().all(|word| ["and", "or", "it", "not", "please"].contains(&word.as_str()))
+}
+
+/// The forms of a phrase: as given, and as an indirect question ("where is X": "where X is").
+pub(crate) fn forms(pattern: &[String]) -> Vec<Vec<String>> {
+    let mut indirect = pattern.to_vec();
+    match pattern.iter().position(is_verb) {
+        Some(at) if at > 0 && at + 1 < pattern.len() => indirect.swap(at, at + 1),
+        _ => return vec![indirect],
+    }
+    vec![pattern.to_vec(), indirect]
+}
+
+/// A word without the signs around it.
+pub(crate) fn bare(word: &str) -> &str {
+    word.trim_matches(|c: char| "\"'.,!?".contains(c))
+}
+
+pub(crate) fn without_article(name: &str) -> &str {
+    ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
+}
+
+/// One of something, with its article: a cup, an apple.
+pub fn one(name: &str) -> String {
+    let is_vowel = name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']);
+    format!("{} {name}", if is_vowel { "an" } else { "a" })
+}
+
+/// Several of something: cups, boxes, berries.
+pub fn plural(name: &str) -> String {
+    const HISSING: [&str; 5] = ["s", "x", "z", "ch", "sh"];
+    let before_y = name.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u']));
+    match before_y.filter(|stem| !stem.is_empty()) {
+        Some(stem) => format!("{stem}ies"),
+        None if HISSING.iter().any(|end| name.ends_with(end)) => format!("{name}es"),
+        None => format!("{name}s"),
+    }
+}

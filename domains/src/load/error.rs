@@ -1,0 +1,42 @@
+//! Reasons why a domain's folder could not be loaded.
+
+use descry_planner::Findings;
+
+/// The reason a domain's folder could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// Neither a built-in name nor a folder.
+    #[error(
+        "there is no domain \"{name}\"\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
+    )]
+    NoDomain {
+        /// The requested domain.
+        name: String,
+        /// The built-in domains.
+        known: String,
+    },
+    /// A file could not be read.
+    #[error("{path}: {because}\n  expected: {expected}")]
+    File {
+        /// The file.
+        path: String,
+        /// Error of the operating system.
+        because: String,
+        /// Expected content.
+        expected: &'static str,
+    },
+    /// A TOML file says what cannot be understood; the drawing points at the place.
+    #[error("{path}\n{drawn}")]
+    Toml {
+        /// The file.
+        path: String,
+        /// The error under the text.
+        drawn: String,
+    },
+    /// The PDDL text has faults, or a value of `domain.toml` lies outside what makes sense.
+    #[error("{}", .findings.render(false))]
+    Findings {
+        /// Each with its place.
+        findings: Findings,
+    },
+}

@@ -1,0 +1,24 @@
+//! Contradictions between looks and the map.
+
+use descry_perception::consistency::Fault;
+
+/// A reason why the looks at a surface prove nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Contradiction {
+    /// Camera or poses are not as stated.
+    Fault(Fault),
+    /// As many views as agree cannot be where they are said to be.
+    Apart,
+}
+
+impl Contradiction {
+    /// The contradiction in a sentence, with the surface by name.
+    pub fn told(&self, surface: &str) -> String {
+        match self {
+            Contradiction::Fault(fault) => {
+                format!("what the looks show of the {surface} contradicts the map: {fault}")
+            }
+            Contradiction::Apart => format!("too few views of the {surface} can be laid on each other"),
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Surfaces that no map knows: which of those in view is the one that was looked at, and which are others.
+//!
+//! Without a map a look shows whatever stands in front of the camera. Each surface to stand things on is one of its own, with its
+//! own views, belief and space: what is asked for may be on any of them.
+
+use std::sync::Arc;
+
+use descry_perception::merge::Merged;
+use descry_perception::nalgebra::Point3;
+use descry_perception::surface::{Role, Surface, SurfaceError, SurfaceOptions, best, find_surfaces};
+
+use crate::mind::{Mind, Region};
+use crate::note::Note;
+use crate::surface::KnownSurface;
+use crate::symbol::symbol;
+
+/// Least area of a surface that is taken up beside the one that is looked at, square metres.
+const LEAST_M2: f64 = 0.1;
+/// Height difference below which two surfaces are level with each other, metres.
+const LEVEL_M: f64 = 0.08;
+/// Distance beside an outline within which the middle of another part of the same surface may lie, metres.
+const BESIDE_M: f64 = 0.05;
+/// Names of the further ones.
+const ORDINALS: [&str; 9] =
+    ["second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
+
+/// The surface that is looked at, and the others to stand things on that are in view. As long as nothing is known of the former it is
+/// the best of all that no other is known to be.
+pub(super) fn look(
+    merged: &Merged,
+    options: &SurfaceOptions,
+    surfaces: &[KnownSurface],
+    on: usize,
+) -> Result<(Surface, Vec<Surface>), SurfaceError> {
+    let found = find_surfaces(&merged.cloud, &merged.visibility, options)?;
+    let is_known_as = |s: &Surface, n: usize| is_one(s, &surfaces[n]);
+    let (mut others, here): (Vec<Surface>, Vec<Surface>) = match surfaces[on].outline.is_empty() {
+        true => found.into_iter().partition(|s| (0..surfaces.len()).any(|n| n != on && is_known_as(s, n))),
+        false => found.into_iter().partition(|s| !is_known_as(s, on)),
+    };
+    let surface = best(here.clone(), options)?;
+    others.extend(here.into_iter().filter(|s| surfaces[on].outline.is_empty() && *s != surface));
+    others.retain(|s| s.role == Role::Support && s.area_m2 >= LEAST_M2);
+    Ok((surface, others))
+}
+
+/// Takes up what was found beside a surface that is looked at, with its views; returns which surfaces are new.
+pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mut Vec<Note>) -> Vec<usize> {
+    let fresh = |s: &Surface, mind: &Mind| !mind.known.surfaces.iter().any(|known| is_one(s, known));
+    let mut new = Vec::new();
+    for surface in others {
+        if !fresh(&surface, mind) {
+            continue;
+        }
+        let number = mind.known.surfaces.len();
+        let first = mind.known.surfaces[0].name.clone();
+        let name = match ORDINALS.get(number - 1) {
+            Some(ordinal) => format!("{ordinal} {first}"),
+            None => format!("{first} {}", number + 1),
+        };
+        let known = KnownSurface {
+            symbol: symbol(&name),
+            name: name.clone(),
+            room: None,
+            floor: Vec::new(),
+            outline: surface.hull.clone(),
+            up: surface.up.into_inner(),
+            whole: false,
+            doubtful: None,
+            placed: None,
+            displaced_m: 0.0,
+        };
+        let at = known.centre().unwrap_or_else(Point3::origin);
+        notes.push(Note::Surface { name, at_m: at.into(), area_m2: surface.area_m2 });
+        let looked_from: Vec<String> = mind
+            .words
+            .instances("observed")
+            .filter(|a| a.get(1).is_some_and(|s| *s == mind.known.surfaces[on].symbol))
+            .filter_map(|a| a.first().cloned())
+            .collect();
+        for from in looked_from {
+            mind.words.set("observed", vec![from, known.symbol.clone()], Some(1.0));
+        }
+        mind.known.surfaces.push(known);
+        mind.known.spaces.push(Arc::default());
+        let seen = &mind.regions[on];
+        let region = Region { looks: seen.looks.clone(), taken: seen.taken, ..Region::default() };
+        mind.regions.push(region);
+        new.push(number);
+    }
+    mind.attend();
+    new
+}
+
+/// Two of those taken up may turn out to be one: the later is given up, and what stood on it is looked for on the other.
+pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
+    let known = &mind.known.surfaces;
+    let Some(last) = (on + 1..known.len()).rev().find(|&n| !known[n].whole && is_one(surface, &known[n]))
+    else {
+        return;
+    };
+    // A later one is known by no index but its own: those that the goal names come first.
+    let gone = mind.known.surfaces.remove(last);
+    mind.known.spaces.remove(last);
+    mind.regions.remove(last);
+    mind.forget_looks(Some(&gone.symbol));
+    let into = mind.known.surfaces[on].symbol.clone();
+    let belief = Arc::make_mut(&mut mind.known.belief);
+    belief.tracks.iter_mut().filter(|t| t.on == gone.symbol).for_each(|t| t.on.clone_from(&into));
+    mind.attend();
+}
+
+/// True if a found surface is a known one: level with it, and overlapping it.
+fn is_one(found: &Surface, known: &KnownSurface) -> bool {
+    let Some(centre) = known.centre() else { return false };
+    let middle = found.surface_from_world.inverse() * Point3::origin();
+    known.up.dot(&(middle - centre)).abs() < LEVEL_M
+        && (found.covers(&centre, BESIDE_M) || known.covers(&middle, BESIDE_M))
+}

@@ -1,0 +1,79 @@
+//! Options for merging views and segmenting the merged cloud.
+
+use descry_perception::View;
+use descry_perception::merge::{MergeError, MergeOptions, Merged};
+use descry_perception::nalgebra::Unit;
+use descry_perception::segment::SceneOptions;
+use descry_perception::surface::{Region, SurfaceOptions};
+use descry_robots::Robot;
+
+use crate::mind::{LastMerged, Mind};
+use crate::surface::KnownSurface;
+use crate::symbol::symbol;
+
+/// Height band around a surface of the map in which points are merged, metres.
+const HEIGHT_TOLERANCE_M: f64 = 0.15;
+/// Height difference within which a level surface is that of the map, metres: beyond it, the surface is
+/// another, or the body is lost.
+const SAME_HEIGHT_M: f64 = 0.08;
+/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
+/// steeper plane cuts through the wall behind a board and through what stands on it.
+const LEVEL_RAD: f64 = 0.045;
+/// Margin around the outline on the map in which points of a surface may lie, metres: localisation errs by
+/// centimetres and degrees.
+const BESIDE_M: f64 = 0.25;
+
+/// Options for merging and segmenting a body's views of a surface (a symbol; none: of any). The search is
+/// limited to the height of the surface on the map, if known, and to objects that can stand on it; without
+/// any map, everything in range is merged.
+pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
+    let up = robot.description().up.map(Unit::new_normalize);
+    let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
+    let band = asked.map(|hint| hint.height_m).fold(None, |band: Option<(f64, f64)>, h| {
+        let (low, high) = band.unwrap_or((h, h));
+        Some((low.min(h), high.max(h)))
+    });
+    let within = |m: f64| band.map(|(low, high)| (low - m, high + m));
+    let surface = SurfaceOptions { up, height_band_m: within(SAME_HEIGHT_M), ..SurfaceOptions::default() };
+    let scene = SceneOptions { surface, ..SceneOptions::default() };
+    let height_band_m = within(HEIGHT_TOLERANCE_M).map(|(low, high)| (low, high + scene.tallest_m));
+    (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
+}
+
+/// The same for one surface: one that the map has is merged and looked for where its outline is, and one that was seen faces up as it was seen
+/// to, where the body does not say which way is up.
+pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
+    let (merging, mut seeking) = options(robot, Some(&known.symbol));
+    if !known.whole {
+        let is_told = !known.outline.is_empty() && known.doubtful.is_none();
+        let seen_up = is_told.then(|| Unit::new_normalize(known.up));
+        seeking.surface.up = seeking.surface.up.or(seen_up);
+        return (merging, seeking);
+    }
+    let region = Some(Region { corners: known.outline.clone(), margin_m: BESIDE_M });
+    let surface = SurfaceOptions { region: region.clone(), tilt_rad: LEVEL_RAD, ..seeking.surface };
+    (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
+}
+
+/// The views of a surface in one cloud. Without a map one view is of all surfaces in it: what the last of them was made of is had again.
+pub(super) fn merged(
+    mind: &mut Mind,
+    on: usize,
+    views: &[View],
+    options: &MergeOptions,
+) -> Result<Merged, MergeError> {
+    let taken: Vec<_> = views.iter().map(|view| (view.stamp_ns, view.world_from_camera)).collect();
+    if let Some(last) = mind.merged.as_ref().filter(|last| last.views == taken && last.options == *options) {
+        return Ok(last.merged.clone());
+    }
+    let merged = mind.regions[on].merger.merge(views, options)?;
+    let kept = || LastMerged { options: options.clone(), views: taken, merged: merged.clone() };
+    mind.merged = (!mind.known.surfaces[on].whole).then(kept);
+    Ok(merged)
+}
+
+/// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
+pub(super) fn without_walls(known: &KnownSurface, mut merged: Merged) -> Merged {
+    merged.cloud = merged.cloud.filter(|p| !known.is_of_wall(&p.cast(), 0.0));
+    merged
+}

@@ -1,0 +1,14 @@
+//! Looking: where from, and how views become belief.
+
+pub mod candidates;
+pub mod change;
+mod consistent;
+pub mod contradiction;
+mod discover;
+pub mod looks;
+pub(crate) mod merging;
+pub mod perceive;
+pub(crate) mod placing;
+pub(crate) mod recording;
+#[doc(hidden)]
+pub mod vanished;

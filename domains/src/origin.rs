@@ -1,0 +1,59 @@
+//! Origins of the values of words: abilities, programs, the domain itself.
+
+use crate::abilities;
+use crate::ability::Fact;
+use crate::config::Source as Kept;
+use crate::load::Domain;
+use crate::vocabulary::Word;
+
+/// The source of a word's value in a run.
+#[derive(Debug, Clone, Copy)]
+pub enum Origin {
+    /// A fact of an ability states it, from what is known now.
+    Sensed(&'static Fact),
+    /// A program states it.
+    SensedByProgram,
+    /// It starts as the domain or the store says and changes as the effects of carried-out actions say.
+    Remembered,
+    /// It never changes.
+    Fixed,
+    /// It changes within a plan alone.
+    Planned,
+    /// The domain's own rules derive it.
+    Derived,
+}
+
+/// The source of a word's value.
+pub fn of(domain: &Domain, word: &Word) -> Origin {
+    let config = &domain.config;
+    let configured = config.word.get(&word.name);
+    if word.is_derived {
+        return Origin::Derived;
+    }
+    if configured.is_some_and(|c| c.program.is_some()) {
+        return Origin::SensedByProgram;
+    }
+    match (configured.and_then(|c| c.is), abilities::fact(&config.uses, &word.name)) {
+        (Some(Kept::Remembered), _) => Origin::Remembered,
+        (Some(Kept::Fixed), _) => Origin::Fixed,
+        (Some(Kept::Planned), _) => Origin::Planned,
+        (None, Some(fact)) => Origin::Sensed(fact),
+        (None, None) if domain.vocabulary.is_changed(&word.name) => Origin::Remembered,
+        (None, None) if config.action.values().any(|a| a.taught().any(|t| t == word.name)) => {
+            Origin::Remembered
+        }
+        (None, None) => Origin::Fixed,
+    }
+}
+
+/// The names of the words of a domain that are remembered, and of those that are fixed.
+pub fn remembered(domain: &Domain) -> Vec<String> {
+    let vocabulary = &domain.vocabulary;
+    let is_remembered = |w: &Word| matches!(of(domain, w), Origin::Remembered);
+    vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
+}
+
+/// True if an ability or a program states the value of a word.
+pub fn is_sensed(domain: &Domain, word: &Word) -> bool {
+    matches!(of(domain, word), Origin::Sensed(_) | Origin::SensedByProgram)
+}

@@ -1,7 +1,12 @@
 //! The invariants of ARCHITECTURE.md that can be read off the source.
 
+mod modules;
+
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+use modules::{Modules, public_types};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the workspace holds this crate").to_path_buf()
@@ -340,6 +345,95 @@ fn no_crate_parses_sentences_of_our_own() {
         let code = fs::read_to_string(root().join(script)).expect("a script is text");
         for reading in [".match(", ".matchAll(", ".split(", ".replace(", ".search(", "new RegExp"] {
             assert!(!code.contains(reading), "{script} takes a text apart: {reading}");
+        }
+    }
+}
+
+/// Crates, and how many modules of each may lead to each other in a circle: six, or as many as there are where it is more.
+const CIRCLES: [(&str, usize); 10] = [
+    ("domains", 6),
+    ("agent", 6),
+    ("explain", 6),
+    ("pages", 6),
+    ("experiments", 6),
+    ("skills", 6),
+    ("memory", 6),
+    ("perception", 10),
+    ("robots", 16),
+    ("planner", 22),
+];
+
+fn modules_of(package: &str) -> Modules {
+    let folder = root().join(package).join("src");
+    Modules::of(&folder, &sources(&folder))
+}
+
+#[test]
+fn no_circle_of_modules_is_above_six() {
+    for (package, most) in CIRCLES {
+        let modules = modules_of(package);
+        let circle = modules.largest_circle();
+        let drawn = || modules.drawn(&circle);
+        assert!(circle.len() <= most, "{package} has a circle of {} modules:\n{}", circle.len(), drawn());
+    }
+}
+
+#[test]
+fn public_type_names_are_unique_in_a_crate() {
+    for package in ["domains", "agent", "explain"] {
+        let mut declared: BTreeMap<String, PathBuf> = BTreeMap::new();
+        for file in sources(&root().join(package).join("src")) {
+            for name in public_types(&file) {
+                if let Some(other) = declared.insert(name.clone(), file.clone()) {
+                    panic!("{name} is declared in {} and in {}", other.display(), file.display());
+                }
+            }
+        }
+    }
+}
+
+/// Layers of `domains`, from below, each with the modules that begin so.
+const LAYERS: [(&str, &str); 4] = [
+    (
+        "language",
+        "config declared english function lexicon load mentions no_plan note objective past program programs slots \
+         symbol template toml_place vocabulary words",
+    ),
+    (
+        "world model",
+        "ability belief conclusion drive error eyes geometry known looking mind own_map range reasons round \
+         situation states surface viewpoint walls",
+    ),
+    ("abilities", "abilities"),
+    ("agent's view", "actions answer asked check culprit goal judge lesson origin saying world"),
+];
+
+/// Number of the layer that a module of `domains` lies in.
+fn layer(module: &str) -> usize {
+    let first = module.split("::").next().unwrap_or_default();
+    let found = LAYERS.iter().position(|(_, modules)| modules.split_whitespace().any(|name| name == first));
+    found.unwrap_or_else(|| panic!("{module} is in no layer of domains: see LAYERS"))
+}
+
+#[test]
+fn a_layer_of_domains_uses_only_those_below() {
+    for (module, others) in modules_of("domains").each().filter(|(module, _)| !module.is_empty()) {
+        for other in others.iter().filter(|other| !other.is_empty()) {
+            let (own, used) = (layer(module), layer(other));
+            assert!(used <= own, "{module} ({}) uses {other} ({})", LAYERS[own].0, LAYERS[used].0);
+        }
+    }
+}
+
+#[test]
+fn no_ability_knows_another() {
+    let ability = |module: &str| module.strip_prefix("abilities::")?.split("::").next().map(str::to_string);
+    for (module, others) in modules_of("domains").each() {
+        let Some(own) = ability(module) else { continue };
+        for other in others {
+            assert!(other != "abilities", "{module} knows the list of abilities");
+            let is_own = ability(other).is_none_or(|name| name == own);
+            assert!(is_own, "{module} uses {other}");
         }
     }
 }

@@ -43,6 +43,7 @@ pub use pddl::{check, nearest};
 pub use plan::{EPSILON_S, Plan, Step, number_text};
 pub use search::portfolio;
 pub use semantics::Semantics;
+pub use solve::optimal::plan_optimally;
 pub use solve::plan;
 pub use state::State;
 pub use task::Task;

@@ -48,6 +48,8 @@ pub struct Statistics {
     pub actions: u64,
     /// Set where the plan is proven to be best, those in which an action overlaps itself among them.
     pub optimal: bool,
+    /// Proven bound on the metric, or on the number of steps without one, where it was asked for: no plan has a better value.
+    pub lower_bound: Option<f64>,
     /// Set where the task has preferences that no search looked for: those that the metric does not count, or that ask for
     /// times or attachments. They only score plans.
     pub scored_only: bool,

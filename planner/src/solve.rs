@@ -1,5 +1,7 @@
 //! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
 
+pub(crate) mod optimal;
+
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,7 +41,18 @@ pub fn plan(
         return Ok(Outcome::Unsolvable { why, statistics: Statistics::default() });
     }
     let outcome = search(task, attachments, options, stop, on_plan)?;
-    let mut outcome = on_the_way(task, attachments, options, stop, outcome);
+    let outcome = on_the_way(task, attachments, options, stop, outcome);
+    Ok(with_culprits(task, attachments, options, stop, outcome))
+}
+
+/// Narrows the reason of an unsolvable task down to the parts of its goal that are to blame.
+fn with_culprits(
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+    mut outcome: Outcome,
+) -> Outcome {
     if let Outcome::Unsolvable { why, statistics } = &mut outcome
         && options.bound.is_none()
         && task.modules.is_empty()
@@ -61,7 +74,7 @@ pub fn plan(
             *why = narrowed.but_for(task, &overlapping);
         }
     }
-    Ok(outcome)
+    outcome
 }
 
 /// Maximum number of ground actions up to which an unsolvable goal is split to find the conflicting

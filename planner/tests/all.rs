@@ -12,6 +12,7 @@ mod linear;
 mod modules;
 mod numeric;
 mod objects;
+mod optimal;
 mod preferences;
 mod reading;
 mod solving;

@@ -1,6 +1,7 @@
 //! Planner, validator and monitor beside a second, plain account of what PDDL means, on random small tasks.
 
 mod generate;
+mod optimal;
 mod oracle;
 mod task;
 

@@ -37,6 +37,9 @@ pub struct Arguments {
     /// End with the first plan, as the search has found it
     #[arg(long, conflicts_with = "anytime")]
     first: bool,
+    /// Prove that no plan is better, or say none at all: A* with LM-cut, where actions take no time. Says the bound while it goes on
+    #[arg(long, conflicts_with_all = ["anytime", "first", "threads"])]
+    optimal: bool,
     /// Print the searches that are tried where actions take no time: engine, heuristics, shares of work, and what their ends prove
     #[arg(long)]
     portfolio: bool,
@@ -97,25 +100,11 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         memory_used: used_bytes().map(|_| (|| used_bytes().unwrap_or(0)) as fn() -> u64),
         ..descry_planner::Options::default()
     };
-    let mut unwritten = Ok(());
-    let mut endless = None;
-    let mut on_plan = |plan: &Plan| {
-        if let Some(path) = &arguments.out {
-            unwritten = write_plan(path, plan);
-        }
-        if arguments.anytime && !arguments.json {
-            input::narrate(&format!("{:8.2} s: {}", started.elapsed().as_secs_f64(), summary(plan)));
-        }
-        if arguments.anytime && endless.is_none() {
-            endless = ever_better(&task, &attachments, plan);
-            endless.iter().filter(|_| !arguments.json).for_each(|said| input::narrate(said));
-        }
-    };
-    let outcome = match descry_planner::plan(&task, &attachments, &options, &stop, &mut on_plan) {
+    let (found, endless) = searched(arguments, &task, &attachments, &options, started, &stop)?;
+    let outcome = match found {
         Err(PlanError::Untried(findings)) => return untried(&findings, arguments.json, started),
         other => other.map_err(failed)?,
     };
-    unwritten?;
     let signal = is_asked().then(|| told.signal());
     let (status, exit) = match &outcome {
         Outcome::Solved { .. } => (Status::Solved, Exit::Done),
@@ -146,12 +135,67 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
         print_json((status, endless), &outcome, answer.as_ref(), started)?;
     } else {
         let cut = signal.map(|_| "stopped").or_else(|| stop().then_some("out of time"));
-        show(&status, &outcome, arguments.out.is_some(), started, cut)?;
+        show(&task, &status, &outcome, arguments.out.is_some(), started, cut)?;
         if let Some(answer) = answer {
             input::narrate_fitted(&answer.said(outcome.plan()));
         }
     }
     Ok(signal.map_or(exit, Exit::of_signal))
+}
+
+/// Searches for a plan, and says on the way what was found or proven so far. Tells besides whether the metric has no best value.
+fn searched(
+    arguments: &Arguments,
+    task: &Task,
+    attachments: &Attachments,
+    options: &descry_planner::Options,
+    started: Instant,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<(Result<Outcome, PlanError>, Option<String>), CommandError> {
+    let told = |said: &str| match arguments.json {
+        true => (),
+        false => input::narrate(&format!("{:8.2} s: {said}", started.elapsed().as_secs_f64())),
+    };
+    if arguments.optimal {
+        let mut told_at: Option<Instant> = None;
+        let mut on_bound = |bound: f64| {
+            if told_at.is_none_or(|told_at| told_at.elapsed() >= BETWEEN_BOUNDS) {
+                told_at = Some(Instant::now());
+                told(&bounded(task, bound));
+            }
+        };
+        let found = descry_planner::plan_optimally(task, attachments, options, stop, &mut on_bound);
+        return Ok((found, None));
+    }
+    let (mut unwritten, mut endless) = (Ok(()), None);
+    let mut on_plan = |plan: &Plan| {
+        if let Some(path) = &arguments.out {
+            unwritten = write_plan(path, plan);
+        }
+        if arguments.anytime {
+            told(&summary(plan));
+        }
+        if arguments.anytime && endless.is_none() {
+            endless = ever_better(task, attachments, plan);
+            endless.iter().filter(|_| !arguments.json).for_each(|said| input::narrate(said));
+        }
+    };
+    let found = descry_planner::plan(task, attachments, options, stop, &mut on_plan);
+    unwritten?;
+    Ok((found, endless))
+}
+
+/// Time between two bounds that are said.
+const BETWEEN_BOUNDS: Duration = Duration::from_secs(1);
+
+/// A proven bound on the metric, or on the number of steps.
+fn bounded(task: &Task, bound: f64) -> String {
+    let bound = number_text(bound);
+    match &task.metric {
+        None => format!("no plan has fewer than {bound} steps"),
+        Some(metric) if metric.minimise => format!("no plan costs less than {bound}"),
+        Some(_) => format!("no plan has a metric above {bound}"),
+    }
 }
 
 /// Prints the searches for a first plan and their turns.
@@ -255,7 +299,7 @@ fn print_json(
         Outcome::Unsolvable { why, .. } => Some(why),
         _ => None,
     };
-    let Statistics { evaluated, expanded, plans, actions, optimal, scored_only, attachments } =
+    let Statistics { evaluated, expanded, plans, actions, optimal, lower_bound, scored_only, attachments } =
         outcome.statistics();
     let mut said = json!({
         "status": status,
@@ -268,6 +312,7 @@ fn print_json(
         "plans": plans,
         "actions": actions,
         "optimal": optimal,
+        "lower_bound": lower_bound,
         "scored_only": scored_only,
         "endless": endless,
         "attachments": attachments,
@@ -286,6 +331,7 @@ fn print_json(
 }
 
 fn show(
+    task: &Task,
     status: &Status,
     outcome: &Outcome,
     written: bool,
@@ -297,6 +343,7 @@ fn show(
         started.elapsed().as_secs_f64(),
         outcome.statistics().evaluated
     );
+    let bound = outcome.statistics().lower_bound.map_or(String::new(), |b| format!("; {}", bounded(task, b)));
     match (outcome, outcome.plan()) {
         (Outcome::Unsolvable { why, .. }, _) => {
             let but_for = match why.overlapping.is_empty() {
@@ -316,7 +363,8 @@ fn show(
             if !written {
                 input::print_text(plan.to_string().trim_end())?;
             }
-            input::narrate(&format!("{} ({time})", summary(plan)));
+            let proof = if outcome.statistics().optimal { ", proven optimal" } else { "" };
+            input::narrate(&format!("{}{proof} ({time})", summary(plan)));
             if outcome.statistics().scored_only {
                 input::narrate(
                     "  not every preference was planned for: those that the metric does not count, and \
@@ -325,10 +373,10 @@ fn show(
             }
         }
         _ if matches!(status, Status::OutOfMemory) => {
-            input::narrate(&format!("out of memory, no plan yet ({time})"))
+            input::narrate(&format!("out of memory, no plan yet{bound} ({time})"))
         }
         _ => input::narrate(&match cut {
-            Some(cut) => format!("{cut}, no plan yet ({time})"),
+            Some(cut) => format!("{cut}, no plan yet{bound} ({time})"),
             None => {
                 format!(
                     "no plan was found, and none is ruled out: the search has left possibilities out ({time})"

@@ -401,6 +401,20 @@ impl Compiled {
         self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(exact)
     }
 
+    /// True if the search counts costs as the metric does, but for their scale.
+    pub(crate) fn has_proportional_costs(&self) -> bool {
+        let proportional = |(&counted, &exact): (&u32, &f64)| {
+            let scaled = exact * self.cost_scale;
+            (f64::from(counted) - scaled).abs() < WHOLE * scaled.max(1.0)
+        };
+        self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(proportional)
+    }
+
+    /// A cost of the search's in the metric's unit.
+    pub(crate) fn unscaled(&self, cost: u32) -> f64 {
+        f64::from(cost) / self.cost_scale
+    }
+
     /// The cost of a plan as the search counts.
     pub(crate) fn search_cost(&self, plan: &[u32]) -> u32 {
         plan.iter().fold(0, |sum, &op| self.with_cost(sum, op))

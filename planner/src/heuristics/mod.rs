@@ -2,6 +2,7 @@
 
 #[doc(hidden)]
 pub mod intervals;
+pub(crate) mod landmark_cut;
 #[doc(hidden)]
 pub mod landmarks;
 pub(crate) mod queue;

@@ -69,7 +69,7 @@ pub(crate) fn plan_classical(
 }
 
 /// The plan in the words of the task.
-fn named(task: &Task, grounded: &GroundTask, operators: &[u32]) -> Plan {
+pub(crate) fn named(task: &Task, grounded: &GroundTask, operators: &[u32]) -> Plan {
     let steps = operators.iter().map(|&operator| {
         let origin = &grounded.actions[operator as usize].origin;
         Step {

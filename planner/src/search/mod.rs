@@ -2,6 +2,7 @@
 
 #[doc(hidden)]
 pub mod abreast;
+pub(crate) mod astar;
 pub(crate) mod classical;
 #[doc(hidden)]
 pub mod horizon;

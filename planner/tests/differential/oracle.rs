@@ -1,7 +1,8 @@
 //! Reference implementation of the semantics, written a second time as plainly as possible, with exhaustive
 //! searches.
 
-use std::collections::{HashMap, VecDeque};
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap, HashSet, VecDeque};
 
 use super::generate::tuples;
 use super::task::{Change, Effect, Formula, Named, Number, Task, Term};
@@ -50,6 +51,17 @@ enum Event<'s> {
 #[derive(Debug)]
 pub enum Found {
     Plan(Vec<Step>),
+    /// Everything was seen.
+    Nothing,
+    /// There is more than was looked at.
+    Unknown,
+}
+
+/// Result of a uniform-cost search.
+#[derive(Debug)]
+pub enum Cheapest {
+    /// The metric of the best plan, or its steps without one.
+    Cost(f64),
     /// Everything was seen.
     Nothing,
     /// There is more than was looked at.
@@ -389,6 +401,43 @@ impl<'t> Oracle<'t> {
             }
         }
         if all { Found::Nothing } else { Found::Unknown }
+    }
+
+    /// The cost of the cheapest plan without times. Nothing but the metric reads the function that it is.
+    pub fn cheapest(&self, most: usize) -> Cheapest {
+        let cost = |state: &State, steps: usize| self.metric(state).unwrap_or(steps as f64);
+        // Costs are halves.
+        let in_halves = |cost: f64| (2.0 * cost).round() as u64;
+        let place = |world: &World| {
+            let mut state = world.state.clone();
+            if self.task.metric.is_some() {
+                state.numbers.pop();
+            }
+            key(&state)
+        };
+        let mut worlds = vec![(World { state: self.initial(), running: Vec::new() }, 0)];
+        let mut queue = BinaryHeap::from([(Reverse(0), 0)]);
+        let mut closed = HashSet::new();
+        while let Some((_, index)) = queue.pop() {
+            let (world, steps) = worlds[index].clone();
+            if !closed.insert(place(&world)) {
+                continue;
+            }
+            if self.is_goal(&world.state) {
+                return Cheapest::Cost(cost(&world.state, steps));
+            }
+            if closed.len() >= most {
+                return Cheapest::Unknown;
+            }
+            for (action, arguments) in &self.instances {
+                let (action, arguments) = (*action, arguments.clone());
+                let step = Step { start_s: steps as f64, action, arguments, duration_s: 0.0 };
+                let Some(next) = self.happen(&world, &[Event::Start(0, &step)]) else { continue };
+                queue.push((Reverse(in_halves(cost(&next.state, steps + 1))), worlds.len()));
+                worlds.push((next, steps + 1));
+            }
+        }
+        Cheapest::Nothing
     }
 
     /// Some plan with times: what starts, starts a little after what happened last.

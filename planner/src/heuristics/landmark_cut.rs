@@ -1,0 +1,322 @@
+//! LM-cut, an admissible heuristic: the costs of action landmarks that are cuts of justification graphs of h_max
+//! (Helmert and Domshlak 2009).
+//!
+//! Conditional effects are operators of their own that share one cost (Röger, Pommerening and Helmert 2014), axioms cost nothing
+//! and derived facts may always be false. A numeric condition that does not hold takes one change of a number that it reads.
+
+use crate::classical::compiled::{Compiled, Lists};
+use crate::ground::Fact;
+
+use super::queue::RadixHeap;
+
+/// No fact, no operator, no cost.
+const NONE: u32 = u32::MAX;
+
+/// Relaxed operator during an evaluation: an operator's unconditional effects, one conditional effect, or an axiom.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Preconditions not reached yet.
+    open: u32,
+    /// Precondition of the greatest h_max; `NONE` until all are reached.
+    supporter: u32,
+    /// h_max of the supporter.
+    supported: u32,
+    /// Cost that no landmark has taken yet.
+    left: u32,
+}
+
+/// The heuristic with its working memory.
+pub struct LandmarkCut {
+    preconditions: Lists<u32>,
+    effects: Lists<u32>,
+    /// Operator of each node; `NONE` for an axiom.
+    operators: Vec<u32>,
+    /// Nodes of each operator.
+    parts: Lists<u32>,
+    /// Nodes with a precondition, by fact.
+    waiting: Lists<u32>,
+    /// Nodes with an effect, by fact.
+    achievers: Lists<u32>,
+    /// Facts that hold in every relaxed state: absences of derived facts, and the precondition of nodes without one.
+    always: Vec<u32>,
+    /// The fact that all goals hold.
+    goal: u32,
+    /// Nodes before an evaluation.
+    fresh: Vec<Node>,
+    nodes: Vec<Node>,
+    /// h_max by fact.
+    costs: Vec<u32>,
+    heap: RadixHeap,
+    /// Zone of each fact in the justification graph, as a stamp of the current cut.
+    zones: Vec<u32>,
+    stamp: u32,
+    stack: Vec<u32>,
+    /// Operators of the current cut.
+    cut: Vec<u32>,
+}
+
+impl LandmarkCut {
+    /// The heuristic of a task, by the search's costs.
+    pub fn new(task: &Compiled) -> LandmarkCut {
+        let mut build = Build::new(task);
+        (0..task.operators()).for_each(|operator| build.operator(operator));
+        for (axiom, &head) in task.axiom_heads.iter().enumerate() {
+            build.node(task.axiom_bodies.get(axiom), vec![task.id(head)], NONE);
+        }
+        build.finish()
+    }
+
+    /// A lower bound on the cost of all plans from a state; `None` if there is none even without delete effects. Once `stop`
+    /// says true, the bound of the landmarks found so far.
+    pub fn evaluate(&mut self, task: &Compiled, state: &[u32], stop: &dyn Fn() -> bool) -> Option<u32> {
+        let values = task.offsets.iter().zip(state).map(|(&offset, &value)| offset + value);
+        let initial: Vec<u32> = values.chain(self.always.iter().copied()).collect();
+        self.explore(&initial);
+        if self.costs[self.goal as usize] == NONE {
+            return None;
+        }
+        self.zones.fill(0);
+        self.stamp = 0;
+        let mut total = 0u32;
+        while self.costs[self.goal as usize] > 0 && !stop() {
+            let cost = self.find_cut(&initial);
+            total = sum(total, cost);
+            for place in 0..self.cut.len() {
+                for &node in self.parts.get(self.cut[place] as usize) {
+                    self.nodes[node as usize].left -= cost;
+                }
+            }
+            self.lower();
+        }
+        Some(total)
+    }
+
+    /// Computes h_max of all facts.
+    fn explore(&mut self, initial: &[u32]) {
+        self.nodes.copy_from_slice(&self.fresh);
+        self.costs.fill(NONE);
+        self.heap.clear();
+        initial.iter().for_each(|&fact| reach(&mut self.costs, &mut self.heap, fact, 0));
+        while let Some((cost, fact)) = self.heap.pop() {
+            if cost > self.costs[fact as usize] {
+                continue;
+            }
+            for &node in self.waiting.get(fact as usize) {
+                let own = &mut self.nodes[node as usize];
+                own.open -= 1;
+                if own.open == 0 {
+                    (own.supporter, own.supported) = (fact, cost);
+                    let cost = sum(cost, own.left);
+                    let effects = self.effects.get(node as usize);
+                    effects.iter().for_each(|&effect| reach(&mut self.costs, &mut self.heap, effect, cost));
+                }
+            }
+        }
+    }
+
+    /// Updates h_max after the costs of the operators of the cut fell.
+    fn lower(&mut self) {
+        self.heap.clear();
+        for place in 0..self.cut.len() {
+            for &node in self.parts.get(self.cut[place] as usize) {
+                let own = self.nodes[node as usize];
+                if own.supporter != NONE {
+                    let cost = sum(own.supported, own.left);
+                    let effects = self.effects.get(node as usize);
+                    effects.iter().for_each(|&effect| reach(&mut self.costs, &mut self.heap, effect, cost));
+                }
+            }
+        }
+        while let Some((cost, fact)) = self.heap.pop() {
+            if cost > self.costs[fact as usize] {
+                continue;
+            }
+            for &node in self.waiting.get(fact as usize) {
+                let own = &mut self.nodes[node as usize];
+                if own.supporter != fact || own.supported <= cost {
+                    continue;
+                }
+                let preconditions = self.preconditions.get(node as usize).iter();
+                let greatest = preconditions.map(|&fact| (self.costs[fact as usize], fact)).max();
+                let (supported, supporter) = greatest.unwrap_or((cost, fact));
+                let falls = supported < own.supported;
+                (own.supported, own.supporter) = (supported, supporter);
+                if falls {
+                    let cost = sum(supported, own.left);
+                    let effects = self.effects.get(node as usize);
+                    effects.iter().for_each(|&effect| reach(&mut self.costs, &mut self.heap, effect, cost));
+                }
+            }
+        }
+    }
+
+    /// Finds the operators that lead into the zone from which the goal is reached at no cost; tells the least of their costs.
+    fn find_cut(&mut self, initial: &[u32]) -> u32 {
+        let (before, beyond) = (self.stamp + 1, self.stamp + 2);
+        self.stamp = beyond;
+        self.zones[self.goal as usize] = beyond;
+        self.stack.push(self.goal);
+        while let Some(fact) = self.stack.pop() {
+            for &node in self.achievers.get(fact as usize) {
+                let Node { supporter, left, .. } = self.nodes[node as usize];
+                if left == 0 && supporter != NONE && self.zones[supporter as usize] != beyond {
+                    self.zones[supporter as usize] = beyond;
+                    self.stack.push(supporter);
+                }
+            }
+        }
+        self.cut.clear();
+        let mut least = NONE;
+        initial.iter().for_each(|&fact| self.zones[fact as usize] = before);
+        self.stack.extend_from_slice(initial);
+        while let Some(fact) = self.stack.pop() {
+            for &node in self.waiting.get(fact as usize) {
+                let Node { supporter, left, .. } = self.nodes[node as usize];
+                if supporter != fact {
+                    continue;
+                }
+                let effects = self.effects.get(node as usize);
+                if effects.iter().any(|&effect| self.zones[effect as usize] == beyond) {
+                    self.cut.push(self.operators[node as usize]);
+                    least = least.min(left);
+                    continue;
+                }
+                for &effect in effects {
+                    if self.zones[effect as usize] != before {
+                        self.zones[effect as usize] = before;
+                        self.stack.push(effect);
+                    }
+                }
+            }
+        }
+        self.cut.sort_unstable();
+        self.cut.dedup();
+        least
+    }
+
+    /// Bytes taken.
+    pub(crate) fn bytes(&self) -> usize {
+        let lists = [&self.preconditions, &self.effects, &self.parts, &self.waiting, &self.achievers];
+        let items: usize = lists.iter().map(|list| list.all().len() + list.len()).sum();
+        4 * items + 2 * size_of_val(&self.nodes[..]) + 3 * size_of_val(&self.costs[..])
+    }
+}
+
+/// The sum of two costs; a fact whose cost cannot be counted stays reachable.
+fn sum(one: u32, other: u32) -> u32 {
+    one.saturating_add(other).min(NONE - 1)
+}
+
+/// Lowers the cost of a fact.
+#[inline]
+fn reach(costs: &mut [u32], heap: &mut RadixHeap, fact: u32, cost: u32) {
+    if cost < costs[fact as usize] {
+        costs[fact as usize] = cost;
+        heap.push(cost, fact);
+    }
+}
+
+/// Collects the nodes.
+struct Build<'a> {
+    task: &'a Compiled,
+    /// Facts that some precondition, condition or goal asks for.
+    needed: Vec<bool>,
+    preconditions: Lists<u32>,
+    effects: Lists<u32>,
+    operators: Vec<u32>,
+}
+
+impl<'a> Build<'a> {
+    fn new(task: &'a Compiled) -> Build<'a> {
+        let mut needed = vec![false; task.facts];
+        let changes = task.numbers.changes.iter().flatten().flat_map(|change| &change.conditions);
+        let own = task.preconditions.all().iter().chain(&task.conditions).chain(changes);
+        let facts = own.chain(task.axiom_bodies.all()).chain(&task.goal);
+        facts.for_each(|&fact| needed[task.id(fact) as usize] = true);
+        Build { task, needed, preconditions: Lists::new(), effects: Lists::new(), operators: Vec::new() }
+    }
+
+    /// Adds a node unless it has no effect that anything needs.
+    fn node(&mut self, preconditions: &[Fact], mut effects: Vec<u32>, operator: u32) {
+        let mut preconditions: Vec<u32> = preconditions.iter().map(|&fact| self.task.id(fact)).collect();
+        preconditions.sort_unstable();
+        preconditions.dedup();
+        effects.retain(|effect| self.needed[*effect as usize] && !preconditions.contains(effect));
+        if effects.is_empty() {
+            return;
+        }
+        effects.sort_unstable();
+        effects.dedup();
+        if preconditions.is_empty() {
+            preconditions.push(self.task.facts as u32);
+        }
+        self.preconditions.push(preconditions);
+        self.effects.push(effects);
+        self.operators.push(operator);
+    }
+
+    fn operator(&mut self, operator: usize) {
+        let task = self.task;
+        let own = task.preconditions.get(operator);
+        let mut plain = Vec::new();
+        let with = |conditions: &[Fact]| [own, conditions].concat();
+        for effect in task.effects.get(operator) {
+            match &task.conditions[effect.from as usize..effect.to as usize] {
+                [] => plain.push(task.id(effect.fact)),
+                conditions => self.node(&with(conditions), vec![task.id(effect.fact)], operator as u32),
+            }
+        }
+        for change in task.numbers.changes.get(operator).into_iter().flatten() {
+            let turned = task.numbers.read_by.get(change.number as usize).iter();
+            let first = |&comparison: &u32| task.offsets[task.numbers.first + comparison as usize];
+            let facts = turned.map(first).flat_map(|fact| [fact, fact + 1]);
+            match &change.conditions[..] {
+                [] => plain.extend(facts),
+                conditions => self.node(&with(conditions), facts.collect(), operator as u32),
+            }
+        }
+        self.node(own, plain, operator as u32);
+    }
+
+    fn finish(mut self) -> LandmarkCut {
+        let task = self.task;
+        let (free, goal) = (task.facts as u32, task.facts as u32 + 1);
+        let goals: Vec<u32> = task.goal.iter().map(|&fact| task.id(fact)).chain([free]).collect();
+        self.preconditions.push(goals);
+        self.effects.push([goal]);
+        self.operators.push(NONE);
+        let count = self.operators.len();
+        let by_fact = |lists: &Lists<u32>| {
+            let pairs = (0..count).flat_map(|node| lists.get(node).iter().map(move |&f| (f, node as u32)));
+            Lists::group(task.facts + 2, pairs)
+        };
+        let own = (0..count as u32).map(|node| (self.operators[node as usize], node));
+        let parts = Lists::group(task.operators(), own.filter(|&(operator, _)| operator != NONE));
+        let fresh = (0..count).map(|node| Node {
+            open: self.preconditions.get(node).len() as u32,
+            supporter: NONE,
+            supported: NONE,
+            left: task.costs.get(self.operators[node] as usize).copied().unwrap_or(0),
+        });
+        let fresh: Vec<Node> = fresh.collect();
+        let absences = (task.basic..task.numbers.first).map(|variable| task.offsets[variable] + 1);
+        LandmarkCut {
+            parts,
+            waiting: by_fact(&self.preconditions),
+            achievers: by_fact(&self.effects),
+            always: absences.chain([free]).collect(),
+            goal,
+            nodes: fresh.clone(),
+            fresh,
+            costs: vec![NONE; task.facts + 2],
+            zones: vec![0; task.facts + 2],
+            heap: RadixHeap::new(),
+            stamp: 0,
+            stack: Vec::new(),
+            cut: Vec::new(),
+            preconditions: self.preconditions,
+            effects: self.effects,
+            operators: self.operators,
+        }
+    }
+}

@@ -9,9 +9,21 @@ use crate::ground::{Change, Effect, Outcome, Values, When};
 use crate::model::between::telling_parts;
 
 use super::order::Access;
-use super::relaxed::Part;
 use super::touch::{Touched, expression_touches};
 use super::world::{Act, Moment, Span, World};
+
+/// The part of an action that a step takes, or that a relaxed operator stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Part {
+    /// Start and end as one operator.
+    Whole,
+    /// The start of an action that then stays open.
+    Start,
+    /// The end of an open action.
+    End,
+    /// A timed effect, or an axiom.
+    Free,
+}
 
 /// An action in progress.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,8 +12,7 @@ use crate::ground::{
 use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
 
-use super::advance::Step;
-use super::relaxed::Part;
+use super::advance::{Part, Step};
 use super::space::Space;
 use super::world::{Act, NOTHING, Span, World};
 

@@ -2,8 +2,7 @@
 
 use crate::ground::{Conjunction, Fact, Outcome};
 
-use super::advance::Step;
-use super::relaxed::Part;
+use super::advance::{Part, Step};
 use super::space::Space;
 use super::touch::Touched;
 use super::world::World;

@@ -14,7 +14,8 @@ use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Effect, Expression, Outcome, Values};
 
-use super::relaxed::{NOBODY, Operator, Part, Relaxed, Seconds, Test, Waiter};
+use super::advance::Part;
+use super::relaxed::{NOBODY, Operator, Relaxed, Seconds, Test, Waiter};
 use super::world::{Moment, World};
 
 /// Estimate of the heuristic for a state.

@@ -11,7 +11,7 @@ use crate::calls::Failure;
 use crate::ground::Earns;
 use crate::memory::MemoryLimit;
 
-use super::advance::{Situation, Step};
+use super::advance::{Part, Situation, Step};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
@@ -19,7 +19,7 @@ use super::joined::shortened;
 use super::linear::{is_linear, linear_plan};
 use super::manner::{Counts, End, Manner};
 use super::overlap::helpful;
-use super::relaxed::{Part, Relaxed};
+use super::relaxed::Relaxed;
 use super::schedule::{Replayed, tightened};
 use super::search::Search;
 use super::space::{Base, Measure, Space};

@@ -5,8 +5,7 @@
 use crate::calls::Failure;
 use crate::ground::Outcome;
 
-use super::advance::Step;
-use super::relaxed::Part;
+use super::advance::{Part, Step};
 use super::schedule::Replayed;
 use super::space::Space;
 use super::world::{Act, World};

@@ -10,6 +10,7 @@ mod direction;
 pub mod envelope;
 mod estimate;
 mod improve;
+mod independence;
 #[doc(hidden)]
 pub mod joined;
 mod linear;

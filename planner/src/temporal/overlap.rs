@@ -13,8 +13,7 @@ use rustc_hash::FxHashMap;
 use crate::calls::Failure;
 use crate::ground::{Fact, Outcome};
 
-use super::advance::{Situation, Step};
-use super::relaxed::Part;
+use super::advance::{Part, Situation, Step};
 use super::touch::Touched;
 use super::world::{Act, Span, World};
 

@@ -11,25 +11,13 @@ use crate::ground::{
 };
 use crate::grouped::Grouped;
 
+use super::advance::Part;
 use super::direction::may_help;
 use super::envelope::settled;
 use super::estimate::Work;
 use super::space::Space;
 use super::touch::Touched;
 use super::world::{Act, World};
-
-/// The part of an action that a relaxed operator stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Part {
-    /// Start and end as one operator.
-    Whole,
-    /// The start of an action that then stays open.
-    Start,
-    /// The end of an open action.
-    End,
-    /// A timed effect, or an axiom.
-    Free,
-}
 
 /// Something whose truth is looked up by evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -11,9 +11,8 @@ use petgraph::graph::{DiGraph, NodeIndex};
 
 use crate::calls::Failure;
 
-use super::advance::Step;
+use super::advance::{Part, Step};
 use super::order::Order;
-use super::relaxed::Part;
 use super::space::{Base, Space, Track};
 
 /// Steps that are replayed at most for one plan.

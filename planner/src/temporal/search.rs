@@ -13,13 +13,13 @@ use crate::calls::Failure;
 use crate::ground::{Earns, Values};
 use crate::memory::{Heap, Rows, soon};
 
-use super::advance::{Gates, Open, Situation, Step};
+use super::advance::{Gates, Open, Part, Situation, Step};
 use super::destroy::shuffled;
 use super::estimate::{Estimate, From};
 use super::manner::{Counts, End, Manner};
 use super::order::Inconsistent;
 use super::overlap::starts_again;
-use super::relaxed::{Part, Relaxed};
+use super::relaxed::Relaxed;
 use super::space::{Base, Space};
 use super::store::Store;
 use super::timed::schedule;

@@ -10,9 +10,8 @@ use crate::attachment::Level;
 use crate::calls::Failure;
 use crate::ground::{Change, Earns, Expression, Outcome, Values, added, weights};
 
-use super::advance::{Accesses, Situation, Step};
+use super::advance::{Accesses, Part, Situation, Step};
 use super::order::{Clock, Inconsistent, Order};
-use super::relaxed::Part;
 use super::timed::is_valid;
 use super::world::{Act, Moment, Span, World};
 

@@ -3,9 +3,8 @@
 use crate::plan::Plan;
 use crate::validate::validate;
 
-use super::advance::Step;
+use super::advance::{Part, Step};
 use super::mentions::keep_apart;
-use super::relaxed::Part;
 use super::space::{Space, Track};
 use super::world::World;
 

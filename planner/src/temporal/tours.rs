@@ -6,8 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::calls::Failure;
 
-use super::advance::Step;
-use super::relaxed::Part;
+use super::advance::{Part, Step};
 use super::schedule::Replayed;
 use super::space::Space;
 use super::world::World;

@@ -16,10 +16,6 @@ use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
 
-use super::mentions::disturbs_itself;
-use super::together::some_only_together;
-use super::touch::{Touched, expression_touches};
-
 /// An action of the temporal search; an instantaneous one has everything at its start.
 #[derive(Debug, Clone)]
 pub struct Act<'a> {
@@ -117,7 +113,7 @@ pub struct World<'a> {
     /// Durative actions first, in the ground task's order, then instantaneous ones, then durative ones again that take longer.
     pub acts: Vec<Act<'a>>,
     /// True if the steps of the search can make every plan; computed on demand.
-    complete: OnceCell<bool>,
+    pub(super) complete: OnceCell<bool>,
     /// True if grounding modules propose parameters.
     pub proposes: bool,
     /// Axioms by stratum.
@@ -197,12 +193,6 @@ impl<'a> World<'a> {
             .collect();
         let complete = OnceCell::new();
         World { task, ground, calls, acts, complete, proposes, strata, derived, objects, last_given }
-    }
-
-    /// True if the steps of the search can make every plan: no action needs a duration that is chosen for its
-    /// effects, or a number while it flows, and none need start or end at the very same time.
-    pub fn is_complete(&self) -> bool {
-        *self.complete.get_or_init(|| !self.chooses_numbers() && !some_only_together(self))
     }
 
     /// True if numbers depend on times: on the chosen duration of an action, or on how long one has been
@@ -324,29 +314,6 @@ impl<'a> World<'a> {
             return Ok(is_longer.then_some(Span { least_s: seconds, most_s: seconds }));
         }
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
-    }
-
-    /// True if the end of an action may happen together with its start: neither changes what the other
-    /// accesses.
-    fn ends_freely(&self, act: &Act) -> bool {
-        let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());
-        read.condition(self, act.at_start);
-        for bound in act.bounds {
-            expression_touches(self, &bound.seconds, if bound.at_end { &mut end_read } else { &mut read });
-        }
-        act.start_effects.iter().for_each(|effect| written.outcome(self, &effect.outcome));
-        [act.over_all, act.at_end].into_iter().for_each(|condition| end_read.condition(self, condition));
-        for effect in act.end_effects {
-            end_written.outcome(self, &effect.outcome);
-            if let Outcome::Change { amount, .. } = &effect.outcome {
-                expression_touches(self, amount, &mut end_read);
-            }
-        }
-        act.flow_effects.is_empty()
-            && !written.meets(&end_read)
-            && !written.meets(&end_written)
-            && !read.meets(&end_written)
-            && !disturbs_itself(self, act)
     }
 
     /// True if the bounds that are evaluated at the end allow this duration.

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::diagnostic::Diagnostic;
 use crate::semantics::{Compared, Why};
 
 /// The cause of a plan's failure.
@@ -75,4 +76,13 @@ impl Moment {
             Moment::End => "at its end",
         }
     }
+}
+
+/// The reason a replay stopped.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fault {
+    pub reason: String,
+    pub step: Option<usize>,
+    pub cause: Cause,
+    pub finding: Diagnostic,
 }

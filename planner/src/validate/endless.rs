@@ -1,6 +1,6 @@
 //! A metric that a plan makes ever better: it may have no best value.
 
-use super::validate;
+use super::verdict::validate;
 use crate::attachment::Attachments;
 use crate::model::walk::{self, Part};
 use crate::plan::{EPSILON_S, Plan, Step};

@@ -4,8 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::Cause;
-use super::{Fault, whole};
+use super::cause::{Cause, Fault};
+use super::verdict::whole;
 use crate::attachment::Attachments;
 use crate::diagnostic::{Findings, Span};
 use crate::plan::Plan;

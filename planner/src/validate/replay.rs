@@ -1,7 +1,7 @@
 //! Replay of a plan, one happening after the other, from the initial state.
 
-use super::timeline::{Event, Happening, happenings, makespan_s};
-use super::{Cause, Fault, Moment, Replayed, SEPARATION_S, Unmet};
+use super::cause::{Cause, Fault, Moment, Unmet};
+use super::timeline::{Event, Happening, SEPARATION_S, happenings, makespan_s};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::between::telling_parts;
 use crate::model::relation::Relation;
@@ -13,6 +13,17 @@ use crate::semantics::{
 };
 use crate::state::State;
 use crate::task::{Action, ActionId, Comparison, GroundChange, Task, Timed, When};
+
+/// The end of a replay.
+pub(crate) struct Replayed {
+    pub state: State,
+    /// States with the times at which they begin, for constraints on the trajectory.
+    pub trace: Vec<(f64, State)>,
+    /// For each preference, the number of violations by preferred conditions of actions.
+    pub violations: Vec<f64>,
+    /// End of the plan: a time, or the number of steps.
+    pub end: f64,
+}
 
 /// A durative action between its start and its end.
 struct Running {

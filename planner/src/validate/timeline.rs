@@ -1,8 +1,11 @@
 //! Timeline of a plan: its happenings in order of time.
 
-use super::SEPARATION_S;
 use crate::plan::{Plan, Step};
 use crate::task::Task;
+
+/// Happenings closer than this are at the same time, in seconds. Plans are printed with few digits, and peers keep
+/// their happenings as little as this apart.
+pub const SEPARATION_S: f64 = 1e-4;
 
 /// An event at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,7 +1,7 @@
 //! Constraints and preferences of PDDL3 (Gerevini and Long 2005) on the states that a plan goes through.
 
-use super::Cause;
-use super::{Fault, Replayed, replay};
+use super::cause::{Cause, Fault};
+use super::replay::{self, Replayed};
 use crate::model::automaton::Automaton;
 use crate::semantics::{Binding, CallFailure, Semantics, Why};
 use crate::task::{Modal, Trajectory};

@@ -52,7 +52,7 @@ pub(super) fn is_false(condition: &Condition) -> bool {
 
 /// The opposite, in negation normal form. Exact for what does not compare numbers: a comparison with an undefined number is
 /// false, and so is its opposite.
-pub(in crate::ground) fn negated(condition: &Condition) -> Condition {
+pub(crate) fn negated(condition: &Condition) -> Condition {
     match condition {
         Condition::And(parts) => any(parts.iter().map(negated)),
         Condition::Or(parts) => all(parts.iter().map(negated)),

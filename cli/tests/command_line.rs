@@ -300,6 +300,56 @@ fn the_portfolio_is_printed() {
 }
 
 #[test]
+fn an_optimal_plan_is_proven_or_there_is_none() {
+    let folder = TempDir::new().expect("a folder can be made");
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("writable");
+        path.display().to_string()
+    };
+    let domain = write(
+        "domain.pddl",
+        "(define (domain dials) (:requirements :fluents) (:functions (a) (b) (total-cost))
+           (:action one :parameters () :effect (and (increase (a) 1) (increase (total-cost) 2)))
+           (:action two :parameters () :precondition (>= (a) 2)
+             :effect (and (decrease (a) 2) (increase (b) 1) (increase (total-cost) 1))))",
+    );
+    let problem = |goal: &str| {
+        let init = "(= (a) 0) (= (b) 0) (= (total-cost) 0)";
+        let metric = "(:metric minimize (total-cost))";
+        write(
+            "problem.pddl",
+            &format!("(define (problem p) (:domain dials) (:init {init}) (:goal {goal}) {metric})"),
+        )
+    };
+    let small = problem("(and (>= (b) 1) (>= (a) 1))");
+    check(
+        &["plan", &domain, &small, "--optimal"],
+        0,
+        &["cost 7", "proven optimal", "no plan costs less than"],
+    );
+    let said = json(&["plan", &domain, &small, "--optimal", "--json"], 0);
+    assert_eq!(
+        (&said["optimal"], &said["lower_bound"], &said["cost"]),
+        (&json!(true), &json!(7.0), &json!(7.0))
+    );
+    check(&["plan", &domain, &problem("(< (b) 0)"), "--optimal"], 3, &["proven unsolvable"]);
+    let large = problem("(>= (b) 1000000)");
+    let cut = ["plan", &domain, &large, "--optimal", "--time-limit", "0.2"];
+    check(&cut, 4, &["out of time, no plan yet; no plan costs less than"]);
+    let said = json(&[&cut[..], &["--json"]].concat(), 4);
+    assert!(said["plan"].is_null() && said["lower_bound"].as_f64() > Some(2.0), "{said}");
+    check(&["plan", &domain, &small, "--optimal", "--anytime"], 2, &["--optimal"]);
+    let (timed, problem) = (data("courier.pddl"), data("courier-problem.pddl"));
+    let drain = format!("drain=sh {}", data("drain.sh"));
+    check(
+        &["plan", &timed, &problem, "--optimal", "--attach", &drain],
+        2,
+        &["not-proven-optimal", "--anytime"],
+    );
+}
+
+#[test]
 fn the_first_plan_may_be_enough() {
     let (domain, problem) = (data("courier.pddl"), data("courier-problem.pddl"));
     let drain = format!("drain=sh {}", data("drain.sh"));

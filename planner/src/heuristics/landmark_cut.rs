@@ -5,7 +5,8 @@
 //! and derived facts may always be false. A numeric condition that does not hold takes one change of a number that it reads.
 
 use crate::classical::compiled::{Compiled, Lists};
-use crate::ground::Fact;
+use crate::classical::numbers::NumberChange;
+use crate::ground::{Fact, Relation};
 
 use super::queue::RadixHeap;
 
@@ -216,6 +217,26 @@ fn reach(costs: &mut [u32], heap: &mut RadixHeap, fact: u32, cost: u32) {
     }
 }
 
+/// Facts of a numeric condition that an operator may bring about: not those that its constant changes lead away from.
+fn turned(task: &Compiled, operator: usize, comparison: usize) -> impl Iterator<Item = u32> {
+    let (numbers, changes) = (&task.numbers, &task.numbers.changes[operator]);
+    // Anything but adding may also give a value to what had none.
+    let adds = |change: &NumberChange| change.conditions.is_empty() && change.constant_gain().is_some();
+    let read = |change: &&NumberChange| numbers.reads[comparison].contains(&change.number);
+    let gain = match changes.iter().filter(read).all(adds) {
+        true => numbers.gain(comparison as u32, changes),
+        false => f64::NAN,
+    };
+    let towards = match numbers.comparisons[comparison].relation {
+        Relation::AtLeast | Relation::Greater => gain,
+        Relation::AtMost | Relation::Less => -gain,
+        Relation::Equal | Relation::Unequal => f64::NAN,
+    };
+    let holds = task.offsets[numbers.first + comparison];
+    let facts = [(holds, towards > 0.0 || towards.is_nan()), (holds + 1, towards < 0.0 || towards.is_nan())];
+    facts.into_iter().filter(|(_, is_turned)| *is_turned).map(|(fact, _)| fact)
+}
+
 /// Collects the nodes.
 struct Build<'a> {
     task: &'a Compiled,
@@ -267,9 +288,8 @@ impl<'a> Build<'a> {
             }
         }
         for change in task.numbers.changes.get(operator).into_iter().flatten() {
-            let turned = task.numbers.read_by.get(change.number as usize).iter();
-            let first = |&comparison: &u32| task.offsets[task.numbers.first + comparison as usize];
-            let facts = turned.map(first).flat_map(|fact| [fact, fact + 1]);
+            let read_by = task.numbers.read_by.get(change.number as usize).iter();
+            let facts = read_by.flat_map(|&comparison| turned(task, operator, comparison as usize));
             match &change.conditions[..] {
                 [] => plain.extend(facts),
                 conditions => self.node(&with(conditions), facts.collect(), operator as u32),

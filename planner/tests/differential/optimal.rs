@@ -64,7 +64,10 @@ fn check(seed: u64, tally: &mut Tally) {
     }
 }
 
-fn check_all(seeds: std::ops::Range<u64>) -> Tally {
+/// Tasks that showed a fault once.
+const FOUND: [u64; 1] = [4433];
+
+fn check_all(seeds: impl Iterator<Item = u64>) -> Tally {
     let mut tally = Tally::default();
     seeds.for_each(|seed| check(seed, &mut tally));
     println!("{tally:?}");
@@ -73,7 +76,7 @@ fn check_all(seeds: std::ops::Range<u64>) -> Tally {
 
 #[test]
 fn random_tasks_are_planned_optimally() {
-    let tally = check_all(0..400);
+    let tally = check_all((0..400).chain(FOUND));
     assert!(tally.optimal > 150 && tally.unsolvable > 100, "{tally:?}");
 }
 

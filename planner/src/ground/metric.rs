@@ -114,30 +114,10 @@ pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
         Change::Decrease => -weight,
         _ => return Earns::Perhaps,
     };
-    match (is_at_least_nothing(amount, weight), is_at_least_nothing(amount, -weight)) {
+    match (amount.is_never_negative(weight), amount.is_never_negative(-weight)) {
         (true, _) => Earns::Never,
         (false, true) => Earns::Surely,
         (false, false) => Earns::Perhaps,
-    }
-}
-
-/// True if an expression times a factor is never below zero, as far as its constants tell.
-fn is_at_least_nothing(expression: &Expression, factor: f64) -> bool {
-    match expression {
-        Expression::Constant(value) => factor * value >= 0.0,
-        Expression::Duration => factor >= 0.0,
-        Expression::Sum(parts) => parts.iter().all(|part| is_at_least_nothing(part, factor)),
-        Expression::Product(parts) => {
-            let rest = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
-            let constants = parts.iter().map(|part| match part {
-                Expression::Constant(value) => *value,
-                _ => 1.0,
-            });
-            factor * constants.product::<f64>() >= 0.0
-                && rest.into_iter().all(|part| is_at_least_nothing(part, 1.0))
-        }
-        Expression::Negative(inner) => is_at_least_nothing(inner, -factor),
-        _ => false,
     }
 }
 

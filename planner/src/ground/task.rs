@@ -129,6 +129,27 @@ impl Expression {
 }
 
 impl Expression {
+    /// True if the value times a factor is at least 0 in every state, as far as constants, durations and answers of attachments,
+    /// which are at least 0, tell.
+    pub fn is_never_negative(&self, factor: f64) -> bool {
+        match self {
+            Expression::Constant(value) => factor * value >= 0.0,
+            Expression::Duration | Expression::Call(_) => factor >= 0.0,
+            Expression::Sum(parts) => parts.iter().all(|part| part.is_never_negative(factor)),
+            Expression::Product(parts) => {
+                let rest = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+                let constants = parts.iter().map(|part| match part {
+                    Expression::Constant(value) => *value,
+                    _ => 1.0,
+                });
+                factor * constants.product::<f64>() >= 0.0
+                    && rest.into_iter().all(|part| part.is_never_negative(1.0))
+            }
+            Expression::Negative(inner) => inner.is_never_negative(-factor),
+            _ => false,
+        }
+    }
+
     /// Coefficient of a number in a sum ([`Expression::is_linear`]).
     pub fn weight_of(&self, fluent: NumericId) -> f64 {
         match self {

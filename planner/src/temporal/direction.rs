@@ -2,39 +2,68 @@
 
 use crate::ground::{Change, ComparisonId, Expression, Outcome, Relation};
 
-use super::touch::Touched;
+use super::touch::{Touched, expression_touches};
 use super::world::World;
 
 /// True if effects that happen together may bring a numeric condition nearer to being true: not if they move
-/// a sum away from its bound by a fixed length.
-pub(super) fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) -> bool {
-    let mut touched = Touched::default();
-    touched.comparison(world, comparison);
+/// a sum away from its bound, or leave it where it is, in every state.
+pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) -> bool {
     let comparison = &world.ground.comparisons[comparison as usize];
     let sign = match comparison.relation {
         Relation::AtLeast | Relation::Greater => 1.0,
         Relation::AtMost | Relation::Less => -1.0,
         Relation::Equal | Relation::Unequal => return true,
     };
-    if !comparison.left.is_linear() || !comparison.right.is_linear() {
+    let (mut read, mut changed) = (Touched::default(), Touched::default());
+    [&comparison.left, &comparison.right]
+        .into_iter()
+        .for_each(|side| expression_touches(world, side, &mut read));
+    outcomes.iter().for_each(|outcome| changed.outcome(world, outcome));
+    if !is_sum(world, &comparison.left, &changed) || !is_sum(world, &comparison.right, &changed) {
         return true;
     }
+    let weight = |fluent| sign * (comparison.left.weight_of(fluent) - comparison.right.weight_of(fluent));
     let mut moved = 0.0;
     for outcome in outcomes {
-        let mut changed = Touched::default();
-        changed.outcome(world, outcome);
-        if !changed.numbers.iter().any(|number| touched.numbers.contains(number)) {
-            continue;
-        }
-        let Outcome::Change { fluent, change, amount: Expression::Constant(amount) } = outcome else {
-            return true;
+        let (fluent, change, amount) = match outcome {
+            Outcome::Change { fluent, change, amount } => (*fluent, *change, amount),
+            Outcome::Flow { fluent, rate } => (*fluent, Change::Increase, rate),
+            Outcome::Set(_) => continue,
+            Outcome::Call(_) => return true,
         };
-        let amount = match change {
-            Change::Increase => *amount,
-            Change::Decrease => -amount,
+        let by = match change {
+            _ if !read.numbers.contains(&fluent) => continue,
+            Change::Increase => weight(fluent),
+            Change::Decrease => -weight(fluent),
+            // It may also give a value to what had none.
             Change::Assign | Change::ScaleUp | Change::ScaleDown => return true,
         };
-        moved += amount * (comparison.left.weight_of(*fluent) - comparison.right.weight_of(*fluent));
+        match amount {
+            Expression::Constant(amount) => moved += by * amount,
+            amount if amount.is_never_negative(-by) => {}
+            _ => return true,
+        }
     }
-    moved * sign > 0.0
+    moved > 0.0
+}
+
+/// True if an expression is a weighted sum of numbers and of answers that do not depend on what changes.
+fn is_sum(world: &World, expression: &Expression, changed: &Touched) -> bool {
+    let holds = |part: &Expression| is_sum(world, part, changed);
+    match expression {
+        Expression::Call(call) => {
+            let mut read = Touched::default();
+            read.call(world, *call);
+            !read.meets(changed)
+        }
+        Expression::Sum(parts) => parts.iter().all(holds),
+        Expression::Difference(left, right) => holds(left) && holds(right),
+        Expression::Negative(inner) => holds(inner),
+        Expression::Product(parts) => {
+            let mut factors = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+            factors.next().is_none_or(holds) && factors.next().is_none()
+        }
+        Expression::Quotient(left, right) => holds(left) && matches!(**right, Expression::Constant(_)),
+        other => other.is_linear(),
+    }
 }

@@ -5,7 +5,8 @@ pub mod advance;
 #[doc(hidden)]
 pub mod compress;
 mod destroy;
-mod direction;
+#[doc(hidden)]
+pub mod direction;
 #[doc(hidden)]
 pub mod envelope;
 mod estimate;

@@ -23,6 +23,7 @@ mod search_novelty;
 mod search_run;
 mod small;
 mod temporal_compress;
+mod temporal_direction;
 mod temporal_envelope;
 mod temporal_joined;
 mod temporal_mentions;

@@ -120,3 +120,22 @@ fn what_only_looks_like_a_plan_without_its_times_is_put_off_to_the_right_ones() 
         check(domain, &problem, false, expect);
     }
 }
+
+#[test]
+fn a_duration_without_a_greatest_value_is_as_long_as_the_goal_needs() {
+    let domain = "(:predicates (idle) (done)) (:functions (charge))
+      (:durative-action charge :parameters () :duration (>= ?duration 1) :condition (at start (idle))
+        :effect (and (at start (not (idle))) (at end (idle)) (at end (increase (charge) (* 2 ?duration)))))
+      (:durative-action run :parameters () :duration (= ?duration 3)
+        :condition (and (at start (idle)) (at start (>= (charge) 20)))
+        :effect (and (at start (not (idle))) (at end (idle)) (at end (decrease (charge) 20)) (at end (done))))";
+    let domain = format!("(define (domain d) (:requirements :durative-actions :numeric-fluents) {domain})");
+    for (charge, steps, longest_s) in [(0, 2, 10.0), (15, 2, 3.0), (20, 1, 3.0)] {
+        let problem =
+            format!("(define (problem p) (:domain d) (:init (idle) (= (charge) {charge})) (:goal (done)))");
+        let (outcome, _) = solve(&read(&domain, &problem), &Options::default());
+        let plan = outcome.plan().expect("a plan");
+        let longest = plan.steps.iter().map(|step| step.duration_s).fold(0.0, f64::max);
+        assert!(plan.steps.len() == steps && (longest - longest_s).abs() < 0.01, "{charge}: {plan}");
+    }
+}

@@ -108,7 +108,7 @@ pub(crate) fn search_plans(
         passes.insert(0, Pass::new(&inside, false));
     }
     let linear = world.chooses_numbers() && is_linear(world);
-    if linear {
+    if linear && !world.chooses_without_end() {
         // Times that are tried serve most tasks: linear programs choose them before the others are searched at length.
         let short = [&inside, &all].map(|apart| Pass { is_short: true, ..Pass::new(apart, false) });
         passes.splice(0..0, short.into_iter().skip(usize::from(inside == all)));

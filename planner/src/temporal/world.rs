@@ -201,6 +201,15 @@ impl<'a> World<'a> {
         self.acts.iter().any(|act| !act.flow_effects.is_empty() || chooses_effects(act))
     }
 
+    /// True if effects depend on a duration without a greatest value, of which no fraction can be tried.
+    pub fn chooses_without_end(&self) -> bool {
+        let ends = |act: &Act| {
+            let mut relations = act.bounds.iter().map(|bound| bound.relation);
+            relations.any(|relation| matches!(relation, Relation::AtMost | Relation::Less | Relation::Equal))
+        };
+        self.acts.iter().any(|act| chooses_effects(act) && !ends(act))
+    }
+
     /// True if the contribution of an action to the metric depends on its chosen duration.
     pub fn chooses_costs(&self) -> bool {
         self.acts.iter().any(chooses_cost)

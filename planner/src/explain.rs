@@ -1,6 +1,7 @@
 //! Explanations of unsolvable tasks.
 
 mod core;
+mod durations;
 mod links;
 mod obstacles;
 mod relaxed;
@@ -20,6 +21,7 @@ use crate::semantics::{Binding, Semantics};
 use crate::task::{Action, Change, Condition, GroundChange, ModuleId, PredicateId, Task};
 
 pub(crate) use self::core::narrowed;
+use self::durations::without_duration;
 use self::links::{Reach, goal_part};
 use self::obstacles::obstacle_finding;
 use self::relaxed::could_be_had;
@@ -186,7 +188,9 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     }
     let only_lost = list.is_empty() && could_be_had(ground);
     if list.is_empty() {
-        list.extend(defeated(task).into_iter().chain(without_value(task)));
+        list.extend(
+            defeated(task).into_iter().chain(without_value(task)).chain(without_duration(task, ground)),
+        );
     }
     let exhausted = list.is_empty();
     if exhausted {

@@ -202,3 +202,46 @@ fn an_action_that_defeats_itself_is_told() {
     check_domain(&action("(over all (free ?r))", "(at start (not (free ?r))) (at start (free ?r))"), &[]);
     check_domain(&action("(at start (free ?r))", "(at start (not (free ?r)))"), &[]);
 }
+
+#[test]
+fn what_bounds_itself_or_follows_from_rules_is_refused_with_a_mend() {
+    let domain = |bound: &str| {
+        let text = format!(
+            "(define (domain d) (:requirements :durative-actions :duration-inequalities :derived-predicates
+               :timed-initial-literals) (:predicates (open) (lit) (done)) (:derived (open) (lit))
+               (:durative-action go :parameters () :duration {bound} :condition (at start (open)) :effect (at end (done))))"
+        );
+        Source::new("domain", text)
+    };
+    let problem = |given: &str| {
+        let text = format!("(define (problem p) (:domain d) (:init {given}) (:goal (done)))");
+        Source::new("problem", text)
+    };
+    for (bound, given, said, mend) in [
+        ("(= ?duration 1)", "(at 3 (lit))", "", ""),
+        (
+            "(= ?duration 1)",
+            "(at 3 (open))",
+            "derived predicate `open` in a timed literal",
+            "what its rules depend on",
+        ),
+        (
+            "(= ?duration 1)",
+            "(at 3 (not (open)))",
+            "derived predicate `open` in a timed literal",
+            "what its rules",
+        ),
+        ("(<= (* ?duration ?duration) 9)", "(lit)", "expected `?duration`", "stands alone on one side"),
+        (
+            "(<= ?duration (/ 9 ?duration))",
+            "(lit)",
+            "cannot depend on `?duration`",
+            "bound it by other numbers",
+        ),
+    ] {
+        let findings = check(&domain(bound), Some(&problem(given)));
+        assert_eq!(findings.has_errors(), !said.is_empty(), "{findings}");
+        let drawn = findings.render(false);
+        assert!(drawn.contains(said) && drawn.contains(mend), "{drawn}");
+    }
+}

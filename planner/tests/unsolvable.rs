@@ -300,3 +300,21 @@ fn what_is_asked_is_told_to_who_takes_it_for_proven() {
         other => panic!("{other:?}"),
     }
 }
+
+#[test]
+fn durations_that_are_never_allowed_are_the_reason() {
+    for (bounds, said) in [
+        ("(= ?duration (- (t) 5))", "`go` can never be taken: its duration comes to -3 s, which is below 0"),
+        (
+            "(and (>= ?duration (+ (t) 5)) (<= ?duration (t)))",
+            "`go` can never be taken: it must last at least 7 s and at most 2 s",
+        ),
+    ] {
+        let domain = format!(
+            "(:requirements :durative-actions :duration-inequalities :numeric-fluents) (:predicates (done))
+             (:functions (t)) (:durative-action go :parameters () :duration {bounds} :effect (at end (done)))"
+        );
+        let told = why(&domain, "(:init (= (t) 2)) (:goal (done))");
+        assert!(told.contains(said) && told.contains("no duration is allowed"), "{told}");
+    }
+}

@@ -91,7 +91,7 @@ impl Checker<'_> {
     fn duration(&mut self, action: &ast::Action, scope: &Scope) -> Vec<DurationBound> {
         let mut bounds = Vec::new();
         for bound in &action.duration {
-            let Some(value) = self.expression(&bound.value, Place::Condition, scope) else { continue };
+            let Some(value) = self.expression(&bound.value, Place::Bound, scope) else { continue };
             bounds.push(DurationBound {
                 when: bound.when,
                 comparison: bound.comparison,

@@ -24,8 +24,10 @@ pub(super) enum Place {
     Condition,
     /// Effects of an instantaneous action.
     Effect,
-    /// Conditions, effects and duration bounds of a durative action: `?duration` has a value.
+    /// Conditions and effects of a durative action: `?duration` has a value.
     Durative,
+    /// Bounds of `?duration`, which have their values before it has one.
+    Bound,
     /// A metric: `total-time` and `is-violated` have values.
     Metric,
 }
@@ -294,8 +296,19 @@ impl Checker<'_> {
                 if place == Place::Durative {
                     return Some(Expression::Duration);
                 }
-                let message = "`?duration` has a value in durative actions alone";
-                self.push(Diagnostic::error("duration", message, *span, "nothing here takes time"));
+                let finding = match place {
+                    Place::Bound => {
+                        let message = "a bound of `?duration` cannot depend on `?duration`";
+                        let help = "bound it by other numbers: `(<= ?duration 3)` in place of `(<= ?duration (/ 9 ?duration))`";
+                        Diagnostic::error("duration", message, *span, "this is what is bounded")
+                            .with_help(help)
+                    }
+                    _ => {
+                        let message = "`?duration` has a value in durative actions alone";
+                        Diagnostic::error("duration", message, *span, "nothing here takes time")
+                    }
+                };
+                self.push(finding);
                 None
             }
             ast::Term::ContinuousTime(span) => {

@@ -25,6 +25,9 @@ impl Checker<'_> {
                 Initial::At(time_s, inner) => (Some(*time_s), &**inner),
                 other => (None, other),
             };
+            if time_s.is_some() && self.is_derived(one) {
+                continue;
+            }
             let Some((change, span)) = self.ground_change(one) else { continue };
             if let Some(time_s) = time_s {
                 init.timed.push(TimedInitial { time_s, change, span });
@@ -94,6 +97,19 @@ impl Checker<'_> {
                 .with_label(first, "it has this value already")
                 .with_help("remove one of them"),
         );
+    }
+
+    /// Refuses what a timed literal says of a derived predicate.
+    fn is_derived(&mut self, one: &Initial) -> bool {
+        let Initial::Literal { name, span, .. } = one else { return false };
+        let known = self.predicates.get(&name.symbol).map(|&known| &self.task.predicates[known as usize]);
+        if known.is_none_or(|predicate| predicate.stratum.is_none()) {
+            return false;
+        }
+        let message = format!("derived predicate `{}` in a timed literal", self.name(name.symbol));
+        let finding = Diagnostic::error("derived", message, *span, "this follows from its rules alone");
+        self.push(finding.with_help("give or take what its rules depend on at that time instead"));
+        true
     }
 
     fn ground_change(&mut self, one: &Initial) -> Option<(GroundChange, Span)> {

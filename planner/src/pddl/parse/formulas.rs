@@ -433,7 +433,7 @@ impl Parser<'_> {
             (Some("?duration"), _) => (right, written),
             (_, Some("?duration")) => (left, mirrored(written)),
             _ => {
-                let help = "one side of the constraint must be `?duration`";
+                let help = "`?duration` stands alone on one side: `(<= ?duration 3)` in place of `(<= (* ?duration ?duration) 9)`";
                 self.expected("`?duration`", left, help);
                 return None;
             }

@@ -5,7 +5,7 @@ use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, SETTINGS_FILE, check_distances, shown};
 use crate::recorded::layouts::{self, Asked, Layout, Stated};
 use crate::recorded::picture::RawDepth;
-use crate::recorded::reading::{self, Given, Pair, Reading, StatedView};
+use crate::recorded::reading::{self, Conventions, Given, Pair, StatedView};
 use crate::recorded::robot::Footage;
 use crate::recorded::settings::{CameraSettings, Settings};
 use crate::request::Pixels;
@@ -45,7 +45,7 @@ pub struct Imported {
     /// The layout.
     pub layout: &'static Layout,
     /// Meaning of its numbers.
-    pub reading: Reading,
+    pub reading: Conventions,
     /// Frames that are kept.
     pub frames: Vec<ImportedFrame>,
     /// The depth camera of all of them.

@@ -87,7 +87,7 @@ impl Axes {
 
 /// Meaning of the numbers of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
+pub struct Conventions {
     /// Direction of the poses.
     pub poses: Poses,
     /// Axes of the camera.
@@ -98,10 +98,10 @@ pub struct Reading {
     pub depth_scale: f64,
 }
 
-impl Reading {
+impl Conventions {
     /// Poses of the optical frame in the world, in metres, and depths of this scale.
-    pub fn usual(depth_scale: f64) -> Reading {
-        Reading { poses: Poses::WorldFromCamera, axes: Axes::Optical, pose_unit_m: 1.0, depth_scale }
+    pub fn usual(depth_scale: f64) -> Conventions {
+        Conventions { poses: Poses::WorldFromCamera, axes: Axes::Optical, pose_unit_m: 1.0, depth_scale }
     }
 
     /// Pose of the optical frame in the world, metres.
@@ -116,7 +116,7 @@ impl Reading {
     }
 
     /// Number of choices in which two readings differ.
-    fn differs(&self, other: &Reading) -> usize {
+    fn differs(&self, other: &Conventions) -> usize {
         [
             self.poses != other.poses,
             self.axes != other.axes,
@@ -129,7 +129,7 @@ impl Reading {
     }
 }
 
-impl fmt::Display for Reading {
+impl fmt::Display for Conventions {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (poses, axes) = (self.poses.name(), self.axes.name());
         write!(
@@ -166,8 +166,8 @@ impl Given {
             && self.depth_scale.is_some()
     }
 
-    fn applied(&self, stated: &Reading) -> Reading {
-        Reading {
+    fn applied(&self, stated: &Conventions) -> Conventions {
+        Conventions {
             poses: self.poses.unwrap_or(stated.poses),
             axes: self.axes.unwrap_or(stated.axes),
             pose_unit_m: self.pose_unit_m.unwrap_or(stated.pose_unit_m),
@@ -271,7 +271,7 @@ impl Pair {
 }
 
 /// Share of what one view shows that lies where the other measures it, over all pairs.
-pub(crate) fn agreement(reading: &Reading, pairs: &[Pair]) -> f64 {
+pub(crate) fn agreement(reading: &Conventions, pairs: &[Pair]) -> f64 {
     let mut tally = Tally::default();
     for Pair(a, b) in pairs {
         let (world_from_a, world_from_b) =
@@ -292,7 +292,7 @@ fn typical(pairs: &[Pair]) -> Option<f64> {
 }
 
 /// All readings that keep what the user has said, the stated one first.
-fn candidates(stated: &Reading, given: &Given) -> Vec<Reading> {
+fn candidates(stated: &Conventions, given: &Given) -> Vec<Conventions> {
     fn one_or<T: Copy>(given: Option<T>, all: &[T]) -> Vec<T> {
         given.map_or(all.to_vec(), |g| vec![g])
     }
@@ -309,7 +309,7 @@ fn candidates(stated: &Reading, given: &Given) -> Vec<Reading> {
         for axes in one_or(given.axes, &Axes::ALL) {
             for &pose_unit_m in &units_m {
                 for &depth_scale in &scales {
-                    all.push(Reading { poses, axes, pose_unit_m, depth_scale });
+                    all.push(Conventions { poses, axes, pose_unit_m, depth_scale });
                 }
             }
         }
@@ -324,10 +324,10 @@ fn candidates(stated: &Reading, given: &Given) -> Vec<Reading> {
 /// # Errors
 /// The question that is left, and its answers as options: several readings fit alike, or none does.
 pub fn settle(
-    stated: &Reading,
+    stated: &Conventions,
     given: &Given,
     pairs: &[Pair],
-) -> Result<(Reading, String), (String, String)> {
+) -> Result<(Conventions, String), (String, String)> {
     let stated = given.applied(stated);
     if pairs.is_empty() {
         let note = "no two views show the same from different places, so units and poses could not be checked: they are read as \
@@ -335,9 +335,9 @@ pub fn settle(
         return Ok((stated, note.into()));
     }
     let typical = typical(pairs).unwrap_or(f64::NAN);
-    let plausible = |r: &Reading| (PLAUSIBLE_M[0]..=PLAUSIBLE_M[1]).contains(&(typical / r.depth_scale));
+    let plausible = |r: &Conventions| (PLAUSIBLE_M[0]..=PLAUSIBLE_M[1]).contains(&(typical / r.depth_scale));
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let scored: Vec<(Reading, f64)> = candidates(&stated, given)
+    let scored: Vec<(Conventions, f64)> = candidates(&stated, given)
         .into_iter()
         .filter(|r| *r == stated || plausible(r))
         .map(|r| (r, agreement(&r, pairs)))
@@ -369,10 +369,10 @@ pub fn settle(
         );
         return Ok((stated, note));
     }
-    let near: Vec<&(Reading, f64)> =
+    let near: Vec<&(Conventions, f64)> =
         scored.iter().filter(|(r, s)| plausible(r) && *s >= best - MARGIN).collect();
     let fewest = near.iter().map(|(r, _)| r.differs(&stated)).min().unwrap_or(0);
-    let fitting: Vec<&(Reading, f64)> =
+    let fitting: Vec<&(Conventions, f64)> =
         near.into_iter().filter(|(r, _)| r.differs(&stated) == fewest).collect();
     if let [(reading, share)] = fitting[..] {
         let note = format!(

@@ -1,7 +1,7 @@
 //! The body in the simulated room: a round base with a pan-tilt head that carries a Kinect, and an arm with a hand.
 
 use crate::parts::{Arm, Base, Camera, Description, Footprint, Frames, Gripper, Head, Speeds};
-use crate::sim::laser::Laser;
+use crate::sim::laser::LaserModel;
 use descry_perception::Intrinsics;
 use nalgebra::{Point3, Vector3};
 
@@ -64,7 +64,7 @@ pub fn description() -> Description {
         head: Some(HEAD),
         arm: Some(Arm { reach_m: REACH_M, hand: Some(Gripper { opening_m: HAND_OPENING_M }) }),
         camera: Some(camera()),
-        laser: Some(Laser::default().part()),
+        laser: Some(LaserModel::default().part()),
         senses: Vec::new(),
         frames: Frames::default(),
         up: Some(Vector3::z()),

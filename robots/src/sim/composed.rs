@@ -1,6 +1,6 @@
 //! Objects composed of several solids, painted with patterns: household objects besides cups and boxes.
 
-use crate::sim::shape::{Part, Shape};
+use crate::sim::shape::{Primitive, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -133,11 +133,11 @@ impl Composed {
     }
 
     /// The surfaces for ray casting, with their colours; `colour` is for pieces without one.
-    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
-        let of = |piece: &Piece| -> Vec<(Part, Paint)> {
+    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Primitive, Paint)> {
+        let of = |piece: &Piece| -> Vec<(Primitive, Paint)> {
             let own = piece.colour.unwrap_or(colour);
             let piece_from_thing = piece.thing_from_piece().inverse();
-            let turned = |(part, paint): (Part, Paint)| {
+            let turned = |(part, paint): (Primitive, Paint)| {
                 let pattern = piece.pattern.or(paint.pattern);
                 (part.turned(piece_from_thing), Paint { pattern, ..paint })
             };

@@ -12,7 +12,7 @@ const STEP_M: f64 = 0.05;
 
 /// One step of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub struct DriveStep {
     /// Pose of the base afterwards.
     pub pose: Pose2,
     /// Duration, seconds.
@@ -23,13 +23,13 @@ pub struct Step {
 
 /// The steps of a route: for each line a turn on the spot, then straight on; finally a turn to the goal's
 /// heading. Their durations add up to that of the route.
-pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<Step> {
+pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<DriveStep> {
     let mut steps = Vec::new();
     let mut heading_rad = from.yaw_rad;
-    let turn_to = |at: &Point2<f64>, from_rad: f64, to_rad: f64, steps: &mut Vec<Step>| {
+    let turn_to = |at: &Point2<f64>, from_rad: f64, to_rad: f64, steps: &mut Vec<DriveStep>| {
         let seconds = turn(from_rad, to_rad) / speeds.angular_rad_s;
         if seconds > 0.0 {
-            steps.push(Step { pose: Pose2::new(at.x, at.y, to_rad), seconds, metres: 0.0 });
+            steps.push(DriveStep { pose: Pose2::new(at.x, at.y, to_rad), seconds, metres: 0.0 });
         }
     };
     for line in route.points_m.windows(2) {
@@ -44,7 +44,7 @@ pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<
         let count = (length_m / STEP_M).ceil().max(1.0);
         for k in 1..=count as usize {
             let at = line[0] + along * (k as f64 / count);
-            steps.push(Step {
+            steps.push(DriveStep {
                 pose: Pose2::new(at.x, at.y, heading_rad),
                 seconds: length_m / count / speeds.linear_m_s,
                 metres: length_m / count,

@@ -12,7 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// A laser that sweeps in a horizontal plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Laser {
+pub struct LaserModel {
     /// Angle of the first reading, anticlockwise from straight ahead.
     pub first_rad: f64,
     /// Angle from one reading to the next.
@@ -29,10 +29,10 @@ pub struct Laser {
     pub precision_m: f64,
 }
 
-impl Default for Laser {
+impl Default for LaserModel {
     /// A SICK LMS 200, 40 cm above the floor (Modayil and Kuipers, section V).
     fn default() -> Self {
-        Laser {
+        LaserModel {
             first_rad: -std::f64::consts::FRAC_PI_2,
             step_rad: std::f64::consts::PI / 180.0,
             readings: 181,
@@ -44,7 +44,7 @@ impl Default for Laser {
     }
 }
 
-impl Laser {
+impl LaserModel {
     /// The laser as a part of a body, above the centre of its base.
     pub fn part(&self) -> parts::Laser {
         parts::Laser {
@@ -62,7 +62,7 @@ impl Laser {
 /// return.
 pub fn sweep(
     scene: &Scene,
-    laser: &Laser,
+    laser: &LaserModel,
     map_from_laser: &Pose2,
     stated: &Pose2,
     rng: &mut impl Rng,
@@ -86,7 +86,7 @@ pub fn sweep(
     }
 }
 
-fn told(laser: &Laser, exact_m: f64, noise: f64) -> f64 {
+fn told(laser: &LaserModel, exact_m: f64, noise: f64) -> f64 {
     if exact_m > laser.reach_m {
         return f64::INFINITY;
     }

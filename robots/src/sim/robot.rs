@@ -12,7 +12,7 @@ use crate::parts::{Camera, Description};
 use crate::sim::body::{self, HEAD, HEAD_SPEED_RAD_S, RADIUS_M, SAFETY_M, SPEEDS};
 use crate::sim::drive::{self, Localisation};
 use crate::sim::faults::{Fault, FaultKind, FaultPlan};
-use crate::sim::laser::{self, Laser};
+use crate::sim::laser::{self, LaserModel};
 use crate::sim::noise::{self, DepthNoise};
 use crate::sim::render::{Frame, render, visible_share};
 use crate::sim::routes::{Doors, Routes};
@@ -43,7 +43,7 @@ pub struct SimOptions {
     /// Noise of the camera.
     pub noise: DepthNoise,
     /// The laser.
-    pub laser: Laser,
+    pub laser: LaserModel,
 }
 
 /// A simulated body in a scene. [`SimRobot::truth`] gives the ground truth; the [`Robot`] trait exposes only
@@ -63,7 +63,7 @@ pub struct SimRobot {
 /// A drive as decided before the base moves.
 struct Departure {
     number: u64,
-    steps: Vec<drive::Step>,
+    steps: Vec<drive::DriveStep>,
     /// Number of steps after which the drive ends early, and the reason.
     end: Option<(usize, End)>,
 }

@@ -6,7 +6,7 @@ use crate::sim::composed::{self, Composed, Paint};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-pub use part::{Hit, Part};
+pub use part::{Hit, Primitive};
 
 /// Shape of an object. Lengths in metres, outer sizes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -286,7 +286,7 @@ impl Shape {
     }
 
     /// The surfaces for ray casting, with their colours; `colour` is for those without one.
-    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Part, Paint)> {
+    pub fn painted(&self, colour: [u8; 3]) -> Vec<(Primitive, Paint)> {
         match self.composed() {
             Some(composed) => composed.painted(colour),
             None => self.parts().into_iter().map(|part| (part, Paint { colour, pattern: None })).collect(),
@@ -294,22 +294,22 @@ impl Shape {
     }
 
     /// The surfaces for ray casting.
-    pub fn parts(&self) -> Vec<Part> {
+    pub fn parts(&self) -> Vec<Primitive> {
         match self {
             Shape::Composed(_) | Shape::Household(_) => {
                 self.painted([0; 3]).into_iter().map(|(part, _)| part).collect()
             }
-            Shape::Ball(Ball { size_m }) => vec![Part::ball(&(0.5 * Vector3::from(*size_m)), 0.0)],
+            Shape::Ball(Ball { size_m }) => vec![Primitive::ball(&(0.5 * Vector3::from(*size_m)), 0.0)],
             Shape::Rod(r) => {
                 let radius = 0.5 * r.diameter_m;
                 let end = Vector3::repeat(radius);
                 vec![
-                    Part::frustum(radius, radius, radius, r.length_m - radius),
-                    Part::ball(&end, 0.0),
-                    Part::ball(&end, r.length_m - r.diameter_m),
+                    Primitive::frustum(radius, radius, radius, r.length_m - radius),
+                    Primitive::ball(&end, 0.0),
+                    Primitive::ball(&end, r.length_m - r.diameter_m),
                 ]
             }
-            Shape::Bow(b) => vec![Part::Handle {
+            Shape::Bow(b) => vec![Primitive::Handle {
                 centre: Point3::new(0.0, 0.0, 0.5 * b.height_m),
                 major_m: 0.5 * (b.height_m - b.thickness_m),
                 minor_m: 0.5 * b.thickness_m,
@@ -318,7 +318,7 @@ impl Shape {
             Shape::Mug(m) => {
                 let mut parts = shell(m.diameter_m, m.base_diameter_m, m.height_m, m.wall_m);
                 let minor_m = 0.5 * m.handle_thickness_m;
-                parts.push(Part::Handle {
+                parts.push(Primitive::Handle {
                     centre: Point3::new(handle_centre_m(m), 0.0, 0.5 * m.height_m),
                     major_m: m.handle_m - minor_m,
                     minor_m,
@@ -328,23 +328,23 @@ impl Shape {
             Shape::Cylinder(c) => {
                 let (base, top) = (0.5 * c.diameter_m, 0.5 * c.top_diameter_m.unwrap_or(c.diameter_m));
                 vec![
-                    Part::frustum(base, top, 0.0, c.height_m),
-                    Part::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: top },
-                    Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
+                    Primitive::frustum(base, top, 0.0, c.height_m),
+                    Primitive::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: top },
+                    Primitive::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
                 ]
             }
             Shape::Canister(c) => {
                 let (body, lid) = (0.5 * c.diameter_m, 0.5 * c.lid_diameter_m);
                 let seam = c.height_m - c.lid_height_m;
                 vec![
-                    Part::frustum(body, body, 0.0, seam),
-                    Part::Disc { z_m: seam, inner_m: 0.0, outer_m: body.max(lid) },
-                    Part::frustum(lid, lid, seam, c.height_m),
-                    Part::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: lid },
-                    Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: body },
+                    Primitive::frustum(body, body, 0.0, seam),
+                    Primitive::Disc { z_m: seam, inner_m: 0.0, outer_m: body.max(lid) },
+                    Primitive::frustum(lid, lid, seam, c.height_m),
+                    Primitive::Disc { z_m: c.height_m, inner_m: 0.0, outer_m: lid },
+                    Primitive::Disc { z_m: 0.0, inner_m: 0.0, outer_m: body },
                 ]
             }
-            Shape::Box(Cuboid { size_m: [x, y, z] }) => vec![Part::Cuboid {
+            Shape::Box(Cuboid { size_m: [x, y, z] }) => vec![Primitive::Cuboid {
                 low: Point3::new(-0.5 * x, -0.5 * y, 0.0),
                 high: Point3::new(0.5 * x, 0.5 * y, *z),
             }],
@@ -357,15 +357,15 @@ fn handle_centre_m(m: &Mug) -> f64 {
     0.25 * (m.diameter_m + m.base_diameter_m.unwrap_or(m.diameter_m))
 }
 
-fn shell(diameter_m: f64, base_diameter_m: Option<f64>, height_m: f64, wall_m: f64) -> Vec<Part> {
+fn shell(diameter_m: f64, base_diameter_m: Option<f64>, height_m: f64, wall_m: f64) -> Vec<Primitive> {
     let (rim, base) = (0.5 * diameter_m, 0.5 * base_diameter_m.unwrap_or(diameter_m));
     let slope = (rim - base) / height_m;
     let inner_base = base + slope * wall_m - wall_m;
     vec![
-        Part::frustum(base, rim, 0.0, height_m),
-        Part::frustum(inner_base, rim - wall_m, wall_m, height_m),
-        Part::Disc { z_m: height_m, inner_m: rim - wall_m, outer_m: rim },
-        Part::Disc { z_m: wall_m, inner_m: 0.0, outer_m: inner_base },
-        Part::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
+        Primitive::frustum(base, rim, 0.0, height_m),
+        Primitive::frustum(inner_base, rim - wall_m, wall_m, height_m),
+        Primitive::Disc { z_m: height_m, inner_m: rim - wall_m, outer_m: rim },
+        Primitive::Disc { z_m: wall_m, inner_m: 0.0, outer_m: inner_base },
+        Primitive::Disc { z_m: 0.0, inner_m: 0.0, outer_m: base },
     ]
 }

@@ -77,7 +77,7 @@ impl State {
     }
 
     /// Does one step of a drive.
-    pub fn follow(&mut self, step: &drive::Step) {
+    pub fn follow(&mut self, step: &drive::DriveStep) {
         self.pass(step.seconds);
         self.estimate = step.pose;
     }
@@ -100,7 +100,7 @@ impl State {
     /// The first step that brings the footprint into an unmapped obstacle, and the obstacle's index. A
     /// touched obstacle stops only steps towards it, and no turns: a turn on the spot shifts the modelled
     /// true position of a base with a wrong estimate, although the base does not move.
-    pub fn first_bump(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
+    pub fn first_bump(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
             let at = self.really(&step.pose).translation.vector.xy().into();
@@ -148,7 +148,7 @@ impl State {
 
     /// The first step that brings the footprint into a shut door, and the door's index. The base detects
     /// doors where its map has them, so the planned pose counts.
-    pub fn first_shut_door(&self, steps: &[drive::Step], radius_m: f64) -> Option<(usize, usize)> {
+    pub fn first_shut_door(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.estimate.point();
         for (i, step) in steps.iter().enumerate() {
             let here = step.pose.point();

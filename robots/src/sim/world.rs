@@ -4,7 +4,7 @@ use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
 use crate::sim::composed::Paint;
 use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
-use crate::sim::shape::{Cuboid, Hit, Part, Shape};
+use crate::sim::shape::{Cuboid, Hit, Primitive, Shape};
 use crate::sim::stereo::Stereo;
 use crate::sim::walls::Wall;
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
@@ -134,7 +134,7 @@ pub struct Solid {
     /// Pose of its frame.
     pub map_from_solid: Isometry3<f64>,
     /// Its surfaces.
-    pub parts: Vec<Part>,
+    pub parts: Vec<Primitive>,
     /// Their colours, in the same order; empty: all have `colour`.
     pub paints: Vec<Paint>,
     /// Its bounding box in its own frame.
@@ -174,7 +174,7 @@ impl Solid {
     fn cuboid(map_from_solid: Isometry3<f64>, low: Point3<f64>, high: Point3<f64>, colour: [u8; 3]) -> Solid {
         Solid {
             map_from_solid,
-            parts: vec![Part::Cuboid { low, high }],
+            parts: vec![Primitive::Cuboid { low, high }],
             paints: Vec::new(),
             bounds: (low, high),
             colour,
@@ -290,22 +290,25 @@ impl ObstacleSpec {
                 let leg = |(sx, sy): (f64, f64)| {
                     let outer = Point3::new(sx * high.x, sy * high.y, 0.0);
                     let inner = outer - Vector3::new(sx, sy, 0.0).component_mul(&thick);
-                    Part::Cuboid { low: outer.inf(&inner), high: outer.sup(&inner) + Vector3::z() * under_m }
+                    Primitive::Cuboid {
+                        low: outer.inf(&inner),
+                        high: outer.sup(&inner) + Vector3::z() * under_m,
+                    }
                 };
-                let seat = Part::Cuboid { low: Point3::new(low.x, low.y, under_m), high };
+                let seat = Primitive::Cuboid { low: Point3::new(low.x, low.y, under_m), high };
                 [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
                     .map(leg)
                     .into_iter()
                     .chain([seat])
                     .collect()
             }
-            None if self.corner_m > 0.0 => vec![Part::Rounded { high, corner_m: self.corner_m }],
-            None => vec![Part::Cuboid { low, high }],
+            None if self.corner_m > 0.0 => vec![Primitive::Rounded { high, corner_m: self.corner_m }],
+            None => vec![Primitive::Cuboid { low, high }],
         };
         if let Some(back_m) = self.back_m {
             let seat = high;
             high.z += back_m;
-            parts.push(Part::Cuboid { low: Point3::new(seat.x - BACK_M, low.y, seat.z), high });
+            parts.push(Primitive::Cuboid { low: Point3::new(seat.x - BACK_M, low.y, seat.z), high });
         }
         Solid { parts, ..Solid::cuboid(self.map_from_obstacle(), low, high, self.colour) }
     }

@@ -5,7 +5,7 @@ use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::shown;
 use crate::recorded::picture;
-use crate::recorded::reading::{Poses, Reading};
+use crate::recorded::reading::{Conventions, Poses};
 use crate::recorded::settings::CameraSettings;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -76,10 +76,10 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     Ok(Stated {
         frames: gathered.frames,
         images: Box::new(gathered.files),
-        reading: Reading {
+        reading: Conventions {
             poses: Poses::CameraFromWorld,
             pose_unit_m: 0.001,
-            ..Reading::usual(1000.0 / scale.unwrap_or(1.0))
+            ..Conventions::usual(1000.0 / scale.unwrap_or(1.0))
         },
         whole: true,
         registered: true,

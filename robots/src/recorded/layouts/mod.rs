@@ -15,7 +15,7 @@ mod tum;
 use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, SETTINGS_FILE, names, shown};
 use crate::recorded::picture::{self, RawDepth};
-use crate::recorded::reading::Reading;
+use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
 use image::RgbImage;
 use nalgebra::Isometry3;
@@ -98,7 +98,7 @@ pub struct Stated {
     /// Images of these frames.
     pub images: Box<dyn Images>,
     /// Units and conventions of the layout.
-    pub reading: Reading,
+    pub reading: Conventions,
     /// True if depths are whole numbers of 16 bits.
     pub whole: bool,
     /// True if pixels of colour and depth are the same.

@@ -5,7 +5,7 @@ use crate::input::{self, InputError};
 use crate::recorded::folder::{names, shown, stem};
 use crate::recorded::import::pairs;
 use crate::recorded::picture::RawDepth;
-use crate::recorded::reading::{self, Reading};
+use crate::recorded::reading::{self, Conventions};
 use crate::recorded::settings::CameraSettings;
 use descry_perception::files::read_cloud;
 use descry_perception::visibility::estimate_intrinsics;
@@ -249,7 +249,7 @@ impl Pcds {
         }
         Stated {
             frames: self.files.iter().map(frame).collect(),
-            reading: Reading::usual(1.0),
+            reading: Conventions::usual(1.0),
             whole: false,
             registered: self.coloured,
             up: None,

@@ -6,7 +6,7 @@ use crate::input::InputError;
 use crate::recorded::folder::{names, read as text, shown};
 use crate::recorded::picture;
 use crate::recorded::pose;
-use crate::recorded::reading::{Poses, Reading};
+use crate::recorded::reading::{Conventions, Poses};
 use crate::recorded::settings::CameraSettings;
 use nalgebra::Isometry3;
 use serde::Deserialize;
@@ -109,7 +109,7 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     Ok(Stated {
         frames: gathered.frames,
         images: Box::new(gathered.files),
-        reading: Reading { poses: direction, ..Reading::usual(DEPTH_SCALE) },
+        reading: Conventions { poses: direction, ..Conventions::usual(DEPTH_SCALE) },
         whole: true,
         registered: true,
         up: None,

@@ -6,7 +6,7 @@ use crate::input::InputError;
 use crate::recorded::folder::{read as text, shown};
 use crate::recorded::picture;
 use crate::recorded::pose;
-use crate::recorded::reading::Reading;
+use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     Ok(Stated {
         frames: gathered.frames,
         images: Box::new(gathered.files),
-        reading: Reading::usual(DEPTH_SCALE),
+        reading: Conventions::usual(DEPTH_SCALE),
         whole: true,
         registered: false,
         up: None,

@@ -5,7 +5,7 @@ use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{read as text, shown, stem};
 use crate::recorded::pose;
-use crate::recorded::reading::Reading;
+use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
     Ok(Stated {
         frames: gathered.frames,
         images: Box::new(gathered.files),
-        reading: Reading::usual(DEPTH_SCALE),
+        reading: Conventions::usual(DEPTH_SCALE),
         whole: true,
         registered: true,
         up: None,

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 
 /// A surface with a closed-form ray intersection (the handle: to a tenth of a millimetre).
 #[derive(Clone, Debug, PartialEq)]
-pub enum Part {
+pub enum Primitive {
     /// Side of a cone around z between two heights: radius = `axis_m` + `slope`·z.
     Frustum {
         /// Radius at z = 0.
@@ -60,7 +60,7 @@ pub enum Part {
         /// Pose of that frame.
         part_from_here: Isometry3<f64>,
         /// The surface there.
-        part: Box<Part>,
+        part: Box<Primitive>,
     },
 }
 
@@ -78,35 +78,35 @@ const NEAREST_T: f64 = 1e-6;
 const HANDLE_TOLERANCE_M: f64 = 1e-4;
 const HANDLE_STEPS: usize = 64;
 
-impl Part {
-    pub(super) fn frustum(base_m: f64, top_m: f64, low_m: f64, high_m: f64) -> Part {
+impl Primitive {
+    pub(super) fn frustum(base_m: f64, top_m: f64, low_m: f64, high_m: f64) -> Primitive {
         let slope = (top_m - base_m) / (high_m - low_m);
-        Part::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
+        Primitive::Frustum { axis_m: base_m - slope * low_m, slope, low_m, high_m }
     }
 
     /// An ellipsoid that touches the plane z = `low_m` from above.
-    pub(super) fn ball(half: &Vector3<f64>, low_m: f64) -> Part {
-        Part::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
+    pub(super) fn ball(half: &Vector3<f64>, low_m: f64) -> Primitive {
+        Primitive::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
     }
 
     /// The surface in another frame.
-    pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Part {
-        Part::Turned { part_from_here, part: Box::new(self) }
+    pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Primitive {
+        Primitive::Turned { part_from_here, part: Box::new(self) }
     }
 
     /// The first hit with 0 < t < `before`.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         match *self {
-            Part::Turned { part_from_here, ref part } => {
+            Primitive::Turned { part_from_here, ref part } => {
                 let hit = part.hit(&(part_from_here * o), &(part_from_here * d), before)?;
                 Some(Hit { normal: part_from_here.rotation.inverse() * hit.normal, ..hit })
             }
-            Part::Ball { middle, half } => ball_hit(o, d, before, &middle, &half),
-            Part::Frustum { axis_m, slope, low_m, high_m } => {
+            Primitive::Ball { middle, half } => ball_hit(o, d, before, &middle, &half),
+            Primitive::Frustum { axis_m, slope, low_m, high_m } => {
                 frustum_hit(o, d, before, (axis_m, slope), (low_m, high_m))
             }
-            Part::Disc { z_m, inner_m, outer_m } => {
+            Primitive::Disc { z_m, inner_m, outer_m } => {
                 let t = (z_m - o.z) / d.z;
                 if !(t > NEAREST_T && t < before) {
                     return None;
@@ -116,9 +116,11 @@ impl Part {
                 (square >= inner_m * inner_m && square <= outer_m * outer_m)
                     .then_some(Hit { t, normal: Vector3::z() })
             }
-            Part::Handle { centre, major_m, minor_m } => handle_hit(o, d, before, &centre, major_m, minor_m),
-            Part::Rounded { high, corner_m } => rounded_hit(o, d, before, &high, corner_m),
-            Part::Cuboid { low, high } => cuboid_hit(o, d, before, &low, &high),
+            Primitive::Handle { centre, major_m, minor_m } => {
+                handle_hit(o, d, before, &centre, major_m, minor_m)
+            }
+            Primitive::Rounded { high, corner_m } => rounded_hit(o, d, before, &high, corner_m),
+            Primitive::Cuboid { low, high } => cuboid_hit(o, d, before, &low, &high),
         }
     }
 }
@@ -233,8 +235,8 @@ fn rounded_hit(
         .into_iter()
         .filter_map(|(x, y)| cuboid_hit(o, d, before, &Point3::new(-x, -y, 0.0), &Point3::new(x, y, high.z)));
     let edge = [
-        Part::frustum(corner_m, corner_m, 0.0, high.z),
-        Part::Disc { z_m: high.z, inner_m: 0.0, outer_m: corner_m },
+        Primitive::frustum(corner_m, corner_m, 0.0, high.z),
+        Primitive::Disc { z_m: high.z, inner_m: 0.0, outer_m: corner_m },
     ];
     let edges = [(x, y), (-x, y), (-x, -y), (x, -y)].into_iter().flat_map(|(x, y)| {
         let from_edge = o - Vector3::new(x, y, 0.0);

@@ -11,7 +11,7 @@ use super::{Asked, Images, Stated, StatedFrame};
 use crate::input::InputError;
 use crate::recorded::folder::{names, shown};
 use crate::recorded::picture::RawDepth;
-use crate::recorded::reading::Reading;
+use crate::recorded::reading::Conventions;
 use gather::{Stored, camera, choose, gather};
 use image::RgbImage;
 use std::path::{Path, PathBuf};
@@ -130,7 +130,7 @@ pub(super) fn read(path: &Path, asked: &Asked) -> Result<Stated, InputError> {
     Ok(Stated {
         frames: kept,
         images: Box::new(images),
-        reading: Reading::usual(scale),
+        reading: Conventions::usual(scale),
         whole: is_whole,
         registered,
         up,

@@ -4,8 +4,9 @@
 use descry_robots::head;
 use descry_robots::nalgebra::{Isometry3, Point3};
 use descry_robots::perception::Intrinsics;
+use descry_robots::sim::frame::Frame;
 use descry_robots::sim::noise::{DepthNoise, observe};
-use descry_robots::sim::render::{Frame, render, visible_share};
+use descry_robots::sim::render::{render, visible_share};
 use descry_robots::sim::shape::Shape;
 use descry_robots::sim::world::{LABEL_OBJECT, LABEL_ROOM};
 use descry_robots::sim::{Object, Scene, SceneSpec, Stand, arrange, body};

@@ -3,11 +3,12 @@
 use crate::body::Colour;
 use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, SETTINGS_FILE, check_distances, shown};
+use crate::recorded::footage::Footage;
 use crate::recorded::layouts::{self, Asked, Layout, Stated};
 use crate::recorded::picture::RawDepth;
-use crate::recorded::reading::{self, Conventions, Given, Pair, StatedView};
-use crate::recorded::robot::Footage;
+use crate::recorded::reading::{self, Conventions, Given};
 use crate::recorded::settings::{CameraSettings, Settings};
+use crate::recorded::stated::pairs;
 use crate::request::Pixels;
 use descry_perception::Intrinsics;
 use image::{ImageBuffer, Luma};
@@ -22,8 +23,6 @@ pub const SPACING_M: f64 = 0.2;
 const LEVER_M: f64 = 0.6;
 /// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
 const FARTHEST_M: f64 = 100.0;
-/// Frames from which pairs of views are sought. From: chosen.
-const ANCHORS: usize = 24;
 /// Units in a metre of depth images made from floating point: half a millimetre, up to 32 m.
 const FINE_SCALE: f64 = 2000.0;
 
@@ -279,29 +278,6 @@ fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Re
     let image = ImageBuffer::<Luma<u16>, _>::from_raw(depth.width as u32, depth.height as u32, pixels);
     let image = image.ok_or_else(|| std::io::Error::other("the depth image has no such size"))?;
     image.save(path).map_err(std::io::Error::other)
-}
-
-/// Pairs of views that show the same from different places, spread over the recording.
-pub(crate) fn pairs(stated: &Stated) -> Result<Vec<Pair>, InputError> {
-    let view = |i: usize| -> Result<StatedView, InputError> {
-        let frame = &stated.frames[i];
-        Ok(StatedView { pose: frame.pose, camera: frame.camera, depth: stated.images.depth(i)? })
-    };
-    let count = stated.frames.len();
-    let mut pairs = Vec::new();
-    for anchor in (0..count).step_by(count.div_ceil(ANCHORS).max(1)) {
-        let first = view(anchor)?;
-        let mut stride = 1;
-        while anchor + stride < count {
-            let pair = Pair(first.clone(), view(anchor + stride)?);
-            if pair.tells() {
-                pairs.push(pair);
-                break;
-            }
-            stride *= 2;
-        }
-    }
-    Ok(pairs)
 }
 
 /// Moves positions far from the origin to it by whole metres; says by how much.

@@ -35,6 +35,7 @@
 //! ```
 
 mod folder;
+mod footage;
 pub mod import;
 pub mod layouts;
 pub(crate) mod outline;
@@ -43,12 +44,14 @@ mod pose;
 pub mod reading;
 mod robot;
 mod settings;
+mod stated;
 mod tape;
 mod taped;
 
 pub use folder::{Recording, StoredFrame};
+pub use footage::Footage;
 pub use picture::RawDepth;
-pub use robot::{Footage, RecordedRobot};
+pub use robot::RecordedRobot;
 pub use settings::{CameraSettings, Settings};
 pub use tape::{Entry, Known, Question, Reply, Tape};
 pub use taped::TapedRobot;

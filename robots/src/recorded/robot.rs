@@ -9,6 +9,7 @@ use crate::grid::OccupancyGrid;
 use crate::input::InputError;
 use crate::parts::{Base, Camera, Description, Footprint, Frames, Part, Speeds};
 use crate::recorded::folder::{CAMERA_FILE, Recording, SETTINGS_FILE};
+use crate::recorded::footage::Footage;
 use crate::recorded::import::{Imported, Options};
 use crate::recorded::layouts::layout_of;
 use crate::recorded::settings::{Settings, SurfaceSettings};
@@ -21,15 +22,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Time for a frame on the body's clock, seconds.
 const FRAME_S: f64 = 0.1;
-
-/// Recorded frames, one at each station.
-pub trait Footage: Send + Sync {
-    /// Pixels of the frame at a station.
-    ///
-    /// # Errors
-    /// The reason for which the frame cannot be read.
-    fn pixels(&self, station: usize) -> Result<Pixels, String>;
-}
 
 /// A recording as a robot. Its base is the camera; it stands at one of its frames and has no map.
 pub struct RecordedRobot {

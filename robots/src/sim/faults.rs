@@ -27,7 +27,6 @@
 
 use crate::input::{self, InputError, Objection, Step};
 use crate::sim::noise::{mix, share};
-use crate::sim::scene::SceneSpec;
 use serde::{Deserialize, Serialize};
 
 /// A kind of fault.
@@ -123,11 +122,6 @@ impl FaultPlan {
         let plan: FaultPlan = input::parse_toml(file, text)?;
         plan.check().map_err(|objection| input::draw(file, text, objection))?;
         Ok(plan)
-    }
-
-    /// Joins the faults of a scene with these, the scene's first.
-    pub fn after(self, scene: &SceneSpec) -> FaultPlan {
-        FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
     }
 
     /// Checks that every fault has a time.

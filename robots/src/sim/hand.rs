@@ -2,9 +2,10 @@
 
 use crate::sim::arrange::{fits, keeps_apart};
 use crate::sim::drive::normal;
+use crate::sim::outline::upright;
 use crate::sim::scene::{SurfaceSpec, headroom_m};
 use crate::sim::shape::Outline;
-use crate::sim::world::{Scene, Stand, upright};
+use crate::sim::world::{Scene, Stand};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;

@@ -3,7 +3,7 @@
 //!
 //! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads.
 
-use crate::sim::render::Frame;
+use crate::sim::frame::Frame;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 

@@ -4,39 +4,12 @@
 //! pixel rectangle of its projected bounding box. Rows are rendered in parallel; pixels are independent.
 
 use crate::body::Stamp;
+use crate::sim::frame::Frame;
 use crate::sim::scene::RoomSpec;
 use crate::sim::world::{LABEL_NOTHING, LABEL_ROOM, Scene, Solid, WALL_COLOUR};
 use descry_perception::Intrinsics;
-use image::RgbImage;
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use rayon::prelude::*;
-
-/// Image of an ideal camera, row by row.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// The camera.
-    pub intrinsics: Intrinsics,
-    /// Time stamp.
-    pub stamp_ns: Stamp,
-    /// Depth along z, metres; infinite without a hit.
-    pub depth_m: Vec<f32>,
-    /// Cosine of the angle between the ray and the surface's normal.
-    pub cosine: Vec<f32>,
-    /// Label of the surface hit, as in [`world`](crate::sim::world).
-    pub label: Vec<u16>,
-    /// Red, green, blue, shaded.
-    pub colour: Vec<[u8; 3]>,
-}
-
-impl Frame {
-    /// The colours as an image.
-    pub fn image(&self) -> RgbImage {
-        let width = self.intrinsics.width;
-        RgbImage::from_fn(width as u32, self.intrinsics.height as u32, |u, v| {
-            image::Rgb(self.colour[v as usize * width + u as usize])
-        })
-    }
-}
 
 /// A solid in the camera's frame.
 struct Placed<'a> {

@@ -6,6 +6,7 @@ use crate::sim::composed::{self, Composed, Paint};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+pub use crate::sim::outline::Outline;
 pub use part::{Hit, Primitive};
 
 /// Shape of an object. Lengths in metres, outer sizes.
@@ -140,21 +141,6 @@ fn default_handle_m() -> f64 {
 }
 fn default_handle_thickness_m() -> f64 {
     0.01
-}
-
-/// Footprint for keeping two shapes apart on a table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Outline {
-    /// Disc around the origin.
-    Disc {
-        /// Radius, metres.
-        radius_m: f64,
-    },
-    /// Axis-aligned rectangle around the origin.
-    Rectangle {
-        /// Half the sides, metres.
-        half_m: [f64; 2],
-    },
 }
 
 impl Shape {

@@ -3,8 +3,8 @@
 //! Every pixel draws from its own hash of (seed, frame, pixel), so the result does not depend on threads.
 //! Bare spots of a surface are fixed by position, so they are bare from every viewpoint.
 
+use crate::sim::frame::Frame;
 use crate::sim::noise::{mix, normal, share};
-use crate::sim::render::Frame;
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

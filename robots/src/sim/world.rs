@@ -3,11 +3,12 @@
 use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
 use crate::sim::composed::Paint;
+use crate::sim::outline::upright;
 use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
 use crate::sim::shape::{Cuboid, Hit, Primitive, Shape};
 use crate::sim::stereo::Stereo;
 use crate::sim::walls::Wall;
-use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Side of a cell of the robot's map, metres.
@@ -185,14 +186,6 @@ impl Solid {
     fn of_room(low: Point3<f64>, high: Point3<f64>, colour: [u8; 3]) -> Solid {
         Solid { label: LABEL_ROOM, ..Solid::cuboid(Isometry3::identity(), low, high, colour) }
     }
-}
-
-/// Upright pose at a point of the map.
-pub(crate) fn upright(x_m: f64, y_m: f64, z_m: f64, yaw_rad: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(
-        Translation3::new(x_m, y_m, z_m),
-        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad),
-    )
 }
 
 /// Side of a table's legs, metres.

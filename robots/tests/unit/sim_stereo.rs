@@ -2,7 +2,7 @@
 
 use descry_robots::sim::arrange;
 use descry_robots::sim::body::intrinsics;
-use descry_robots::sim::render::Frame;
+use descry_robots::sim::frame::Frame;
 use descry_robots::sim::render::render;
 use descry_robots::sim::scene::SceneSpec;
 use descry_robots::sim::stereo::*;

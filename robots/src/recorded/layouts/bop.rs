@@ -1,12 +1,12 @@
 //! A scene of the BOP challenge: images, and cameras in one JSON file by the number of the image.
 
 use super::pieces::{self, Gathered, by_number, depths, json};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::shown;
 use crate::recorded::picture;
 use crate::recorded::reading::{Conventions, Poses};
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -14,12 +14,8 @@ mod tum;
 
 use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, SETTINGS_FILE, names, shown};
-use crate::recorded::picture::{self, RawDepth};
-use crate::recorded::reading::Conventions;
-use crate::recorded::settings::CameraSettings;
-use image::RgbImage;
-use nalgebra::Isometry3;
-use std::path::{Path, PathBuf};
+pub use crate::recorded::stated::{Asked, Files, Images, Stated, StatedFrame};
+use std::path::Path;
 
 /// A published layout.
 pub struct Layout {
@@ -68,92 +64,6 @@ pub const LAYOUTS: [Layout; 8] = [
     },
     Layout { name: "pcd", files: "*.pcd, each with its VIEWPOINT", is: pcds::is, read: pcds::read },
 ];
-
-/// Choices of the user about what a folder does not say.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Asked {
-    /// Name of the layout.
-    pub layout: Option<String>,
-    /// The depth camera.
-    pub camera: Option<CameraSettings>,
-    /// Topic of the depth images in a bag.
-    pub topic: Option<String>,
-}
-
-/// A frame as its layout states it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StatedFrame {
-    /// Name, for the station.
-    pub name: String,
-    /// The depth camera.
-    pub camera: CameraSettings,
-    /// Pose in the units and the convention of the files.
-    pub pose: Isometry3<f64>,
-}
-
-/// A recording as its layout states it.
-pub struct Stated {
-    /// Frames whose pose is known, in their order.
-    pub frames: Vec<StatedFrame>,
-    /// Images of these frames.
-    pub images: Box<dyn Images>,
-    /// Units and conventions of the layout.
-    pub reading: Conventions,
-    /// True if depths are whole numbers of 16 bits.
-    pub whole: bool,
-    /// True if pixels of colour and depth are the same.
-    pub registered: bool,
-    /// Upward direction in the world of the poses, if the layout defines it.
-    pub up: Option<[f64; 3]>,
-    /// Notes for people: what was assumed or left out.
-    pub notes: Vec<String>,
-}
-
-/// Images of a recording, by frame.
-pub trait Images: Send + Sync {
-    /// Depth image of a frame.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    fn depth(&self, frame: usize) -> Result<RawDepth, InputError>;
-
-    /// Colour image of a frame, if there is one.
-    ///
-    /// # Errors
-    /// If it cannot be read.
-    fn colour(&self, frame: usize) -> Result<Option<RgbImage>, InputError>;
-
-    /// Files of a frame's depth and colour that may be copied as they are.
-    fn files(&self, _frame: usize) -> Option<(&Path, Option<&Path>)> {
-        None
-    }
-
-    /// True if any frame has colour.
-    fn coloured(&self) -> bool;
-}
-
-/// Images in files of their own: depth, and colour if there is some.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Files(pub Vec<(PathBuf, Option<PathBuf>)>);
-
-impl Images for Files {
-    fn depth(&self, frame: usize) -> Result<RawDepth, InputError> {
-        picture::depth(&self.0[frame].0)
-    }
-
-    fn colour(&self, frame: usize) -> Result<Option<RgbImage>, InputError> {
-        self.0[frame].1.as_deref().map(picture::colour).transpose()
-    }
-
-    fn files(&self, frame: usize) -> Option<(&Path, Option<&Path>)> {
-        let (depth, colour) = &self.0[frame];
-        Some((depth, colour.as_deref()))
-    }
-
-    fn coloured(&self) -> bool {
-        self.0.iter().any(|(_, colour)| colour.is_some())
-    }
-}
 
 /// The layout of a folder or file, if it is one of those that are known.
 pub fn layout_of(path: &Path) -> Option<&'static Layout> {

@@ -1,12 +1,11 @@
 //! A folder of PCD files, each with the place of its sensor as `VIEWPOINT`.
 
-use super::{Asked, Images, Stated, StatedFrame};
 use crate::input::{self, InputError};
 use crate::recorded::folder::{names, shown, stem};
-use crate::recorded::import::pairs;
 use crate::recorded::picture::RawDepth;
 use crate::recorded::reading::{self, Conventions};
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Images, Stated, StatedFrame, pairs};
 use descry_perception::files::read_cloud;
 use descry_perception::visibility::estimate_intrinsics;
 use descry_perception::{Cloud, Intrinsics};

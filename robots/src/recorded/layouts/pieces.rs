@@ -1,11 +1,11 @@
 //! Pieces that several layouts share: folders of images, matrices, JSON, the camera.
 
-use super::{Asked, Files, StatedFrame};
 use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, names, read, shown, stem};
 use crate::recorded::picture;
 use crate::recorded::pose;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Files, StatedFrame};
 use nalgebra::Isometry3;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;

@@ -1,13 +1,13 @@
 //! Redwood and Open3D: a folder of depth images and a trajectory as `.log` or `.json`.
 
 use super::pieces::{self, Gathered, by_number, depths, json};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{names, read as text, shown};
 use crate::recorded::picture;
 use crate::recorded::pose;
 use crate::recorded::reading::{Conventions, Poses};
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use nalgebra::Isometry3;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};

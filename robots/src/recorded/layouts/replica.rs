@@ -1,13 +1,13 @@
 //! Replica as rendered for NICE-SLAM and its successors.
 
 use super::pieces::{self, Gathered, by_number, json};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{read as text, shown};
 use crate::recorded::picture;
 use crate::recorded::pose;
 use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use serde::Deserialize;
 use std::path::Path;
 

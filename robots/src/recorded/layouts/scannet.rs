@@ -1,13 +1,13 @@
 //! ScanNet as its exporter writes it: folders of images and poses with the same numbers.
 
 use super::pieces::{self, Gathered, by_number, depths};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{read as text, shown};
 use crate::recorded::picture;
 use crate::recorded::pose;
 use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use std::path::Path;
 
 /// Units of a depth image in a metre. From: the data set's page on its format (`depthShift`).

@@ -1,12 +1,12 @@
 //! 7-Scenes: frames side by side, whose camera is stated on the data set's page alone.
 
 use super::pieces::{self, Gathered};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{CAMERA_FILE, names, read as text, shown};
 use crate::recorded::pose;
 use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use std::path::Path;
 
 const DEPTH: &str = ".depth.png";

@@ -1,12 +1,12 @@
 //! TUM RGB-D: images with stamps for names, and a trajectory of its own stamps.
 
 use super::pieces::{self, Gathered};
-use super::{Asked, Stated};
 use crate::input::InputError;
 use crate::recorded::folder::{read as text, shown, stem};
 use crate::recorded::pose;
 use crate::recorded::reading::Conventions;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::{Asked, Stated};
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 

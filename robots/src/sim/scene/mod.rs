@@ -191,6 +191,13 @@ fn default_grey() -> [u8; 3] {
     [150, 150, 150]
 }
 
+impl FaultPlan {
+    /// Joins the faults of a scene with these, the scene's first.
+    pub fn after(self, scene: &SceneSpec) -> FaultPlan {
+        FaultPlan { faults: scene.faults.iter().cloned().chain(self.faults).collect() }
+    }
+}
+
 impl SceneSpec {
     /// Parses a scene. `file` is its name for messages.
     ///

@@ -4,9 +4,7 @@ use super::check::{finite, object, positive, unique};
 use super::room::RoomSpec;
 use super::{SceneSpec, default_grey};
 use crate::input::{Objection, Step};
-use crate::sim::arrange::gap_between;
-use crate::sim::shape::Outline;
-use crate::sim::world::upright;
+use crate::sim::outline::{Outline, gap_between, upright};
 use nalgebra::{Isometry2, Isometry3, Point2, Point3, Vector2};
 use serde::{Deserialize, Serialize};
 

@@ -2,11 +2,12 @@
 
 use super::cdr::{self, CameraInfo, Cdr};
 use super::transforms::Transforms;
-use super::{Asked, Message, Messages, Place, Topic, frames};
+use super::{Message, Messages, Place, Topic, frames};
 use crate::input::InputError;
 use crate::recorded::folder::shown;
 use crate::recorded::layouts::pieces;
 use crate::recorded::settings::CameraSettings;
+use crate::recorded::stated::Asked;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -7,11 +7,11 @@ mod mcap;
 mod sqlite;
 mod transforms;
 
-use super::{Asked, Images, Stated, StatedFrame};
 use crate::input::InputError;
 use crate::recorded::folder::{names, shown};
 use crate::recorded::picture::RawDepth;
 use crate::recorded::reading::Conventions;
+use crate::recorded::stated::{Asked, Images, Stated, StatedFrame};
 use gather::{Stored, camera, choose, gather};
 use image::RgbImage;
 use std::path::{Path, PathBuf};

@@ -178,6 +178,13 @@ fn a_body_from_a_bag_knows_what_is_up() {
     bags::mcap(folder.path(), &shots());
     let (robot, _) = RecordedRobot::open(&folder.path().join("drive_0.mcap")).unwrap();
     assert_eq!(robot.description().up, Some(Vector3::z()));
+    // In the frame of the first camera z is forward, whatever the frame is called.
+    let folder = TempDir::new().unwrap();
+    let first = shots()[0].stated;
+    bags::mcap(folder.path(), &restated(&shots(), |pose| first.inverse() * pose));
+    let (robot, notes) = RecordedRobot::open(&folder.path().join("drive_0.mcap")).unwrap();
+    assert_eq!(robot.description().up, None);
+    assert!(notes.iter().any(|note| note.contains("up is told from the views")), "{notes:?}");
 }
 
 /// Points without pixels: told in which frame they are, and found where they are.

@@ -21,6 +21,8 @@ use std::path::Path;
 pub const SPACING_M: f64 = 0.2;
 /// Distance that a turn of one radian counts as, metres: that of what is looked at. From: chosen.
 const LEVER_M: f64 = 0.6;
+/// Angle between up and the upper side of the images, on average, beyond which cameras are held against that up. From: chosen, that of perception.
+const HELD_RAD: f64 = 1.2;
 /// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
 const FARTHEST_M: f64 = 100.0;
 /// Units in a metre of depth images made from floating point: half a millimetre, up to 32 m.
@@ -81,6 +83,10 @@ impl Imported {
         let mut poses: Vec<Isometry3<f64>> =
             stated.frames.iter().map(|f| reading.world_from_camera(&f.pose)).collect();
         notes.extend(recentre(&mut poses));
+        let up = stated.up.filter(|up| are_held_upright(&poses, up));
+        if stated.up != up {
+            notes.push("the frame of the poses should have z up by its name, but the cameras are not held so: up is told from the views".into());
+        }
         check_distances(path, poses.iter().zip(&stated.frames).map(|(pose, f)| (f.name.as_str(), pose)))?;
         let kept = spaced(&poses, options.spacing_m.unwrap_or(SPACING_M));
         if kept.len() < poses.len() {
@@ -103,7 +109,7 @@ impl Imported {
         let settings = Settings {
             name: Some(name.clone()),
             depth_scale: if stated.whole { reading.depth_scale } else { FINE_SCALE },
-            up: stated.up,
+            up,
             registered: stated.registered,
             camera: Some(camera),
             ..Settings::default()
@@ -278,6 +284,12 @@ fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Re
     let image = ImageBuffer::<Luma<u16>, _>::from_raw(depth.width as u32, depth.height as u32, pixels);
     let image = image.ok_or_else(|| std::io::Error::other("the depth image has no such size"))?;
     image.save(path).map_err(std::io::Error::other)
+}
+
+/// True if cameras are held as people and robots hold them where this is up.
+fn are_held_upright(poses: &[Isometry3<f64>], up: &[f64; 3]) -> bool {
+    let upper: Vector3<f64> = poses.iter().map(|pose| -(pose * Vector3::y())).sum();
+    upper.angle(&Vector3::from(*up)) < HELD_RAD
 }
 
 /// Moves positions far from the origin to it by whole metres; says by how much.

@@ -138,8 +138,9 @@ impl LandmarkCut {
                     continue;
                 }
                 let preconditions = self.preconditions.get(node as usize).iter();
-                let greatest = preconditions.map(|&fact| (self.costs[fact as usize], fact)).max();
-                let (supported, supporter) = greatest.unwrap_or((cost, fact));
+                // A supporter stays one among equals: landmarks found from it before stay good ones.
+                let key = |&other: &u32| (self.costs[other as usize], other == fact, other);
+                let (supported, _, supporter) = preconditions.map(key).max().unwrap_or((cost, true, fact));
                 let falls = supported < own.supported;
                 (own.supported, own.supporter) = (supported, supporter);
                 if falls {

@@ -77,6 +77,30 @@ pub struct Segment {
     pub base_sigma_m: f64,
 }
 
+impl Segment {
+    /// Union with another segment, in order of the indices, on the support of the lower one.
+    pub(crate) fn with(&self, other: &Segment) -> Segment {
+        let count = self.indices.len() + other.indices.len();
+        let lower = if other.base_m < self.base_m { other } else { self };
+        let mut both = Segment {
+            indices: Vec::with_capacity(count),
+            points: Vec::with_capacity(count),
+            base_m: lower.base_m,
+            base_sigma_m: lower.base_sigma_m,
+        };
+        let (mut i, mut j) = (0, 0);
+        while i < self.indices.len() || j < other.indices.len() {
+            let is_own =
+                other.indices.get(j).is_none_or(|next| self.indices.get(i).is_some_and(|own| own <= next));
+            let (from, at) = if is_own { (self, &mut i) } else { (other, &mut j) };
+            both.indices.push(from.indices[*at]);
+            both.points.push(from.points[*at]);
+            *at += 1;
+        }
+        both
+    }
+}
+
 /// A surface with the objects on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {

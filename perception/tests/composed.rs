@@ -45,6 +45,8 @@ fn models() -> Vec<ObjectModel> {
 }
 
 const SAUCER: &[[f64; 2]] = &[[0.0, 0.05], [0.02, 0.075]];
+const BOWL: &[[f64; 2]] = &[[0.0, 0.05], [0.052, 0.072]];
+const OPEN_TIN: &[[f64; 2]] = &[[0.0, 0.0585], [0.0665, 0.0585]];
 const BOTTLE: &[[f64; 2]] = &[[0.0, 0.035], [0.16, 0.035], [0.2, 0.014], [0.25, 0.014]];
 const JAR: &[[f64; 2]] = &[[0.0, 0.0425], [0.125, 0.0425], [0.127, 0.025], [0.16, 0.025]];
 
@@ -104,6 +106,23 @@ fn a_cup_on_another_thing_is_found_in_merged_views() {
         vec![
             ("on a saucer", vec![turned(SAUCER, false), cup_at(0.02)], "cup A", [0.5, 1.0]),
             ("on a tin", vec![tin(0.045, 0.13), cup_at(0.13)], "cup A", [0.5, 1.0]),
+        ],
+        1,
+    );
+}
+
+#[test]
+fn a_cup_on_a_tin_that_is_hardly_wider_is_not_denied() {
+    check(vec![("on a narrow tin", vec![tin(0.0405, 0.1235), cup_at(0.1235)], "cup A", [0.2, 1.0])], 3);
+}
+
+#[test]
+fn a_cup_in_a_vessel_stands_on_its_bottom_and_not_on_its_rim() {
+    check(
+        vec![
+            ("in a bowl", vec![turned(BOWL, true), cup_at(0.004)], "cup A", [0.5, 1.0]),
+            ("in an open tin", vec![turned(OPEN_TIN, true), cup_at(0.004)], "cup A", [0.5, 1.0]),
+            ("a larger cup", vec![turned(OPEN_TIN, true), larger_cup_at(0.004)], "cup A", [0.0, 0.05]),
         ],
         1,
     );

@@ -12,7 +12,7 @@ use super::likelihood::{
 };
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::necked::{self, Necked};
-use super::parting::parted_log;
+use super::parting::{Held, Standing, parted_log, within_log};
 use super::percept::{Percept, Stance};
 use super::rays::PIXELS;
 use super::resting::{self, Resting};
@@ -163,16 +163,14 @@ impl Descry {
             if necked.is_some() {
                 return necked;
             }
-            if let Some(body) = resting::in_vessel(setting.scene, n, sigma_m) {
+            if let Some(body) = within(setting, n, sigma_m, seen) {
                 return Some((vec![self.judge(setting, &body, seen, models)], vec![n]));
             }
             let resting = resting::seek(segment, &rounds, sigma_m).into_iter();
             let parted = resting.map(|resting| self.judge_parts(setting, segment, &resting, seen, models));
-            let Parted { body, rest, log } =
+            let parted = parted.filter(|parted| parted.log >= FAR);
+            let Parted { body, rest, .. } =
                 parted.max_by(|a, b| a.body.known().total_cmp(&b.body.known()))?;
-            if log < FAR {
-                return None;
-            }
             let all = better(vec![body.clone()]).map(|mut all| {
                 all.push(rest);
                 all
@@ -195,7 +193,7 @@ impl Descry {
         &self,
         setting: &Setting,
         whole: &Segment,
-        Resting { body, rest }: &Resting,
+        Resting { body, rest, is_within }: &Resting,
         seen: &Visibility,
         models: &[ObjectModel],
     ) -> Parted {
@@ -204,8 +202,12 @@ impl Descry {
         let (place, half_m) = own.measured.footprint_reach();
         let rays =
             rays_around((place, half_m, PIXELS), whole, (&whole.points, &own.measured), &asker, setting);
-        let parts = [(&upper.measured, body.base_m), (&lower.measured, rest.base_m)];
-        let log = parted_log(&rays, (&own.measured, whole.base_m), parts);
+        let held = Held {
+            body: Standing::at(&upper.measured, body.base_m),
+            holder: Standing::at(&lower.measured, rest.base_m),
+            is_within: *is_within,
+        };
+        let log = parted_log(&rays, Standing::at(&own.measured, whole.base_m), held);
         let judge = |part, looked| self.judge_looked(setting, part, looked, seen, models);
         Parted { body: judge(body, upper), rest: judge(rest, lower), log }
     }
@@ -227,6 +229,24 @@ impl Descry {
         let weighed = self.weigh(models, &measured, None, &vec![[0.0; 3]; models.len()]);
         self.named(setting, &necked.whole, measured, models, weighed)
     }
+}
+
+/// Segment with its foot on the bottom of the vessel around it, if rays find that by far likelier than its foot on the vessel.
+fn within(setting: &Setting, of: usize, sigma_m: f64, seen: &Visibility) -> Option<Segment> {
+    let (body, vessel) = resting::in_vessel(setting.scene, of, sigma_m)?;
+    let segments = &setting.scene.segments;
+    let (segment, holder) = (&segments[of], &segments[vessel]);
+    let [own, around] = [segment, holder].map(|part| measure(setting, part, seen).measured);
+    let whole = segment.with(holder);
+    let asker = setting.asker(&whole, seen, &own);
+    let (place, half_m) = around.footprint_reach();
+    let height_m = (segment.base_m + own.height_m - whole.base_m).max(around.height_m);
+    let all = Measured { height_m, ..around.clone() };
+    let rays = rays_around((place, half_m, PIXELS), &whole, (&whole.points, &all), &asker, setting);
+    let stands = Standing::at(&own, segment.base_m);
+    let on = Held { body: stands, holder: Standing::at(&around, holder.base_m), is_within: false };
+    let within = Held { body: Standing { base_m: body.base_m, ..stands }, is_within: true, ..on };
+    (within_log(&rays, within, on) >= FAR).then_some(body)
 }
 
 /// Sensor model whose noise is fitted to the residuals of the supporting surface.

@@ -43,14 +43,61 @@ impl Body for Pair {
     }
 }
 
-/// The bodies of a thing's own measures, which stands at a height.
-fn forms(m: &Measured, base_m: f64) -> Vec<Form> {
-    let top_m = base_m + m.height_m;
-    let wall_m = (m.upper.open_log > 0.0).then_some(WALL_M);
-    let round =
-        m.round.map(|round| Form::Round(Frustum { wall_m, ..Frustum::around(&round, base_m, top_m) }));
-    let rectangle = m.rectangle.unwrap_or(m.footprint);
-    round.into_iter().chain([Form::Box(Cuboid::around(&rectangle, base_m, top_m))]).collect()
+/// Measures of an upright thing with the heights of its foot and of its upper end, metres.
+#[derive(Clone, Copy)]
+pub(super) struct Standing<'a> {
+    pub measured: &'a Measured,
+    pub base_m: f64,
+    pub top_m: f64,
+}
+
+impl<'a> Standing<'a> {
+    /// Thing of its measured height above a foot.
+    pub fn at(measured: &'a Measured, base_m: f64) -> Standing<'a> {
+        Standing { measured, base_m, top_m: base_m + measured.height_m }
+    }
+
+    /// Round body of its measures: a vessel with walls, or closed.
+    fn round(&self, wall_m: Option<f64>) -> Option<Form> {
+        let round = self.measured.round?;
+        Some(Form::Round(Frustum { wall_m, ..Frustum::around(&round, self.base_m, self.top_m) }))
+    }
+
+    /// Box of its measures.
+    fn cuboid(&self) -> Form {
+        let rectangle = self.measured.rectangle.unwrap_or(self.measured.footprint);
+        Form::Box(Cuboid::around(&rectangle, self.base_m, self.top_m))
+    }
+
+    /// Round body, if a circle fits, and box of its measures.
+    fn forms(&self) -> Vec<Form> {
+        let wall_m = (self.measured.upper.open_log > 0.0).then_some(WALL_M);
+        self.round(wall_m).into_iter().chain([self.cuboid()]).collect()
+    }
+}
+
+/// Body that stands on or in its holder.
+#[derive(Clone, Copy)]
+pub(super) struct Held<'a> {
+    pub body: Standing<'a>,
+    pub holder: Standing<'a>,
+    /// True if the body stands on the bottom of an open holder; otherwise the holder ends at the foot of the body.
+    pub is_within: bool,
+}
+
+impl Held<'_> {
+    /// Log likelihoods of the views given the likeliest pair of body and holder.
+    fn logs(&self, rays: &Rays) -> Vec<f64> {
+        let holders: Vec<Form> = if self.is_within {
+            self.holder.round(Some(WALL_M)).into_iter().collect()
+        } else {
+            let bearing = Standing { top_m: self.body.base_m, ..self.holder };
+            bearing.round(None).into_iter().chain([bearing.cuboid()]).collect()
+        };
+        let bodies = self.body.forms();
+        let pairs = bodies.iter().flat_map(|body| holders.iter().map(|holder| Pair(*body, *holder)));
+        best(rays, &pairs.collect::<Vec<_>>())
+    }
 }
 
 /// Log likelihoods of the views given the likeliest of some bodies, against no body; that of no body if none is likelier.
@@ -61,16 +108,22 @@ fn best<B: Body + Sync>(rays: &Rays, bodies: &[B]) -> Vec<f64> {
     bodies.iter().map(of).chain([none]).max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default()
 }
 
-/// Log of how much likelier two parts of a thing, each with the height that it stands at, make the views than the thing in one
-/// piece does; no view counts against them for more than it may be a bad one.
-pub(super) fn parted_log(rays: &Rays, whole: (&Measured, f64), [one, other]: [(&Measured, f64); 2]) -> f64 {
-    let single = best(rays, &forms(whole.0, whole.1));
-    let [ones, others] = [one, other].map(|(m, base_m)| forms(m, base_m));
-    let pairs = ones.iter().flat_map(|one| others.iter().map(|other| Pair(*one, *other)));
-    let parted = best(rays, &pairs.collect::<Vec<_>>());
+/// Log likelihood ratio of two explanations, summed over the views; each view speaks no louder against the first than a bad
+/// view may.
+fn likelier_log(with: &[f64], without: &[f64]) -> f64 {
     let of_view = |(with, without): (&f64, &f64)| match with - without {
         log if log < 0.0 => bounded(log, BAD_VIEW),
         log => log,
     };
-    parted.iter().zip(&single).map(of_view).sum()
+    with.iter().zip(without).map(of_view).sum()
+}
+
+/// Log likelihood ratio of a body with its holder against both in one piece.
+pub(super) fn parted_log(rays: &Rays, whole: Standing, held: Held) -> f64 {
+    likelier_log(&held.logs(rays), &best(rays, &whole.forms()))
+}
+
+/// Log likelihood ratio of a body within its holder against the body on its holder.
+pub(super) fn within_log(rays: &Rays, within: Held, on: Held) -> f64 {
+    likelier_log(&within.logs(rays), &on.logs(rays))
 }

@@ -33,10 +33,10 @@ const BEARS: usize = 9;
 const NEARLY: f64 = 0.8;
 /// Spread of the height that it is found to have, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
-/// Number of directions in which the support must be seen for a body to rest on it; and in which an
-/// enclosing vessel must be seen for the body to stand in it. From: chosen.
-const BORNE: usize = 14;
+/// Number of directions in which an enclosing vessel must be seen for a body to stand in it, unless a
+/// support right beside its foot is seen in so many. From: chosen.
 const ALL_AROUND: usize = 27;
+const BORNE: usize = 14;
 /// Share of the least height of a known body that tells its axis, below its top. From: chosen.
 const SIDE: f64 = 0.8;
 /// Share of the points between top and support that lie on the side of a body that stands there. From: chosen, more than half.
@@ -52,6 +52,8 @@ const FEWEST_LEFT: usize = 60;
 pub(super) struct Resting {
     pub body: Segment,
     pub rest: Segment,
+    /// True if the body stands in the rest, a vessel.
+    pub is_within: bool,
 }
 
 /// A circle in the height map.
@@ -92,18 +94,19 @@ pub(super) fn seek(segment: &Segment, models: &Rounds, sigma_m: f64) -> Vec<Rest
     circles.iter().filter_map(|circle| resting(segment, circle, models.least_m, sigma_m)).collect()
 }
 
-/// A segment that was taken to stand on another, as if it stood on the bottom of that, if that is a vessel: it is seen all around and as
-/// high as the foot, but not right beside that.
-pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<Segment> {
+/// Segment with its foot on the bottom of another segment, and the index of that segment: a possible vessel, which is seen all
+/// around and at least as high as the foot.
+pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<(Segment, usize)> {
     let segment = &scene.segments[of];
     if segment.base_m < BOTTOM_M.0 + PLACE_M {
         return None;
     }
     let axis = round::fit(&segment.points, segment.base_m, top_m(segment), sigma_m, round::SEED)?;
-    let others = scene.segments.iter().enumerate().filter(|(n, _)| *n != of).map(|(_, other)| other);
-    let Bearing { around, level } = Bearing::of(others, &axis, segment.base_m);
-    let (base_m, base_sigma_m) = BOTTOM_M;
-    (around >= ALL_AROUND && level < BORNE).then(|| Segment { base_m, base_sigma_m, ..segment.clone() })
+    let is_around = |other: &Segment| Bearing::of(other, &axis, segment.base_m).around >= ALL_AROUND;
+    let mut others = scene.segments.iter().enumerate().filter(|(n, _)| *n != of);
+    let (vessel, holder) = others.find(|(_, other)| is_around(other))?;
+    let (bottom_m, base_sigma_m) = BOTTOM_M;
+    Some((Segment { base_m: holder.base_m + bottom_m, base_sigma_m, ..segment.clone() }, vessel))
 }
 
 /// Height map of a segment.
@@ -225,7 +228,7 @@ fn ring(radius_m: f64) -> Vec<(i32, i32)> {
 fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Option<Resting> {
     let outside_m = |p: &Point3<f64>| distance(p.x - circle.x, p.y - circle.y) - circle.radius_m;
     let mut beside = [false; SECTORS];
-    let lower = segment.points.iter().filter(|p| p.z < circle.top_m - APART_M && outside_m(p) > PLACE_M);
+    let lower = segment.points.iter().filter(|p| p.z < circle.top_m - APART_M && outside_m(p) > AROUND_M.0);
     lower.for_each(|p| beside[sector(p.x - circle.x, p.y - circle.y)] = true);
     if beside.iter().filter(|seen| **seen).count() < BEARS {
         return None;
@@ -238,14 +241,18 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
         return None;
     }
     let level_m = level_m(segment, &axis, circle.top_m)?;
-    let (base_m, base_sigma_m) = match Bearing::of(std::iter::once(segment), &axis, level_m) {
-        Bearing { level, .. } if level >= BORNE => (level_m, LEVEL_SIGMA_M),
-        Bearing { around, .. } if around >= ALL_AROUND => (segment.base_m + BOTTOM_M.0, BOTTOM_M.1),
-        Bearing { .. } => return None,
+    let Bearing { around, level } = Bearing::of(segment, &axis, level_m);
+    let is_within = around >= ALL_AROUND && level < BORNE;
+    let (base_m, base_sigma_m) = match is_within {
+        true => (segment.base_m + BOTTOM_M.0, BOTTOM_M.1),
+        false => (level_m, LEVEL_SIGMA_M),
     };
-    let is_high = circle.top_m - base_m > least_m;
-    let parted = is_high.then(|| parted(segment, &axis, circle.top_m, (level_m, base_m, base_sigma_m)));
-    parted.filter(|parted| parted.rest.indices.len() >= FEWEST_LEFT)
+    if circle.top_m - base_m <= least_m {
+        return None;
+    }
+    let (body, rest) = parted(segment, &axis, circle.top_m, level_m);
+    let body = Segment { base_m, base_sigma_m, ..body };
+    (rest.indices.len() >= FEWEST_LEFT).then_some(Resting { body, rest, is_within })
 }
 
 /// Evidence of a support below a body: number of directions in which the surroundings of its foot
@@ -256,12 +263,12 @@ struct Bearing {
 }
 
 impl Bearing {
-    fn of<'s>(others: impl Iterator<Item = &'s Segment>, axis: &Round, foot_m: f64) -> Bearing {
+    fn of(other: &Segment, axis: &Round, foot_m: f64) -> Bearing {
         /// Maximum distance of a level from the foot's height, metres. From: derived, an edge, and how far
         /// things differ from their forms.
         const OFF_M: f64 = EDGE_M + SHAPE_M;
         let [mut around, mut level] = [[false; SECTORS]; 2];
-        for p in others.flat_map(|other| &other.points).filter(|p| (p.z - foot_m).abs() < REACH_M) {
+        for p in other.points.iter().filter(|p| (p.z - foot_m).abs() < REACH_M) {
             let outside_m = axis.outside_m(p);
             if (AROUND_M.0..REACH_M).contains(&outside_m) {
                 let direction = sector(p.x - axis.x, p.y - axis.y);
@@ -299,13 +306,8 @@ fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     (level_m > segment.base_m + PLACE_M).then_some(level_m)
 }
 
-/// A segment parted into the body above what is around it, which stands at a height, and the rest.
-fn parted(
-    segment: &Segment,
-    axis: &Round,
-    top_m: f64,
-    (level_m, base_m, base_sigma_m): (f64, f64, f64),
-) -> Resting {
+/// A segment parted into the body above what is around it, and the rest.
+fn parted(segment: &Segment, axis: &Round, top_m: f64, level_m: f64) -> (Segment, Segment) {
     let is_body = |p: &Point3<f64>| {
         p.z > level_m + PLACE_M
             && p.z < top_m + APART_M
@@ -316,5 +318,5 @@ fn parted(
         let (indices, points) = kept.map(|(i, p)| (*i, *p)).unzip();
         Segment { indices, points, base_m: segment.base_m, base_sigma_m: segment.base_sigma_m }
     };
-    Resting { body: Segment { base_m, base_sigma_m, ..part(true) }, rest: part(false) }
+    (part(true), part(false))
 }

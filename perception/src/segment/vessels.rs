@@ -98,32 +98,12 @@ pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment
         match pool::find_first(first + 1..parts.len(), |second| is_one(second).then_some(second)) {
             Some(second) => {
                 let other = parts.remove(second);
-                parts[first] = Candidate::new(None, union(&parts[first].segment, &other.segment));
+                parts[first] = Candidate::new(None, parts[first].segment.with(&other.segment));
             }
             None => first += 1,
         }
     }
     parts.into_iter().map(|c| c.segment).collect()
-}
-
-/// The union of two segments, in order of the indices.
-fn union(a: &Segment, b: &Segment) -> Segment {
-    let count = a.indices.len() + b.indices.len();
-    let mut both = Segment {
-        indices: Vec::with_capacity(count),
-        points: Vec::with_capacity(count),
-        base_m: 0.0,
-        base_sigma_m: 0.0,
-    };
-    let (mut i, mut j) = (0, 0);
-    while i < a.indices.len() || j < b.indices.len() {
-        let from_a = b.indices.get(j).is_none_or(|next| a.indices.get(i).is_some_and(|own| own <= next));
-        let (from, at) = if from_a { (a, &mut i) } else { (b, &mut j) };
-        both.indices.push(from.indices[*at]);
-        both.points.push(from.points[*at]);
-        *at += 1;
-    }
-    both
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {

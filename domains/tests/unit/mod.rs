@@ -22,6 +22,7 @@ mod no_plan;
 mod program;
 mod reasons;
 mod saying;
+mod states;
 mod toml_place;
 mod vocabulary;
 mod walls;

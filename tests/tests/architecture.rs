@@ -360,7 +360,7 @@ const CIRCLES: [(&str, usize); 10] = [
     ("memory", 6),
     ("perception", 10),
     ("robots", 6),
-    ("planner", 22),
+    ("planner", 6),
 ];
 
 fn modules_of(package: &str) -> Modules {

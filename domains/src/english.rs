@@ -68,12 +68,32 @@ const RELATED: [&[&str]; 2] = [
     &["find", "see", "spot", "show", "locate", "seek", "where", "look for", "search for", "check"],
     &[
         "bring", "fetch", "get", "give", "hand", "put", "place", "move", "carry", "pick up", "grab", "take",
-        "drop", "hold", "clear",
+        "drop", "hold", "clear", "return",
     ],
 ];
 
 /// Words before a noun that do not tell which object is meant.
-const DETERMINERS: [&str; 10] = ["the", "any", "an", "a", "my", "our", "your", "some", "both", "either"];
+const DETERMINERS: [&str; 9] = ["the", "any", "an", "a", "my", "our", "your", "some", "either"];
+
+/// Words that deny what stands beside them.
+const DENIALS: [&str; 12] = [
+    "not", "never", "no", "nor", "neither", "nothing", "nowhere", "without", "except", "cannot", "avoid",
+    "stop",
+];
+
+/// True if a word denies what stands beside it.
+pub(crate) fn is_denial(word: &str) -> bool {
+    DENIALS.contains(&word) || word.ends_with("n't") || word.ends_with("n’t")
+}
+
+/// True if the words before a name say that something leaves it: "from the", "off the", "out of".
+pub(crate) fn is_left(before: &[String]) -> bool {
+    let mut words = before.iter().rev().map(String::as_str).skip_while(|word| DETERMINERS.contains(word));
+    match words.next() {
+        Some("of") => words.next() == Some("out"),
+        last => matches!(last, Some("from" | "off")),
+    }
+}
 
 /// The words of a text in lower case, without the signs around them; a comma is a word of its own.
 pub(crate) fn words(said: &str) -> Vec<String> {
@@ -116,12 +136,19 @@ pub(crate) fn plain(words: &[String]) -> Vec<String> {
         rest.rotate_right(1);
         rest.swap(0, 1);
     }
+    // "look in the kitchen for …"
+    if let Some(at) = rest.iter().position(|word| word == "for").filter(|at| *at > 1)
+        && ["look", "search", "hunt"].contains(&rest[0].as_str())
+        && ["in", "on", "inside"].contains(&rest[1].as_str())
+    {
+        rest[1..].rotate_left(at - 1);
+    }
     // "whether … is …" asks "is … …".
     if let Some(at) = rest.iter().position(is_verb).filter(|_| rest[0] == "whether" || rest[0] == "if") {
         rest[..=at].rotate_right(1);
         rest.remove(1);
     }
-    rest.retain(|word| word != "please");
+    rest.retain(|word| word != "please" && word != "both");
     joined(&rest)
 }
 

@@ -85,6 +85,18 @@ pub enum GoalError {
         /// The words as they were given.
         said: String,
     },
+    /// A word denies what is asked for, and no phrase of the domain has that word.
+    #[error(
+        "\"{said}\" says by \"{word}\" what is not to be\n  expected what is to be found, known or brought about; a run is stopped with Ctrl-C\n{suggestions}"
+    )]
+    Denied {
+        /// The words as they were given.
+        said: String,
+        /// The word that denies.
+        word: String,
+        /// The phrases that would have been understood, a line each.
+        suggestions: String,
+    },
     /// A question stands beside a task.
     #[error(
         "\"{said}\" is a question and a task\n  a question changes nothing: ask first, then say what is to be done"
@@ -92,6 +104,18 @@ pub enum GoalError {
     Apart {
         /// The words as they were given.
         said: String,
+    },
+    /// One thing is asked for in two places at once.
+    #[error(
+        "\"{said}\" has {thing} in two places at once: {places}\n  expected one place for a thing; join places by \"or\" if either will do"
+    )]
+    TwoPlaces {
+        /// The words as they were given.
+        said: String,
+        /// Name of the thing.
+        thing: String,
+        /// Names of the places.
+        places: String,
     },
     /// The phrase itself cannot be used.
     #[error("the phrase \"{phrase}\" in domain.toml: {because}")]
@@ -124,6 +148,11 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
 /// Nothing fits: the nearest goals, and what could be said.
 fn not_understood(said: &str, plain: &[String], reader: Reader<'_>) -> GoalError {
     let Reader { domain, lexicon, misses, .. } = reader;
+    // The nearest goal would be the opposite.
+    if let Some(word) = plain.iter().find(|word| english::is_denial(word)) {
+        let suggestions = phrase_suggestions(domain, lexicon);
+        return GoalError::Denied { said: said.into(), word: word.clone(), suggestions };
+    }
     let near = nearest::nearest(plain, domain, lexicon);
     let goals: Vec<String> = near.goals.iter().map(|goal| format!("\"{goal}\"")).collect();
     let meant = (!goals.is_empty()).then(|| format!("  did you mean {}?", goals.join(", or ")));
@@ -161,6 +190,7 @@ fn goal_of(
     lexicon: &Lexicon,
 ) -> Result<Goal, GoalError> {
     let question = sentence.is_question(said)?;
+    sentence.check_places(said, question)?;
     let usual = |c: &Clause<'_>| c.phrase.confidence.unwrap_or(domain.config.thresholds.confidence);
     let threshold =
         wanted.confidence.unwrap_or_else(|| sentence.clauses.iter().map(usual).fold(0.0, f64::max));

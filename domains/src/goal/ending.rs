@@ -17,7 +17,7 @@ pub(crate) const DEADLINE: [&str; 1] = ["within"];
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
 pub(super) fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
-    let mut words = english::words(said);
+    let mut words = usual(english::words(said));
     let mut wanted = Wanted { confidence: None, deadline_s: None };
     loop {
         let confidence = words.windows(2).rposition(|w| w == CONFIDENCE);
@@ -38,6 +38,33 @@ pub(super) fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError>
     }
 }
 
+/// Words with every wording of a confidence as "with confidence 0.9": "with 90% confidence", "and be 90 % sure".
+fn usual(mut words: Vec<String>) -> Vec<String> {
+    const AROUND: [(&str, &[&str]); 2] =
+        [("with", &["confidence", "certainty"]), ("be", &["sure", "certain"])];
+    for (first, lasts) in AROUND {
+        let begins = words.iter().rposition(|word| word == first);
+        let Some(from) = begins else { continue };
+        let Some(to) = words[from..].iter().position(|word| lasts.contains(&word.as_str())) else { continue };
+        let inner = &words[from + 1..from + to];
+        let number = inner.strip_prefix(&["at".to_string(), "least".to_string()]).unwrap_or(inner).join(" ");
+        if probability(&number).is_none() {
+            continue;
+        }
+        let joined = from.checked_sub(1).filter(|&before| words[before] == "and").unwrap_or(from);
+        let told = CONFIDENCE.map(str::to_string).into_iter().chain([number]);
+        words.splice(joined..=from + to, told);
+    }
+    words
+}
+
+/// "0.9", "90%", "90 percent".
+fn probability(words: &str) -> Option<f64> {
+    let percent = ["%", "percent", "per cent"].iter().find_map(|sign| words.strip_suffix(sign));
+    let number: f64 = percent.unwrap_or(words).trim().parse().ok()?;
+    Some(if percent.is_some() { number / 100.0 } else { number })
+}
+
 /// The words after a condition, without commas and courtesies.
 fn ended(words: &[String]) -> String {
     english::unlisted(english::without_endings(words)).join(" ")
@@ -48,22 +75,46 @@ fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> R
     other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
 }
 
-/// "0.9": a yes must be likelier than a no.
+/// "0.9" or "90%": a yes must be likelier than a no.
 fn confidence_of(found: String) -> Result<f64, GoalError> {
-    match found.parse::<f64>() {
-        Ok(c) if c > 0.5 && c < 1.0 => Ok(c),
-        Ok(c) if c > 0.0 && c < 1.0 => Err(GoalError::LowConfidence { found }),
+    match probability(&found) {
+        Some(c) if c > 0.5 && c < 1.0 => Ok(c),
+        Some(c) if c > 0.0 && c < 1.0 => Err(GoalError::LowConfidence { found }),
         _ => Err(GoalError::BadConfidence { found }),
     }
 }
 
-/// "60 s", "60s", "60 seconds", "1.5 minutes"; a number alone may be meant as either.
+/// Numbers in words.
+const NUMBERS: [(&str, f64); 13] = [
+    ("half a", 0.5),
+    ("half an", 0.5),
+    ("a", 1.0),
+    ("an", 1.0),
+    ("one", 1.0),
+    ("two", 2.0),
+    ("three", 3.0),
+    ("four", 4.0),
+    ("five", 5.0),
+    ("ten", 10.0),
+    ("twenty", 20.0),
+    ("thirty", 30.0),
+    ("sixty", 60.0),
+];
+
+/// "60 s", "60s", "60 seconds", "1.5 minutes", "half an hour"; a number alone may be meant as any.
 fn seconds(found: String) -> Result<f64, GoalError> {
-    let end = found.find(|c: char| c.is_alphabetic()).unwrap_or(found.len());
-    let (number, unit) = (found[..end].trim().parse::<f64>().ok(), &found[end..]);
+    let said = found.strip_prefix("the next ").unwrap_or(&found);
+    let digits = said.find(|c: char| c.is_alphabetic()).unwrap_or(said.len());
+    let (number, unit) = match said.rsplit_once(' ') {
+        Some((number, unit)) if digits == 0 => {
+            (NUMBERS.iter().find(|(word, _)| *word == number).map(|(_, n)| *n), unit)
+        }
+        _ => (said[..digits].trim().parse::<f64>().ok(), &said[digits..]),
+    };
     let factor = match unit {
-        "s" | "second" | "seconds" => 1.0,
+        "s" | "sec" | "second" | "seconds" => 1.0,
         "min" | "minute" | "minutes" => 60.0,
+        "h" | "hour" | "hours" => 3600.0,
         "" if number.is_some_and(|n| n > 0.0) => return Err(GoalError::NoUnit { found }),
         _ => return Err(GoalError::BadDeadline { found }),
     };

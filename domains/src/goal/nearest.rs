@@ -1,6 +1,8 @@
 //! Suggestions for words that are no goal: the phrases of the domain that are nearest to the words, with the
 //! names that were given.
 
+use std::ops::Range;
+
 use super::{pattern, sentence, spoken_types};
 use crate::english;
 use crate::lexicon::Lexicon;
@@ -11,16 +13,21 @@ use crate::slots::type_of_slot;
 const SHOWN: usize = 2;
 /// Words of a long sentence for which a goal is suggested: its first.
 const HEARD: usize = 24;
+/// Score that a name costs which was not said. From: fitted, `domains/tests/phrases.toml`.
+const MADE_UP: f64 = 0.8;
 /// Share of the letters in which a mistyped word may differ.
 const MISTYPED: f64 = 0.34;
 
 /// A name that occurs among the words.
+#[derive(Clone)]
 struct Mention {
     of_type: String,
     name: String,
     /// Its words, by position.
-    at: std::ops::Range<usize>,
+    at: Range<usize>,
     is_exact: bool,
+    /// True if something leaves it: "from the desk".
+    is_left: bool,
 }
 
 /// A phrase, as near to the words as it comes.
@@ -28,6 +35,8 @@ struct Candidate {
     text: String,
     /// Words that neither the phrase nor a name in it has.
     left: Vec<String>,
+    /// True if every name in it was said, and there is one.
+    is_named: bool,
     score: f64,
 }
 
@@ -42,8 +51,11 @@ pub(super) struct Nearest {
 /// The goals that are nearest to words, in plain form.
 pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> Nearest {
     let words = &words[..words.len().min(HEARD)];
-    let mut mentions = mentions(words, domain, lexicon, true);
-    mentions.extend(self::mentions(words, domain, lexicon, false));
+    let exact = mentions(words, domain, lexicon, true);
+    // The kitchen of "kitchen table" is not spoken of.
+    let is_part = |m: &&Mention| exact.iter().any(|o| o.at.len() > m.at.len() && contains(&o.at, &m.at));
+    let whole = exact.iter().filter(|m| !is_part(m)).cloned();
+    let mentions: Vec<Mention> = whole.chain(self::mentions(words, domain, lexicon, false)).collect();
     let mut all: Vec<Candidate> = Vec::new();
     for phrase in &domain.config.goal {
         let ways = phrase.ways().filter_map(|say| candidate(say, words, &mentions, lexicon));
@@ -55,7 +67,10 @@ pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> N
     }
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
     let least = all.first().map_or(0.0, |best| best.score - 1.0).max(0.5);
-    let shown: Vec<Candidate> = all.into_iter().filter(|c| c.score >= least).take(SHOWN).collect();
+    // Of a name alone everything may be meant that can be said of it and nothing else.
+    let is_near = all.first().is_some_and(|best| best.score >= least);
+    let is_meant = |c: &Candidate| if is_near { c.score >= least } else { c.is_named };
+    let shown: Vec<Candidate> = all.into_iter().filter(is_meant).take(SHOWN).collect();
     let left = shown.first().map(|c| c.left.join(" ")).unwrap_or_default();
     Nearest { goals: shown.into_iter().map(|c| c.text).collect(), left }
 }
@@ -79,11 +94,16 @@ fn mentions(words: &[String], domain: &Domain, lexicon: &Lexicon, is_exact: bool
                     name,
                     at: at.clone(),
                     is_exact,
+                    is_left: english::is_left(&words[..from]),
                 }));
             }
         }
     }
     found
+}
+
+fn contains(outer: &Range<usize>, inner: &Range<usize>) -> bool {
+    outer.start <= inner.start && inner.end <= outer.end
 }
 
 /// True if a known name occurs among words.
@@ -122,9 +142,10 @@ fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexico
     let mut used = vec![false; words.len()];
     let (mut score, mut text) = (0.0, Vec::new());
     let slot_of = |word: &str| word.strip_prefix('<')?.strip_suffix('>').map(|s| type_of_slot(s).to_string());
-    let mut names = Vec::new();
+    let (mut names, mut is_named) = (Vec::new(), true);
     for of in own.iter().filter_map(|word| slot_of(word)) {
-        let is_free = |m: &&Mention| m.of_type == of && !used[m.at.clone()].contains(&true);
+        // What something leaves is nowhere that it is brought to.
+        let is_free = |m: &&Mention| m.of_type == of && !m.is_left && !used[m.at.clone()].contains(&true);
         match mentions.iter().find(is_free) {
             Some(mention) => {
                 used[mention.at.clone()].fill(true);
@@ -132,12 +153,16 @@ fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexico
                 names.push(mention.name.clone());
             }
             None => {
-                score -= 0.5;
+                score -= MADE_UP;
+                is_named = false;
+                let is_left = |name: &&String| mentions.iter().any(|m| m.is_left && m.name == **name);
                 let usual = lexicon.of_type(&of).iter().map(|named| &named.names[0]);
+                let usual = usual.filter(|name| !is_left(name));
                 names.push(usual.min_by_key(|name| name.len())?.clone());
             }
         }
     }
+    is_named &= !names.is_empty();
     let mut names = names.into_iter();
     for word in english::joined(&own) {
         if slot_of(&word).is_some() {
@@ -162,5 +187,5 @@ fn candidate(say: &str, words: &[String], mentions: &[Mention], lexicon: &Lexico
         .map(|(w, _)| w.clone())
         .collect();
     score -= 0.25 * left.len() as f64;
-    Some(Candidate { text: text.join(" "), left, score })
+    Some(Candidate { text: text.join(" "), left, is_named, score })
 }

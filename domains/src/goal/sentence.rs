@@ -370,4 +370,31 @@ impl Sentence<'_> {
             _ => Err(GoalError::Apart { said: said.into() }),
         }
     }
+
+    /// Checks that a task has no thing in two places: whoever says so means another thing, or either place.
+    ///
+    /// # Errors
+    /// [`GoalError::TwoPlaces`] with the thing and its places.
+    pub(super) fn check_places(&self, said: &str, question: bool) -> Result<(), GoalError> {
+        if question || self.joint == Joint::Or {
+            return Ok(());
+        }
+        let placed = |c: &Clause<'_>| match c.slots.as_slice() {
+            [thing, place] if type_of_slot(&thing.slot) == "thing" && is_place(&place.slot) => {
+                Some((c.phrase.say.clone(), thing.name.clone(), place.name.clone()))
+            }
+            _ => None,
+        };
+        let all: Vec<(String, String, String)> = self.clauses.iter().filter_map(placed).collect();
+        let twice = all.iter().enumerate().find_map(|(n, (phrase, thing, place))| {
+            let other = |(p, t, o): &&(String, String, String)| p == phrase && t == thing && o != place;
+            all[..n].iter().find(other).map(|(_, _, before)| (thing.clone(), format!("{before} and {place}")))
+        });
+        let said = said.to_string();
+        twice.map_or(Ok(()), |(thing, places)| Err(GoalError::TwoPlaces { said, thing, places }))
+    }
+}
+
+fn is_place(slot: &str) -> bool {
+    ["surface", "room"].contains(&type_of_slot(slot))
 }

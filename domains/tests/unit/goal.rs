@@ -77,12 +77,20 @@ fn how_sure_and_how_soon_are_said_once() {
         }
     };
     check("within 60 seconds with confidence 0.9", Ok((0.9, Some(60.0))));
-    for (time, expected_s) in [("90 s", 90.0), ("90s", 90.0), ("5 minutes", 300.0), ("1.5 min", 90.0)] {
+    let times = [
+        ("90 s", 90.0),
+        ("90s", 90.0),
+        ("5 minutes", 300.0),
+        ("five minutes", 300.0),
+        ("1.5 min", 90.0),
+        ("half an hour", 1800.0),
+    ];
+    for (time, expected_s) in times {
         check(&format!("within {time}"), Ok((0.8, Some(expected_s))));
     }
     check("within 5", Err("\"within 5\" does not say of what"));
     check("within 5 with confidence 0.9", Err("\"within 5 seconds\" or \"within 5 minutes\""));
-    for none in ["0 s", "-5", "nan", "inf s", "1e9e s", "5 days", "s", "five minutes", ""] {
+    for none in ["0 s", "-5", "nan", "inf s", "1e9e s", "5 days", "s", "many minutes", ""] {
         check(&format!("within {none}"), Err("asks for no time"));
     }
     check("with confidence 0.9 within 60 seconds", Ok((0.9, Some(60.0))));

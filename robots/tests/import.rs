@@ -213,6 +213,19 @@ fn the_frame_of_points_is_told_from_the_views() {
     assert!(error.contains("same VIEWPOINT"), "{error}");
 }
 
+/// A merged cloud has no viewpoint: nothing is known of the space between its points.
+#[test]
+fn a_merged_cloud_is_no_body() {
+    let folder = TempDir::new().unwrap();
+    let merged = restated(&shots()[..1], |_| Isometry3::identity());
+    writers::loose_pcds_of_the_sensor(folder.path(), &merged);
+    let error = Imported::open(folder.path(), &all()).err().unwrap().to_string();
+    assert!(
+        error.contains("from where its points were seen") && error.contains("descry recognise"),
+        "{error}"
+    );
+}
+
 /// Checks the message for a bag with some messages changed.
 fn check_bag(change: impl Fn(&mut Vec<bags::Message>), options: &Options, words: &[&str]) {
     let folder = TempDir::new().unwrap();

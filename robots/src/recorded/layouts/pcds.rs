@@ -110,6 +110,11 @@ pub(super) fn read(folder: &Path, asked: &Asked) -> Result<Stated, InputError> {
         let pcds = Pcds::organised(&all, FRAMES[k], camera);
         return Ok(pcds.stated(FRAMES[k], "pixels as a camera has them"));
     }
+    if all.len() == 1 && one.viewpoint == Isometry3::identity() {
+        let problem = "nothing says from where its points were seen: it has no pixels, and VIEWPOINT is left as it begins";
+        let mend = "write the pose of the sensor as VIEWPOINT; of a merged cloud nothing can be said not to be there: look at it with `descry recognise`";
+        return Err(InputError::whole(shown(&one.path), problem, mend));
+    }
     let mut both = Vec::new();
     for (points, note) in FRAMES
         .into_iter()

@@ -38,6 +38,9 @@ pub struct Breaches(pub Vec<Breach>);
 
 /// Tolerance on transforms that should be equal, for rounding, metres and radians.
 const ROUNDING: f64 = 1e-6;
+/// Time that the messages before and after a drive may take on the clock of a body that is not simulated,
+/// seconds. From: chosen, a busy computer.
+const LATE_S: f64 = 1.0;
 /// Maximum distance of the estimated pose from the goal after a drive, in standard deviations of the
 /// localisation.
 const ARRIVED_SIGMAS: f64 = 5.0;
@@ -305,10 +308,11 @@ async fn check_drive(robot: &dyn Robot, goal: &Place) -> Result<(), Breach> {
     let watch = Watch { progress: &listen, ..Watch::default() };
     let driven = done(robot.drive_to(goal, &watch).await, "a body drives where a route leads")?;
     let passed_s = (robot.now_ns() - before_ns) as f64 * 1e-9;
-    ensure((passed_s - driven.duration_s).abs() < 0.01, "driving takes the time that it says", || {
+    let simulated = robot.description().simulated;
+    let (off_s, late_s) = (passed_s - driven.duration_s, if simulated { 0.01 } else { LATE_S });
+    ensure(off_s > -0.01 && off_s < late_s, "driving takes the time that it says", || {
         format!("{passed_s} s on the clock, {} s reported", driven.duration_s)
     })?;
-    let simulated = robot.description().simulated;
     let as_said = (driven.duration_s - predicted.duration_s).abs() <= 0.05 * predicted.duration_s + 0.01;
     ensure(!simulated || as_said, "without mishaps a simulated drive takes what was predicted", || {
         format!("{} s, predicted {} s", driven.duration_s, predicted.duration_s)

@@ -1,7 +1,11 @@
 //! Tests of `lexicon`.
 
+use descry_domains::abilities::learning::news::News;
 use descry_domains::english::*;
 use descry_domains::lexicon::*;
+use descry_memory::learned::{LearnedThing, Place};
+use descry_perception::Cloud;
+use descry_perception::nalgebra::Point3;
 
 #[test]
 fn several_are_called_as_people_call_them() {
@@ -27,4 +31,24 @@ fn places_have_names_of_their_own() {
     check(&["table", "Table"], &[], Some("nothing tells the surface \"Table\" from the surface \"table\""));
     check(&["a b", "c", "a-b"], &[], Some("nothing tells the surface \"a-b\" from the surface \"a b\""));
     check(&["table"], &["--"], Some("\"--\" is no name of a room"));
+}
+
+#[test]
+fn a_learned_thing_has_the_symbol_that_goals_give_its_name() {
+    for name in ["kettle", "the thing from Tuesday", "a lunch box", "3rd cup"] {
+        let mut lexicon = Lexicon::default();
+        lexicon.learn("thing", name);
+        let thing = LearnedThing {
+            name: name.into(),
+            learned_unix_s: 0.0,
+            cloud: Cloud::default(),
+            sides: 1.0,
+            directions: 0,
+            meetings: 1,
+            seen: Place { unix_s: 0.0, at_m: Point3::origin(), on: "table".into() },
+        };
+        let news = News { things: vec![thing], ..News::default() };
+        let symbol = &lexicon.of_type("thing")[0].symbol;
+        assert_eq!(news.thing(symbol).map(|t| t.name.as_str()), Some(name), "{symbol}");
+    }
 }

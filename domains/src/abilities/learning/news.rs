@@ -173,9 +173,9 @@ impl News {
         later.visited = news.visited(std::mem::take(&mut later.visited), pose, past.now_unix_s);
     }
 
-    /// The thing of a symbol that was learned.
+    /// The learned object of a symbol, as the lexicon makes symbols of names.
     pub fn thing(&self, of: &str) -> Option<&LearnedThing> {
-        self.things.iter().find(|t| called(&t.name) == of)
+        self.things.iter().find(|t| symbol(&t.name) == of)
     }
 
     /// The novelty of a symbol.
@@ -185,7 +185,7 @@ impl News {
 
     /// A name that nothing learned has yet.
     pub(super) fn free_name(&self) -> String {
-        let is_free = |n: &usize| self.thing(&called(&format!("thing {n}"))).is_none();
+        let is_free = |n: &usize| self.thing(&symbol(&format!("thing {n}"))).is_none();
         let number = (self.things.len() + 1..).find(is_free).unwrap_or_default();
         format!("thing {number}")
     }
@@ -309,7 +309,7 @@ fn model(thing: &LearnedThing) -> ObjectModel {
     }
 }
 
-/// Symbol of a name as people say it, without a leading article.
+/// Symbol of a name as people say it, without a leading article: two names with the same one cannot be told apart.
 pub fn called(name: &str) -> String {
     symbol(crate::english::without_article(&name.to_lowercase()))
 }

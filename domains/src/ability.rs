@@ -36,6 +36,8 @@ pub struct Ability {
     pub calls: &'static [Meaning],
     /// Skills that it can carry out.
     pub skills: &'static [SkillWord],
+    /// The words that it reads by name and a domain remembers.
+    pub traces: &'static [Trace],
     /// The parts of a body without which it can do nothing.
     pub needs: &'static [Part],
     /// Preparation at the beginning of a run, if any.
@@ -80,6 +82,7 @@ impl Ability {
             facts: &[],
             calls: &[],
             skills: &[],
+            traces: &[],
             needs: &[],
             begins: None,
             fallback: None,
@@ -109,6 +112,19 @@ pub struct Fact {
     pub states: fn(&Situation) -> Vec<String>,
     /// Bounds on the value that looks may still reveal; none: its value is known.
     pub bounds: Option<Bounds>,
+}
+
+/// A word that is remembered of what a skill has done, read by its name.
+#[derive(Debug)]
+pub struct Trace {
+    /// The predicate.
+    pub name: &'static str,
+    /// The types of its arguments.
+    pub types: &'static [&'static str],
+    /// The skill.
+    pub of: &'static str,
+    /// The consequence for a domain that does not remember it, in a line.
+    pub without: &'static str,
 }
 
 /// Facts on which the answer of a call depends besides its arguments.

@@ -128,13 +128,14 @@ pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
 
 /// True if an action of the domain uses a skill.
 pub(crate) fn does(domain: &Domain, skill: &str) -> bool {
+    doer(domain, skill).is_some()
+}
+
+/// The first action of the domain that uses a skill.
+pub(crate) fn doer<'a>(domain: &'a Domain, skill: &str) -> Option<&'a descry_planner::task::Action> {
     let is_it = |text: &String| text.split_whitespace().next() == Some(skill);
-    domain
-        .vocabulary
-        .task
-        .actions
-        .iter()
-        .any(|action| texts(&domain.config, &action.name, &[]).iter().any(is_it))
+    let mut actions = domain.vocabulary.task.actions.iter();
+    actions.find(|action| texts(&domain.config, &action.name, &[]).iter().any(is_it))
 }
 
 /// The skills of an action as texts; none where a program carries it out.

@@ -344,11 +344,17 @@ fn words_of(name: &str) -> String {
         let types: String = types.iter().map(|of| format!(" {of}")).collect();
         format!("({name}{types})")
     };
-    let facts = ability.facts.iter().map(|fact| ("fact", with(fact.name, fact.types), fact.about));
-    let calls = ability.calls.iter().map(|call| ("call", format!("[{}]", call.name), call.about));
-    let skills = ability.skills.iter().map(|skill| ("skill", with(skill.name, skill.types), skill.about));
+    let facts =
+        ability.facts.iter().map(|fact| ("fact", with(fact.name, fact.types), fact.about.to_string()));
+    let calls = ability.calls.iter().map(|call| ("call", format!("[{}]", call.name), call.about.to_string()));
+    let skills =
+        ability.skills.iter().map(|skill| ("skill", with(skill.name, skill.types), skill.about.to_string()));
+    let traces = ability.traces.iter().map(|trace| {
+        let meaning = format!("remembered of `{}`; without it {}", trace.of, trace.without);
+        ("reads", with(trace.name, trace.types), meaning)
+    });
     let mut text = String::from("| | word | meaning |\n|---|---|---|\n");
-    for (what, word, about) in facts.chain(calls).chain(skills) {
+    for (what, word, about) in facts.chain(calls).chain(traces).chain(skills) {
         text += &format!("| {what} | `{word}` | {about} |\n");
     }
     text

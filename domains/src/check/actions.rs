@@ -5,8 +5,8 @@ use descry_skills::Call;
 
 use super::Check;
 use crate::abilities;
-use crate::ability::SkillWord;
-use crate::actions::substituted;
+use crate::ability::{SkillWord, Trace};
+use crate::actions::{doer, substituted};
 use crate::config::ActionConfig;
 use crate::origin::{self, Origin};
 
@@ -44,6 +44,28 @@ impl Check<'_> {
             list.push(self.error("no-action", message, self.toml.at(&["action", name]), help));
         }
         list
+    }
+
+    /// Words that an ability reads by name, and that the domain does not remember.
+    pub(super) fn traces(&self) -> Vec<Diagnostic> {
+        let vocabulary = &self.domain.vocabulary;
+        let is_type = |of: &&str| vocabulary.task.types.iter().any(|known| known.name == **of);
+        let has = |trace: &Trace| {
+            vocabulary.word(trace.name).is_some_and(|word| word.types.len() == trace.types.len())
+        };
+        let all = abilities::used(&self.domain.config.uses).flat_map(|ability| ability.traces);
+        let missed = all.filter(|trace| trace.types.iter().all(&is_type) && !has(trace));
+        let finding = |trace: &Trace| {
+            let place = doer(self.domain, trace.of)?.span;
+            let types: String = trace.types.iter().map(|of| format!(" ?{of} - {of}")).collect();
+            let message = format!("nothing remembers `{}`: {}", trace.name, trace.without);
+            let help = format!(
+                "declare ({}{types}), the name by which it is read, and set it by an effect, `gives_up` or `teaches`",
+                trace.name
+            );
+            Some(Diagnostic::warning("no-trace", message, place, "this does it").with_help(help))
+        };
+        missed.filter_map(finding).collect()
     }
 
     /// Skill or program that carries an action out.

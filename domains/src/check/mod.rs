@@ -33,6 +33,7 @@ pub fn findings(domain: &Domain) -> Findings {
     let lexicon = Lexicon::new(domain, &places);
     let check = Check { domain, toml: TomlPlaces::of(&domain.toml.text), places, lexicon };
     let mut list = check.actions();
+    list.extend(check.traces());
     list.extend(check.calls());
     list.extend(check.words());
     list.extend(check.objects());

@@ -321,6 +321,30 @@ fn goals_that_need_a_look_find_an_action_that_looks() {
 }
 
 #[test]
+fn words_that_are_read_by_name_have_that_name() {
+    for (word, name) in [("observed", "seen"), ("out-of-reach", "given-up")] {
+        let texts = template::files("mine");
+        let renamed = |file: &str| {
+            let (_, text) =
+                texts.iter().find(|(path, _)| path.display().to_string() == file).expect("it is there");
+            text.replace(&format!("({word} "), &format!("({name} "))
+                .replace(&format!("\n{word} ="), &format!("\n{name} ="))
+        };
+        let mut files: Files = Files::new();
+        for (path, text) in &texts {
+            files.insert(path.display().to_string(), (path.display().to_string(), text.clone()));
+        }
+        for file in ["domain.pddl", "domain.toml"] {
+            files.insert(file.into(), (file.into(), renamed(file)));
+        }
+        let found = findings(&from_files(files, None).unwrap_or_else(|e| panic!("{e}")));
+        let codes: Vec<&str> = found.list.iter().map(|d| d.code).collect();
+        assert_eq!(codes, ["no-trace"], "{found}");
+        assert!(found.to_string().contains(&format!("declare ({word} ?")), "{found}");
+    }
+}
+
+#[test]
 fn numbers_that_are_compared_begin_somewhere() {
     let charge = ("domain.pddl", "(:functions", "(:functions (charge)");
     let needs = (

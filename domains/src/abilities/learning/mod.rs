@@ -19,7 +19,7 @@ use descry_robots::{Part, Place as Where};
 use descry_skills::{Model, Observe, Outcome};
 use news::{News, Place};
 
-use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord, Trace};
 use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::load::Domain;
@@ -36,6 +36,12 @@ const RANGE_M: f64 = 2.5;
 pub const ABILITY: Ability = Ability {
     facts: facts::ALL,
     calls: calls::ALL,
+    traces: &[Trace {
+        name: "faced",
+        types: &["pose", "novelty"],
+        of: "face",
+        without: "the views of a plan promise the same thing twice",
+    }],
     skills: &[
         SkillWord {
             name: "patrol",

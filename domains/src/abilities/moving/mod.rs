@@ -6,7 +6,7 @@ mod time_left;
 
 use descry_skills::{Circle, Move, OpenDoor, Outcome};
 
-use crate::ability::{Ability, ActionKind, Fact, MOVE, Meaning, NOTHING_MORE, Reads, SkillWord};
+use crate::ability::{Ability, ActionKind, Fact, MOVE, Meaning, NOTHING_MORE, Reads, SkillWord, Trace};
 use crate::drive;
 use crate::error::WorldError;
 use crate::situation::Situation;
@@ -50,6 +50,20 @@ pub const ABILITY: Ability = Ability {
         about: "seconds that the drive takes past shut doors; infinite where no route leads",
         answers: path_cost::answer,
     }],
+    traces: &[
+        Trace {
+            name: "shut",
+            types: &["door"],
+            of: MOVE,
+            without: "a drive through a shut door is tried again and again",
+        },
+        Trace {
+            name: "out-of-reach",
+            types: &["pose"],
+            of: MOVE,
+            without: "a pose that no drive reaches is tried again and again",
+        },
+    ],
     skills: &[
         SkillWord {
             name: MOVE,

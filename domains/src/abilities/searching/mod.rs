@@ -8,7 +8,7 @@ pub use calls::FirstLook;
 use descry_robots::Part;
 use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 
-use crate::ability::{Ability, ActionKind, OBSERVE, SkillWord};
+use crate::ability::{Ability, ActionKind, OBSERVE, SkillWord, Trace};
 use crate::belief::doubt::{Doubt, Taken};
 use crate::belief::obstacle;
 use crate::error::WorldError;
@@ -22,6 +22,15 @@ use crate::situation::Situation;
 pub const ABILITY: Ability = Ability {
     facts: facts::ALL,
     calls: calls::ALL,
+    traces: &[
+        Trace {
+            name: "observed",
+            types: &["pose", "surface"],
+            of: OBSERVE,
+            without: "the looks of a plan promise the same thing twice, and a look in vain is taken again",
+        },
+        Trace { name: "pushed", types: &["obstacle"], of: "push-aside", without: "nothing is pushed aside" },
+    ],
     skills: &[
         SkillWord {
             name: OBSERVE,

@@ -18,7 +18,7 @@ use descry_skills::{Align, Circle, Outcome, Scan};
 use floor::{Floor, Outline, thing};
 use unseen::UnseenFloor;
 
-use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord, Trace};
 use crate::drive;
 use crate::error::WorldError;
 use crate::eyes::Eyes;
@@ -34,6 +34,12 @@ use crate::symbol::symbol;
 pub const ABILITY: Ability = Ability {
     facts: facts::ALL,
     calls: calls::ALL,
+    traces: &[Trace {
+        name: "scanned",
+        types: &["pose"],
+        of: "scan",
+        without: "the sweeps of a plan promise the same thing twice",
+    }],
     skills: &[
         SkillWord {
             name: "scan",

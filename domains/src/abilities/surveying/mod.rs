@@ -16,7 +16,7 @@ use descry_robots::nalgebra::Point3;
 use descry_robots::{Part, Place};
 use descry_skills::{Observe, Outcome};
 
-use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
+use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord, Trace};
 use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::load::Domain;
@@ -35,6 +35,12 @@ const CHART: &str = "chart";
 pub const ABILITY: Ability = Ability {
     facts: facts::ALL,
     calls: calls::ALL,
+    traces: &[Trace {
+        name: "charted",
+        types: &["pose"],
+        of: "chart",
+        without: "the views of a plan promise the same thing twice",
+    }],
     skills: &[SkillWord {
         name: CHART,
         kind: ActionKind::Sensing,

@@ -348,7 +348,7 @@ fn words_keys_and_headings_are_told_in_texts_that_are_not_finished() {
     for (sought, further, word) in [
         (action, 10, ":parameters"),
         (action, 3, "How each action is carried out"),
-        ("retries", 2, "tried again so often"),
+        ("retries", 2, "tries again after a failure"),
         ("[[goal]]", 4, "What may be said"),
     ] {
         let said = editor.hover(&toml, &keys, sought, further);

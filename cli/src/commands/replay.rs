@@ -49,7 +49,7 @@ fn say(replayed: &Replayed, json: bool) -> Result<(), CommandError> {
     if let Some(why) = &replayed.cut_off {
         input::print_text(&format!("the run was cut off: {why}"))?;
     }
-    input::print_text(&format!("the same, byte for byte, in documents of each kind: {}", counts.join(", ")))?;
+    input::print_text(&format!("the same, byte for byte: {}", counts.join(", ")))?;
     replayed.differences.iter().try_for_each(|line| input::print_text(&format!("not the same: {line}")))
 }
 

@@ -19,7 +19,7 @@ fn headings_and_keys_mean_what_the_reference_says() {
     check("say =", 0, Some("say"), "Words and `<slots>`");
     check("[action.fly]", 2, Some("action"), "How each action is carried out");
     check("[action.fly]", 9, Some("fly"), "");
-    check("retries", 7, Some("retries"), "tried again so often");
+    check("retries", 7, Some("retries"), "tries again after a failure");
     check("\"move ?from", 2, None, "");
     check("\"toy\"", 2, None, "");
 }

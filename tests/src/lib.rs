@@ -1,1 +1,3 @@
-//! Tests of the whole.
+//! Tests of the whole, and what fuzzing feeds the readers of bytes from outside.
+
+pub mod fuzz;

@@ -68,7 +68,7 @@ const FLOORS: &[(&str, &str)] = &[
     ("experiments", "agent domains memory pages perception robots"),
     ("cli", "agent domains experiments explain memory pages perception planner robots"),
     ("python", "agent domains explain memory pages perception planner robots"),
-    ("tests", "agent"),
+    ("tests", "agent domains memory perception planner robots"),
 ];
 
 #[test]

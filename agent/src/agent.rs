@@ -23,10 +23,6 @@ use crate::report::Event;
 use crate::stop::Stop;
 use crate::{standing, weigh, written};
 
-/// The maximum number of evaluated states of a planning call; at this limit the best plan so far, or one good
-/// look, is taken.
-const MOST_EVALUATED: u64 = 2_500;
-
 /// An agent at work on one goal.
 pub struct Agent<'a> {
     robot: Arc<dyn Robot>,
@@ -181,14 +177,17 @@ impl<'a> Agent<'a> {
             }
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, &reason)?,
             Planned::OutOfTime { best, statistics } | Planned::OutOfMemory { best, statistics } => {
-                let reason = Reason { search_ended_after: Some(MOST_EVALUATED), ..reason };
+                let most = world.most_states();
+                let reason = Reason { search_ended_after: Some(most), ..reason };
                 match best {
                     Some(plan) => self.adopt(round, plan, &statistics, &reason)?,
                     None => {
                         match self.take_up(world, round, &reason, asked_of(&statistics), World::fallback)? {
                             Taken::Up => {}
                             _ => {
-                                let why = format!("the search ended after {MOST_EVALUATED} states");
+                                let why = format!(
+                                    "the search ended after {most} states; `states` under [limits] allows more"
+                                );
                                 return Ok(Some(Ended::Undecided(why)));
                             }
                         }
@@ -232,7 +231,7 @@ impl<'a> Agent<'a> {
         let mut statistics = Statistics::default();
         for stage in 0.. {
             let Some(focus) = world.focus(round, task, stage) else { break };
-            match self.plan_once(&focus.task, round)? {
+            match self.plan_once(&focus.task, round, world.most_states())? {
                 Planned::Unsolvable { statistics: asked, .. } if !focus.is_whole => statistics = asked,
                 planned => return Ok(planned),
             }
@@ -241,13 +240,11 @@ impl<'a> Agent<'a> {
         Ok(Planned::OutOfTime { best: None, statistics })
     }
 
-    fn plan_once(&mut self, task: &Task, round: &Round) -> Result<Planned, CommandError> {
+    fn plan_once(&mut self, task: &Task, round: &Round, most: u64) -> Result<Planned, CommandError> {
         let _span = tracing::info_span!("plan").entered();
         let started = Instant::now();
-        let options = descry_planner::Options {
-            evaluation_limit: Some(MOST_EVALUATED),
-            ..descry_planner::Options::default()
-        };
+        let options =
+            descry_planner::Options { evaluation_limit: Some(most), ..descry_planner::Options::default() };
         let stop = self.stop.clone();
         let is_stopped = || stop.is_asked();
         let planned = descry_planner::plan(task, &round.attachments, &options, &is_stopped, &mut |_| {})

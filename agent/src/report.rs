@@ -3,6 +3,7 @@
 use std::fmt;
 
 use descry_domains::conclusion::{Believed, Verdict};
+use descry_domains::english;
 use descry_domains::lesson::Lesson;
 use descry_domains::note::Note;
 use descry_domains::objective::Goal;
@@ -298,20 +299,16 @@ impl fmt::Display for Report {
         let is_held = self.objects.iter().any(|o| o.asked && o.position_m.is_none());
         if let Some(object) = self.object.as_ref().filter(|_| is_held) {
             writeln!(f, "  {object} in the hand, confidence {:.2}", self.confidence)?;
-        } else if let (Some(object), Some([x, y, z])) = (&self.object, self.position_m) {
+        } else if let (Some(object), Some(at)) = (&self.object, self.position_m.map(english::position)) {
             let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
             let give = self
                 .position_sigma_m
                 .map(|sigma_m| format!(" give or take {:.0} cm", (1e2 * sigma_m).max(1.0)));
             let give = give.unwrap_or_default();
-            writeln!(
-                f,
-                "  {object}{on} at ({x:.2}, {y:.2}, {z:.2}) m{give}, confidence {:.2}",
-                self.confidence
-            )?;
+            writeln!(f, "  {object}{on} at {at}{give}, confidence {:.2}", self.confidence)?;
         }
-        if let Some([x, y, z]) = self.true_position_m {
-            writeln!(f, "  in truth at ({x:.2}, {y:.2}, {z:.2}) m")?;
+        if let Some(at) = self.true_position_m.map(english::position) {
+            writeln!(f, "  in truth at {at}")?;
         }
         let any_asked = self.objects.iter().any(|o| o.asked);
         for (n, o) in self.objects.iter().enumerate().filter(|_| self.object.is_none()) {
@@ -320,8 +317,8 @@ impl fmt::Display for Report {
             }
             let name = o.label.as_deref().unwrap_or("unknown");
             let on = o.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
-            let at = match o.position_m {
-                Some([x, y, z]) => format!("at ({x:.2}, {y:.2}, {z:.2}) m{on}"),
+            let at = match o.position_m.map(english::position) {
+                Some(at) => format!("at {at}{on}"),
                 None => "in the hand".into(),
             };
             writeln!(f, "  {name:16} {:.2} {at}", o.confidence)?;

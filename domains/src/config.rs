@@ -308,13 +308,15 @@ pub struct Limits {
     pub plans: usize,
     /// How often the very same situation may come back.
     pub repeats: usize,
+    /// States that the search for a plan evaluates; then the best plan so far, or one good look, is taken.
+    pub states: u64,
     /// Time for a run on the body's clock.
     pub seconds: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { views: 40, pushes: 6, plans: 300, repeats: 3, seconds: 7200.0 }
+        Self { views: 40, pushes: 6, plans: 300, repeats: 3, states: 2500, seconds: 7200.0 }
     }
 }
 
@@ -382,6 +384,7 @@ pub(crate) fn check(source: &Text, config: &Config) -> Result<(), LoadError> {
     value("limits.views", l.views as f64, l.views > 0, "at least one look")?;
     value("limits.plans", l.plans as f64, l.plans > 0, "at least one plan")?;
     value("limits.repeats", l.repeats as f64, l.repeats > 0, "at least one")?;
+    value("limits.states", l.states as f64, l.states > 0, "at least one")?;
     value("limits.seconds", l.seconds, l.seconds > 0.0, "seconds, above 0")?;
     for (name, action) in &config.action {
         let (key, limit_s) = (format!("action.{name}.limit_s"), action.limit_s());

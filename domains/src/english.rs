@@ -245,6 +245,12 @@ pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
+/// A position for people, to the centimetre: nothing is called minus nothing.
+pub fn position(metres: [f64; 3]) -> String {
+    let [x, y, z] = metres.map(|m| (m * 100.0).round() / 100.0 + 0.0);
+    format!("({x:.2}, {y:.2}, {z:.2}) m")
+}
+
 /// One of something, with its article: a cup, an apple.
 pub fn one(name: &str) -> String {
     let is_vowel = name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']);

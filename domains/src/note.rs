@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use crate::english;
+
 /// Something that was learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "event")]
@@ -202,11 +204,9 @@ impl fmt::Display for Note {
                 objects.iter().try_for_each(|text| write!(f, "\n{text}"))?;
                 changed.iter().try_for_each(|change| write!(f, "\n{change}"))
             }
-            Note::Surface { name, at_m: [x, y, z], area_m2 } => {
-                write!(
-                    f,
-                    "another surface to stand things on, the {name}: {area_m2:.2} m² at ({x:.2}, {y:.2}, {z:.2}) m"
-                )
+            Note::Surface { name, at_m, area_m2 } => {
+                let at = english::position(*at_m);
+                write!(f, "another surface to stand things on, the {name}: {area_m2:.2} m² at {at}")
             }
             Note::Swept { things } => {
                 let all = if things.len() == 1 { "thing" } else { "things" };

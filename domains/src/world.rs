@@ -352,6 +352,11 @@ impl<'a> World<'a> {
         self.is_unasked
     }
 
+    /// States that the search for a plan may evaluate.
+    pub fn most_states(&self) -> u64 {
+        self.setting.domain.config.limits.states
+    }
+
     /// A plan was made.
     pub fn planned(&mut self) {
         self.plans += 1;

@@ -1,5 +1,6 @@
 //! Text for people: numbers, lists and wrapped lines.
 
+use descry_domains::english;
 use descry_memory::belief::Track;
 
 pub use descry_agent::numbers::{count, share, share_of};
@@ -39,8 +40,7 @@ pub fn capital(text: &str) -> String {
 
 /// Position of an object in the map frame, as text.
 pub fn place(track: &Track) -> String {
-    let [x, y, z]: [f64; 3] = track.position_m.coords.into();
-    format!("({x:.2}, {y:.2}, {z:.2}) m")
+    english::position(track.position_m.coords.into())
 }
 
 /// Wraps a text at `most` letters; the first line starts with `first`, the others are indented by its width.

@@ -20,6 +20,7 @@ use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use descry_robots::Description;
 use serde_json::json;
 
+use crate::english;
 use crate::error::WorldError;
 use crate::eyes::{self, Eyes};
 use crate::known::Thing;
@@ -382,12 +383,9 @@ fn confidences(mind: &Mind, eyes: Eyes<'_>) -> Vec<f64> {
 pub fn in_a_line(p: &Percept) -> String {
     let name = p.label.as_deref().unwrap_or("unknown");
     let probability = p.label.as_deref().map_or(p.unknown, |label| p.probability_of(label));
-    let (at, [w, d, h]) = (p.position_m, p.size_m.map(|m| m * 100.0));
-    let seen = p.seen_fraction * 100.0;
-    format!(
-        "{name:16} {probability:.2} ({:.2}, {:.2}, {:.2}) m, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen",
-        at.x, at.y, at.z
-    )
+    let at = english::position(p.position_m.coords.into());
+    let ([w, d, h], seen) = (p.size_m.map(|m| m * 100.0), p.seen_fraction * 100.0);
+    format!("{name:16} {probability:.2} {at}, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen")
 }
 
 /// Takes what the views of a surface saw into its space. One that was left out may have been taken up since, and the other way round,

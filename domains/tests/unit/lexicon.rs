@@ -21,6 +21,12 @@ fn several_are_called_as_people_call_them() {
 }
 
 #[test]
+fn a_position_has_no_minus_before_nothing() {
+    assert_eq!(position([-0.004, -0.0, 0.716]), "(0.00, 0.00, 0.72) m");
+    assert_eq!(position([-0.006, 1.0, 10.0]), "(-0.01, 1.00, 10.00) m");
+}
+
+#[test]
 fn places_have_names_of_their_own() {
     let check = |surfaces: &[&str], rooms: &[&str], expected: Option<&str>| {
         let own = |list: &[&str]| list.iter().map(|name| name.to_string()).collect();

@@ -27,7 +27,7 @@ pub struct Mind {
     pub views: usize,
     /// Pushes tried so far.
     pub pushes: usize,
-    /// How often what was seen has become void, as something moved.
+    /// Number of disturbances of the scene: each time something moved, earlier views became void.
     pub disturbed: usize,
     /// Driven so far, metres.
     pub distance_m: f64,

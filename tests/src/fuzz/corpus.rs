@@ -144,7 +144,7 @@ pub fn records() -> Vec<Vec<u8>> {
     vec![killed, fs::read(&segment).expect("it is there")]
 }
 
-/// What a body says from its hello to its answers.
+/// Messages of a body, from its hello to its answers.
 pub fn bodies() -> Vec<Vec<u8>> {
     let hello = r#"{"hello": {"protocol": 1, "name": "fuzzed", "simulated": true, "now_ns": 0, "pose_sigma_m": 0.03, "pose_sigma_rad": 0.03, "base": {"footprint": {"disc": {"radius_m": 0.25}}, "linear_m_s": 0.4, "angular_rad_s": 0.8}, "camera": {"width": 4, "height": 3, "fx": 4, "fy": 4, "cx": 1.5, "cy": 1, "range_m": [0.5, 6]}, "head": {"base_from_head": [0, 0, 1.4], "pan_limit_rad": 2.6, "tilt_down_rad": 1.2, "tilt_up_rad": 0.8}, "map": {"resolution_m": 0.5, "origin_m": [-2.5, -2.5], "width": 10, "height": 10}, "surfaces": [{"name": "table", "outline_m": [[1, 1], [2, 1], [2, 2], [1, 2]], "height_m": 0.72}]}, "bytes": 100}"#;
     let still = r#"{"translation": [0, 0, 0], "rotation": [0, 0, 0, 1]}"#;

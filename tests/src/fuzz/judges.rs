@@ -1,4 +1,4 @@
-//! What each reader makes of an input, and what must hold of it.
+//! Judges of the readers: each reads an input and checks what must hold of the result.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -83,7 +83,7 @@ pub fn scene(input: &[u8]) {
 }
 
 thread_local! {
-    /// What is spoken about.
+    /// Domain and lexicon that sentences are read in.
     static SPOKEN: (Domain, Lexicon) = {
         let domain = Domain::load("home").expect("it is built in");
         let lexicon = Lexicon::new(&domain, &Places::of_scene(&domain));

@@ -54,7 +54,7 @@ pub const NOT_IT: f64 = 0.002;
 #[derive(Clone, Default)]
 struct Glances {
     by_time: BTreeMap<i64, Arc<Glance>>,
-    /// How often something had moved when they were taken.
+    /// Number of disturbances of the scene when they were taken.
     disturbed: usize,
 }
 

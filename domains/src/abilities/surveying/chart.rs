@@ -376,7 +376,6 @@ impl Known {
 }
 
 impl OwnMap for Chart {
-    /// The surfaces as searching takes them: as far as they were seen.
     fn surfaces(&self) -> Vec<KnownSurface> {
         let known = self.surfaces.iter().map(|(name, level)| KnownSurface {
             symbol: symbol(name),
@@ -397,10 +396,6 @@ impl OwnMap for Chart {
         known.collect()
     }
 
-    /// Travel from one place to each of the others: on this map if there is one, else on the body's own.
-    ///
-    /// # Errors
-    /// Each entry by itself, as [`Robot::travel`].
     fn travel(
         &self,
         robot: &dyn Robot,
@@ -430,7 +425,6 @@ impl OwnMap for Chart {
         found
     }
 
-    /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
     fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>> {
         let (Place::Pose(from), Place::Pose(to)) = (from, to) else { return None };
         let chart_from_map = self.map_from_chart.inverse();
@@ -446,17 +440,14 @@ impl OwnMap for Chart {
         Some(way)
     }
 
-    /// True if routes are planned on the floor of this map.
     fn has_ways(&self) -> bool {
         self.router.is_some()
     }
 
-    /// True if a surface is one of this map.
     fn has(&self, surface: &str) -> bool {
         self.surfaces.iter().any(|(name, _)| symbol(name) == surface)
     }
 
-    /// True if a wall or a pillar of this map stands between two places.
     fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let [from, to] = &[from, to].map(|p| self.map_from_chart.inverse_transform_point(p));
         let side = |a: &Point2<f64>, b: &Point2<f64>, p: &Point2<f64>| (b - a).perp(&(p - a));
@@ -466,8 +457,6 @@ impl OwnMap for Chart {
         self.map.as_ref().is_some_and(|m| m.feet().any(|(a, b)| crosses(&a, &b)))
     }
 
-    /// Sentence about frontiers of the map, where unseen floor begins without a wall; none if there is no
-    /// frontier, or nothing was mapped.
     fn goes_on(&self, body: &Description) -> Option<String> {
         let floor = self.floor(body)?;
         let ends = frontiers(&floor, &explore(body)?);

@@ -49,7 +49,7 @@ pub struct Weighed {
     pub chosen: Option<Way>,
     /// Others that could have been taken, those that gain most a second first.
     pub others: Vec<Way>,
-    /// The number of ways that were open in all, the chosen one and those left out here among them.
+    /// Number of feasible alternatives, including the chosen plan and those not in `others`.
     pub open: usize,
     /// The plan up to its first gain, with consecutive steps merged into one where possible.
     pub shorter: Option<Way>,

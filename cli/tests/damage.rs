@@ -100,7 +100,7 @@ fn linked(from: &Path, to: &Path) {
     }
 }
 
-/// Checks that every record, event and run shown of a damaged record is also shown of the undamaged one.
+/// Checks that what is shown of a damaged record is a subset of what is shown of the intact one.
 fn check_shown(whole: &Value, shown: &Value, about: &str) {
     for list in ["records", "events"] {
         let all = whole[list].as_array().map_or(&[][..], Vec::as_slice);

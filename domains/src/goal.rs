@@ -47,7 +47,7 @@ pub enum GoalError {
         /// The words after "with confidence".
         found: String,
     },
-    /// With the confidence that was asked for, a yes would be no likelier than a no.
+    /// The requested confidence is at most 0.5.
     #[error(
         "\"with confidence {found}\" asks for a yes that is no likelier than a no\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
     )]

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 /// The number of `domain.toml` among the sources of the findings; the first is `domain.pddl`.
 const TOML: usize = 1;
 
-/// The text of `domain.toml`, to be pointed into.
+/// Resolves key paths of `domain.toml` to source spans, for diagnostics.
 pub struct TomlPlaces<'a> {
     text: &'a str,
 }

@@ -371,10 +371,11 @@ impl<'a> World<'a> {
         }
     }
 
-    /// The `step`-th part of a call for the body, with its time limit; none where the call has no such part.
+    /// Job for part `step` of a call, with its time limit; `None` past the last part. `Job::skill`
+    /// holds the failure if the call cannot be grounded now.
     ///
     /// # Errors
-    /// [`SkillFailure`] where it has no meaning now; [`WorldError`] where it never has.
+    /// [`WorldError`] if the call can never be grounded.
     pub fn ground(&self, call: &Call, step: usize) -> Result<Option<Job>, WorldError> {
         let domain = self.setting.domain;
         let limit_s = actions::limit_s(domain, call);

@@ -36,7 +36,7 @@ pub trait Recogniser: Send + Sync {
     /// The name by which it is chosen on the command line and in files.
     fn name(&self) -> &'static str;
 
-    /// The percepts of all segments, in their order; what rests on or in another thing of its segment follows that. The models
-    /// exclude each other.
+    /// Percepts of all segments, in segment order; an object on or in another follows that one. The
+    /// models are mutually exclusive hypotheses.
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept>;
 }

@@ -176,7 +176,7 @@ fn the_merged_cloud_stays_within_its_bound() {
     }
 }
 
-/// Everything that merging gives, but for words.
+/// True if two merge results are equal, notes ignored.
 fn same(one: &Merged, other: &Merged) -> bool {
     let maps = |m: &Merged| m.visibility.maps.iter().map(|map| map.camera_from_world).collect::<Vec<_>>();
     // Normals that are not known are no numbers.

@@ -114,7 +114,7 @@ fn on_the_way(
     }
 }
 
-/// The task with nothing asked but the goal.
+/// Task without constraints and preferences; the metric goes too if there were preferences.
 fn freed(task: &Task) -> Task {
     let mut free = task.clone();
     free.constraints.clear();

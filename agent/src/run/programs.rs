@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::exit::CommandError;
 
-/// The kind under which it is recorded.
+/// Record kind of an exchange with a program.
 const PROGRAM: &str = "program";
 
 /// A question to a program, and what it said.

@@ -55,7 +55,7 @@ pub fn leads(step: &Step) -> bool {
     !matches!(step.arguments.as_slice(), [from, to] if from == to)
 }
 
-/// The objects about which a step makes facts true.
+/// Objects in the atoms that a step adds.
 pub fn brought(semantics: &Semantics<'_>, step: &Step) -> Vec<String> {
     let Ok((action, _)) = semantics.bind(step) else { return Vec::new() };
     let effects = &semantics.task.action(action).effects;

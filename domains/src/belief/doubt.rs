@@ -196,8 +196,8 @@ impl Doubt {
         self.share_settled(situation, look, before) * all.min(1.0)
     }
 
-    /// Total weight that possible looks could settle; as long as nothing is moved, only looks not yet taken
-    /// count.
+    /// Total weight of the hypotheses that at least one feasible look could settle. Looks already
+    /// taken count only if an object is to be moved.
     fn within_reach(&self, situation: &Situation, moved: Option<usize>) -> Reach {
         *self.within_reach[moved.map_or(0, |o| o + 1)].get_or_init(|| {
             let open = |look: &(usize, usize)| moved.is_some() || !situation.observed.contains(look);

@@ -226,7 +226,7 @@ impl MongoStore {
         Ok(bytes)
     }
 
-    /// The first document in time order that matches a query and a further condition.
+    /// First matching document in ascending (`sign` 1) or descending (-1) time order.
     fn first(&self, query: &Query, side: Fields, sign: i32) -> Result<Option<Document>, Error> {
         let filter = doc! { "$and": [query::filter(query, &self.name), side] };
         let mut find = self.records.find(filter).sort(doc! { "stamp_ns": sign, "_id": sign });

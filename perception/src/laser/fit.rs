@@ -33,7 +33,8 @@ impl Default for FitOptions {
 pub enum Start {
     /// Near a known pose.
     Near(Isometry2<f64>),
-    /// Starts from every angle, with the middles together.
+    /// Multi-start over headings of the laser, with the scan on the side of the model that faces
+    /// the laser.
     AllAngles,
 }
 

@@ -36,7 +36,7 @@ pub use skin::outward;
 pub struct KnowOptions {
     /// Returns farther away are not looked at, metres.
     pub range_m: f64,
-    /// Distance of the places that are described, metres (paper: 1.5 cm).
+    /// Spacing of the keypoints that get a descriptor, metres (paper: 1.5 cm).
     pub keypoint_m: f32,
     /// Minimum confidence of a reported object.
     pub least_confidence: f64,

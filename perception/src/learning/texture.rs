@@ -23,7 +23,8 @@ const CELL_PX: usize = 12;
 const CONTRAST: f32 = 3.0;
 /// Usual difference of lightness between looks at one mark; marks that differ more weigh little.
 const LIGHTNESS: f32 = 8.0;
-/// A mark that would lie farther before or behind what the other look measured there is hidden or of another surface, metres.
+/// Minimum tolerance between a feature's predicted depth and the depth measured in the other view,
+/// metres; beyond it the feature is occluded or on another surface.
 const NEAR_M: f32 = 0.015;
 /// Neighbouring pixels that differ by more than this and what the camera errs are of two surfaces, metres.
 const STEP_M: f32 = 0.01;

@@ -265,10 +265,10 @@ impl Cells {
     }
 }
 
-/// The normal at `at` from the centroids of regions around it (Eq. 4): the mean of the products of all pairs of ways to them; `None` where they are too
-/// few or do not agree.
+/// Surface normal at `at`: normalised sum of the cross products of all pairs of vectors to the
+/// centroids of neighbouring regions (Eq. 4), or `None` if the regions are too few or disagree.
 ///
-/// Written as it stands, products of pairs on opposite sides cancel: each is turned to the side it was seen from first, `towards` the camera.
+/// Each product is first flipped `towards` the camera, as opposite pairs would cancel.
 pub fn by_regions(
     at: &Point3<f64>,
     regions: &[Point3<f64>],

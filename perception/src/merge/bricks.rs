@@ -262,8 +262,8 @@ impl<C: Copy> Bricks<C> {
     }
 }
 
-/// The index of the brick, of three along an axis, that holds a voxel of the wide brick, and the voxel's
-/// index in that brick.
+/// Along one axis of a brick with a margin of one voxel: the brick that holds the voxel (0
+/// previous, 1 this, 2 next), and the voxel's index there.
 #[inline(always)]
 fn in_brick(wide: usize) -> (usize, usize) {
     (wide.div_ceil(SIDE), (wide + SIDE - 1) % SIDE)

@@ -262,7 +262,7 @@ impl<'a> Returns<'a> {
     }
 }
 
-/// Pixels beside each other.
+/// Block of `LANES` neighbouring pixels, processed together (SIMD).
 struct Block {
     /// Camera frame, metres.
     at: [[f32; LANES]; 3],

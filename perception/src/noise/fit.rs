@@ -130,8 +130,9 @@ fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, off
     let (mut sigma, mut residuals) = (f64::INFINITY, Vec::new());
     let mut gate = vec![true; seen.len()];
     for _ in 0..2 {
-        let line =
-            line(seen.iter().zip(&gate).filter(|(_, within)| **within).map(|((_, row, q), _)| (*row, *q)))?;
+        let line = fit_plane(
+            seen.iter().zip(&gate).filter(|(_, within)| **within).map(|((_, row, q), _)| (*row, *q)),
+        )?;
         residuals = seen.iter().map(|(_, row, q)| q - row.dot(&line)).collect();
         let within = residuals.iter().zip(&gate).filter(|(_, within)| **within);
         let (n, squares) = within.fold((0.0, 0.0), |(n, s), (r, _)| (n + 1.0, s + r * r));
@@ -141,8 +142,8 @@ fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, off
     Some(Block { depth_m, sigma_m: sigma * depth_m * depth_m, looks: looks(&seen, &residuals, &gate, sigma) })
 }
 
-/// Least squares of inverse depths over rows.
-fn line(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>> {
+/// Least-squares coefficients of inverse depth, linear in the rows; `None` if singular.
+fn fit_plane(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>> {
     let (normal, right) = rows.fold((Matrix3::zeros(), Vector3::zeros()), |(n, r), (row, q)| {
         (n + row * row.transpose(), r + row * q)
     });

@@ -101,35 +101,40 @@ impl fmt::Display for Sign {
 
 /// Rays that are looked at for each camera. From: chosen.
 const RAYS: usize = 5000;
-/// Distance below a surface from which returns count as lower, metres, and its growth with the
-/// distance from the surface's middle, metres a metre: sensors bend distant surfaces. From: chosen.
+/// Distance below a surface from which returns count as lower, metres. From: chosen.
 const LOWER_M: f64 = 0.06;
+/// Growth of `LOWER_M` with the distance from the surface's middle, metres per metre: sensors bend
+/// distant surfaces. From: chosen.
 const LOWER_PER_M: f64 = 0.03;
-/// Fewest rays past the edge, and least share of all returning rays, that are no accident. From: chosen.
+/// Minimum number of rays past the edge; fewer are an accident. From: chosen.
 const PAST_RAYS: usize = 15;
+/// Minimum share of all returning rays that pass the edge; fewer are an accident. From: chosen.
 const PAST_SHARE: f64 = 0.005;
-/// Surfaces are parallel if their normals differ by no more, cosine of 8 degrees. From: chosen.
+/// Minimum cosine between the normals of parallel surfaces, that of 8 degrees. From: chosen.
 const PARALLEL: f64 = 0.99;
-/// Distance around a thing within which its support is seen, metres, fewest rays of the support, and its
-/// maximum unevenness, metres. From: chosen.
+/// Margin around an object's outline within which its support must be seen, metres. From: chosen.
 const AROUND_M: f64 = 0.1;
+/// Minimum number of rays that hit the support within this margin. From: chosen.
 const AROUND_RAYS: usize = 5;
+/// Maximum deviation of these hits from the support plane, metres. From: chosen.
 const LEVEL_M: f64 = 0.012;
-/// Least and greatest height of a surface on another one that is a thing, or on the floor a step, metres.
-/// From: chosen.
+/// Minimum and maximum height of an object's top above the surface that it stands on (on the floor: of
+/// a step), metres. From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
-/// Fewest samples seen beneath a surface, and their least distances within its outline and below it, metres.
-/// From: chosen.
+/// Minimum number of samples seen beneath a raised surface. From: chosen.
 const BENEATH: usize = 15;
+/// Minimum distance of these samples within the surface's outline and below the surface, metres.
+/// From: chosen.
 const BENEATH_M: (f64, f64) = (0.05, 0.08);
 /// Width below which a surface is a rail or the top of a wall, metres. From: chosen.
 const NARROW_M: f64 = 0.12;
-/// The floor is looked down on from at least so high, and lies at least so far below a surface to stand things on, metres. From: chosen.
+/// Minimum height of the camera above the floor, metres. From: chosen.
 const EYE_M: f64 = 0.8;
+/// Minimum height of a supporting surface above the floor, metres. From: chosen.
 const UNDER_M: f64 = 0.25;
-/// Least reach of the floor in view if something stands on it, metres, and least area if nothing does, square
-/// metres. From: chosen.
+/// Minimum extent of the visible floor if something stands on the floor, metres. From: chosen.
 const REACH_M: f64 = 1.2;
+/// Minimum area of the visible floor if nothing stands on the floor, square metres. From: chosen.
 const WIDE_M2: f64 = 2.5;
 /// A height band no wider than this speaks of tables alone, metres. From: chosen.
 const TELLING_M: f64 = 1.0;

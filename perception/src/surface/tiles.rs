@@ -67,7 +67,7 @@ impl<T: Copy + Default> Tiles<T> {
         start
     }
 
-    /// The cells of all tiles that are laid, by x, then by y.
+    /// Cells of all allocated tiles, sorted by x, then y.
     pub fn all(&self) -> Vec<([i32; 2], T)> {
         let mut tiles: Vec<(&[i32; 2], &[T])> =
             self.tiles.iter().zip(self.values.chunks_exact(SIDE * SIDE)).collect();

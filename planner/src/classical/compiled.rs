@@ -420,7 +420,7 @@ impl Compiled {
         plan.iter().fold(0, |sum, &op| self.with_cost(sum, op))
     }
 
-    /// The cost of a beginning of a plan with an operator more, as the search counts.
+    /// Search cost of a plan prefix extended by one operator, saturating.
     pub(crate) fn with_cost(&self, cost: u32, operator: u32) -> u32 {
         cost.saturating_add(self.costs[operator as usize]).min(MOST_COUNTED)
     }

@@ -35,7 +35,7 @@ pub(super) struct Atoms {
     tables: Vec<Table>,
     /// Predicate and row, by atom.
     places: Vec<(u32, u32)>,
-    /// Bits that hold one object.
+    /// Bits per object in a key of arguments.
     bits: u32,
 }
 

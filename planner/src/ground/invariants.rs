@@ -108,8 +108,9 @@ struct Unbalanced {
     key: Vec<u32>,
 }
 
-/// Finds mutex groups among `atoms`. `predicates` are the ones to start from, with their arities; `initial` are the
-/// atoms that hold at first. Those found so far once `stop` says true. Deterministic: the order of everything is the order of the input.
+/// Finds mutex groups among `atoms`; returns the groups found so far if `stop` becomes true.
+/// `predicates`: predicates to start from, with arity. `initial`: atoms that hold initially. The
+/// order of the output follows the order of the input.
 pub(crate) fn mutex_groups<N: AtomNames>(
     names: &N,
     atoms: &[u32],

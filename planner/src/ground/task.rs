@@ -446,7 +446,7 @@ pub struct GroundTask {
 }
 
 impl GroundTask {
-    /// Bytes that its actions take, which are nearly all of it.
+    /// Approximate memory of the ground task, bytes; actions dominate.
     pub(crate) fn bytes(&self) -> usize {
         let condition = |condition: &Conjunction| {
             condition.facts.len() * size_of::<Fact>()

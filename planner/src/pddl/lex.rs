@@ -167,7 +167,7 @@ const SECTIONS: &[&str] = &[
     ":metric",
 ];
 
-/// Sections that have parts.
+/// Keywords of sections whose body is `:keyword` parts.
 const ACTIONS: &[&str] = &[":action", ":durative-action", ":process", ":event"];
 
 /// Keywords that stand directly in an action.

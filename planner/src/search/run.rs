@@ -440,8 +440,8 @@ impl<'a, 's> Run<'a, 's> {
         self.task.has_exact_costs() && self.bound < MOST_COUNTED
     }
 
-    /// Searches for plans that end in states of which the metric makes less, where it looks at nothing else: once every state was
-    /// seen, there is none.
+    /// Searches for plans with a better metric value if the metric depends on the final state
+    /// alone; `Exhausted` proves that none exists.
     fn beyond(&mut self) -> ClassicalEnd {
         let mut work_limit = self.options.first_work;
         for turn in 0.. {

@@ -349,7 +349,8 @@ impl Relaxed {
         self.operators.push(Operator { act, part, needs, gives, moves, gates, seconds });
     }
 
-    /// Lets the operators just made for a part of an action give the token that it is open, or closed.
+    /// Adds `token` (action open, or closed) to the add effects of the relaxed operators just made
+    /// for one snap action of `act`.
     fn give(&mut self, act: u32, part: Part, token: u32) {
         let own = self.operators.iter_mut().rev().take_while(|operator| operator.act == act);
         own.filter(|operator| operator.part == part).for_each(|operator| operator.gives.push(token));

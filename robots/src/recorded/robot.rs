@@ -142,7 +142,8 @@ impl RecordedRobot {
     }
 }
 
-/// True if a path holds a recording in a published layout and not in ours, which states its settings or its camera.
+/// True if the folder is in a published layout and has none of our own files (settings, camera,
+/// pose).
 fn is_foreign(path: &Path) -> bool {
     let ours = [SETTINGS_FILE, CAMERA_FILE, "pose.txt"];
     !ours.iter().any(|file| path.join(file).is_file()) && layout_of(path).is_some()

@@ -9,7 +9,7 @@ use crate::mind::Mind;
 use crate::objective::Goal;
 use crate::situation::Situation;
 
-/// A thing of which less was seen is not known from all sides.
+/// Minimum share of an object's sides that must be seen to call it seen from all around.
 const ALL_ROUND: f64 = 0.9;
 
 /// Answers a goal about learning; `None` for other goals.

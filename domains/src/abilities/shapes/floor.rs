@@ -52,7 +52,7 @@ pub struct Floor {
     pub room: Vec<Point2<f64>>,
     /// Poses from which some of these can be seen.
     pub promising: BTreeSet<String>,
-    /// The poses that are made around a thing.
+    /// Number and distance of the viewpoints placed around a floor object.
     pub poses: Candidates,
 }
 

@@ -278,8 +278,8 @@ struct Rebuild<'a> {
     dir: &'a Path,
     index: Index,
     old: Old,
-    /// Durability of the records, if torn ends are to be cut off and segments finished, provided that nothing
-    /// is damaged.
+    /// Durability of repairs: torn segment ends are truncated and segments completed, unless a
+    /// record is damaged. `None`: nothing is repaired.
     mends: Option<Durability>,
     /// Segments with a torn end or without a summary.
     unfinished: Vec<(u64, Scan)>,

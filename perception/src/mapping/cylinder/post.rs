@@ -52,7 +52,7 @@ fn upright_m2(columns: &[Local], tolerance_m: f64) -> f64 {
     mean_m2(columns.iter().map(|c| (c.of, from_post_m(c, &sides))), tolerance_m)
 }
 
-/// The nearest side of those that a column may have been seen on, and how far off that is, metres.
+/// Nearest side of the post that faces the laser, and the column's distance to it, metres.
 fn nearest(column: &Local, sides: &[f64; 4]) -> (usize, f64) {
     let away_m = |side: usize| {
         let outward =

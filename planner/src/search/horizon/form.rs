@@ -38,7 +38,7 @@ pub(super) struct Form {
     pub adders: Lists<u32>,
     /// Operators in the order of their application within a step.
     pub order: Vec<u32>,
-    /// The goals' facts, those first that others would cut off.
+    /// Goal facts in a reasonable order (Koehler and Hoffmann 2000).
     pub goals: Vec<u32>,
     /// First moment at which a fact can hold, or an operator can be applied; `u32::MAX` for never.
     first_fact: Vec<u32>,

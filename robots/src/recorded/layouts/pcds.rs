@@ -79,7 +79,7 @@ struct Look {
     points_from_camera: Isometry3<f64>,
     /// Slope within which nearly all points are.
     reach: f64,
-    /// Points before it.
+    /// Number of points in front of the camera.
     points: usize,
 }
 

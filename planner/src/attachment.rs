@@ -71,7 +71,8 @@ pub struct Reading {
 pub enum Read {
     /// Every ground instance of a predicate or function.
     All(String),
-    /// The instances of a symbol of which each argument is what stands at that position among the call's arguments; `None`: anything.
+    /// Instances whose arguments equal the call's arguments at the given positions; `None`: any
+    /// object.
     At(String, Vec<Option<usize>>),
     /// The whole state. The cache then helps only where a state recurs.
     Everything,
@@ -141,13 +142,14 @@ pub enum Answer {
     Number(f64),
     /// Answer of an effect module: one value for each term that the module lists, in that order.
     Writes(Vec<FactValue>),
-    /// Answer of a grounding module: every parameter that it proposes (none: the action is not
-    /// applicable).
+    /// Answer of a grounding module: all proposed values of the parameter; empty if the action is
+    /// not applicable.
     Proposals(Vec<Arc<str>>),
 }
 
 impl Answer {
-    /// The answer as its kind has it: names and values are both lists of texts where they come as JSON.
+    /// Answer of the given kind: from JSON, object names and effect values both come as lists of
+    /// texts.
     fn of_kind(self, kind: CallKind) -> Answer {
         let name = |value: &FactValue| match value {
             FactValue::Object(name) => Some(name.clone()),
@@ -181,7 +183,7 @@ pub enum CallError {
     /// The attachment itself reports a failure.
     #[error("{0}")]
     Failed(String),
-    /// It looked for a fact that it does not declare in `reads`, or of another type.
+    /// The attachment read a fact that is not declared in `reads`, or has another type.
     #[error("{term} is not among the facts that the attachment declares to read, or is not {expected}")]
     NotRead {
         /// The fact looked for.
@@ -208,7 +210,7 @@ pub enum CallError {
     Crashed(String),
 }
 
-/// A failed call together with what was asked.
+/// Failed call, with the call's module and arguments.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("module {call} (attachment `{attachment}`) failed: {cause}")]
 pub struct AttachmentError {
@@ -225,9 +227,9 @@ pub struct AttachmentError {
 /// Accuracy of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Level {
-    /// For plans: the real answer.
+    /// Exact answer, for plans.
     Exact,
-    /// For heuristics: cheap and optimistic.
+    /// Optimistic, cheap answer, for heuristics.
     Relaxed,
 }
 

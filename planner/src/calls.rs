@@ -1,4 +1,5 @@
-//! Ground calls bound to attachments: what the searches ask, and from which variables an answer is made.
+//! Ground calls bound to attachments: questions of the searches, and the state variables on which
+//! each answer depends.
 
 mod terms;
 
@@ -20,7 +21,7 @@ use crate::task::{Module, ModuleId, Task};
 
 use self::terms::{Origin, Sources, Terms};
 
-/// A failed call on its way up to [`crate::plan()`].
+/// Failed call, returned up to [`crate::plan()`].
 pub type Failure = Box<AttachmentError>;
 
 /// Data that all calls of a module share.
@@ -29,13 +30,13 @@ struct Asked<'a> {
     attachment: String,
     module: Arc<str>,
     kind: CallKind,
-    /// Number of terms that it writes.
+    /// Number of terms that the call writes.
     writes: usize,
     /// Counts answers that were known already, for the statistics of the attachment.
     hits: Option<&'a AtomicU64>,
-    /// The positions of the arguments on which it depends what a call reads.
+    /// Argument positions that select the facts a call reads.
     positions: Vec<usize>,
-    /// Sources of its readings, if the arguments make no difference to them.
+    /// Sources of the call's readings, if these are the same for all arguments.
     sources: Option<Arc<Sources>>,
 }
 
@@ -47,10 +48,10 @@ struct Bound<'b> {
     sources: &'b Sources,
 }
 
-/// Answers known already, by what stands where the call reads.
+/// Cached answers, by the values of the variables that a call reads.
 type Known = FxHashMap<Box<[u64]>, Answer>;
 
-/// A call, what was needed of it, and the proposed parameter.
+/// Refused call: its id, the truth that was needed, and the proposed parameter.
 type Refusal = (CallId, bool, Option<Arc<str>>);
 
 /// Every call of a ground task, bound to its attachment.
@@ -63,14 +64,15 @@ pub struct Calls<'a> {
     asked: Vec<Asked<'a>>,
     /// Sources of the readings by call.
     sources: Vec<Arc<Sources>>,
-    /// Answers of calls that read nothing and take no proposed parameter, exact and relaxed.
+    /// Exact and relaxed answers of calls with no readings and no proposed parameter.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
     /// Answers of calls that read something, without a proposed parameter, by call, exact and relaxed.
     known: RefCell<Vec<[Known; 2]>>,
     /// Buffer for the readings of the last question.
     read: RefCell<Vec<u64>>,
     terms: Terms,
-    /// Calls that were answered otherwise than needed: what was needed, and the proposed parameter.
+    /// Calls whose answer differed from the truth needed, with that truth and the proposed
+    /// parameter.
     refused: RefCell<FxHashSet<Refusal>>,
 }
 
@@ -217,7 +219,7 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// Lets an effect module write into a state what it answers on another.
+    /// Evaluates an effect module in one state and writes the result into another.
     pub fn write(
         &self,
         call: CallId,
@@ -258,7 +260,7 @@ impl<'a> Calls<'a> {
         Ok(())
     }
 
-    /// The value of an object fluent's variable that means the object of this name, or that it is undefined.
+    /// Value of an object fluent's variable for the object of this name; `None`: undefined.
     fn object_value(&self, variable: VariableId, name: Option<&Arc<str>>) -> Option<u32> {
         let means = |meaning: &Meaning| match meaning {
             Meaning::Object { value: Some(object), .. } => name == Some(&self.names[*object as usize]),
@@ -354,7 +356,8 @@ impl<'a> Calls<'a> {
         Ok(answer)
     }
 
-    /// The values of the variables that are read, as many in a word as it can tell apart, then those of the numbers.
+    /// Cache key of a state: values of the variables read, packed into words, then those of the
+    /// numbers read.
     fn what_is_read(&self, sources: &Sources, state: &Values, words: &mut Vec<u64>) {
         words.clear();
         let (mut word, mut room) = (0, 1_u64);
@@ -391,7 +394,7 @@ impl<'a> Calls<'a> {
         Ok(self.attachments.call(&bound.asked.attachment, &question, level)?)
     }
 
-    /// The question without its readings.
+    /// Question of a call, without its readings.
     fn unread(&self, bound: Bound, proposal: Option<&Arc<str>>) -> Question {
         let arguments = bound.arguments.iter().map(|&object| &self.names[object as usize]);
         Question {
@@ -443,7 +446,7 @@ impl<'a> Calls<'a> {
     }
 }
 
-/// A failed call as an error of the whole planning call, pointing at where the domain asks it.
+/// Planning error for a failed call, pointing at the call in the domain.
 pub(crate) fn report(task: &Task, failure: Failure) -> PlanError {
     let module = task.modules.iter().position(|module| module.name == failure.module);
     let list = module

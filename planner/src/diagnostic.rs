@@ -4,7 +4,7 @@ mod excerpt;
 
 use serde::Serialize;
 
-/// A named text: a domain, a problem or a plan. The name is what messages call it, usually the path.
+/// Named source text (domain, problem or plan); messages use the name, usually the path.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Source {
     /// Name of the text in messages.
@@ -14,13 +14,13 @@ pub struct Source {
 }
 
 impl Source {
-    /// A source from its name and its text. A carriage return alone ends a line too: it is taken for a line feed.
+    /// Source with a name and a text. A lone carriage return counts as a line end.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), text: with_line_feeds(text.into()) }
     }
 }
 
-/// The text with line feeds for carriage returns that stand alone; all places stay where they are.
+/// Text with lone carriage returns replaced by line feeds; byte positions are unchanged.
 fn with_line_feeds(text: String) -> String {
     if !text.contains('\r') {
         return text;
@@ -42,12 +42,12 @@ pub struct Span {
     pub source: u32,
     /// First byte.
     pub start: u32,
-    /// The byte after its last one.
+    /// Byte after the span's last one.
     pub end: u32,
 }
 
 impl Span {
-    /// The smallest span that holds both; they are taken to be in the same source.
+    /// Smallest span that covers both; the two must lie in the same source.
     pub fn to(self, other: Span) -> Span {
         Span { source: self.source, start: self.start.min(other.start), end: self.end.max(other.end) }
     }
@@ -57,13 +57,13 @@ impl Span {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// A fault: the text means nothing, or certainly not what was intended.
+    /// Error: the text has no meaning, or certainly not the intended one.
     Error,
-    /// Readable and usable, but surely not quite what was intended.
+    /// Warning: the text is usable, but probably not as intended.
     Warning,
 }
 
-/// A place and what is to be said about it.
+/// Span with a message.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Label {
     /// The place.
@@ -72,12 +72,12 @@ pub struct Label {
     pub text: String,
 }
 
-/// A finding: the fault, the places that show it, and a remedy where one is known.
+/// Finding: message, spans that show the fault, and a remedy if one is known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
     /// Fault or warning.
     pub severity: Severity,
-    /// A stable name of the kind of finding, such as `undeclared-predicate`.
+    /// Stable code of the finding's kind, such as `undeclared-predicate`.
     pub code: &'static str,
     /// The fault in one sentence, without the place.
     pub message: String,
@@ -119,20 +119,20 @@ impl Diagnostic {
         Self { severity, code, message: message.into(), labels, help: None }
     }
 
-    /// The same finding with one more place.
+    /// Adds a labelled span.
     pub fn with_label(mut self, span: Span, text: impl Into<String>) -> Self {
         self.labels.push(Label { span, text: text.into() });
         self
     }
 
-    /// The same finding with a mend.
+    /// Adds a remedy.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 }
 
-/// Every finding of one reading, in the order of the text, with the sources that they point into.
+/// All findings of one reading in text order, with the sources that they point into.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Findings {
     /// The texts, by the numbers that spans use.
@@ -142,20 +142,20 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// True if a fault is among them (warnings do not count).
+    /// True if there is at least one error; warnings do not count.
     pub fn has_errors(&self) -> bool {
         self.list.iter().any(|finding| finding.severity == Severity::Error)
     }
 
-    /// True if there is no finding.
+    /// True if there are no findings.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 }
 
 impl Findings {
-    /// The findings drawn under the texts that they are about, with or without colour. Of a very long line, what is near
-    /// the place alone.
+    /// Renders the findings under their source text, with or without colour; very long lines are
+    /// cut around the span.
     pub fn render(&self, colour: bool) -> String {
         let mut drawn = Vec::new();
         let names: Vec<String> = self.sources.iter().map(|source| source.name.clone()).collect();
@@ -190,7 +190,7 @@ impl Findings {
     }
 }
 
-/// Findings as data: a list, each place with its file, line and column (both from 1) beside its bytes.
+/// Serialises findings as a list, each span with file, line and column (from 1) and byte range.
 impl Serialize for Findings {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]

@@ -28,16 +28,16 @@ use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
 pub(crate) use self::within::too_slow;
 
-/// Explanation of why a task has no plan: findings that point at the goal, at atoms that nothing achieves,
+/// Explanation why a task has no plan: findings that point at the goal, at atoms without achievers,
 /// and at attachments that refused.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Explanation {
     /// The reasons, the goal's first.
     pub findings: Findings,
-    /// Actions that could start while they run, which might help, and which no search tries to the end: where there are any, the proof
-    /// holds for plans in which no action overlaps itself. The last finding says so.
+    /// Actions that may help if they overlap themselves, which no search tries exhaustively. If
+    /// any, the proof excludes plans in which an action overlaps itself; the last finding says so.
     pub overlapping: BTreeSet<String>,
-    /// True if the goal is surely reachable when nothing is ever deleted.
+    /// True if the goal is reachable under delete relaxation.
     #[serde(skip)]
     pub(crate) only_lost: bool,
     /// True if the only reason is that every state was seen and none fulfils the whole goal.
@@ -48,7 +48,7 @@ pub struct Explanation {
     refused: Vec<NoPlan>,
 }
 
-/// A reason why there is no plan, as a value.
+/// Structured reason why no plan exists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum NoPlan {
@@ -58,16 +58,16 @@ pub enum NoPlan {
         module: String,
         /// The answer of the attachment.
         answer: Refusal,
-        /// Its calls, in PDDL.
+        /// Refused calls, in PDDL.
         calls: Vec<String>,
     },
     /// Every state that can be reached was seen, and none fulfils the goal.
     Exhausted,
-    /// Anything else, in one sentence.
+    /// Other reason, in one sentence.
     Finding {
         /// The sentence.
         message: String,
-        /// Advice on how to mend it.
+        /// Suggested remedy.
         help: Option<String>,
     },
 }
@@ -104,7 +104,7 @@ impl Explanation {
         self.findings.list.iter().map(reason).collect()
     }
 
-    /// The same for plans in which these actions do not overlap themselves.
+    /// Explanation limited to plans in which these actions do not overlap themselves.
     pub(crate) fn but_for(mut self, task: &Task, overlapping: &BTreeSet<String>) -> Explanation {
         let mut actions = task.actions.iter().filter(|action| overlapping.contains(&action.name));
         if let Some(first) = actions.next() {
@@ -123,7 +123,7 @@ impl Explanation {
     }
 }
 
-/// Code of findings about the goal as a whole, or a part of it.
+/// Code of findings about the goal or a part of the goal.
 const UNSOLVABLE: &str = "unsolvable";
 /// Code of findings about attachments that did not answer as needed.
 const REFUSED: &str = "attachment-refused";
@@ -151,8 +151,8 @@ pub(crate) type Refusals = BTreeMap<(u32, bool), Vec<String>>;
 /// The maximum number of refused calls shown for one module.
 const SHOWN: usize = 8;
 
-/// The reasons why a task has no plan: what stands in the goal itself, what grounding found out, who said no; and where
-/// each part of the goal could be had by itself, what that leaves.
+/// Explains why a task has no plan: contradictions in the goal, obstacles found by grounding,
+/// refusals by attachments, and a minimal unsolvable subset of the goal.
 pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> Explanation {
     let reach = Reach::new(task);
     let mut list = Vec::new();
@@ -202,7 +202,7 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
 /// Message where no relaxation gives a better reason.
 const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
 
-/// No way to the goal keeps the constraints. `reachable` where there is a way that breaks them.
+/// Explanation that no plan satisfies the constraints; `reachable`: plans exist that violate them.
 pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     let hard = task.constraints.iter().filter(|constraint| constraint.preference.is_none());
     let mut spans = hard.map(|constraint| constraint.span);
@@ -221,8 +221,8 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     Explanation::new(task, vec![finding])
 }
 
-/// Finding about parts of the goal that cannot be had together. `narrowed`: these parts alone cannot be had;
-/// `only_lost`: they could be had if nothing were ever deleted.
+/// Finding about goal parts that are jointly unreachable. `narrowed`: the subset is minimal;
+/// `only_lost`: reachable under delete relaxation.
 fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) -> Diagnostic {
     let message = match (narrowed, parts.len()) {
         (false, _) => UNREACHED.to_string(),
@@ -275,7 +275,7 @@ fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) 
 
 const LASTS: &str = "what an action gives only while it runs does not last long enough";
 
-/// A predicate that an action makes true at its start and false at its end.
+/// Action that adds an atom of the predicate at its start and deletes that atom at its end.
 fn given_while_running(action: &Action) -> Option<(&Action, Span, PredicateId)> {
     action.effects.start.iter().find_map(|effect| {
         let Change::Add(atom) = &effect.change else { return None };
@@ -292,7 +292,7 @@ fn conjuncts<'t>(condition: &'t Condition, parts: &mut Vec<&'t Condition>) {
     }
 }
 
-/// Finding about the calls of one module that were refused, pointing at its calls in the domain.
+/// Finding about one module's refused calls, pointing at the calls in the domain.
 fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<(Diagnostic, NoPlan)> {
     let mut sites = sites(task, module).into_iter();
     let (who, span) = sites.next()?;

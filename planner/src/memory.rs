@@ -6,21 +6,21 @@ use std::ops::{Index, IndexMut};
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryLimit {
     bytes: usize,
-    /// Memory in use by the process, if a caller can tell.
+    /// Memory in use by the process; `None` if the caller cannot measure it.
     used: Option<fn() -> u64>,
 }
 
-/// The part of the limit that is left for what is taken between two looks.
+/// Share of the limit reserved for allocations between two checks, as a divisor.
 const RESERVE: usize = 32;
 
 impl MemoryLimit {
-    /// `None` for no limit; `used` tells what the whole process has in use.
+    /// Limit in bytes (`None`: unlimited); `used` measures the memory of the whole process.
     pub fn new(bytes: Option<u64>, used: Option<fn() -> u64>) -> MemoryLimit {
         let bytes = bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
         MemoryLimit { bytes: bytes - bytes / RESERVE, used: used.filter(|_| bytes != usize::MAX) }
     }
 
-    /// Limit for counted memory; `None` if the process tells its use.
+    /// Limit on counted memory; `None` if process memory is measured.
     pub(crate) fn counted(&self) -> Option<usize> {
         (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
     }
@@ -33,7 +33,7 @@ impl MemoryLimit {
         }
     }
 
-    /// True if `more` bytes fit beside those `counted`.
+    /// True if `more` bytes fit besides `counted`.
     pub fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
         let used = match self.used {
             Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
@@ -51,7 +51,8 @@ pub(crate) fn soon(length: usize, capacity: usize) -> bool {
 /// Bytes of a piece of a list.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// Rows of the same length one after another, kept in pieces: growing copies nothing, and takes one piece at a time.
+/// Rows of equal length, stored in chunks: growing copies nothing and allocates one chunk at a
+/// time.
 #[derive(Debug)]
 pub struct Rows<T> {
     pieces: Vec<Vec<T>>,

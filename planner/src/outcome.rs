@@ -16,7 +16,7 @@ pub struct Options {
     /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
     /// short improvement whose length is fixed by the task alone.
     pub anytime: bool,
-    /// End with the first plan, as the search has found it.
+    /// Return the first plan, without improvement.
     pub first: bool,
     /// Accept only plans whose metric (makespan or cost where there is none) is below this.
     pub bound: Option<f64>,
@@ -24,14 +24,13 @@ pub struct Options {
     pub seed: u64,
     /// Give up beyond this much memory for the grounded task and the search; with `memory_used`, for the whole process.
     pub memory_limit_bytes: Option<u64>,
-    /// Tells how many bytes the process has in use, which is asked now and then. Without it, only what the searches keep
-    /// is counted.
+    /// Measures the memory of the whole process, bytes; polled now and then. `None`: only the
+    /// searches' own memory is counted.
     pub memory_used: Option<fn() -> u64>,
     /// Give up, or stop improving, after this many evaluated states.
     pub evaluation_limit: Option<u64>,
-    /// Number of parallel searches for plans without durations; none: one. The plan is the same for
-    /// any number, as long as nothing runs out. Where states or the memory of searches are counted,
-    /// there is one.
+    /// Number of parallel searches for plans without durations; default 1. The plan is the same for
+    /// any number unless limits run out. If states or search memory are limited, 1 is used.
     pub threads: Option<NonZeroUsize>,
 }
 
@@ -46,12 +45,13 @@ pub struct Statistics {
     pub plans: u64,
     /// Ground actions.
     pub actions: u64,
-    /// Set where the plan is proven to be best, those in which an action overlaps itself among them.
+    /// True if the plan is proven optimal among all plans, including those in which an action
+    /// overlaps itself.
     pub optimal: bool,
-    /// Proven bound on the metric, or on the number of steps without one, where it was asked for: no plan has a better value.
+    /// Proven lower bound on the metric (on the number of steps without one), if requested.
     pub lower_bound: Option<f64>,
-    /// Set where the task has preferences that no search looked for: those that the metric does not count, or that ask for
-    /// times or attachments. They only score plans.
+    /// True if some preferences were not optimised, only scored: those outside the metric, or with
+    /// times or attachments.
     pub scored_only: bool,
     /// Statistics by attachment, for this call alone.
     pub attachments: BTreeMap<String, CallStatistics>,
@@ -67,7 +67,8 @@ pub enum Outcome {
         /// Statistics.
         statistics: Statistics,
     },
-    /// Proven to have no plan; where `why` names actions that overlap themselves, none in which no action does.
+    /// Proven to have no plan; if `why` names self-overlapping actions, only plans without
+    /// self-overlap are excluded.
     Unsolvable {
         /// Explanation.
         why: Explanation,
@@ -91,7 +92,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The plan, if there is one.
+    /// The plan, if one was found.
     pub fn plan(&self) -> Option<&Plan> {
         match self {
             Outcome::Solved { plan, .. } => Some(plan),
@@ -124,12 +125,12 @@ impl Outcome {
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The task asks for something that cannot be done: a module without an attachment, or a part of the language that
-    /// no search here handles. Each finding points at its place.
+    /// The task uses an unsupported feature or a module without an attachment. Each finding points
+    /// at its place.
     #[error("{}", first_message(.0))]
     Refused(Findings),
-    /// The plans found break constraints of kinds that no search here keeps: whether some plan keeps them is not known. Each finding
-    /// points at a constraint.
+    /// All plans found violate constraints of kinds that no search supports, so solvability is
+    /// unknown. Each finding points at a constraint.
     #[error("{}", first_message(.0))]
     Untried(Findings),
     /// An attachment failed; the finding points at the call in the domain.

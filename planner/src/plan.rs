@@ -1,4 +1,4 @@
-//! Plans: what to do, when, for how long; in the form of the planning competitions.
+//! Plans: steps with start times and durations, in the format of the planning competitions.
 
 #[doc(hidden)]
 pub mod format;
@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::diagnostic::{Diagnostic, Findings, Source, Span};
 
-/// The least time between two happenings of which one disturbs the other, in seconds.
+/// Minimum time between two interfering happenings (epsilon), seconds.
 pub const EPSILON_S: f64 = 0.001;
 
 /// One step of a plan.
@@ -17,7 +17,7 @@ pub struct Step {
     pub start_s: Option<f64>,
     /// Name of the action.
     pub action: String,
-    /// Names of the objects, and behind them what grounding modules proposed.
+    /// Names of the objects, then parameters proposed by grounding modules.
     pub arguments: Vec<String>,
     /// Duration; 0 for an instantaneous action.
     pub duration_s: f64,
@@ -28,7 +28,7 @@ pub struct Step {
 pub struct Plan {
     /// Its steps.
     pub steps: Vec<Step>,
-    /// Its cost, as far as known.
+    /// Cost, if known.
     pub cost: Option<f64>,
 }
 
@@ -60,8 +60,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The plan with times rounded where only the last digits differ from a short number; a third
-    /// of a second stays as it is.
+    /// Plan with rounding noise removed from times; a third of a second stays unchanged.
     pub fn tidy(&self) -> Plan {
         let rounded = |seconds: f64| {
             let short = (seconds * 1e6).round() / 1e6;
@@ -111,7 +110,7 @@ pub fn seconds(value: f64) -> String {
     short.iter().find(exact).cloned().unwrap_or_else(|| format!("{value}"))
 }
 
-/// A number as people read it: what is left of rounding in its last digits is not shown.
+/// Number for people, without rounding noise in the last digits.
 pub fn number_text(value: f64) -> String {
     const DIGITS: f64 = 1e6;
     let size = value.abs();
@@ -152,7 +151,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The next step that can be read; what cannot is reported, line by line.
+    /// Next readable step; unreadable lines are reported.
     fn step(&mut self) -> Option<(Step, Span)> {
         loop {
             self.skip_blanks();

@@ -19,7 +19,8 @@ pub struct CallStatistics {
     pub relaxed: u64,
     /// Questions that the cache answered.
     pub hits: u64,
-    /// Seconds inside the attachment by the clock given to [`Attachments::with_clock`], else zero.
+    /// Time spent in the attachment by the clock of [`Attachments::with_clock`], seconds; 0 without
+    /// a clock.
     pub time_s: f64,
 }
 
@@ -95,7 +96,7 @@ impl Attachments {
         Attachments::default()
     }
 
-    /// The same, timing calls with `clock_s` (seconds since any moment, never running backwards).
+    /// Registry that also times calls with `clock_s` (seconds from an arbitrary origin, monotonic).
     pub fn with_clock(self, clock_s: impl Fn() -> f64 + Send + Sync + 'static) -> Attachments {
         Attachments { clock_s: Some(Box::new(clock_s)), ..self }
     }
@@ -152,7 +153,8 @@ impl Attachments {
         self.registered.get(name).map(|registered| &registered.hits)
     }
 
-    /// Hands one entry of `:moduleoptions` to the attachment of that name. `Ok(false)` if there is none.
+    /// Passes one entry of `:moduleoptions` to the attachment `name`; `Ok(false)` if none has that
+    /// name.
     pub fn configure(&self, name: &str, options: &[String]) -> Result<bool, AttachmentError> {
         let Some(found) = self.resolve(name, name) else { return Ok(false) };
         let Some(registered) = self.registered.get(found) else { return Ok(false) };
@@ -164,7 +166,7 @@ impl Attachments {
         })
     }
 
-    /// Asks the attachment `name`, or its cache.
+    /// Answers a call from the cache, or by the attachment `name`.
     ///
     /// Errors are not cached. An answer that does not fit the module's kind is a [`CallError::WrongAnswer`].
     pub fn call(&self, name: &str, call: &Call, level: Level) -> Result<Answer, AttachmentError> {
@@ -201,7 +203,7 @@ impl Attachments {
         Ok(answer)
     }
 
-    /// Asks for the exact answers of many calls, in one batch those that the cache does not know.
+    /// Exact answers of many calls; the calls that the cache does not hold are sent in one batch.
     pub fn call_all(&self, name: &str, calls: &[Call]) -> Vec<Result<Answer, AttachmentError>> {
         let Some(registered) = self.registered.get(name) else {
             return calls.iter().map(|call| Err(missing(name, call))).collect();
@@ -244,7 +246,8 @@ impl Attachments {
         counts.collect()
     }
 
-    /// Forgets every cached answer (the counts stay): for when what the attachments are bound to has changed.
+    /// Clears all cached answers and keeps the counts; needed after the data behind the attachments
+    /// has changed.
     pub fn forget(&self) {
         for registered in self.registered.values() {
             registered.cache.lock().unwrap_or_else(PoisonError::into_inner).clear();

@@ -18,11 +18,11 @@ pub(super) enum Origin {
     Number(NumericId),
     /// The object that the variable's value means.
     Object(VariableId),
-    /// The same in every state.
+    /// Constant, equal in every state.
     Constant(FactValue),
 }
 
-/// A reading without its value: symbol, arguments, and where its value stands.
+/// Declared reading without its value: symbol, arguments, and origin of the value in a state.
 pub(super) type Source = (Arc<str>, Arc<[Arc<str>]>, Origin);
 
 /// Everything that a call reads.
@@ -30,9 +30,9 @@ pub(super) type Source = (Arc<str>, Arc<[Arc<str>]>, Origin);
 pub(super) struct Sources {
     /// Sources in the order of the declaration.
     pub list: Vec<Source>,
-    /// The variables among them, in order, each once.
+    /// State variables of the sources, sorted, without duplicates.
     pub variables: Vec<VariableId>,
-    /// The numbers among them, in order, each once.
+    /// Numeric fluents of the sources, sorted, without duplicates.
     pub numbers: Vec<NumericId>,
 }
 

@@ -8,14 +8,14 @@ use crate::model::agreement::reset;
 use super::measure::Measure;
 use super::numbers::{Numbers, is_plain};
 
-/// Costs that are not whole numbers are multiplied by the first of these that makes them so, or else by the very first, and rounded
-/// for the search; plans report exact costs.
+/// Candidate factors that make all costs whole numbers; if none does, costs are scaled by the first
+/// and rounded for the search. Plans report exact costs.
 const COST_SCALES: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
 /// Greatest distance from a whole number at which a number counts as whole.
 const WHOLE: f64 = 1e-6;
 /// Costs above this are scaled down for the search.
 const LARGEST_COST: f64 = 1.0e6;
-/// Greatest cost of a plan that the search can count; an infinite bound is above it.
+/// Maximum plan cost that the search can represent; infinite bounds are one above.
 pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
 /// Lists of different lengths in one array.
@@ -53,7 +53,7 @@ impl<T> Lists<T> {
         self.starts.len() - 1
     }
 
-    /// From pairs of list number and item, keeping the order of items within a list.
+    /// Groups `(list number, item)` pairs into lists, keeping the order of items within a list.
     pub(crate) fn group(count: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Self
     where
         T: Copy + Default,
@@ -103,7 +103,8 @@ pub struct Compiled {
     pub effects: Lists<Achieve>,
     /// Conditions of conditional effects.
     pub conditions: Vec<Fact>,
-    /// True, by operator, if it may give an object several values at once; empty if none may.
+    /// True, by operator, if its effects may give one object fluent several values at once; empty
+    /// if no operator can.
     contested: Vec<bool>,
     /// True, by variable that is not derived, for object fluents.
     objects: Vec<bool>,
@@ -115,7 +116,7 @@ pub struct Compiled {
     pub cost_scale: f64,
     /// True if all costs are one.
     pub unit_cost: bool,
-    /// True if some operator costs nothing.
+    /// True if some operator has zero cost.
     pub free_operators: bool,
     /// Bodies of axioms, by stratum in rising order.
     pub axiom_bodies: Lists<Fact>,
@@ -129,11 +130,11 @@ pub struct Compiled {
     pub goal: Vec<Fact>,
     /// The first state, derived variables included.
     pub initial: Vec<u32>,
-    /// Predicate or function by fact; `u32::MAX` for "none of those".
+    /// Predicate or function by fact; `u32::MAX` for "none of these atoms".
     pub symbols: Vec<u32>,
     /// Variable by fact.
     pub variables: Vec<u32>,
-    /// The numbers and what changes them.
+    /// Numeric fluents and their changes.
     pub numbers: Arc<Numbers>,
 }
 
@@ -160,7 +161,8 @@ pub fn is_classical(task: &GroundTask) -> bool {
             .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
-/// True, by action, if it may give an object several values at once; empty if none may.
+/// True, by action, if its effects may give one object fluent several values at once; empty if no
+/// action can.
 fn contested(task: &GroundTask) -> Vec<bool> {
     let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
     let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
@@ -401,7 +403,7 @@ impl Compiled {
         self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(exact)
     }
 
-    /// True if the search counts costs as the metric does, but for their scale.
+    /// True if search costs are proportional to metric costs.
     pub(crate) fn has_proportional_costs(&self) -> bool {
         let proportional = |(&counted, &exact): (&u32, &f64)| {
             let scaled = exact * self.cost_scale;

@@ -17,7 +17,8 @@ pub struct Measure {
 enum Kind {
     /// The estimates are exact.
     Sum,
-    /// Cost by operator in the state before it, times the sign.
+    /// State-dependent cost of each operator, evaluated in the state before it, with the metric's
+    /// sign.
     Adding(Vec<Expression>, f64),
     /// Metric of the last state, times the sign.
     Last(Expression, f64),
@@ -44,12 +45,13 @@ impl Measure {
         Measure { kind, estimates }
     }
 
-    /// True if a plan costs the sum of its operators' costs.
+    /// True if plan cost is the sum of operator costs.
     pub(crate) fn is_sum(&self) -> bool {
         matches!(self.kind, Kind::Sum)
     }
 
-    /// Cost of a plan by its last state, where that state alone decides it.
+    /// Plan cost as a function of the final state; `None` if the metric depends on more than that
+    /// state.
     pub(crate) fn of_last(&self, numbers: &Numbers, state: &[u32]) -> Option<f64> {
         match &self.kind {
             Kind::Last(expression, sign) => Some(sign * numbers.value(expression, state)),
@@ -77,8 +79,8 @@ impl Measure {
     }
 }
 
-/// Measure by the last state: where the metric is a weighted sum of numbers, an operator is
-/// estimated by its state-independent changes; else each counts one.
+/// Measure that depends on the final state. Operator costs are estimated from state-independent
+/// changes if the metric is linear; otherwise each operator costs one.
 fn of_last(expression: &Expression, sign: f64, numbers: &Numbers) -> Measure {
     let kind = Kind::Last(expression.clone(), sign);
     let mut linear = Linear::default();

@@ -1,4 +1,5 @@
-//! The numbers of a task: what changes them, which conditions read them, and what the metric makes of them.
+//! Numeric fluents of a task: their changes, the comparisons that read them, and the metric over
+//! them.
 //!
 //! A state carries its numbers behind its variables, two words each. Every numeric condition is a variable of its own
 //! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
@@ -12,7 +13,7 @@ use super::compiled::Lists;
 /// One effect on a number.
 #[derive(Clone, Debug, Default)]
 pub struct NumberChange {
-    /// Facts (those of comparisons included) under which it happens.
+    /// Facts (including those of comparisons) that enable the change.
     pub conditions: Vec<Fact>,
     /// Number that changes.
     pub number: u32,
@@ -23,7 +24,7 @@ pub struct NumberChange {
 }
 
 impl NumberChange {
-    /// Added amount, if it is the same in every state.
+    /// Added amount, if constant.
     pub(crate) fn constant_gain(&self) -> Option<f64> {
         match (self.change, &self.amount) {
             (Some(Change::Increase), Some(Expression::Constant(by))) => Some(*by),
@@ -42,16 +43,16 @@ pub struct Linear {
     pub constant: f64,
 }
 
-/// The numbers of a task; none for a task without them.
+/// Numeric fluents of a task; empty for a task without numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Numbers {
     /// Variable of the first comparison.
     pub first: usize,
-    /// Words of a state before its numbers.
+    /// Number of words of a state before the numeric fluents.
     base: usize,
     /// Numeric conditions.
     pub comparisons: Vec<Comparison>,
-    /// Left minus right by comparison, as a sum, if it is one.
+    /// Left minus right of each comparison as a linear sum; `None` if not linear.
     pub linear: Vec<Option<Linear>>,
     /// Numbers that each comparison reads.
     pub reads: Vec<Vec<u32>>,
@@ -126,7 +127,7 @@ impl Numbers {
         self.changes.push(changes);
     }
 
-    /// The facts of a conjunction, those that stand for its comparisons included.
+    /// Facts of a conjunction, including those that represent its comparisons.
     pub(crate) fn facts(&self, conjunction: &Conjunction) -> Vec<Fact> {
         let comparisons = conjunction.comparisons.iter().map(|&c| self.fact(c));
         conjunction.facts.iter().copied().chain(comparisons).collect()
@@ -160,7 +161,7 @@ impl Numbers {
         state[at + 1] = (bits >> 32) as u32;
     }
 
-    /// Completes a first state of which the variables are there, derived ones and comparisons excepted.
+    /// Completes an initial state that has all variables but derived ones and comparisons.
     pub(crate) fn append_initial(&self, state: &mut Vec<u32>) {
         state.resize(self.base + 2 * self.initial.len(), 1);
         for (number, &value) in self.initial.iter().enumerate() {
@@ -212,7 +213,7 @@ impl Numbers {
         changes.iter().map(added).sum()
     }
 
-    /// The least value of a number with which a comparison that reads nothing else holds.
+    /// Minimum value of a number that satisfies a comparison over this number alone.
     pub(crate) fn least(&self, comparison: usize, number: u32) -> Option<f64> {
         let linear = self.linear[comparison].as_ref()?;
         let [(read, weight)] = linear.weights[..] else { return None };

@@ -3,7 +3,7 @@
 
 use super::compiled::Compiled;
 
-/// Nothing below.
+/// Node without children.
 const EMPTY: u32 = u32::MAX;
 
 /// The tree. A node is either a list of operators followed by the node to go on with, or a variable to switch over.

@@ -7,7 +7,7 @@ use super::solver::{NONE, PAIR, Solver};
 pub(super) struct Learned {
     pub clause: Vec<Literal>,
     pub level: u32,
-    /// Number of decision levels of its literals (LBD).
+    /// Number of decision levels among the clause's literals (LBD).
     pub rank: u32,
 }
 

@@ -1,15 +1,15 @@
-//! Clauses over truth values, and the search for values that satisfy them all.
+//! Clauses over Boolean variables, and a solver that satisfies them (CDCL).
 
 mod learn;
 #[doc(hidden)]
 pub mod solver;
 
-/// A variable (counted from 0) or its negation.
+/// Boolean variable (counted from 0) or its negation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Literal(pub u32);
 
 impl Literal {
-    /// Says that a variable is true, or (`false`) that it is not.
+    /// Positive literal of a variable, or (`false`) the negative one.
     pub fn new(variable: u32, positive: bool) -> Literal {
         Literal(variable << 1 | u32::from(!positive))
     }

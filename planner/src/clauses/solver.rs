@@ -1,5 +1,6 @@
-//! Search with learned clauses (Marques-Silva and Sakallah 1999; watched literals after Moskewicz et al. 2001; what to
-//! forget after Audemard and Simon 2009). What to try next is left to the caller, who knows what the variables mean.
+//! CDCL solver (Marques-Silva and Sakallah 1999; watched literals after Moskewicz et al. 2001;
+//! clause deletion after Audemard and Simon 2009). Decisions are left to the caller, who knows the
+//! meaning of the variables.
 
 use super::Literal;
 
@@ -8,7 +9,7 @@ pub(super) type Place = u32;
 pub(super) const NONE: Place = u32::MAX;
 /// Set in a reason that is a clause of two: the other literal.
 pub(super) const PAIR: u32 = 1 << 31;
-/// Words before the literals of a clause: how many there are, and its rank (0 for one that was given).
+/// Words before a clause's literals: length and LBD (0 for an input clause).
 pub(super) const HEAD: usize = 2;
 
 /// Conflicts of the shortest run between restarts.
@@ -26,31 +27,32 @@ pub enum Answer {
     Satisfied,
     /// No values satisfy the clauses.
     Unsatisfiable,
-    /// The work was done, or the caller wanted to stop: it can be gone on with.
+    /// Work limit reached or stopped by the caller; the solver can continue.
     Interrupted,
 }
 
-/// Says what to try next.
+/// Decision heuristic.
 pub trait Decide {
-    /// Appends literals to be tried in this order, as far as they are still open. None where nothing is left that matters: then
-    /// all that is open is taken to be false. Returns the work done (see [`Solver::work`]).
+    /// Appends decision literals, in order of preference; assigned ones are skipped. If none is
+    /// appended, all open variables become false. Returns the work done (see [`Solver::work`]).
     fn next(&mut self, solver: &Solver, out: &mut Vec<Literal>) -> u64;
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Watch {
     clause: Place,
-    /// A literal of the clause: where it holds, the clause need not be looked at.
+    /// Blocking literal of the clause: while this literal is true, the clause is satisfied and need
+    /// not be inspected.
     blocker: Literal,
 }
 
-/// The clauses and what is known of the variables.
+/// Clause database and assignment.
 pub struct Solver {
     /// Clauses of three and more, one after another.
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
     kept: usize,
-    /// Binary clauses by literal: the other literals of clauses with its negation.
+    /// Binary clauses, by literal: the other literals of the clauses with its negation.
     pairs: Vec<Vec<Literal>>,
     /// Clauses that watch a literal, by literal.
     watches: Vec<Vec<Watch>>,
@@ -59,7 +61,7 @@ pub struct Solver {
     /// Decision level by variable.
     pub(super) levels: Vec<u32>,
     pub(super) reasons: Vec<u32>,
-    /// Activity by variable: its part in recent conflicts.
+    /// Activity by variable: decayed count of its recent conflicts.
     activity: Vec<f64>,
     bump: f64,
     pub(super) trail: Vec<Literal>,
@@ -119,12 +121,12 @@ impl Solver {
         }
     }
 
-    /// Activity of a variable: its part in recent conflicts.
+    /// Activity of a variable: decayed count of its recent conflicts.
     pub(crate) fn activity(&self, variable: u32) -> f64 {
         self.activity[variable as usize]
     }
 
-    /// Clauses that did not hold so far: until there are more, nothing that was set is taken back.
+    /// Number of conflicts so far; while unchanged, no assignment has been undone.
     pub(crate) fn conflicts(&self) -> u64 {
         self.conflicts
     }
@@ -148,7 +150,7 @@ impl Solver {
         }
     }
 
-    /// Keeps a clause of two or more; what it is a reason by.
+    /// Stores a clause of two or more literals; returns its reason reference.
     fn store(&mut self, clause: &[Literal], rank: u32) -> u32 {
         self.bytes += 24;
         if let [one, other] = *clause {
@@ -190,7 +192,7 @@ impl Solver {
         self.plan.clear();
     }
 
-    /// Draws what follows from what was set; the literals of a clause that does not hold, if there is one.
+    /// Unit propagation; returns the literals of a conflicting clause, if any.
     fn propagate(&mut self) -> Option<Vec<Literal>> {
         while self.followed < self.trail.len() {
             let literal = self.trail[self.followed];
@@ -219,7 +221,8 @@ impl Solver {
         None
     }
 
-    /// Looks at the clauses that watch a literal which has become false; one that does not hold, if there is one.
+    /// Inspects the clauses that watch a literal that became false; returns a conflicting clause,
+    /// if any.
     fn follow(&mut self, gone: Literal) -> Option<Place> {
         let mut watches = std::mem::take(&mut self.watches[gone.at()]);
         self.work += 2 * watches.len() as u64;
@@ -348,7 +351,7 @@ impl Solver {
         true
     }
 
-    /// Forgets the worse half of what was learned.
+    /// Deletes the worse half of the learned clauses.
     fn forget(&mut self) {
         let mut learned = std::mem::take(&mut self.learned);
         let rank = |place: Place| self.arena[place as usize + 1];

@@ -1,4 +1,4 @@
-//! Findings on very long lines: what is near the place, not the whole line.
+//! Findings on very long lines are drawn with an excerpt around the span.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -27,7 +27,7 @@ pub(super) fn is_needed(sources: &[Source], finding: &Diagnostic) -> bool {
     })
 }
 
-/// The line in which a place begins; a place over many lines is as long as it is.
+/// Line in which a span begins; a span of several lines extends to its end.
 fn line_of(text: &str, span: Span) -> Range<usize> {
     let at = (span.start as usize).min(text.len());
     let (before, after) = (text.as_bytes()[..at].iter(), text.as_bytes()[at..].iter());
@@ -36,7 +36,7 @@ fn line_of(text: &str, span: Span) -> Range<usize> {
     start..end
 }
 
-/// A finding with what is near each of its places.
+/// Renders a finding with an excerpt around each of its spans.
 pub(super) fn draw(sources: &[Source], finding: &Diagnostic) -> String {
     let kind = match finding.severity {
         Severity::Error => "Error",
@@ -59,7 +59,7 @@ pub(super) fn draw(sources: &[Source], finding: &Diagnostic) -> String {
     drawn
 }
 
-/// Text around a span on one line, with the column at which the span begins in it and its width.
+/// Single-line excerpt around a span, with the span's column and width in the excerpt.
 fn excerpt(text: &str, span: Span) -> (String, usize, usize) {
     let line = line_of(text, span);
     let start = (span.start as usize).clamp(line.start, line.end);

@@ -1,4 +1,4 @@
-//! Minimal unsolvable subset of a goal: a smallest set of its parts that cannot be had together.
+//! Minimal unsolvable subset of a goal.
 
 use crate::task::{Condition, Task};
 
@@ -7,8 +7,9 @@ use super::{Explanation, together};
 /// Goals with more parts than this are not taken apart.
 const MOST_PARTS: usize = 24;
 
-/// Leaves out what need not be in the goal for it to stay out of reach, as far as `unsolvable` proves; and tells what
-/// is left; `only_lost` where all of it could be had if nothing were ever taken away. Nothing of it can be left out, where every question is answered.
+/// Drops goal parts while `unsolvable` still proves the remainder unreachable; returns the
+/// remainder. The subset is minimal if every query is decided. `only_lost`: all parts are reachable
+/// under delete relaxation.
 pub(crate) fn narrowed(
     task: &Task,
     only_lost: bool,

@@ -1,5 +1,5 @@
-//! Chains of what stands in the way of a part of the goal: who could bring it about, and what those lack, down to what
-//! nobody brings about at all.
+//! Causal chain of obstacles to a goal part: its achievers, their unreachable preconditions, down
+//! to predicates without achievers.
 
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::walk::{self, Part};
@@ -10,8 +10,8 @@ use crate::task::{
 
 use super::UNSOLVABLE;
 
-/// Predicates that can become true when nothing is taken away and arguments do not matter, and what stands in the way
-/// of the actions that can never be taken.
+/// Predicates reachable under delete relaxation with arguments ignored, and the obstacle of each
+/// unreachable action.
 pub(super) struct Reach<'t> {
     task: &'t Task,
     predicates: Vec<bool>,
@@ -48,7 +48,8 @@ impl<'t> Reach<'t> {
         grown
     }
 
-    /// The first atom that keeps an action from ever being taken. What its own start adds holds inside it.
+    /// First unreachable atom of an action's conditions; conditions over all may use the action's
+    /// own start effects.
     fn lacks(&self, action: &'t Action) -> Option<&'t Atom> {
         let own: Vec<PredicateId> = action
             .effects
@@ -85,7 +86,7 @@ impl<'t> Reach<'t> {
     }
 }
 
-/// Predicates that an action can make true, its effect modules included.
+/// Predicates that an action can add, including those written by effect modules.
 fn added<'t>(task: &'t Task, action: &'t Action) -> impl Iterator<Item = (PredicateId, Span)> + 't {
     let effects = action.effects.start.iter().chain(&action.effects.end);
     effects.flat_map(|effect| match &effect.change {
@@ -153,14 +154,15 @@ pub(super) fn goal_part(
     }
 }
 
-/// A goal atom out of reach: who could add it, and what those lack, down to what nobody adds at all.
+/// Finding about an unreachable goal atom, with the chain of obstacles down to predicates without
+/// achievers.
 fn nobody(task: &Task, reach: &Reach, goal: &Atom, told: &mut Vec<PredicateId>) -> Diagnostic {
     let message = format!("the goal {} can never be reached", atom_text(task, goal));
     let finding = Diagnostic::error(UNSOLVABLE, message, goal.span, "asked for here");
     trace(task, reach, finding, goal.predicate, told)
 }
 
-/// Follows what stands in the way of a predicate, down to what nobody adds at all.
+/// Follows the obstacles of a predicate down to predicates without achievers.
 fn trace(
     task: &Task,
     reach: &Reach,

@@ -33,7 +33,8 @@ fn needed(action: &Action, missing: &[MissingAtom]) -> Option<Span> {
     missing.iter().find_map(asks)
 }
 
-/// Finding about an atom that never holds: who asks for it, who could bring it about, and what those lack.
+/// Finding about an atom that never holds: the conditions that need it, its achievers, and the
+/// atoms they lack.
 pub(super) fn obstacle_finding(
     task: &Task,
     obstacle: &Obstacle,
@@ -93,7 +94,7 @@ pub(super) fn obstacle_finding(
     finding
 }
 
-/// An atom as it is written; `?` for any object.
+/// Atom in PDDL, with `?` for any object.
 fn named(task: &Task, (predicate, arguments): &MissingAtom) -> String {
     let object = |a: &Option<u32>| a.map_or("?", |a| &task.objects[a as usize].name);
     let words: Vec<&str> = arguments.iter().map(object).collect();

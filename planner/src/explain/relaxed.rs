@@ -1,5 +1,5 @@
-//! Delete-relaxed reachability of the goal, counting sure effects only. Numeric and attachment conditions are
-//! not evaluated: a goal that needs them counts as unreachable.
+//! Delete-relaxed reachability of the goal, counting certain effects only. Numeric and attachment
+//! conditions are not evaluated; goals that need them count as unreachable.
 
 use crate::ground::{
     Action, Change, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact, GroundTask,
@@ -8,7 +8,7 @@ use crate::ground::{
 use crate::model::agreement::contradictions;
 use crate::model::relation::Relation;
 
-/// True if the goal is surely reachable when nothing is deleted; false if that is not known.
+/// True if the goal is reachable under delete relaxation; false if unknown.
 pub(super) fn could_be_had(ground: &GroundTask) -> bool {
     let mut had = Had::new(ground);
     while had.grow() {}
@@ -84,7 +84,7 @@ impl<'g> Had<'g> {
         self.holds(&action.condition) && self.can_happen(&action.effects)
     }
 
-    /// True if a durative action can run, with the effects of its own start.
+    /// True if a durative action is applicable, given the effects of its own start.
     fn can_run(&self, action: &DurativeAction) -> bool {
         let lists = [&action.start_effects, &action.flow_effects, &action.end_effects];
         let inside = [&action.over_all, &action.at_end];
@@ -143,7 +143,7 @@ impl<'g> Had<'g> {
     }
 }
 
-/// True if bounds surely leave a duration: they are the same in every state.
+/// True if constant duration bounds exclude every duration.
 fn lasts(bounds: &[DurationBound]) -> bool {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {

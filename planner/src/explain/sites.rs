@@ -4,7 +4,7 @@ use crate::diagnostic::Span;
 use crate::model::walk::{self, Part};
 use crate::task::{ModuleId, Task};
 
-/// Every call of a module, in the order of the text: who makes it, and where.
+/// All calls of a module in text order, with the caller and the span.
 pub(crate) fn sites(task: &Task, module: ModuleId) -> Vec<(String, Span)> {
     let mut found = Vec::new();
     for action in &task.actions {

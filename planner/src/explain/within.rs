@@ -7,8 +7,8 @@ use crate::task::{Modal, Task, Trajectory};
 
 use super::Explanation;
 
-/// Explanation of a condition that cannot come about within the time that a constraint gives it; `None` where
-/// that is not known. `free` is the task without preferences and constraints.
+/// Explanation that a condition cannot become true within a constraint's deadline; `None` if
+/// unknown. `free`: task without preferences and constraints.
 pub(crate) fn too_slow(
     task: &Task,
     free: Task,
@@ -42,7 +42,8 @@ fn is_within(constraint: &&Trajectory) -> bool {
     constraint.operator == Modal::Within && constraint.preference.is_none()
 }
 
-/// The actions, as they stand in the compiled task, of which one each must see an instance of a constraint in time.
+/// Witness actions of a constraint in the compiled task; one instance must observe the condition in
+/// time.
 fn witnesses(compiled: &Task, constraint: &Trajectory) -> impl Iterator<Item = u32> {
     let own = |action: &crate::task::Action| action.name == WITNESS && action.span == constraint.span;
     (0..).zip(&compiled.actions).filter(move |(_, action)| own(action)).map(|(schema, _)| schema)

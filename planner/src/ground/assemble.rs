@@ -103,7 +103,8 @@ pub(super) fn assemble(
     ground
 }
 
-/// The groups that may share a variable. What a timed deletion takes away may be gone already: alone, it can be lost whatever else holds.
+/// Mutex groups that may share one variable; an atom deleted by a timed literal gets its own
+/// variable, because it may already be false.
 fn shared(raw: &RawTask, groups: &Groups) -> Vec<Vec<u32>> {
     let lost = raw.timed.iter().flat_map(|(_, deeds)| deeds).filter_map(|deed| match deed {
         Deed::Delete(atom) => Some(*atom),
@@ -246,7 +247,7 @@ pub(super) fn initial_numbers(make: &Instantiate<'_>) -> Vec<f64> {
     make.numerics.iter().map(number).collect()
 }
 
-/// Drops numeric fluents and calls that nothing mentions any more (all are kept where attachments may read them).
+/// Drops unreferenced numeric fluents and calls; keeps all of them if attachments may read them.
 fn compact(ground: &mut GroundTask, keep: bool) {
     if keep {
         return;
@@ -424,7 +425,8 @@ impl Instantiate<'_> {
             && self.statics.fluent[predicate]
     }
 
-    /// True for an atom of a plain predicate (of an object function, another value may replace it).
+    /// True if the atom belongs to a plain predicate; an object function's atom may be replaced by
+    /// another value.
     fn atoms_hold(&self, atom: usize) -> bool {
         atom < self.atoms.len()
             && (self.atoms.predicate(atom as u32) as usize) < self.statics.task.predicates.len()

@@ -30,7 +30,7 @@ struct Table {
     indexes: Vec<Index>,
 }
 
-/// Every atom that was found reachable, numbered in the order in which it was found.
+/// All reachable atoms, numbered in order of discovery.
 pub(super) struct Atoms {
     tables: Vec<Table>,
     /// Predicate and row, by atom.
@@ -72,7 +72,7 @@ impl Atoms {
         self.tables[predicate as usize].row(row)
     }
 
-    /// Adds a predicate, returning its number.
+    /// Adds a predicate and returns its number.
     pub(super) fn add_predicate(&mut self) -> u32 {
         self.tables.push(Table {
             arity: 0,
@@ -88,7 +88,7 @@ impl Atoms {
         &self.tables[predicate as usize].atoms
     }
 
-    /// The number of the atom, if it was found.
+    /// Number of the atom, if reachable.
     pub(super) fn find(&self, predicate: u32, arguments: &[u32]) -> Option<u32> {
         let table = &self.tables[predicate as usize];
         let index = &table.indexes[0];
@@ -102,7 +102,7 @@ impl Atoms {
         None
     }
 
-    /// Adds the atom; tells its number and whether it is new.
+    /// Inserts the atom; returns its number and true if the atom is new.
     pub(super) fn insert(&mut self, predicate: u32, arguments: &[u32]) -> (u32, bool) {
         if let Some(atom) = self.find(predicate, arguments) {
             return (atom, false);

@@ -35,11 +35,11 @@ pub enum GroundError {
     TooManyArguments(String),
 }
 
-/// Bytes that a ground action takes until the search has its own form, roughly.
+/// Approximate memory per ground action until the search compiles the task, bytes.
 const BYTES_AN_INSTANCE: usize = 600;
 
-/// Grounds a task: relaxed reachability, static parts evaluated away, what is unreachable or irrelevant left out,
-/// atoms grouped into finite-domain variables by mutex groups.
+/// Grounds a task: relaxed reachability, evaluation of static parts, removal of unreachable and
+/// irrelevant parts, and mutex groups as finite-domain variables.
 ///
 /// # Errors
 /// [`GroundError`] when stopped, too large, or beyond the limit on arguments.
@@ -51,7 +51,7 @@ pub fn ground(
     ground_with(task, memory_limit_bytes, false, stop)
 }
 
-/// The same; `keep_metric` makes what actions add to the metric a part of states.
+/// Grounds a task; `keep_metric` keeps the fluents of the metric in the state.
 pub(crate) fn ground_with(
     task: &Task,
     memory_limit_bytes: Option<usize>,
@@ -129,7 +129,7 @@ pub(crate) fn ground_with(
     Ok(ground)
 }
 
-/// Number of the function with its arguments, by atom of an object function.
+/// Object function and its arguments, by atom of an object function.
 fn valued(task: &Task, atoms: &Atoms) -> FxHashMap<u32, u32> {
     let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
     let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
@@ -220,7 +220,7 @@ fn insert_initial(task: &Task, atoms: &mut Atoms) {
     }
 }
 
-/// Atoms that hold at first and that no instance can take away hold always.
+/// Marks atoms that hold initially and that no instance deletes: they always hold.
 fn mark_always(
     task: &Task,
     normal: &Normal,
@@ -273,7 +273,7 @@ fn mark_always(
     Ok(())
 }
 
-/// The effect without its condition.
+/// Effect without its condition.
 fn unconditional(effect: &Effect_) -> Effect_ {
     let nothing = || Formula::And(Vec::new());
     Effect_ {

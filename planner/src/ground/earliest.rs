@@ -19,9 +19,9 @@ const ROUNDING_S: f64 = 1e-6;
 /// An operator of the relaxed task.
 struct Operator {
     missing: u32,
-    /// The latest label of what it needs, so far.
+    /// Latest label among the operator's preconditions, so far.
     base_s: f64,
-    /// Time at which one of its preconditions ends for good, seconds.
+    /// Time after which one of the operator's preconditions is false for good, seconds.
     until_s: f64,
     gives: Vec<u32>,
 }
@@ -29,12 +29,14 @@ struct Operator {
 /// Earliest times, in seconds from the start of the plan.
 pub(crate) struct Earliest<'g> {
     ground: &'g GroundTask,
-    /// Proposition of the value 0 of each variable; those of started actions follow after all facts.
+    /// Proposition of each variable's value 0; propositions of started actions follow after all
+    /// facts.
     offsets: Vec<u32>,
     /// Time from which each proposition is false for good, seconds; infinite for never.
     until_s: Vec<f64>,
     operators: Vec<Operator>,
-    /// Preconditions: a proposition, the operator that needs it, and the delay before its effects, seconds.
+    /// Preconditions: proposition, the operator that needs it, and delay to the operator's effects,
+    /// seconds.
     waits: Vec<(u32, (u32, f64))>,
     labels_s: Vec<f64>,
 }
@@ -62,8 +64,8 @@ impl<'g> Earliest<'g> {
         earliest
     }
 
-    /// Earliest time at which all of a condition's facts can hold, each by itself, seconds; infinite for
-    /// never.
+    /// Earliest time at which all facts of a condition can hold, each taken alone, seconds;
+    /// infinite for never.
     pub(crate) fn of(&self, condition: &Conjunction) -> f64 {
         let labels = condition.facts.iter().map(|&fact| self.labels_s[self.place(fact) as usize]);
         labels.fold(0.0, f64::max)
@@ -170,7 +172,7 @@ impl<'g> Earliest<'g> {
         }
     }
 
-    /// Notes until when that holds which nothing but time gives.
+    /// Records the end times of facts that only timed literals add.
     fn endings(&mut self) {
         let mut made = vec![false; self.until_s.len()];
         let facts = made.len();

@@ -1,4 +1,4 @@
-//! Groups of atoms that share a variable: what the synthesis of invariants is asked, and object functions.
+//! Groups of atoms that share a variable: synthesised mutex groups and object functions.
 
 use rustc_hash::FxHashMap;
 use tracing::debug_span;
@@ -13,7 +13,7 @@ use super::raw::RawTask;
 use super::relaxed;
 use super::rules::Rules;
 
-/// Names of atoms, and of the tokens that say that a durative action runs.
+/// Names of atoms, and of tokens that mark a running durative action.
 struct Names<'a> {
     atoms: &'a Atoms,
     /// Atoms at and beyond this one are tokens.
@@ -38,7 +38,7 @@ impl AtomNames for Names<'_> {
     }
 }
 
-/// Mutex groups by synthesis, and those of object functions, which must share a variable.
+/// Synthesised mutex groups, and those of object functions, which must share a variable.
 pub(super) struct Groups {
     pub found: Vec<Vec<u32>>,
     pub fixed: Vec<Vec<u32>>,

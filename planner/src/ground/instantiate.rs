@@ -21,7 +21,7 @@ pub(super) struct Clauses {
 }
 
 impl Clauses {
-    /// True if it always holds.
+    /// True if the condition always holds.
     pub(super) fn is_true(&self) -> bool {
         self.literals.is_empty()
             && self.comparisons.is_empty()
@@ -63,7 +63,7 @@ pub(super) enum Deed {
     Call(u32),
 }
 
-/// A ground call, with what it writes.
+/// Ground call with the places it writes.
 #[derive(Clone, Debug)]
 pub(super) struct RawCall {
     pub origin: Origin,
@@ -79,7 +79,7 @@ pub(super) enum RawPlace {
 }
 
 impl RawCall {
-    /// The atoms that it may make true or false.
+    /// Atoms that the effect may make true or false.
     pub(super) fn atoms(&self) -> impl Iterator<Item = u32> {
         self.writes
             .iter()
@@ -103,7 +103,7 @@ pub(super) struct GroundEffect {
 /// A condition that cannot hold.
 struct Never;
 
-/// Makes ground things and numbers numeric fluents, comparisons and calls.
+/// Instantiates lifted structures, and numbers numeric fluents, comparisons and calls.
 pub(super) struct Instantiate<'a> {
     pub statics: &'a Statics<'a>,
     pub atoms: Atoms,
@@ -134,7 +134,7 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// Adds the formula to a condition; `false` where it can never hold.
+    /// Conjoins a formula to a condition; `false` if the result can never hold.
     pub(super) fn conjoin(
         &mut self,
         formula: &Formula,
@@ -379,7 +379,7 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// The condition of an effect, `None` for always; `Err` if it can never hold.
+    /// Condition of an effect; `None`: unconditional; `Err`: never holds.
     fn when(
         &mut self,
         effect: &Effect_,

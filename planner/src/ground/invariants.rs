@@ -7,17 +7,19 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// An atom that is added or taken away, with the atoms that this depends on.
+/// Atom of an add or delete effect, with the atoms of the effect's condition.
 pub(crate) type Changed = (u32, Vec<u32>);
 
 /// A transition of the task, in atoms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Transition<'t> {
-    /// Atoms that hold before it, sorted.
+    /// Atoms of the transition's precondition, sorted.
     pub before: &'t [u32],
-    /// Atoms that it adds, with further atoms that then held before it (of conditional effects).
+    /// Atoms that the transition adds, with further atoms that held before (of conditional
+    /// effects).
     pub adds: &'t [Changed],
-    /// Atoms that it takes away, with all that this depends on; what it depends on otherwise must be left out.
+    /// Atoms that the transition deletes, with all conditions of the deletion; deletions with other
+    /// conditions must be left out.
     pub deletes: &'t [Changed],
 }
 
@@ -37,7 +39,7 @@ impl Transitions {
         self.ends.len()
     }
 
-    /// One of them.
+    /// Transition by index.
     pub fn get(&self, index: usize) -> Transition<'_> {
         let end = self.ends[index].map(|end| end as usize);
         let from = index.checked_sub(1).map_or([0; 3], |before| self.ends[before].map(|end| end as usize));
@@ -96,7 +98,7 @@ struct Synthesis<'a, N: AtomNames> {
     transitions: &'a Transitions,
     /// Transitions that add an atom of a predicate, by predicate.
     adders: FxHashMap<u32, Vec<u32>>,
-    /// Predicates at and beyond this one are tokens, of which any number of arguments may be counted.
+    /// First predicate number that is a token; a token may have any number of counted arguments.
     first_token: u32,
     work: usize,
 }
@@ -231,7 +233,8 @@ impl<N: AtomNames> Synthesis<'_, N> {
         left.key.iter().zip(&right.key).all(|(&l, &r)| a[l as usize] == b[r as usize])
     }
 
-    /// Adds a predicate that the unbalanced transition takes away, its key placed wherever the objects fit.
+    /// Candidates extended by a predicate that the unbalanced transition deletes, with its key at
+    /// every position where the objects fit.
     fn refine(&self, candidate: &[Part], unbalanced: &Unbalanced) -> Vec<Vec<Part>> {
         let transition = self.transitions.get(unbalanced.transition as usize);
         let extra = &transition.adds[unbalanced.add].1;

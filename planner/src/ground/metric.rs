@@ -14,8 +14,8 @@ pub(super) struct Costs {
     pub read: Vec<u32>,
 }
 
-/// Coefficients of the numeric fluents (`count` of them) and of the total time in a linear
-/// expression.
+/// Coefficients of the numeric fluents (`count` of them) and of the total time; `None` if not
+/// linear.
 pub(crate) fn weights(expression: &Expression, count: usize) -> Option<(Vec<f64>, f64)> {
     let (mut weights, mut time) = (vec![0.0; count], 0.0);
     linear(expression, 1.0, &mut weights, &mut time).then_some((weights, time))
@@ -54,8 +54,8 @@ fn linear(expression: &Expression, factor: f64, weights: &mut [f64], time: &mut 
     }
 }
 
-/// Numeric fluents that something besides the metric reads, or that are not only increased without condition by amounts
-/// that are always defined.
+/// Numeric fluents that are not pure costs: read outside the metric, or changed by more than
+/// unconditional increases of defined amounts.
 fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]) -> Vec<bool> {
     let mut read = vec![false; undefined.len()];
     let mark = |expression: &Expression, read: &mut Vec<bool>| {
@@ -93,7 +93,7 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]
     read
 }
 
-/// Tells if actions improve an additive metric.
+/// Possible improvement of an additive metric by actions.
 fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     let earns = |effect: &GroundEffect| match &effect.deed {
         Deed::Change(id, change, amount) => added(*change, amount, sign * weights[*id as usize]),
@@ -106,7 +106,7 @@ fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     effects.map(earns).max().unwrap_or(Earns::Never)
 }
 
-/// Tells if a change of a number lowers a sum in which it has a weight.
+/// Possible improvement by one change of a number with this weight in the metric.
 pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
     let weight = match change {
         _ if weight == 0.0 => return Earns::Never,
@@ -121,7 +121,8 @@ pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
     }
 }
 
-/// Looks into the metric. `keep` keeps every numeric fluent in the state, `keep_metric` those that the metric is made of.
+/// Analyses the metric. `keep` keeps all numeric fluents in the state, `keep_metric` those of the
+/// metric.
 pub(super) fn costs(
     task: &RawTask,
     comparisons: &[Comparison],
@@ -159,8 +160,8 @@ pub(super) fn costs(
 }
 
 impl Costs {
-    /// Contribution of the action to the metric by fluents that only add up costs; those effects
-    /// are removed.
+    /// Contribution of the action to the metric through pure cost fluents; their effects are
+    /// removed.
     pub(super) fn of(&self, action: &mut RawAction) -> Expression {
         if self.metric.is_none() && action.later.is_none() {
             strip(&self.weights, &mut action.effects, &mut Vec::new());

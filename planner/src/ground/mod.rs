@@ -1,4 +1,4 @@
-//! The grounded task, which every search works on, and how it is made from the lifted one.
+//! Grounded task, the input of all searches, and its construction from the lifted task.
 
 mod assemble;
 mod atoms;

@@ -1,5 +1,5 @@
-//! The lifted task in the form that grounding works on: object functions become predicates with one more argument,
-//! so that every term is a variable or an object.
+//! Normalised lifted task for grounding: object functions become predicates with one more argument,
+//! so every term is a variable or an object.
 
 use std::sync::Arc;
 
@@ -76,7 +76,7 @@ pub(super) enum Change_ {
     Add(Pattern),
     Delete(Pattern),
     Number(Assignment, Named, Number),
-    /// The object function loses its value: function and arguments.
+    /// Effect that makes an object function undefined: function and arguments.
     Unset(Pattern),
     Call(Named),
 }
@@ -113,7 +113,7 @@ pub(super) struct Action_ {
 }
 
 impl Timed3<Formula> {
-    /// All of it.
+    /// Formulas of all three times.
     pub fn all(&self) -> [&Formula; 3] {
         [&self.start, &self.over_all, &self.end]
     }
@@ -332,7 +332,8 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// An effect. Where an object that it names may be undefined, `needs` gets what the action needs for it to have a result.
+    /// Normalised effect. If an object that the effect names may be undefined, `needs` gets the
+    /// condition for a defined result.
     fn effect(&mut self, effect: &Effect, at_end: bool, needs: &mut Needs) -> Effect_ {
         let mut forall = self.quantify(&effect.forall);
         let mut when = self.timed(&effect.when);
@@ -382,7 +383,7 @@ impl<'a> Scope<'a> {
         function.is_some_and(|function| may_be_undefined(self.task, FunctionId(function)))
     }
 
-    /// Condition that the objects named by an effect are defined where it happens.
+    /// Condition that the objects named by an effect are defined at the effect's time.
     fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Formula {
         let atoms = fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), true)).collect();
         let defined = Formula::Exists(fresh.slots.clone(), Box::new(Formula::And(atoms)));
@@ -402,12 +403,12 @@ impl<'a> Scope<'a> {
 struct Needs {
     /// Conditions of their action.
     conditions: Vec<Formula>,
-    /// Effects that must not happen, beside those at its end that depend on earlier times.
+    /// Effects that must not happen, besides end effects with conditions on earlier times.
     forbidden: Vec<Effect_>,
 }
 
-/// An effect that cannot happen, where an effect at the end would that names an undefined object: the object function gets a number,
-/// which is none.
+/// Effect that marks an inapplicable end effect, which names an undefined object: the object
+/// function gets a number, which is no object.
 fn without_result(function: u32, forall: &[u32], when: &Timed3<Formula>, fresh: &Fresh) -> Effect_ {
     let mut absent: Vec<Formula> =
         fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), false)).collect();
@@ -518,7 +519,7 @@ pub(super) fn normalise(task: &Task) -> Normal {
     }
 }
 
-/// A place that an effect module writes, over its parameters.
+/// Term that an effect module writes, over the module's parameters.
 pub(super) enum Target {
     Number(Named),
     /// An atom.

@@ -8,17 +8,18 @@ const MOST_OBSTACLES: usize = 24;
 /// Maximum number of candidate atoms for a condition whose missing preconditions are reported.
 const MOST_MATCHES: usize = 4;
 
-/// An atom that no state has, and what stands in the way of all that could bring it about.
+/// Atom that holds in no reachable state, with the obstacles of all its achievers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Obstacle {
     /// Predicate of the lifted task, or (from its number of predicates on) function.
     pub predicate: u32,
     /// Objects; `None` for any. Of a function, the value comes last.
     pub arguments: Vec<Option<u32>>,
-    /// Actions that could bring it about, by index, each with the conditions of it that no state has. Empty where no
-    /// action could. An empty list of conditions: each of them can be had, but never together, or not in atoms.
+    /// Actions that add the atom, by index, each with its unreachable conditions; empty without
+    /// achievers. An empty list of conditions: each is reachable, but not all together, or they are
+    /// not atoms.
     pub achievers: Vec<(u32, Vec<MissingAtom>)>,
-    /// Rules that derive it, by index, in the same way.
+    /// Rules that derive the atom, by index, in the same form.
     pub rules: Vec<(u32, Vec<MissingAtom>)>,
 }
 
@@ -121,9 +122,9 @@ impl Find<'_> {
 }
 
 impl Find<'_> {
-    /// Missing atoms of an action whose conditions can each be had, but not all at once: for one condition,
-    /// the atoms that are missing wherever a reached atom fulfils it. Initial facts and conditions that lead
-    /// on to new atoms come first.
+    /// Missing atoms of an action whose conditions are reachable one by one but not together: for
+    /// one condition, the atoms that are missing under every reached atom that fulfils it. Initial
+    /// facts and conditions that lead to new atoms come first.
     fn missing_together(&self, action: &Action_, binding: &[u32]) -> Vec<MissingAtom> {
         let mut literals: Vec<&Pattern> = Vec::new();
         let condition = &action.condition;
@@ -136,8 +137,8 @@ impl Find<'_> {
         explaining.find(|missing| missing.iter().any(|atom| !self.queue.contains(atom))).unwrap_or_default()
     }
 
-    /// Atoms that an action lacks under every reached atom that fulfils one of its conditions; `None` if one
-    /// of them leaves nothing lacking, or if there are many.
+    /// Atoms that an action lacks under every reached atom that fulfils one of its conditions;
+    /// `None` if nothing is lacking for one of them, or if there are many.
     fn lacking(&self, action: &Action_, pattern: &Pattern, binding: &[u32]) -> Option<Vec<MissingAtom>> {
         let mut lacking: Vec<MissingAtom> = Vec::new();
         let mut matches = 0;
@@ -178,7 +179,7 @@ fn literals_of<'f>(formula: &'f Formula, into: &mut Vec<&'f Pattern>) {
     }
 }
 
-/// The binding with what a pattern binds where it is an atom.
+/// Binding extended by matching a pattern with an atom.
 fn extended(pattern: &Pattern, arguments: &[u32], binding: &[u32]) -> Option<Vec<u32>> {
     let mut binding = binding.to_vec();
     for (term, &argument) in pattern.terms.iter().zip(arguments) {

@@ -1,5 +1,5 @@
-//! Groups of facts of which at most one holds, by which pairs of facts can be reached together (the graph of h², Haslum and
-//! Geffner 2000). Says more than the synthesis of invariants where actions are no longer those of the lifted task.
+//! Mutex groups from h² (Haslum and Geffner 2000): pairs of facts that are reachable together.
+//! Finds more than invariant synthesis where actions no longer correspond to lifted ones.
 
 use super::task::{Action, Fact, GroundTask, Outcome};
 
@@ -9,7 +9,7 @@ const MOST_WORK: usize = 50_000_000;
 /// Members of all groups at most.
 const MOST_MEMBERS: usize = 50_000;
 
-/// Groups of facts that exclude each other, such that every pair of different variables found to do so is in one. None for
+/// Mutex groups that cover every pair of different variables found mutually exclusive; none for
 /// tasks with axioms, conditional effects or too many facts.
 pub fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
     let conditional = task.actions.iter().flat_map(|action| &action.effects).any(|e| e.when.is_some());
@@ -74,7 +74,7 @@ impl Pairs {
         self.row(one)[other / 64] >> (other % 64) & 1 == 1
     }
 
-    /// Lets an action happen wherever it may; whether that reaches new pairs.
+    /// Applies an action wherever possible; true if this reaches new pairs.
     fn apply(&mut self, action: &Action, offsets: &[usize]) -> bool {
         let id = |fact: Fact| offsets[fact.variable as usize] + fact.value as usize;
         let needs: Vec<usize> = action.condition.facts.iter().map(|&fact| id(fact)).collect();
@@ -121,7 +121,7 @@ impl Pairs {
         changed
     }
 
-    /// Every pair of different variables that was not reached is in a group, each made as large as it can be.
+    /// Greedy maximal mutex groups that cover every unreached pair of different variables.
     fn groups(&self, facts: &[Fact]) -> Vec<Vec<Fact>> {
         let reached: Vec<usize> = (0..facts.len()).filter(|&fact| self.may(fact, fact)).collect();
         let mut all = vec![0; self.words];
@@ -146,7 +146,7 @@ impl Pairs {
         groups
     }
 
-    /// Facts with further ones of `all` that exclude them and each other, the first that there are.
+    /// Extends a set of facts by further mutex facts of `all`, first come first served.
     fn enlarged(&self, facts: &[usize], all: &[u64]) -> Vec<usize> {
         let mut open = all.to_vec();
         let without = |open: &mut Vec<u64>, fact: usize| {

@@ -26,22 +26,22 @@ use crate::task::{
 use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
 use touch::Mentioned;
 
-/// Name of the action that observes in time what must come about; its place is the constraint's.
+/// Name of the action that observes a condition before its deadline; its span is the constraint's.
 pub(crate) const WITNESS: &str = "see it";
-/// Preferences of one action that become conditions of its copies, at most.
+/// Maximum number of preferences of one action that are compiled into copies of the action.
 const MOST_OF_AN_ACTION: usize = 3;
 
 /// A task without preferences and constraints.
 pub(crate) struct Compiled {
     /// The task. Actions whose names hold a blank are no steps of a plan.
     pub task: Task,
-    /// A preference that the metric counts is not in it.
+    /// True if a preference that the metric counts was dropped.
     pub forgets: bool,
     /// The metric counts no preference at all.
     pub uncounted: bool,
 }
 
-/// The task without its preferences and constraints; `None` where it has none.
+/// Task without preferences and constraints; `None` if the task has neither.
 pub(crate) fn compile(task: &Task) -> Option<Compiled> {
     if task.constraints.is_empty() && task.preferences.is_empty() {
         return None;
@@ -87,7 +87,7 @@ enum Asked {
     Within(f64),
 }
 
-/// A constraint or preference with objects for its variables, as it is stated.
+/// Constraint or preference with its variables bound to objects.
 struct Stated {
     asked: Asked,
     span: Span,
@@ -95,7 +95,7 @@ struct Stated {
     preference: Option<PreferenceId>,
 }
 
-/// The same with what the searches need of it.
+/// Bound constraint or preference with its automaton and flags.
 struct Instance {
     automaton: &'static Automaton,
     /// Both conditions; atoms and their absence only, where numbers are compared.
@@ -123,7 +123,7 @@ impl Instance {
         any(cases.iter().map(|case| self.case(case)))
     }
 
-    /// The fact that it was broken.
+    /// Fact that the instance has been violated.
     fn was_broken(&self) -> Option<&Condition> {
         self.flags.get(self.automaton.flags)
     }
@@ -139,15 +139,14 @@ struct Compiler<'t> {
     task: &'t Task,
     made: Task,
     fixed: Fixed,
-    /// Function that counts the violations of a preference, by preference, if the metric asks for
-    /// them.
+    /// Violation counter of each preference, if the metric uses it.
     counters: Vec<Option<FunctionId>>,
-    /// Instances by what they say, with how often it is said.
+    /// Number of occurrences of each distinct instance, by its text.
     said: FxHashMap<(String, Option<PreferenceId>), usize>,
     instances: Vec<(Stated, f64)>,
     /// Condition and weight of each undecided preference in the last state.
     kept: Vec<(PreferenceId, f64, Condition)>,
-    /// Violations that nothing can avert.
+    /// Unavoidable violations by preference.
     lost: FxHashMap<PreferenceId, f64>,
     goal: Vec<Condition>,
     forgets: bool,
@@ -177,7 +176,7 @@ impl<'t> Compiler<'t> {
         compiler
     }
 
-    /// A function for each preference that the metric asks for, in its place.
+    /// Adds a violation counter for each preference in the metric and substitutes it there.
     fn count_violations(&mut self) {
         let Some(metric) = &self.task.metric else { return };
         walk::expression(&metric.value, &mut |part| {
@@ -216,7 +215,7 @@ impl<'t> Compiler<'t> {
         Condition::Atom(atom(self.predicate(name, Vec::new()), &[]))
     }
 
-    /// Every instance of a constraint or preference, those that say the same together.
+    /// All instances of constraints and preferences; equal ones are merged.
     fn instances(
         &mut self,
         asked: Asked,
@@ -286,7 +285,7 @@ impl<'t> Compiler<'t> {
         }
     }
 
-    /// The fact that some action of ours has seen the condition before it was too late.
+    /// Fact that an action observed the condition before the deadline.
     fn witnessed(&mut self, time_s: f64, span: Span, condition: Condition) -> Condition {
         let (seen, early) = (self.fact("seen in time"), self.fact("early"));
         let (Condition::Atom(own), Condition::Atom(early_atom)) = (&seen, &early) else { return seen };
@@ -303,7 +302,7 @@ impl<'t> Compiler<'t> {
         seen
     }
 
-    /// A derived fact in place of a condition of which the opposite cannot be said.
+    /// Derived fact that replaces a condition whose negation cannot be expressed.
     fn derived(&mut self, condition: Condition) -> Condition {
         if condition.is_true() {
             return condition;
@@ -316,7 +315,7 @@ impl<'t> Compiler<'t> {
         Condition::Atom(atom(predicate, &[]))
     }
 
-    /// Lets an action look, right before it changes something.
+    /// Adds automaton transitions to an action, evaluated just before its effects.
     fn watch(&mut self, instance: &Instance, mentioned: &Mentioned, index: usize) {
         let own = &self.task.actions[index];
         let start = mentioned.touched(own, &own.effects.start);
@@ -330,7 +329,7 @@ impl<'t> Compiler<'t> {
     }
 }
 
-/// Conditions and effects that an instance has on an action that touches it.
+/// Conditions and effects that an instance adds to an action that affects it.
 fn look(
     instance: &Instance,
     touched: &Condition,
@@ -363,7 +362,7 @@ fn look(
 }
 
 impl Compiler<'_> {
-    /// Copies of an action, one for each set of its preferences that it pays for.
+    /// Copies of an action, one for each subset of its preferences that may be violated.
     fn action_preferences(&mut self, index: usize, own: &Action) {
         let mut parts: Vec<(FunctionId, bool, &Condition)> = Vec::new();
         for (id, Timed { start, over_all, end }) in &own.preferences {
@@ -453,7 +452,7 @@ impl Compiler<'_> {
         self.goal.extend(turns.last().cloned());
     }
 
-    /// Facts of which one after the other holds: before each preference, and after the last.
+    /// Phase facts, exactly one of which holds: one before each preference, and one after the last.
     fn turns(&mut self) -> Vec<Condition> {
         let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
         let parameter = Parameter { name: "?stage".to_string(), types: types.clone(), objects, span };
@@ -466,7 +465,8 @@ impl Compiler<'_> {
         (0..=self.kept.len()).map(stage).collect()
     }
 
-    /// Without times, the length of a plan is the number of its steps, and bookkeeping is none.
+    /// Replaces total time in the metric by the number of steps, for tasks without durations;
+    /// bookkeeping actions count zero.
     fn steps_for_time(&mut self) {
         let mut timed = false;
         let metric = self.made.metric.iter();
@@ -489,7 +489,7 @@ impl Compiler<'_> {
     }
 }
 
-/// A number of its own, zero at first.
+/// Adds a numeric function with initial value 0.
 fn function(task: &mut Task, name: String) -> FunctionId {
     let function = FunctionId(task.functions.len() as u32);
     task.functions.push(Function { name, parameters: Vec::new(), result: None, span: Span::default() });
@@ -521,7 +521,7 @@ fn pay(counter: FunctionId, times: f64, at_end: bool) -> Effect {
     effect(change, Condition::TRUE, at_end)
 }
 
-/// One fact gives way to another.
+/// Effects that replace one fact by another.
 fn from_to(from: &Condition, to: &Condition) -> Vec<Effect> {
     let (Condition::Atom(from), Condition::Atom(to)) = (from, to) else { return Vec::new() };
     let changes = [Change::Delete(from.clone()), Change::Add(to.clone())];

@@ -6,7 +6,7 @@ use super::instantiate::{Clauses, Deed, GroundEffect};
 use super::statics::Tries;
 use super::task::{DurationBound, Expression};
 
-/// A disjunctive condition gives at most this many copies of its action; beyond, it becomes a derived variable.
+/// Maximum number of action copies for a disjunctive condition; more become a derived variable.
 const MOST_COPIES: usize = 4;
 
 /// The durative part of an action.
@@ -60,7 +60,7 @@ pub(super) struct Resolve<'a> {
 }
 
 impl<'a> Resolve<'a> {
-    /// Numbers new atoms from `next` on. Once nothing more is to be tried, what it makes is not whole.
+    /// Numbers new atoms from `next` on. Once `tries` are used up, the result is incomplete.
     pub(super) fn new(next: u32, tries: &'a Tries<'a>) -> Self {
         Resolve { next, tries, known: FxHashMap::default(), axioms: Vec::new() }
     }
@@ -132,7 +132,7 @@ fn join(left: &Clauses, right: &Clauses) -> Clauses {
     joined
 }
 
-/// True if it asks for an atom and its absence (literals sorted).
+/// True if the clauses contain an atom and its negation (literals sorted).
 pub(super) fn contradictory(clauses: &Clauses) -> bool {
     clauses.literals.windows(2).any(|pair| pair[0] ^ 1 == pair[1])
 }

@@ -1,4 +1,4 @@
-//! Relaxed reachability over the lifted task: a semi-naive join for every new atom (nothing is ever taken away).
+//! Delete-relaxed reachability over the lifted task: a semi-naive join for every new atom.
 //!
 //! Each rule's body is matched by taking the atom with the fewest candidates next, given what is bound so far; a body
 //! atom with no candidate ends the branch at once.
@@ -34,7 +34,7 @@ pub(super) struct Head {
     pub atom: Pattern,
 }
 
-/// Tests a filter under a complete binding, with what is known to be static; true where it is not known to be false.
+/// Filter under a complete binding by static facts; true unless known to be false.
 pub(super) trait Possible {
     /// True if the formula may hold in some reachable state.
     fn possible(
@@ -49,7 +49,7 @@ pub(super) trait Possible {
     fn is_stopped(&self) -> bool;
 }
 
-/// Who ended the work before it was done.
+/// Marker of work that was interrupted.
 pub(super) struct Stopped;
 
 /// The work in progress.
@@ -64,7 +64,7 @@ pub(super) struct Reach<'a, P: Possible> {
     /// Upper bound on atoms and instances together.
     pub limit: usize,
     pub count: usize,
-    /// Objects tried so far where nothing but their type narrows them down.
+    /// Number of objects tried for slots restricted by type alone.
     pub tried: usize,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
@@ -76,7 +76,7 @@ const TRIED_AT_ONCE: usize = 1 << 14;
 struct Join<'r> {
     rule: &'r Rule,
     domains: &'r [Arc<[ObjectId]>],
-    /// Objects that fit a slot, as bits, by slot, where they are not all.
+    /// Objects that fit each slot, as a bit set; `None`: all objects.
     fits: &'r [Option<Vec<u64>>],
     binding: Vec<u32>,
     trigger: u32,
@@ -204,7 +204,8 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// Each instance is found once: by its newest atom, at that atom's first position in the body.
+    /// True at the first position of the body that matches the instance's newest atom, so that each
+    /// instance is found once.
     fn visible(&self, join: &Join<'_>, position: usize, atom: u32) -> bool {
         if !self.fluent[join.rule.body[position].predicate as usize] {
             return true;
@@ -272,7 +273,7 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// Counts one more object that is tried; an error once nothing more is to be tried.
+    /// Counts one more tried object; an error once `tries` are used up.
     fn go_on(&mut self) -> Result<(), Stopped> {
         self.tried += 1;
         let asked = self.tried.is_multiple_of(TRIED_AT_ONCE);
@@ -284,7 +285,7 @@ impl<P: Possible> Reach<'_, P> {
 }
 
 impl Join<'_> {
-    /// Writes the bound arguments (others `NONE`), and tells how many are bound.
+    /// Writes the bound arguments (`NONE` for unbound ones) and returns their number.
     fn pattern(&self, terms: &[Term], out: &mut [u32; 32]) -> usize {
         let mut bound = 0;
         for (i, term) in terms.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Relaxed reachability of the ground task: what no sequence of actions can bring about goes.
+//! Delete-relaxed reachability of the ground task; unreachable parts are removed.
 
 use crate::grouped::Grouped;
 
@@ -9,11 +9,11 @@ use super::raw::{RawAction, RawTask};
 pub(super) struct Reached {
     /// True, by atom, if reachable.
     pub atoms: Vec<bool>,
-    /// True, by atom, if something may delete it, or it is initially false.
+    /// True, by atom, if it may be deleted or is initially false.
     pub absent: Vec<bool>,
 }
 
-/// A relaxed operator: reaches its atom (or does nothing but count) once its conditions are.
+/// Relaxed operator: reaches its atom (or only counts) once its conditions are reached.
 struct Unary {
     missing: u32,
     reaches: u32,
@@ -21,7 +21,8 @@ struct Unary {
 
 struct Fixpoint {
     unary: Vec<Unary>,
-    /// Atoms (those beyond the task's stand for "the action was started") with operators that wait for them.
+    /// Atoms (those beyond the task's mean "the action was started") with the operators that need
+    /// them.
     waits: Vec<(u32, u32)>,
     /// Open conditions of the operator at hand.
     wanted: Vec<u32>,
@@ -82,8 +83,8 @@ impl Fixpoint {
     }
 }
 
-/// Removes actions, effects and axioms that need what cannot be reached, and conditions that always hold. Returns
-/// what is reachable.
+/// Removes actions, effects and axioms with unreachable conditions, and conditions that always
+/// hold. Returns the reachable part.
 pub(super) fn prune(task: &mut RawTask, calls: &[RawCall]) -> Reached {
     let count = task.init.len();
     let mut fixpoint = Fixpoint { unary: Vec::new(), waits: Vec::new(), wanted: Vec::new() };

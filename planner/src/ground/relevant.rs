@@ -1,4 +1,4 @@
-//! Backward relevance: what no goal, condition or metric asks for goes.
+//! Backward relevance analysis: parts that no goal, condition or metric depends on are removed.
 
 use rustc_hash::FxHashMap;
 
@@ -9,9 +9,9 @@ use crate::model::agreement::contradictions;
 
 /// Relevant atoms and numbers.
 pub(super) struct Relevant {
-    /// True, by atom, if its truth is asked for.
+    /// True, by atom, if some condition or goal needs it true.
     pub wanted: Vec<bool>,
-    /// True, by atom, if its absence is asked for.
+    /// True, by atom, if some condition or goal needs it false.
     pub unwanted: Vec<bool>,
     /// True, by numeric fluent, if relevant.
     pub numerics: Vec<bool>,
@@ -58,7 +58,7 @@ fn known(expression: &Expression) -> f64 {
     if let Expression::Constant(value) = expression { *value } else { f64::NAN }
 }
 
-/// True if an expression may be undefined although all that it reads is defined.
+/// True if an expression may be undefined although all its inputs are defined.
 fn may_fail(expression: &Expression) -> bool {
     match expression {
         Expression::Constant(value) => !value.is_finite(),
@@ -84,7 +84,8 @@ impl Work<'_> {
         self.numbers(clauses);
     }
 
-    /// The body of an axiom whose head is asked for: what makes it true, and what makes it false if the head is to be.
+    /// Marks the body of a relevant axiom: literals that make its head true, and their negations if
+    /// the head must be false.
     fn body(&mut self, body: &Clauses, head: u32) {
         if self.relevant.wanted[head as usize] {
             self.literals(body, 0);
@@ -136,7 +137,7 @@ impl Work<'_> {
         }
     }
 
-    /// Also what only harms must be followed once the action is kept.
+    /// True if the effect must be kept; harmful effects of a kept action are relevant too.
     fn keeps(&self, deed: &Deed) -> bool {
         match deed {
             Deed::Add(a) | Deed::Delete(a) => {
@@ -149,7 +150,8 @@ impl Work<'_> {
         }
     }
 
-    /// A number that one action changes in contradicting ways may forbid it, whoever asks for the number.
+    /// Marks a number that one action may change in contradicting ways as relevant: the
+    /// contradiction makes the action inapplicable.
     fn contradictions(&mut self, effects: &[GroundEffect]) {
         let change = |effect: &GroundEffect| match &effect.deed {
             Deed::Change(id, change, amount) => Some((*id, *change, known(amount))),
@@ -164,7 +166,8 @@ impl Work<'_> {
         }
     }
 
-    /// An object that one action gives two values forbids it: it may matter that one of them does not happen.
+    /// Marks an object fluent that one action may give two values as relevant: the contradiction
+    /// makes the action inapplicable.
     fn contests(&mut self, effects: &[GroundEffect]) {
         // The object, its value (none where it loses that), and how it gets it.
         let valued = self.valued;
@@ -253,9 +256,9 @@ impl Work<'_> {
     }
 }
 
-/// Removes actions that bring nothing about that matters, and effects that nothing asks about. `undefined` says of the
-/// numeric fluents which have no value at first; `metric` lists those that the metric depends on beyond the actions' costs; `valued`
-/// tells for atoms of object functions, where giving one value takes the others away, the function with its arguments.
+/// Removes irrelevant actions and effects. `undefined`: numeric fluents without initial value;
+/// `metric`: fluents that the metric depends on beyond action costs; `valued`: function and
+/// arguments by atom of an object function.
 pub(super) fn prune(
     task: &mut RawTask,
     comparisons: &[Comparison],

@@ -13,12 +13,13 @@ use super::normal::{
 };
 use super::reach::{Head, Rule};
 
-/// Body atoms beyond this many are tested only against what is static.
+/// Maximum number of body atoms that a join matches; further ones are tested against static facts
+/// only.
 const LONGEST_BODY: usize = 60;
-/// Disjunctions are distributed over a condition as long as it gives at most this many alternatives.
+/// Maximum number of alternatives up to which disjunctions are distributed over a condition.
 const MOST_ALTERNATIVES: usize = 16;
 
-/// One way to satisfy a derived predicate: a conjunction over the rule's variables and witnesses.
+/// Alternative body of a derived predicate: a conjunction over the rule's variables and witnesses.
 pub(super) struct Alternative {
     /// Index of the rule in the normal form.
     pub rule: usize,
@@ -27,15 +28,15 @@ pub(super) struct Alternative {
     pub parts: Vec<Formula>,
 }
 
-/// All rules, and the alternatives of the axioms; their instances are numbered after those of the actions.
+/// All rules and the alternatives of axioms; axiom instances are numbered after action instances.
 pub(super) struct Rules {
     pub rules: Vec<Rule>,
     pub alternatives: Vec<Alternative>,
     /// True, by action, if an instance may be found more than once.
     pub repeats: Vec<bool>,
-    /// True, by predicate, if it changes; "the action was applied" predicates included.
+    /// True, by predicate, if it changes; includes predicates "the action was applied".
     pub fluent: Vec<bool>,
-    /// True, by predicate, if rules define it.
+    /// True, by predicate, if it is derived.
     derived: Vec<bool>,
 }
 
@@ -65,7 +66,7 @@ pub(super) fn fluent_predicates(task: &Task, normal: &Normal) -> Vec<bool> {
     fluent
 }
 
-/// The conjunctive parts of a condition, sorted by what a join can use.
+/// Conjunctive parts of a condition, sorted by their use in a join.
 #[derive(Clone, Default)]
 struct Parts {
     slots: Vec<u32>,
@@ -145,7 +146,8 @@ fn heads(task: &Task, effect: &Effect_, domains: &mut Vec<Arc<[ObjectId]>>) -> V
     }
 }
 
-/// A module may make its atoms true and give its object functions any value.
+/// Adds rules for an effect module: its atoms may become true and its object functions take any
+/// value.
 fn written(
     task: &Task,
     effect: &Effect_,
@@ -287,9 +289,9 @@ impl Rules {
         }
     }
 
-    /// Splits a durative action's conditions: those needed at the start, and those that may be
-    /// achieved while it runs. A condition over all must hold at the start unless the start itself,
-    /// or a simultaneous one, achieves it.
+    /// Splits a durative action's conditions into those needed at the start and those that may be
+    /// achieved while the action runs. A condition over all must hold at the start unless the start
+    /// itself, or a simultaneous one, achieves it.
     fn split(&self, action: &Action_, given: &Given) -> (Vec<Formula>, Vec<Formula>) {
         let mut start = vec![action.condition.start.clone()];
         let mut later = Vec::new();
@@ -331,8 +333,8 @@ impl Given {
     }
 }
 
-/// Actions that may have to start together: in a circle, each holds over all what the next one gives at its start. By
-/// action, the number of its circle; by circle, what the starts in it give.
+/// Cycles of actions that may have to start together: each holds over all an atom that the next one
+/// adds at its start. Returns the cycle of each action, and the start effects of each cycle.
 fn circles(actions: &[Action_]) -> (Vec<usize>, Vec<Given>) {
     let mut givers: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
     let mut of_anything: Vec<u32> = Vec::new();

@@ -15,9 +15,9 @@ use super::reach::Possible;
 /// Static predicates and functions.
 pub(super) struct Statics<'a> {
     pub task: &'a Task,
-    /// True, by predicate (object functions after them), if its atoms change.
+    /// True, by predicate (object functions follow), if its atoms change.
     pub fluent: Vec<bool>,
-    /// True, by function, if some effect writes its numbers.
+    /// True, by function, if some effect writes it.
     pub written: Vec<bool>,
     /// The initial numbers.
     pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
@@ -32,7 +32,7 @@ pub(super) struct Tries<'a> {
     stopped: Cell<bool>,
 }
 
-/// Objects that are tried before it is asked again whether to stop.
+/// Number of objects tried between two checks of the stop signal.
 const TRIED_AT_ONCE: u32 = 4096;
 
 impl<'a> Tries<'a> {
@@ -40,7 +40,7 @@ impl<'a> Tries<'a> {
         Tries { stop, tried: Cell::new(0), stopped: Cell::new(false) }
     }
 
-    /// Counts one more object that is tried; `false` once nothing more is to be tried.
+    /// Counts one more tried object; `false` once stopped.
     pub(super) fn go_on(&self) -> bool {
         self.tried.set(self.tried.get().wrapping_add(1));
         if self.tried.get().is_multiple_of(TRIED_AT_ONCE) && (self.stop)() {
@@ -56,7 +56,7 @@ impl<'a> Tries<'a> {
 }
 
 impl Statics<'_> {
-    /// The number of a function that nothing writes, NaN where it has none.
+    /// Value of a numeric function that no effect changes; NaN if undefined.
     pub(super) fn number(&self, named: &Named, binding: &[u32]) -> f64 {
         let arguments: Box<[u32]> = named.terms.iter().map(|t| t.bound(binding)).collect();
         self.numbers.get(&(named.index, arguments)).copied().unwrap_or(f64::NAN)

@@ -14,19 +14,19 @@ pub type CallId = u32;
 /// Index of a numeric comparison in [`GroundTask::comparisons`].
 pub type ComparisonId = u32;
 
-/// A variable together with one of its values.
+/// Variable with one of its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fact {
     /// The variable.
     pub variable: VariableId,
-    /// One of its values, below [`Variable::domain_size`].
+    /// Value of the variable, below [`Variable::domain_size`].
     pub value: u32,
 }
 
 /// Meaning of a value of a finite-domain variable in the lifted task.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Meaning {
-    /// The atom holds (and no other atom of its variable does).
+    /// The atom holds, and no other atom of the variable does.
     Atom {
         /// Predicate of the lifted task.
         predicate: u32,
@@ -42,19 +42,20 @@ pub enum Meaning {
         /// The value, or `None` for an undefined fluent.
         value: Option<u32>,
     },
-    /// An inner condition that got a variable of its own: a disjunction inside a condition.
+    /// Derived variable of a nested condition: a disjunction inside a condition.
     Inner,
     /// None of the other values' atoms holds.
     NoneOfThose,
 }
 
-/// A finite-domain variable: a group of atoms of which at most one holds, or one object fluent.
+/// Finite-domain variable: a group of atoms of which at most one holds, or an object fluent.
 #[derive(Clone, Debug)]
 pub struct Variable {
-    /// Meanings of the values. Of a two-valued variable over one atom, value 0 is the atom, value 1
+    /// Meaning of each value. In a two-valued variable over one atom, value 0 is the atom, value 1
     /// its absence.
     pub values: Vec<Meaning>,
-    /// Set for a derived variable, which no effect writes: the stratum of its axioms. Its default is value 1 (absent).
+    /// Axiom stratum of a derived variable, which no effect writes; its default is value 1
+    /// (absent). `None`: not derived.
     pub stratum: Option<u32>,
 }
 
@@ -64,7 +65,7 @@ impl Variable {
         self.values.len() as u32
     }
 
-    /// True for object fluents: given two values at once, it has neither.
+    /// True for object fluents: two values given at once contradict each other.
     pub fn is_object(&self) -> bool {
         matches!(self.values[0], Meaning::Object { .. })
     }
@@ -79,7 +80,7 @@ pub struct NumericFluent {
     pub arguments: Vec<u32>,
 }
 
-/// An arithmetic expression over the state. Evaluates to NaN where a fluent is undefined (its number is NaN).
+/// Arithmetic expression over the state; NaN if an input fluent is undefined (its number is NaN).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expression {
     /// A number.
@@ -129,8 +130,8 @@ impl Expression {
 }
 
 impl Expression {
-    /// True if the value times a factor is at least 0 in every state, as far as constants, durations and answers of attachments,
-    /// which are at least 0, tell.
+    /// True if the value times `factor` is at least 0 in every state, judged by constants,
+    /// durations and attachment answers (never negative).
     pub fn is_never_negative(&self, factor: f64) -> bool {
         match self {
             Expression::Constant(value) => factor * value >= 0.0,
@@ -235,25 +236,24 @@ pub enum Outcome {
 pub struct When {
     /// Must hold where the effect happens.
     pub here: Conjunction,
-    /// Must have held at the start of the durative action (only in effects at its end).
+    /// Condition at the start of the durative action (end effects only).
     pub at_start: Conjunction,
     /// Must have held all the time (only in effects at the end of a durative action).
     pub over_all: Conjunction,
 }
 
-/// An effect and when it happens. Of the effects of one action that happen together, conditions and amounts are
-/// evaluated before any of them; then they are applied in their order (what takes away stands before what adds).
+/// Effect with its condition. Simultaneous effects of one action are all evaluated before any is
+/// applied, then applied in order (deletes before adds).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
-    /// `None` where it happens always.
+    /// Condition of the effect; `None`: unconditional.
     pub when: Option<Box<When>>,
     /// Outcome.
     pub outcome: Outcome,
 }
 
 impl Effect {
-    /// True if both give one object fluent different values where both happen, which is possible as
-    /// far as their conditions tell.
+    /// True if both effects may happen together and give one object fluent different values.
     pub(crate) fn contests(&self, other: &Effect, variables: &[Variable]) -> bool {
         let (Outcome::Set(one), Outcome::Set(another)) = (&self.outcome, &other.outcome) else {
             return false;
@@ -289,10 +289,10 @@ pub struct Origin {
     pub arguments: Vec<u32>,
 }
 
-/// An instantaneous action. One lifted instance may give several when its condition is a disjunction.
+/// Instantaneous action; a disjunctive condition gives several ground actions per lifted instance.
 #[derive(Clone, Debug)]
 pub struct Action {
-    /// The lifted action and its arguments.
+    /// Lifted action and its arguments.
     pub origin: Origin,
     /// Precondition.
     pub condition: Conjunction,
@@ -305,7 +305,7 @@ pub struct Action {
 /// A durative action.
 #[derive(Clone, Debug)]
 pub struct DurativeAction {
-    /// The lifted action and its arguments.
+    /// Lifted action and its arguments.
     pub origin: Origin,
     /// Bounds on the duration in seconds, evaluated in the state at the start (`true`) or at the end (`false`).
     pub duration: Vec<DurationBound>,
@@ -328,7 +328,7 @@ pub struct DurativeAction {
 /// A bound on a duration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DurationBound {
-    /// Evaluated at the end of the action instead of at its start.
+    /// True if evaluated at the end of the action instead of its start.
     pub at_end: bool,
     /// Relation of `?duration` to the expression.
     pub relation: Relation,
@@ -339,7 +339,7 @@ pub struct DurationBound {
 /// Makes a derived variable true (value 0) in every state where the body holds.
 #[derive(Clone, Debug)]
 pub struct Axiom {
-    /// The derived fact, always value 0 of its variable.
+    /// Derived fact, always value 0 of its variable.
     pub head: Fact,
     /// Condition.
     pub body: Conjunction,
@@ -359,7 +359,7 @@ pub struct TimedEffect {
 pub struct Call {
     /// The module of the lifted task and the arguments.
     pub origin: Origin,
-    /// Terms that an effect module writes, in its order; empty for others.
+    /// Terms written by an effect module, in module order; empty for other kinds.
     pub writes: Vec<Place>,
 }
 
@@ -385,21 +385,21 @@ pub struct Metric {
     pub expression: Expression,
     /// True where the metric is a constant, plus the costs of the plan's actions, plus `time_weight` × makespan.
     pub additive: bool,
-    /// Improvement by actions beyond the value without them: if any, a best value may
-    /// not exist.
+    /// Possible improvement by actions beyond the value without them; if any, a best value may not
+    /// exist.
     pub earns: Earns,
     /// The weight of `total-time` in an additive metric.
     pub time_weight: f64,
 }
 
-/// Tells if actions may improve a metric beyond its value without them.
+/// Possibility that actions improve a metric beyond its value without them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Earns {
-    /// Whatever is done, it gets no better.
+    /// Impossible.
     Never,
-    /// It is not known beforehand.
+    /// Unknown before the search.
     Perhaps,
-    /// Some action makes it better.
+    /// Certain: some action improves the metric.
     Surely,
 }
 
@@ -437,9 +437,9 @@ pub struct GroundTask {
     pub goal: Conjunction,
     /// Metric; `None` counts steps (classical) or time (temporal).
     pub metric: Option<Metric>,
-    /// Sets of facts of which at most one holds, beyond those that share a variable.
+    /// Mutex groups beyond those that share a variable.
     pub mutex_groups: Vec<Vec<Fact>>,
-    /// False where the goal is out of reach even when nothing is ever taken away.
+    /// False if the goal is unreachable even under delete relaxation.
     pub goal_reachable: bool,
     /// Obstacles of an unreachable task: atoms without achievers, the goal's first.
     pub obstacles: Vec<super::obstacles::Obstacle>,

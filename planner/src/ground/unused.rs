@@ -1,10 +1,10 @@
-//! Parameters that nothing of an action mentions: one object for each is enough.
+//! Unused parameters of an action: one object is enough for each.
 
 use super::normal::{Action_, Change_, Effect_, Formula, Pattern, Term};
 use crate::task::{Action, GroundChange, Task};
 
-/// Lets parameters that nothing of their action mentions stand for their first object. What takes time may go on twice at once only
-/// under two names: there that must be of no use.
+/// Replaces unused action parameters by their first object, unless a durative action may need to
+/// overlap itself under two names.
 pub(super) fn leave_out_what_nothing_uses(task: &Task, actions: &mut [Action_]) {
     let bare = |lifted: &Action| lifted.grounding.is_empty() && lifted.preferences.is_empty();
     let once: Vec<bool> = actions
@@ -25,7 +25,7 @@ pub(super) fn leave_out_what_nothing_uses(task: &Task, actions: &mut [Action_]) 
     }
 }
 
-/// True, by slot, if something mentions it.
+/// True, by slot, if the action uses the parameter.
 fn used(action: &Action_) -> Vec<bool> {
     let mut used = vec![false; action.domains.len()];
     let mut note = |term: &Term| {
@@ -59,8 +59,8 @@ fn used(action: &Action_) -> Vec<bool> {
     used
 }
 
-/// True if, of overlapping instances, the one that ends first suffices: the action's only effects
-/// are additions at its end that nobody deletes.
+/// True if the earliest end among overlapping instances suffices: the action only adds atoms at its
+/// end, and no effect deletes them.
 fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let lasts = |effect: &Effect_| match &effect.change {
         Change_::Add(added) => {
@@ -83,8 +83,8 @@ fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
         && action.end_effects.iter().all(|effect| always(effect) && lasts(effect))
 }
 
-/// True if instances of an action exclude each other: it needs and deletes an atom at its start,
-/// and only actions that do the same restore it, at their end.
+/// True if instances of an action are mutex: the action needs and deletes an atom at its start, and
+/// only actions of the same kind restore it, at their end.
 fn alone(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let mut taken = action.start_effects.iter().filter_map(|effect| match &effect.change {
         Change_::Delete(pattern) => Some(pattern),

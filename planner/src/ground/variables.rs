@@ -8,15 +8,15 @@ const NOWHERE: Fact = Fact { variable: u32::MAX, value: 0 };
 
 /// Encoding of atoms in variables.
 pub(super) struct Encoding {
-    /// Fact that states an atom, by atom; `NOWHERE` for atoms that never change or do not matter.
+    /// Fact of each atom; `NOWHERE` for static and irrelevant atoms.
     facts: Vec<Fact>,
     /// Fact that states an atom's absence, by atom, if a single fact does.
     absent: Vec<Option<Fact>>,
-    /// Extra two-valued variable of an atom, by atom, besides the one that it shares.
+    /// Extra two-valued variable of an atom besides the shared one, by atom.
     doubles: Vec<Option<u32>>,
     /// True, by variable, if one of its atoms has an extra variable.
     doubled: Vec<bool>,
-    /// Value for "none of those" by variable.
+    /// Value "none of these atoms", by variable.
     none: Vec<Option<u32>>,
     /// True, by atom, if it holds in every reachable state.
     always: Vec<bool>,
@@ -32,7 +32,7 @@ pub(super) struct Choice<'a> {
     pub carried: &'a [bool],
     /// Atoms that hold in every reachable state.
     pub always: Vec<bool>,
-    /// Groups of which at most one atom holds.
+    /// Mutex groups of atoms.
     pub groups: &'a [Vec<u32>],
     /// Groups that must share a variable (object functions).
     pub fixed: &'a [Vec<u32>],
@@ -139,13 +139,13 @@ impl Encoding {
         self.atoms.push(group);
     }
 
-    /// The fact that says that the atom holds.
+    /// Fact of an atom.
     pub(super) fn fact(&self, atom: u32) -> Option<Fact> {
         let fact = self.facts[atom as usize];
         (fact != NOWHERE).then_some(fact)
     }
 
-    /// The condition over variables; `None` if it can never hold. Expects conditions without disjunctions.
+    /// Condition over variables; `None` if it can never hold. Expects no disjunctions.
     pub(super) fn conjunction(&self, clauses: &Clauses) -> Option<Conjunction> {
         let mut facts = Vec::with_capacity(clauses.literals.len());
         for &literal in &clauses.literals {
@@ -168,7 +168,7 @@ impl Encoding {
         Some(Conjunction { facts, comparisons: clauses.comparisons.clone(), calls: clauses.calls.clone() })
     }
 
-    /// The effects over variables, given what holds before them. What takes away comes first.
+    /// Effects over variables, given the conditions before them; deletes come first.
     pub(super) fn effects(&self, effects: &[GroundEffect], before: &[&Conjunction]) -> Vec<Effect> {
         let mut all = Vec::with_capacity(effects.len());
         for effect in effects {
@@ -198,7 +198,8 @@ impl Encoding {
         all
     }
 
-    /// One value replaces the others: an assignment names no deletion, but their doubles must hear of it.
+    /// Adds the effects of one value on the atoms it replaces: an assignment has no explicit
+    /// delete, but the extra variables need one.
     fn replace(&self, atom: u32, effect: &GroundEffect, out: &mut Vec<Effect>) {
         let variable = self.fact(atom).map(|fact| fact.variable as usize);
         let Some(variable) = variable.filter(|&variable| self.doubled[variable]) else { return };
@@ -245,7 +246,8 @@ impl Encoding {
         self.push(effect, extra, Outcome::Set(Fact { variable: fact.variable, value: none }), out);
     }
 
-    /// An object function loses its value, of which this is one: that contradicts what gives it another.
+    /// Adds the effects of an object function becoming undefined for this value, which contradict
+    /// an assignment of another value.
     fn unset(&self, atom: u32, fact: Fact, effect: &GroundEffect, out: &mut Vec<Effect>) {
         if let Some(variable) = self.doubles[atom as usize] {
             self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
@@ -283,12 +285,12 @@ impl Encoding {
     }
 }
 
-/// True, by variable, if "none of those" is initially needed, or the variable has one atom only.
+/// True, by variable, if it starts with the value "none of these atoms", or has one atom only.
 pub(super) fn used_none(variables: &[Variable], initial: &[u32]) -> Vec<bool> {
     variables.iter().zip(initial).map(|(v, &i)| v.values.len() <= 2 || i + 1 == v.domain_size()).collect()
 }
 
-/// Notes that an effect brings "none of those" about.
+/// Marks variables that an effect may set to "none of these atoms".
 pub(super) fn mark_none(variables: &[Variable], effect: &Effect, used: &mut [bool]) {
     if let Outcome::Set(fact) = effect.outcome {
         let variable = fact.variable as usize;
@@ -296,7 +298,7 @@ pub(super) fn mark_none(variables: &[Variable], effect: &Effect, used: &mut [boo
     }
 }
 
-/// Removes the value "none of those" where nothing brings it about.
+/// Removes the value "none of these atoms" from variables that never take it.
 pub(super) fn drop_none(variables: &mut [Variable], used: &[bool]) {
     for (variable, used) in variables.iter_mut().zip(used) {
         if !used {

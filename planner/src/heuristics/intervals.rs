@@ -1,4 +1,4 @@
-//! Interval relaxation of numbers: nothing is ever taken away.
+//! Interval relaxation of numeric fluents: reachable intervals only grow.
 //!
 //! Two relaxations work together. Where an operator adds the same to a linear condition whenever it is applied, how
 //! often it must be applied is known (subgoaling with repetitions; Scala, Haslum, Thiébaux and Ramirez 2020, sections 4
@@ -14,15 +14,14 @@ use crate::ground::{Change, Expression, Relation};
 
 use super::relaxed::Relevant;
 
-/// Number of moves of an interval's bound after which it counts as unbounded.
+/// Number of widenings of an interval bound after which the bound counts as infinite.
 const MOST_WIDENINGS: u8 = 6;
-/// Number of applications assumed for a condition that a node does not help soon, though intervals
-/// leave it open.
+/// Number of applications assumed for a node whose progress towards a condition cannot be bounded.
 const UNLIKELY: u32 = 1000;
-/// Nothing.
+/// No node.
 const NONE: u32 = u32::MAX;
 
-/// The values that a number may have; none where `low` is above `high`.
+/// Interval of reachable values of a number; empty if `low` is above `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     low: f64,
@@ -40,7 +39,7 @@ impl Range {
         self.low > self.high
     }
 
-    /// From corners; a corner that is no number (zero times infinity) counts as zero.
+    /// Range spanned by corner values; an undefined corner (zero times infinity) counts as zero.
     fn of(corners: &[f64]) -> Range {
         let zeroed = corners.iter().map(|&c| if c.is_nan() { 0.0 } else { c });
         zeroed.fold(EMPTY, |r, c| Range { low: r.low.min(c), high: r.high.max(c) })
@@ -111,9 +110,9 @@ fn range(expression: &Expression, ranges: &impl Fn(u32) -> Range) -> Range {
 struct Near {
     first: Range,
     range: Range,
-    /// The nodes that made it lowest and highest.
+    /// Nodes that set the low and the high bound.
     by: [u32; 2],
-    /// Number of moves of its bounds.
+    /// Number of widenings of the bounds.
     moves: u8,
 }
 
@@ -170,7 +169,7 @@ pub(super) struct Intervals {
     changes: Lists<NumberChange>,
     /// Nodes whose amounts read a number, by number.
     amounts_on: Vec<Vec<u32>>,
-    /// True, by comparison, if anyone asks for it.
+    /// True, by comparison, if some condition needs it.
     needed: Vec<bool>,
     /// Nodes that raise a number, with the least amount, by number.
     givers: Vec<Vec<(u32, f64)>>,
@@ -181,18 +180,18 @@ pub(super) struct Intervals {
     widened: Vec<[u8; 2]>,
     /// Node that moved a number last, by number.
     mover: Vec<u32>,
-    /// Values of a number after one application of each node to its first value, which estimates
+    /// Values of a number after one application of each node to the initial value, for estimating
     /// state-dependent amounts (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
     near: Vec<Near>,
     times: Vec<u32>,
-    /// Facts that the last node brings about, with how often it must be applied.
+    /// Facts that the last node achieves, with the required number of applications.
     pub(super) found: Vec<(u32, u32)>,
     /// Working memory of the caller.
     pub(super) movers: Vec<u32>,
 }
 
 impl Intervals {
-    /// For the changes of each node, towards the needed facts.
+    /// Intervals for the nodes' changes, restricted to the needed facts.
     pub(super) fn new(task: &Compiled, needed: &[bool], changes: Lists<NumberChange>) -> Intervals {
         let numbers = Arc::clone(&task.numbers);
         if numbers.is_empty() {
@@ -282,8 +281,8 @@ impl Intervals {
         }
     }
 
-    /// Applies a node: leaves in `found` what it brings about, and appends to `again` the nodes among those that
-    /// `fired` whose amounts it changed.
+    /// Applies a node: writes the achieved facts to `found`, and appends to `again` the fired nodes
+    /// whose amounts changed.
     pub(super) fn fire(&mut self, node: u32, fired: &dyn Fn(u32) -> bool, again: &mut Vec<u32>) {
         self.found.clear();
         if self.changes.get(node as usize).is_empty() {
@@ -364,8 +363,8 @@ impl Intervals {
         (after != before || nearer).then_some(number)
     }
 
-    /// Number of applications of a node for a condition with its present amounts, or with those it
-    /// can soon have where that saves more than the extra step.
+    /// Number of applications of a node for a condition, with present amounts, or with larger ones
+    /// soon reachable if these save more than the extra step.
     fn times_now(&self, node: u32, comparison: u32) -> u32 {
         let still = self.times_with(node, comparison, &|number| self.near[number as usize].first);
         let soon = self.times_with(node, comparison, &|number| self.near[number as usize].range);
@@ -394,7 +393,7 @@ impl Intervals {
         Some((change.amount.as_ref()?, sign * weight))
     }
 
-    /// Appends the nodes that make a node add more to what a comparison of the fact reads.
+    /// Appends the nodes that increase a node's contribution to the fact's comparison.
     pub(super) fn collect_levers(&self, fact: u32, node: u32, out: &mut Vec<u32>) {
         if !self.dynamic {
             return;
@@ -425,7 +424,7 @@ impl Intervals {
         }
     }
 
-    /// Notes how often the fact's supporter is to be applied.
+    /// Records the required number of applications of the fact's supporter.
     pub(super) fn support(&mut self, fact: u32, times: u32) {
         self.times[(fact - self.first) as usize / 2] = times;
     }
@@ -443,8 +442,8 @@ impl Intervals {
         &self.givers[number as usize]
     }
 
-    /// Numbers of which the operators of a relaxed plan use up more than there is and than they give back, with what
-    /// is missing: each operator that asks for a least amount and takes from it must find it.
+    /// Numbers that a relaxed plan consumes beyond the available and returned amounts, with the
+    /// shortage; an operator that needs a minimum and consumes must find that minimum.
     pub(super) fn shortages(&self, task: &Compiled, state: &[u32], plan: &[Relevant]) -> Vec<(u32, f64)> {
         let mut balance: Vec<f64> = vec![0.0; self.numbers.len()];
         let mut floor: Vec<f64> = vec![f64::INFINITY; self.numbers.len()];
@@ -471,7 +470,7 @@ impl Intervals {
         compared.filter_map(|c| self.numbers.least(c, number)).reduce(f64::max)
     }
 
-    /// Appends the nodes that moved what a comparison reads.
+    /// Appends the nodes that widened the numbers of a comparison.
     pub(super) fn collect_movers(&self, fact: u32, out: &mut Vec<u32>) {
         if !self.dynamic {
             return;

@@ -10,7 +10,7 @@ use crate::ground::{Fact, Relation};
 
 use super::queue::RadixHeap;
 
-/// No fact, no operator, no cost.
+/// No fact, operator or cost.
 const NONE: u32 = u32::MAX;
 
 /// Relaxed operator during an evaluation: an operator's unconditional effects, one conditional effect, or an axiom.
@@ -26,7 +26,7 @@ struct Node {
     left: u32,
 }
 
-/// The heuristic with its working memory.
+/// LM-cut heuristic with its working memory.
 pub struct LandmarkCut {
     preconditions: Lists<u32>,
     effects: Lists<u32>,
@@ -67,8 +67,8 @@ impl LandmarkCut {
         build.finish()
     }
 
-    /// A lower bound on the cost of all plans from a state; `None` if there is none even without delete effects. Once `stop`
-    /// says true, the bound of the landmarks found so far.
+    /// Lower bound on the cost of all plans from a state; `None` if unreachable under delete
+    /// relaxation. Returns the bound so far if `stop` becomes true.
     pub fn evaluate(&mut self, task: &Compiled, state: &[u32], stop: &dyn Fn() -> bool) -> Option<u32> {
         let values = task.offsets.iter().zip(state).map(|(&offset, &value)| offset + value);
         let initial: Vec<u32> = values.chain(self.always.iter().copied()).collect();
@@ -152,7 +152,7 @@ impl LandmarkCut {
         }
     }
 
-    /// Finds the operators that lead into the zone from which the goal is reached at no cost; tells the least of their costs.
+    /// Finds the operators that enter the zero-cost zone of the goal; returns their minimum cost.
     fn find_cut(&mut self, initial: &[u32]) -> u32 {
         let (before, beyond) = (self.stamp + 1, self.stamp + 2);
         self.stamp = beyond;
@@ -218,7 +218,8 @@ fn reach(costs: &mut [u32], heap: &mut RadixHeap, fact: u32, cost: u32) {
     }
 }
 
-/// Facts of a numeric condition that an operator may bring about: not those that its constant changes lead away from.
+/// Facts of a numeric condition that an operator may achieve; constant changes in the wrong
+/// direction are excluded.
 fn turned(task: &Compiled, operator: usize, comparison: usize) -> impl Iterator<Item = u32> {
     let (numbers, changes) = (&task.numbers, &task.numbers.changes[operator]);
     // Anything but adding may also give a value to what had none.
@@ -258,7 +259,7 @@ impl<'a> Build<'a> {
         Build { task, needed, preconditions: Lists::new(), effects: Lists::new(), operators: Vec::new() }
     }
 
-    /// Adds a node unless it has no effect that anything needs.
+    /// Adds a relaxed operator if some condition needs one of its effects.
     fn node(&mut self, preconditions: &[Fact], mut effects: Vec<u32>, operator: u32) {
         let mut preconditions: Vec<u32> = preconditions.iter().map(|&fact| self.task.id(fact)).collect();
         preconditions.sort_unstable();

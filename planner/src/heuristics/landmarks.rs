@@ -17,25 +17,24 @@ const MOST_LANDMARKS: usize = 20_000;
 /// ones.
 const EXPLORATION_WORK: usize = 40_000_000;
 
-/// One landmark: one of the facts (a single one unless it is disjunctive).
+/// Landmark: one fact, or a disjunction of facts.
 #[derive(Clone, Debug)]
 pub struct Landmark {
     pub facts: Vec<u32>,
     /// True if the goal requires it.
     pub goal: bool,
-    /// Landmarks that are to be seen before this one: those that must be true right before it first becomes true, and
-    /// those for which it would have to be given up again.
+    /// Landmarks ordered before this one (greedy-necessary and reasonable orders).
     before: Vec<u32>,
     /// Landmarks for whose first achievement this one must be true.
     enables: Vec<u32>,
-    /// Facts that come about whenever it first becomes true.
+    /// Facts that become true whenever the landmark first does.
     beside: Vec<u32>,
 }
 
 /// The landmarks of a task.
 pub struct Landmarks {
     pub all: Vec<Landmark>,
-    /// For each fact, the landmarks that it makes true.
+    /// Landmarks of each fact.
     by_fact: Lists<u32>,
     /// Landmarks that the goal requires.
     goals: Vec<u32>,
@@ -45,7 +44,7 @@ pub struct Landmarks {
 /// The search for landmarks.
 struct Find<'a> {
     task: &'a Compiled,
-    /// Achievers by fact: operators, and after them axioms.
+    /// Achievers by fact: operators, then axioms.
     achievers: Lists<u32>,
     /// Operators and axioms that need a fact, by fact.
     needed_by: Lists<u32>,
@@ -57,7 +56,7 @@ struct Find<'a> {
 }
 
 impl Landmarks {
-    /// Finds the landmarks of a task; those found so far once `stop` says true.
+    /// Finds the landmarks of a task; returns those found so far if `stop` becomes true.
     pub fn new(task: &Compiled, mutex_groups: &[Vec<Fact>], stop: &(dyn Fn() -> bool + Sync)) -> Landmarks {
         let mut find = Find::new(task);
         for &fact in &task.goal {
@@ -131,7 +130,7 @@ impl<'a> Find<'a> {
         id
     }
 
-    /// Adds what must hold right before the landmark first becomes true.
+    /// Adds the preconditions shared by all first achievers of a landmark, ordered before it.
     fn backchain(&mut self, id: u32) {
         let task = self.task;
         let facts = self.all[id as usize].facts.clone();
@@ -186,7 +185,8 @@ impl<'a> Find<'a> {
         facts
     }
 
-    /// Facts that all operators need, and small sets of facts over one predicate of which each operator needs one.
+    /// Facts that all operators need, and small disjunctions over one predicate of which each
+    /// operator needs a fact.
     fn shared(&self, operators: &[u32]) -> Vec<Vec<u32>> {
         let task = self.task;
         let mut counts: FxHashMap<u32, u32> = FxHashMap::default();
@@ -273,9 +273,9 @@ impl<'a> Find<'a> {
 /// Most steps of looking for cycles among orderings.
 const ORDERING_WORK: usize = 5_000_000;
 
-/// Orders a landmark before others that would have to be given up again for it: goals, and what must hold together with
-/// it for a later landmark (Hoffmann et al. 2004, reasonable orders; Richter and Westphal 2010, section 4.3). Orders that
-/// would close a cycle are left out.
+/// Orders a landmark before others that it would have to delete: goals, and facts needed together
+/// with a later landmark (Hoffmann et al. 2004, reasonable orders; Richter and Westphal 2010,
+/// section 4.3). Orders that close a cycle are dropped.
 fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Landmark]) {
     let exclusions = Exclusions::new(task, mutex_groups, all);
     let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
@@ -380,7 +380,7 @@ fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool
     false
 }
 
-/// Landmark status of each state: landmarks accepted on its way.
+/// Landmark status of each state: landmarks accepted on all paths to the state.
 pub(crate) struct Status {
     accepted: Rows<u64>,
     scratch: Vec<u64>,
@@ -416,8 +416,8 @@ impl Status {
         self.accepted.push_row(&self.scratch);
     }
 
-    /// Sets the status of a state reached from another; where it was known already, only what both ways have seen
-    /// counts.
+    /// Updates the status of a successor state; over several paths to a state, the intersection of
+    /// accepted landmarks counts.
     pub(crate) fn follow(
         &mut self,
         landmarks: &Landmarks,
@@ -471,8 +471,7 @@ impl Status {
         left
     }
 
-    /// Goal count: goals still to come, or to come again; a goal achieved before others that it has
-    /// to be given up for is one.
+    /// Goal count: goals that are false or must become true again because they hold too early.
     pub(crate) fn goals_left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
         let bits = self.of(id);
         let open = |&&goal: &&u32| {

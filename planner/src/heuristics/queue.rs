@@ -1,6 +1,6 @@
 //! A radix heap: a priority queue for keys that never fall below the last one taken (Ahuja et al. 1990).
 
-/// Entries with 32-bit keys; equal keys leave in the reverse order of their moves, always the same way.
+/// Monotone radix heap with 32-bit keys; ties leave in a deterministic order.
 #[derive(Clone, Debug)]
 pub(crate) struct RadixHeap {
     buckets: Vec<Vec<(u32, u32)>>,
@@ -14,7 +14,7 @@ impl RadixHeap {
         RadixHeap { buckets: vec![Vec::new(); 33], last: 0, len: 0 }
     }
 
-    /// Empties it for keys from 0 on.
+    /// Empties the heap; keys may start at 0 again.
     pub(crate) fn clear(&mut self) {
         if self.len > 0 {
             self.buckets.iter_mut().for_each(Vec::clear);
@@ -23,7 +23,7 @@ impl RadixHeap {
         self.len = 0;
     }
 
-    /// Adds an entry; its key must not be below the last one taken.
+    /// Adds an entry; the key must be at least the last one popped.
     #[inline]
     pub(crate) fn push(&mut self, key: u32, item: u32) {
         let bucket = 32 - (key ^ self.last).leading_zeros() as usize;

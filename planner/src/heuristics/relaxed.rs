@@ -8,10 +8,10 @@ use crate::ground::Fact;
 use super::intervals::Intervals;
 use super::queue::RadixHeap;
 
-/// No node, no operator, no cost.
+/// No node, operator or cost.
 const NONE: u32 = u32::MAX;
 
-/// Repetitions of an operator that gives back what is used up, at most.
+/// Maximum repetitions of an operator that refills a consumed number.
 const MOST_REFILLS: f64 = 1000.0;
 
 /// Number of steps that weigh as much as a unit of cost where zero-cost operators exist.
@@ -24,7 +24,7 @@ pub enum Counting {
     Steps,
     /// Cost, plus one unless all costs are one.
     CostAndSteps,
-    /// Cost first; steps only where operators without cost would make plans longer for nothing.
+    /// Cost first; steps break ties, so that zero-cost operators do not lengthen plans.
     CostThenSteps,
 }
 
@@ -46,14 +46,14 @@ impl Counting {
 /// An operator in a relaxed plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Relevant {
-    /// The estimated cost at which it can be applied and has been.
+    /// Estimated cost at which the node has fired.
     pub at: u32,
     /// The operator.
     pub operator: u32,
-    /// Number of applications for the number that it is to change.
+    /// Number of applications needed for the node's numeric target.
     pub times: u32,
-    /// The fact of the numeric condition that it is repeated for; `u32::MAX` for none, [`REFILL`] for a number that the
-    /// relaxed plan uses up.
+    /// Fact of the numeric condition that determines the repetitions; `u32::MAX` for none,
+    /// [`REFILL`] for a number that the relaxed plan consumes.
     pub until: u32,
 }
 
@@ -65,7 +65,7 @@ fn reached(cost: u32, more: u32) -> u32 {
 /// Marks an operator that refills a number which others of the relaxed plan use up, in place of a fact.
 pub const REFILL: u32 = u32::MAX - 1;
 
-/// The heuristic with its working memory.
+/// Additive heuristic with its working memory.
 #[derive(Clone)]
 pub struct Relaxed {
     /// Preconditions of each node (an operator's unconditional effects, one conditional effect, or an axiom).
@@ -78,7 +78,7 @@ pub struct Relaxed {
     open: Vec<u32>,
     /// Nodes that need a fact, by fact.
     waiting: Lists<u32>,
-    /// Nodes that need nothing.
+    /// Nodes without preconditions.
     free: Vec<u32>,
     /// Facts that hold always in the relaxation: absences of derived facts.
     always: Vec<u32>,
@@ -105,7 +105,7 @@ pub struct Relaxed {
 }
 
 impl Relaxed {
-    /// The heuristic of a task, counting operators in this way, towards the task's goal.
+    /// Heuristic towards the task's goal, with the given operator costs.
     pub fn new(task: &Compiled, counting: Counting) -> Relaxed {
         let all: Vec<u32> = (0..task.operators() as u32).collect();
         let goal = task.goal.iter().map(|&f| task.id(f)).collect();
@@ -217,7 +217,8 @@ impl Relaxed {
         }
     }
 
-    /// Lets a node move its numbers, and again all nodes whose amounts depend on numbers that moved.
+    /// Applies a node's numeric changes, and re-applies the nodes whose amounts depend on changed
+    /// numbers.
     fn move_numbers(&mut self, node: usize) {
         let now = self.node_costs[node];
         let mut waiting = vec![node as u32];
@@ -257,7 +258,7 @@ impl Relaxed {
         total
     }
 
-    /// Adds what gives back the numbers that the relaxed plan uses up.
+    /// Adds operators that refill the numbers that the relaxed plan consumes.
     fn refill(&mut self, task: &Compiled, state: &[u32], total: &mut u32) {
         for (number, missing) in self.intervals.shortages(task, state, &self.plan) {
             let givers = self.intervals.givers(number).iter();
@@ -302,7 +303,8 @@ impl Relaxed {
         marked.then(|| &self.plan[self.slots[place] as usize])
     }
 
-    /// Takes a node into the relaxed plan, repeated so often until a fact holds, and asks for what it needs.
+    /// Adds a node to the relaxed plan, repeated until a fact holds, and requests its
+    /// preconditions.
     fn take(&mut self, node: u32, (times, until): (u32, u32), total: &mut u32) {
         let preconditions = self.preconditions.get(node as usize);
         self.stack.extend_from_slice(preconditions);

@@ -1,5 +1,6 @@
-//! Changes of one number or one object at once. PDDL 2.1 (section 8.1) gives them a result only where their order does not matter:
-//! where all add to it, all scale it, or all give it the same value. Where they contradict each other, what makes them cannot happen.
+//! Simultaneous changes of one number or object. PDDL 2.1 (section 8.1) defines a result only if
+//! the order does not matter: all increase, all scale, or all assign the same value. Actions with
+//! contradicting changes are inapplicable.
 
 use std::hash::Hash;
 
@@ -21,8 +22,8 @@ impl Assignment {
     }
 }
 
-/// True if two changes of one number, each with its amount, have a joint result; false for unknown
-/// amounts (NaN).
+/// True if two changes of one number, each with its amount, commute; false for unknown amounts
+/// (NaN).
 fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f64)) -> bool {
     let adds = |change: Assignment| matches!(change, Assignment::Increase | Assignment::Decrease);
     let scales = |change: Assignment| matches!(change, Assignment::ScaleUp | Assignment::ScaleDown);

@@ -11,7 +11,7 @@ use crate::task::Modal;
 pub(crate) enum Literal {
     /// The operator's first condition.
     First(bool),
-    /// Its second condition.
+    /// Second condition of the constraint.
     Second(bool),
     /// A flag that earlier states have left.
     Flag(usize, bool),
@@ -19,19 +19,19 @@ pub(crate) enum Literal {
 
 use Literal::{First, Flag, Second};
 
-/// Conjunctions of literals; one of them is enough.
+/// Disjunction of conjunctions of literals.
 pub(crate) type Cases = &'static [&'static [Literal]];
 
 /// Automaton of a trajectory constraint (PDDL3).
 #[derive(Debug)]
 pub(crate) struct Automaton {
-    /// Number of flags, all of them initially down.
+    /// Number of flags, all initially false.
     pub flags: usize,
-    /// States that break it, whatever comes later.
+    /// States that violate the constraint for good.
     pub broken: Cases,
-    /// States that raise (or lower) a flag for the states after them.
+    /// Transitions: states that set or clear a flag for the following states.
     pub changes: &'static [(usize, bool, &'static [Literal])],
-    /// Last states that leave it unfulfilled.
+    /// Final states that leave the constraint unsatisfied.
     pub open: Cases,
 }
 
@@ -45,7 +45,7 @@ static SOMETIME: Automaton = Automaton {
     changes: &[(0, true, &[First(true)])],
     open: &[&[First(false), Flag(0, false)]],
 };
-/// It was true; it was true and became false.
+/// Flags: has been true; has been true and became false.
 static AT_MOST_ONCE: Automaton = Automaton {
     flags: 2,
     broken: &[&[First(true), Flag(1, true)]],
@@ -81,7 +81,7 @@ impl Automaton {
         }
     }
 
-    /// True if it accepts a plan, given the truths of both conditions state by state.
+    /// True if the automaton accepts a plan, given the truth of both conditions in each state.
     pub(crate) fn accepts(&self, truths: impl IntoIterator<Item = (bool, bool)>) -> bool {
         let mut flags = [false; 2];
         let mut open = true;

@@ -3,11 +3,11 @@
 
 use super::relation::Relation;
 
-/// Parts of an interval no longer than this are nothing but rounding.
+/// Minimum length of a sub-interval; shorter ones are rounding errors.
 const EDGE: f64 = 1e-9;
 
-/// Parts of an interval, from 0 to 1 and without these ends, such that a condition on numbers holds all the time inside if it
-/// holds at each of them: where a comparison may change, and once between two such places.
+/// Test points in the open interval (0, 1): a numeric condition holds throughout if it holds at
+/// each of them. They are the roots of the comparisons, and one point between neighbours.
 ///
 /// `differences` are those of the sides of each comparison: at the beginning, in the middle and at the end. They are taken to
 /// change at a rate, or as products of two such numbers do.

@@ -1,9 +1,10 @@
-//! Durative actions that can never be carried out, whatever the state: their own start takes away what they need while they run.
+//! Durative actions that are never applicable: their own start deletes an invariant.
 
 use crate::diagnostic::Span;
 use crate::task::{Action, Atom, Change, Condition};
 
-/// An atom that a durative action needs over all and its own start takes away, and the effect that does so.
+/// Invariant (over-all atom) that a durative action deletes at its own start, with the span of that
+/// effect.
 pub fn self_defeating(action: &Action) -> Option<(&Atom, Span)> {
     let effects = &action.effects.start;
     let adds = |atom: &Atom| {

@@ -25,7 +25,7 @@ pub enum Relation {
 }
 
 impl Relation {
-    /// The relation that a comparison, or its negation, asks for.
+    /// Relation required by a comparison or by its negation.
     pub(crate) fn of(comparison: Comparison, wanted: bool) -> Relation {
         match (comparison, wanted) {
             (Comparison::Less, true) | (Comparison::GreaterOrEqual, false) => Relation::Less,
@@ -37,7 +37,7 @@ impl Relation {
         }
     }
 
-    /// True if all numbers on one side of a bound fulfil it.
+    /// True if all numbers on one side of a bound satisfy the relation.
     pub fn is_bound(self) -> bool {
         !matches!(self, Relation::Equal | Relation::Unequal)
     }
@@ -81,7 +81,7 @@ fn equal(left: f64, right: f64) -> bool {
         || apart.is_finite() && apart <= RELATIVE_TOLERANCE * left.abs().max(right.abs())
 }
 
-/// The quotient; undefined (NaN) if it is not finite.
+/// Quotient; NaN if not finite.
 pub fn quotient(left: f64, right: f64) -> f64 {
     let value = left / right;
     if value.is_finite() { value } else { f64::NAN }

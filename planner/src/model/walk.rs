@@ -1,8 +1,8 @@
-//! Walking over what a task says: conditions, expressions, calls and terms, each part before what it is made of.
+//! Pre-order traversal of a task's conditions, expressions, calls and terms.
 
 use crate::task::{Action, Call, Change, Condition, Effect, Expression, Fluent, Task, Term, Timed};
 
-/// A part of what is said.
+/// Visited node.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Part<'t> {
     Condition(&'t Condition),
@@ -112,20 +112,21 @@ fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t Call> {
 }
 
 impl Action {
-    /// All that it asks of modules: for its parameters, duration, conditions, effects, rates and preferences.
+    /// All module calls of an action: grounding, duration, conditions, effects, rates and
+    /// preferences.
     pub fn calls(&self) -> Vec<&Call> {
         calls(|visit| action(self, visit))
     }
 }
 
 impl Expression {
-    /// All that it asks of modules.
+    /// All module calls of a rule.
     pub fn calls(&self) -> Vec<&Call> {
         calls(|visit| expression(self, visit))
     }
 }
 
-/// Visits all that a task says of its goal, and of the way there.
+/// Visits goal, constraints, preferences and metric of a task.
 pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     condition(&task.goal.body, visit);
     let constraints = task.constraints.iter().flat_map(|constraint| &constraint.conditions);
@@ -135,7 +136,7 @@ pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     task.metric.iter().for_each(|metric| expression(&metric.value, visit));
 }
 
-/// An expression with something else for some of its parts.
+/// Expression with some subexpressions replaced.
 pub(crate) fn replaced(own: &Expression, with: &dyn Fn(&Expression) -> Option<Expression>) -> Expression {
     let list = |parts: &[Expression]| parts.iter().map(|part| replaced(part, with)).collect();
     let both = |sides: &[Expression; 2]| Box::new(sides.each_ref().map(|side| replaced(side, with)));

@@ -1,4 +1,4 @@
-//! The tree of a domain or problem file as it was written: names not yet looked up, every part with its place.
+//! Syntax tree of a domain or problem file: names unresolved, every node with its span.
 
 use crate::attachment::CallKind;
 use crate::diagnostic::Span;
@@ -7,7 +7,7 @@ use crate::diagnostic::Span;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol(pub u32);
 
-/// A name where it was written.
+/// Name with its span.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Name {
     /// The case-folded name.
@@ -21,7 +21,7 @@ pub struct Name {
 pub struct Typed {
     /// The name that is declared.
     pub name: Name,
-    /// Its types, alternatives of an `either`; empty where none is given.
+    /// Types, the alternatives of an `either`; empty if untyped.
     pub types: Vec<Name>,
 }
 
@@ -39,7 +39,7 @@ pub struct Signature {
 pub struct FunctionDeclaration {
     /// Name and parameters.
     pub signature: Signature,
-    /// Types of its value.
+    /// Types of the function's value.
     pub result: Vec<Name>,
 }
 
@@ -232,7 +232,7 @@ pub enum Modal {
     HoldAfter,
 }
 
-/// The five ways to change a fluent.
+/// Five operators that change a fluent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Assignment {
     /// `assign`
@@ -289,7 +289,7 @@ pub enum Effect {
 pub struct DurationBound {
     /// The time at which the bound is evaluated.
     pub when: When,
-    /// `?duration` stands on the left of it.
+    /// Comparison with `?duration` on the left-hand side.
     pub comparison: Comparison,
     /// The bound.
     pub value: Term,
@@ -332,7 +332,7 @@ pub struct Derived {
 /// A domain file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Domain {
-    /// True if a part of it could not be read at all.
+    /// True if a part of the domain could not be parsed.
     pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
@@ -340,7 +340,7 @@ pub struct Domain {
     pub requirements: Vec<Name>,
     /// Declared types.
     pub types: Vec<Typed>,
-    /// `:oplinit`: what the modules are set up with, whatever the problem.
+    /// `:oplinit`: options of the modules, independent of the problem.
     pub module_options: Vec<ModuleOption>,
     /// Declared semantic modules.
     pub modules: Vec<ModuleDeclaration>,
@@ -363,7 +363,7 @@ pub struct Domain {
 pub enum Initial {
     /// `(p a b)`, or `(not (p a b))`
     Literal {
-        /// True if it is stated to be false.
+        /// True for a negative literal.
         negated: bool,
         /// The predicate.
         name: Name,
@@ -410,11 +410,11 @@ pub struct Metric {
 /// A problem file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Problem {
-    /// True if a part of it could not be read at all.
+    /// True if a part of the problem could not be parsed.
     pub unread: bool,
     /// Its name.
     pub name: Option<Name>,
-    /// The domain that it says it belongs to.
+    /// Name of the domain that the problem refers to.
     pub domain: Option<Name>,
     /// Requirements repeated in the problem.
     pub requirements: Vec<Name>,

@@ -1,4 +1,5 @@
-//! PDDL text laid out: the author's line breaks between parts stay, indentation, blanks and closing parentheses become alike.
+//! PDDL formatter: keeps the author's line breaks between parts; normalises indentation, blanks and
+//! closing parentheses.
 //!
 //! Comments are kept where they stand. What is read is the same before and after, and laying out twice changes nothing.
 
@@ -9,7 +10,7 @@ mod tree;
 use super::lex::{self, Symbols};
 use crate::diagnostic::{Findings, Source};
 
-/// Layouts are made until nothing changes any more, at most so often.
+/// Maximum number of layout passes until a fixed point.
 const MOST_PASSES: usize = 6;
 
 /// Lays out a domain, a problem, or any text of lists.

@@ -9,7 +9,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use super::ast::Symbol;
 use crate::diagnostic::{Diagnostic, Span};
 
-/// Deepest nesting that is read. Everything after works recursively, so that this bounds the stack.
+/// Maximum nesting depth; bounds the stack of all later recursion.
 pub const MAX_DEPTH: usize = 200;
 
 /// Names, each once, case-folded. Shared by the files of one task.
@@ -50,7 +50,8 @@ impl Symbols {
         &self.names[symbol.0 as usize]
     }
 
-    /// Notes the names that a domain's tree declares as predicates: what they begin is no misspelt connective.
+    /// Records predicate names declared by the domain, so that they are not taken for misspelt
+    /// connectives.
     pub fn declare_predicates(&mut self, tree: &Tree) {
         let head = |list: usize| match tree.children(list).next().map(|first| tree.nodes[first].kind) {
             Some(Kind::Word(symbol)) => Some(symbol),
@@ -93,13 +94,13 @@ pub enum Kind {
 /// A list or word.
 #[derive(Debug, Clone, Copy)]
 pub struct Node {
-    /// Its kind.
+    /// Kind of the node.
     pub kind: Kind,
     /// First byte.
     pub start: u32,
     /// One past the last byte.
     pub end: u32,
-    /// Index of the node after this one and all that is in it.
+    /// Index of the node after this one's subtree.
     pub next: u32,
 }
 
@@ -144,7 +145,7 @@ impl Iterator for Children<'_> {
     }
 }
 
-/// Sections: lists that stand directly in `(define …)` and nowhere else.
+/// Keywords of sections: lists directly inside `(define …)` only.
 const SECTIONS: &[&str] = &[
     ":requirements",
     ":types",
@@ -174,7 +175,7 @@ const ACTIONS: &[&str] = &[":action", ":durative-action", ":process", ":event"];
 const ACTION_PARTS: &[&str] =
     &[":parameters", ":precondition", ":condition", ":duration", ":effect", ":grounding"];
 
-/// Reads a text of source number `source` into a tree; what is wrong with its parentheses goes to `findings`.
+/// Parses a text of source number `source` into a tree; parenthesis errors go to `findings`.
 pub fn read(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Tree {
     let mut builder = Builder {
         text,
@@ -208,14 +209,16 @@ struct Builder<'a> {
     last_close: Option<u32>,
     /// The action closed last, directly in the definition.
     last_action: Option<usize>,
-    /// An open list that a later line stands left of, with that line's first byte: probably never closed.
+    /// Open list that is probably unclosed: a later line starts left of it. With the first byte of
+    /// that line.
     suspect: Option<(usize, u32)>,
-    /// The same of the section closed last.
+    /// Suspect of the previous section.
     suspect_before: Option<(usize, u32)>,
     line_start: usize,
     fresh_line: bool,
     too_deep: bool,
-    /// True for each kind of sign unknown to PDDL, such as a blank or a hyphen, that was already reported.
+    /// True for each kind of non-PDDL character, such as a special blank or hyphen, that was
+    /// already reported.
     odd: [bool; 3],
     findings: &'a mut Vec<Diagnostic>,
 }
@@ -268,7 +271,7 @@ impl Builder<'_> {
         self.finish();
     }
 
-    /// Reads a word, or skips what stands for a blank; gives where it ends.
+    /// Reads a word, or skips a character that counts as a blank; returns the end.
     fn word_or_blank(&mut self, at: usize, symbols: &mut Symbols) -> usize {
         let end = self.word_end(at);
         let word = &self.text[at..end];
@@ -287,7 +290,7 @@ impl Builder<'_> {
         blank.map_or(end, |(before, _)| at + before)
     }
 
-    /// Says once of each kind that a sign is not the one of PDDL for which it is read.
+    /// Reports a non-PDDL character once per kind, with the character it is read as.
     fn odd(&mut self, kind: usize, message: String, span: Span, help: &str) {
         if !std::mem::replace(&mut self.odd[kind], true) {
             let finding = Diagnostic::warning("odd-sign", message, span, "other planners do not read this");
@@ -347,7 +350,7 @@ impl Builder<'_> {
         }
     }
 
-    /// A closing sign of the other kind. Says so; true if it closes a list all the same.
+    /// Reports a mismatched closing bracket; true if it closes the list anyway.
     fn mend_mixed(&mut self, at: usize, list: usize) -> bool {
         let node = self.tree.nodes[list];
         let (open, wanted, got) = if node.kind == Kind::List { ('(', ')', ']') } else { ('[', ']', ')') };
@@ -426,8 +429,8 @@ impl Builder<'_> {
         }
     }
 
-    /// The column that what belongs to a list stands right of: that of its sign; where nothing but its first word stands in its line,
-    /// that of the line.
+    /// Column right of which the list's contents should stand: the bracket's, or the line's if only
+    /// its first word stands there.
     fn edge(&self, start: usize) -> usize {
         let line = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let rest = self.text[start + 1..].lines().next().unwrap_or_default();
@@ -456,7 +459,7 @@ impl Builder<'_> {
         words.iter().any(|section| section.eq_ignore_ascii_case(word))
     }
 
-    /// A section begins here: everything before it but `(define` should be closed.
+    /// Handles the start of a section: all lists before it except `(define` should be closed.
     fn expect_section(&mut self, at: usize) {
         if self.open.len() > 1 {
             self.unclosed(1, at, "a new section begins here");
@@ -482,7 +485,7 @@ impl Builder<'_> {
         self.open.push(define);
     }
 
-    /// A part of an action begins here: it should stand directly in the action.
+    /// Handles the start of an action part, which should stand directly inside the action.
     fn expect_action_part(&mut self, start: usize, end: usize) {
         let in_action =
             self.open.get(1).is_some_and(|&list| self.begins(self.tree.nodes[list].start as usize, ACTIONS));
@@ -496,7 +499,7 @@ impl Builder<'_> {
         }
     }
 
-    /// An action goes on although a parenthesis closed it, and maybe the whole definition with it.
+    /// Reopens an action (and possibly the definition) that a parenthesis closed too early.
     fn reopen_action(&mut self, start: usize, end: usize) {
         let (Some(action), Some(close)) = (self.last_action, self.last_close) else { return };
         // While a list is open its end is not known: only closed ones can be walked.
@@ -525,7 +528,8 @@ impl Builder<'_> {
         self.open.push(action);
     }
 
-    /// Reports the list that misses its closing sign, of those open beyond `depth`; `there` says what stands at `at`.
+    /// Reports the list that lacks its closing bracket, of those open beyond `depth`; `there`:
+    /// description of the text at `at`.
     fn unclosed(&mut self, depth: usize, at: usize, there: &str) {
         let outer = depth.checked_sub(1).map(|parent| self.open[parent]);
         let (list, before, there) = match self.suspect.take().filter(|&(list, _)| Some(list) > outer) {

@@ -1,4 +1,4 @@
-//! PDDL text: from characters to a tree of names, and the checks that make a [`Task`](crate::Task) of it.
+//! PDDL text: parsing to a syntax tree, and the checks that make a [`Task`](crate::Task) from it.
 
 pub mod ast;
 mod check;
@@ -11,7 +11,7 @@ pub use check::check;
 pub(crate) use check::{defeated, without_value};
 pub use format::format;
 
-/// The name most like `name`, if one is near enough to be meant: at most a third of its letters differ.
+/// Known name most similar to `name`, if at most a third of the letters differ.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.chars().count() / 3).max(1);
     known
@@ -22,7 +22,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Edits (insertions, deletions, replacements, swaps of neighbours) from one word to the other; above `limit` just more than it.
+/// Edit distance (insertion, deletion, replacement, transposition of neighbours); above `limit`,
+/// some larger number.
 fn distance(from: &str, to: &str, limit: usize) -> usize {
     let (from, to): (Vec<char>, Vec<char>) = (from.chars().collect(), to.chars().collect());
     if from.len().abs_diff(to.len()) > limit {

@@ -1,10 +1,11 @@
-//! A plan laid out: a step a line, times and durations in three digits where that is exact, comments where they stand.
+//! Plan formatter: one step per line, times and durations with three decimals if exact, comments
+//! kept in place.
 
 use super::{Plan, Reader, seconds};
 use crate::diagnostic::{Findings, Source};
 
 impl Plan {
-    /// Lays a plan out. Steps keep their order, and reading it gives the same plan.
+    /// Formats a plan; steps keep their order, and reading the result gives the same plan.
     ///
     /// # Errors
     /// Every line that is no step: such a text is not touched.
@@ -47,7 +48,7 @@ impl Plan {
     }
 }
 
-/// A step as it is written, with one blank where some are.
+/// Step text with runs of blanks reduced to one.
 fn step(text: &str) -> String {
     let (before, rest) = text.split_once('(').unwrap_or(("", text));
     let (inside, after) = rest.split_once(')').unwrap_or((rest, ""));
@@ -59,7 +60,7 @@ fn step(text: &str) -> String {
     format!("{time}({call}){duration}")
 }
 
-/// A number in the digits of plans where these say all of it; else as it is written.
+/// Number with the decimals of plans if exact; otherwise unchanged.
 fn exact(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(value) if seconds(value).parse() == Ok(value) => seconds(value),

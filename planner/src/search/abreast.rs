@@ -1,9 +1,9 @@
-//! Searches side by side that come to what they would come to one after another.
+//! Parallel portfolio: the results equal those of running the searches one after another.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Does jobs at the same time, each in a thread. Returns what they came to in their order, up to the first that ends the matter;
-/// those behind it are told that nobody waits for them.
+/// Runs jobs in parallel threads. Returns their results in order, up to the first conclusive one;
+/// later jobs are cancelled.
 pub fn in_order<R: Send>(
     jobs: Vec<impl FnOnce(&AtomicBool) -> R + Send>,
     ends_it: impl Fn(&R) -> bool,

@@ -1,4 +1,5 @@
-//! A* with LM-cut (Hart, Nilsson and Raphael 1968; Helmert and Domshlak 2009): the cheapest plan with its proof.
+//! A* with LM-cut (Hart, Nilsson and Raphael 1968; Helmert and Domshlak 2009): an optimal plan with
+//! its proof.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use crate::memory::{MemoryLimit, Rows};
 use super::lazy::{Counts, End};
 use super::store::{NO_STATE, Store};
 
-/// Bytes of an open entry, with the room that lists have beyond what they hold.
+/// Memory of an open-list entry, bytes, including spare capacity.
 const ENTRY_BYTES: usize = 8;
 /// Bytes of a bucket of the open list.
 const BUCKET_BYTES: usize = 64;
@@ -19,7 +20,7 @@ const BUCKET_BYTES: usize = 64;
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     cost: u32,
-    /// False while the bound is only what the parent's leaves.
+    /// True if the bound is the state's own; false if inherited from its parent.
     is_own: bool,
 }
 
@@ -31,7 +32,7 @@ pub(crate) struct AStar<'a> {
     store: Store,
     /// Lower bounds by state.
     bounds: Rows<Bound>,
-    /// States by the bound on the cost of plans through them, then by the bound from there; LIFO among equal ones.
+    /// Open list by f, then by h; LIFO among ties.
     open: BTreeMap<(u32, u32), Vec<u32>>,
     entries: usize,
     counts: Counts,
@@ -105,7 +106,7 @@ impl<'a> AStar<'a> {
         End::Exhausted
     }
 
-    /// Bounds the cost from a state that has only its parent's bound, and opens it again unless it is a dead end.
+    /// Evaluates a state whose bound is inherited, and reopens it unless it is a dead end.
     fn evaluate(&mut self, id: u32, state: &[u32], stop: &(dyn Fn() -> bool + Sync)) {
         self.counts.evaluated += 1;
         let inherited = self.bounds[id as usize].cost;
@@ -152,7 +153,7 @@ impl<'a> AStar<'a> {
         self.entries += 1;
     }
 
-    /// Takes the state with the least bound on the cost of plans through it.
+    /// Pops the state with minimum f.
     fn pop(&mut self) -> Option<(u32, u32)> {
         let mut bucket = self.open.first_entry()?;
         let (through, _) = *bucket.key();

@@ -9,8 +9,8 @@ use crate::task::Task;
 
 use super::run::{ClassicalEnd, ClassicalOptions, FIRST_WORK, solve};
 
-/// Plans for a task that is [`crate::classical::compiled::is_classical`]; `check` validates each plan, and keeps back those that
-/// are no better than the ones before. `soft` where more is to be won than what a first plan has.
+/// Plans a classical task ([`crate::classical::compiled::is_classical`]); `check` validates each
+/// plan and rejects those that are no better than earlier ones. `soft`: the task has soft goals.
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn plan_classical(
     task: &Task,

@@ -16,7 +16,7 @@ use super::store::{NO_STATE, Store};
 const SMALLEST_WINDOW: usize = 4;
 /// States evaluated for a window in the first round.
 const FIRST_EVALUATIONS: u32 = 12;
-/// Overestimate of a state's distance, in per cent, above which it is left out.
+/// Maximum distance estimate of a kept state, per cent of the remaining budget.
 const TRUST_PERCENT: u64 = 80;
 
 /// The work of improving one plan after another.
@@ -83,8 +83,8 @@ impl<'a> Improve<'a> {
         self.work
     }
 
-    /// Improves the plan in place until nothing helps any more, `work` more is done, or stopped. `on_better` hears of
-    /// every better plan.
+    /// Improves the plan in place until no window helps, `work` is used up, or stopped; `on_better`
+    /// gets every better plan.
     pub fn run(&mut self, plan: &mut Vec<u32>, work: u64, on_better: &mut dyn FnMut(&[u32])) -> bool {
         self.work_limit = self.work().saturating_add(work);
         let mut best = self.cost(plan);
@@ -168,8 +168,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Puts steps that depend on each other next to each other. Every order that keeps steps apart that touch the same
-    /// variable, one of them writing, has the same effect.
+    /// Moves dependent steps next to each other. Any order that preserves the order of interfering
+    /// steps has the same effect.
     fn rearrange(&mut self, plan: &mut Vec<u32>, round: usize) {
         let reverse = round % 2 == 1;
         let (mut after, mut waits) = dependencies(self.task, plan);
@@ -235,8 +235,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// True if the rest of a plan still reaches the goal after a replanned window. That is certain
-    /// without numbers: a window's goal does not mention them.
+    /// True if the rest of a plan still reaches the goal after a replanned window; certain without
+    /// numbers, as a window's goal does not include them.
     fn fits(&mut self, from: &[u32], window: &[u32], rest: &[u32]) -> bool {
         let task = self.task;
         if !task.some_impossible() {
@@ -252,7 +252,8 @@ impl<'a> Improve<'a> {
         works && task.is_goal(&state)
     }
 
-    /// A way from the state to the goal facts that costs less than `budget`, if a short search finds one.
+    /// Plan from the state to the goal facts that is cheaper than `budget`, if a short search finds
+    /// one.
     fn replan(
         &mut self,
         from: &[u32],
@@ -309,7 +310,7 @@ impl<'a> Improve<'a> {
         best.map(|(_, plan)| plan)
     }
 
-    /// The heuristic over the operators that write only what the window writes.
+    /// Heuristic over the operators that write only variables that the window writes.
     fn restricted(&mut self, window: &[u32], goal: &[u32]) -> Relaxed {
         let task = self.task;
         self.touched.fill(false);
@@ -381,7 +382,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Follows the relaxed plan as far as it can be applied; a goal on its way that is cheap enough is taken.
+    /// Applies the relaxed plan as far as possible; accepts a goal state on its path if cheap
+    /// enough.
     fn try_lookahead(
         &mut self,
         relaxed: &Relaxed,
@@ -412,7 +414,7 @@ impl<'a> Improve<'a> {
     }
 }
 
-/// Pairs of variable and operator that writes it.
+/// Pairs of a variable and an operator that writes it.
 fn writes(task: &Compiled) -> impl Iterator<Item = (u32, u32)> + Clone + '_ {
     (0..task.operators() as u32).flat_map(move |op| {
         let mut variables: Vec<u32> = task.written(op).collect();
@@ -426,7 +428,7 @@ fn writes_only(task: &Compiled, operator: u32, touched: &[bool]) -> bool {
     task.written(operator).all(|v| touched[v as usize])
 }
 
-/// For each step: the later steps that must stay behind it; and how many steps each waits for.
+/// For each step, the later steps that depend on it, and its number of dependencies.
 fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     let mut after: Vec<Vec<u32>> = vec![Vec::new(); plan.len()];
     let mut waits = vec![0u32; plan.len()];
@@ -455,7 +457,7 @@ fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     (after, waits)
 }
 
-/// Needs of the rest of a plan at each of its steps.
+/// Regressed needs of a plan's remainder at each of its steps.
 struct Needs {
     /// Steps at which a value of a variable is needed, with the value, or written (`u32::MAX`), by
     /// variable; rising.
@@ -487,8 +489,8 @@ impl Needs {
         Needs { events }
     }
 
-    /// Facts that must hold before step `end`. Where conditional effects or axioms make this hard to tell, the whole
-    /// state of the plan at that point.
+    /// Facts that must hold before step `end`; with conditional effects or axioms, the whole state
+    /// at that point.
     fn at(&self, task: &Compiled, plan: &[u32], end: usize) -> Vec<u32> {
         if self.events.is_empty() {
             if end == plan.len() {

@@ -20,7 +20,7 @@ const BOOST: i64 = 1000;
 /// Configuration of one search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strategy {
-    /// Greedy where `None`, else weighted A* with this weight.
+    /// Weight of weighted A*; `None`: greedy.
     pub weight: Option<u32>,
     /// Operator costs of the heuristics.
     pub counting: Counting,
@@ -47,7 +47,7 @@ pub(crate) struct Strategy {
 pub enum End {
     /// A plan.
     Plan(Vec<u32>),
-    /// There is no (cheaper) plan.
+    /// No plan exists, or none below the bound.
     Exhausted,
     /// The work limit.
     Limit,
@@ -70,7 +70,7 @@ pub struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
-    /// Facts of which one holds at most.
+    /// Mutex groups of facts.
     pub mutex_groups: &'a [Vec<Fact>],
     pub memory: MemoryLimit,
     pub stop: &'a (dyn Fn() -> bool + Sync),
@@ -90,13 +90,13 @@ pub struct Allowed<'c> {
 }
 
 impl Allowed<'_> {
-    /// True if a search must end: it was stopped, or nobody waits for it.
+    /// True if a search must end: stopped, or its result is no longer needed.
     pub(crate) fn has_ended(&self, shared: &Shared<'_>) -> bool {
         self.cancelled.load(Ordering::Relaxed) || (shared.stop)()
     }
 }
 
-/// A search, which can be gone on with after it ended with [`End::Limit`].
+/// Resumable search; after [`End::Limit`] it can continue.
 pub(crate) struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     strategy: Strategy,
@@ -118,7 +118,7 @@ pub(crate) struct Search<'a, 's> {
     next: Vec<u32>,
     applicable: Vec<u32>,
     preferred: Vec<u32>,
-    /// States on the way of the last lookahead.
+    /// States along the last lookahead.
     trail: Vec<u32>,
 }
 
@@ -131,7 +131,7 @@ pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, cancelled: &Atomic
 }
 
 impl Counts {
-    /// Adds what another search took.
+    /// Adds the counts of another search.
     pub(crate) fn add(&mut self, other: Counts) {
         self.evaluated += other.evaluated;
         self.expanded += other.expanded;
@@ -236,7 +236,7 @@ impl<'a, 's> Search<'a, 's> {
         memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
-    /// Makes the state behind an entry and visits it if that is worth while.
+    /// Generates the successor of an entry and visits it if worthwhile.
     fn follow(&mut self, parent: u32, operator: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
         let cost = task.with_cost(self.store.cost(parent), operator);
@@ -256,8 +256,8 @@ impl<'a, 's> Search<'a, 's> {
         self.visit(id)
     }
 
-    /// True if a known state is to be visited: never expanded, or (weighted A*) reached more
-    /// cheaply.
+    /// True if a known state is to be visited again: never expanded, or (weighted A*) reached at
+    /// lower cost.
     fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
         let reopens = self.strategy.weight.is_some() || self.strategy.bound != u32::MAX;
         if cost < self.store.cost(id) && reopens {
@@ -267,8 +267,8 @@ impl<'a, 's> Search<'a, 's> {
         !self.store.is_expanded(id)
     }
 
-    /// Evaluates and expands the state in `self.state`, then its lookahead states as long as they are better. Where a
-    /// lookahead ran into a dead end, half of its way is tried.
+    /// Evaluates and expands `self.state`, then its lookahead states while they improve. After a
+    /// dead end, half of the lookahead is tried.
     fn visit(&mut self, mut id: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
         let mut last = u32::MAX;
@@ -357,7 +357,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Moves `self.state` to the lookahead state; `None` if there is none or it is known already.
+    /// Moves `self.state` to the lookahead state; `None` if there is none or the state is known.
     fn look_ahead(&mut self, mut id: u32) -> Option<u32> {
         let task = self.shared.task;
         self.lookahead.run(task, &self.state, &self.relaxed.plan);

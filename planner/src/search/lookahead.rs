@@ -13,9 +13,9 @@ pub struct Lookahead {
     /// Number of remaining operators (and goals) that need a fact, by fact.
     pub(super) needed: Vec<i32>,
     pub(super) rest: Vec<Relevant>,
-    /// Operators of the relaxed plan that are there to move a number.
+    /// Operators of the relaxed plan that serve to change a number.
     pub(super) moves: Vec<Relevant>,
-    /// Operators of the relaxed plan that give back what others use up.
+    /// Operators of the relaxed plan that refill numbers.
     pub(super) refills: Vec<Relevant>,
     pub(super) state: Vec<u32>,
     next: Vec<u32>,
@@ -29,7 +29,7 @@ pub struct Lookahead {
 pub(super) const MOST_STEPS: usize = 20_000;
 
 impl Lookahead {
-    /// For a task.
+    /// Lookahead for a task.
     pub fn new(task: &Compiled) -> Lookahead {
         let pairs = (0..task.operators())
             .flat_map(|op| task.effects.get(op).iter().map(move |e| (task.id(e.fact), op as u32)));
@@ -48,7 +48,7 @@ impl Lookahead {
         }
     }
 
-    /// Applies what can be applied of the relaxed plan; leaves the operators in `plan`.
+    /// Applies as much of the relaxed plan as possible; leaves the applied operators in `plan`.
     pub fn run(&mut self, task: &Compiled, from: &[u32], relaxed: &[Relevant]) {
         self.plan.clear();
         self.rest.clear();
@@ -77,9 +77,8 @@ impl Lookahead {
         self.steer_to_goal(task);
     }
 
-    /// Applies every applicable operator of the relaxed plan in order. Operators that only change
-    /// numbers are kept back, and applied just before an operator that would disable them. Returns
-    /// true if any was applied.
+    /// Applies every applicable operator of the relaxed plan in order; number-changing ones are
+    /// delayed until an operator would disable them. True if any was applied.
     fn pass(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         let mut rest = std::mem::take(&mut self.rest);
@@ -99,7 +98,7 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Applies what gives back numbers that the rest uses up, wherever that is possible; tells whether there was any.
+    /// Applies refill operators wherever possible; true if any was applied.
     pub(super) fn fill(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         for place in 0..self.refills.len() {
@@ -112,7 +111,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Moves numbers with what can be applied now, but no longer once an operator has been; tells whether there was any.
+    /// Applies number-changing operators that the given operator would disable; true if any was
+    /// applied.
     fn hurry(&mut self, task: &Compiled, operator: u32) -> bool {
         let before = self.plan.len();
         for place in 0..self.moves.len() {
@@ -124,8 +124,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Applies an operator as often as the relaxed plan says, but no longer than it can be applied and is needed; how
-    /// often that was.
+    /// Applies an operator repeatedly, up to the relaxed plan's count, while applicable and needed;
+    /// returns the number of applications.
     pub(super) fn repeat(&mut self, task: &Compiled, entry: Relevant) -> u32 {
         let mut times = 0;
         while times < entry.times
@@ -144,8 +144,8 @@ impl Lookahead {
         self.plan.push(operator);
     }
 
-    /// Finds two operators of which the first was to give the second a fact, and another operator that gives it and
-    /// can be applied now; puts that in the first one's place.
+    /// Repairs the relaxed plan: an applicable operator that adds the same needed fact replaces an
+    /// inapplicable one.
     fn mend(&mut self, task: &Compiled) -> bool {
         for i in 0..self.rest.len() {
             for effect in task.effects.get(self.rest[i].operator as usize) {
@@ -170,7 +170,7 @@ impl Lookahead {
     }
 }
 
-/// Counts an operator's preconditions among those that the rest of the plan needs.
+/// Adds an operator's preconditions to the facts that the rest of the plan needs.
 pub(super) fn count(needed: &mut [i32], task: &Compiled, operator: u32, by: i32) {
     for &fact in task.preconditions.get(operator as usize) {
         needed[task.id(fact) as usize] += by;

@@ -1,6 +1,7 @@
-//! Best-first width search: states that show something new come first (Lipovetzky and Geffner 2017, BFWS with
-//! evaluation f5). What is new is judged among states of a kind: with as many landmarks left and as much of the last relaxed
-//! plan made true. No heuristic is computed for most states, so this is fast, and strong where relaxed plans mislead.
+//! Best-first width search: novel states come first (Lipovetzky and Geffner 2017, BFWS(f5)).
+//! Novelty is judged among states with the same number of open landmarks and of achieved facts of
+//! the last relaxed plan. Most states need no heuristic, so this is fast, and strong where relaxed
+//! plans mislead.
 //!
 //! A narrow search counts goals left instead of landmarks, and keeps only states that show a new fact (the first pass of
 //! Dual-BFWS): it ends soon, and often with a plan.
@@ -19,7 +20,7 @@ use super::store::{NO_STATE, Store};
 const PAIR_TABLE_BYTES: usize = 256 << 20;
 /// Words of facts of a relaxed plan that are followed, at least and at most.
 const FOLLOWED_WORDS: [usize; 2] = [2, 8];
-/// Bits of a key that tell how deep a state lies.
+/// Bits of a key that hold the depth of a state.
 const DEPTH_BITS: u32 = 12;
 /// Work that a state costs, in the units of the heuristics, and in a narrow search, which soon ends or does not help.
 const STATE_WORK: u64 = 30;
@@ -31,7 +32,7 @@ struct Memory {
     /// Index of the relaxed plan that is followed.
     anchor: u32,
     left: u32,
-    /// Operators on the way.
+    /// Number of operators from the initial state.
     depth: u32,
 }
 
@@ -91,7 +92,7 @@ impl Novelty {
     }
 }
 
-/// The search, which can be gone on with after it ended with [`End::Limit`].
+/// Resumable search; after [`End::Limit`] it can continue.
 pub struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
@@ -101,7 +102,7 @@ pub struct Search<'a, 's> {
     store: Store,
     status: Status,
     memory: Rows<Memory>,
-    /// Facts of the followed relaxed plan that have been true on the way, by state.
+    /// Facts of the followed relaxed plan that have held since its anchor state, by state.
     done: Rows<u64>,
     /// Relaxed plans that are followed: their facts.
     anchors: Vec<Vec<u32>>,
@@ -201,8 +202,8 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Makes the successors of a state; the plan if one of them is a goal. The buffers hold the state, a successor and
-    /// the applicable operators.
+    /// Generates the successors of a state; returns the plan if one is a goal. The buffers hold the
+    /// state, a successor and the applicable operators.
     fn expand(
         &mut self,
         id: u32,
@@ -249,7 +250,7 @@ impl<'a, 's> Search<'a, 's> {
         memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
-    /// Follows a new relaxed plan from this state; `None` if there is none.
+    /// Computes a new relaxed plan to follow from this state; `None` for a dead end.
     fn anchor(&mut self, state: &[u32]) -> Option<u32> {
         let task = self.shared.task;
         self.counts.evaluated += 1;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// A generated but not yet made state: its parent and the operator.
+/// Open-list entry of a state not yet generated: parent and operator.
 pub(crate) type Entry = (u32, u32);
 
 /// Keys below this have a bucket each; others share a map.
@@ -96,7 +96,7 @@ impl OpenList {
         self.len
     }
 
-    /// Bytes taken: entries, with the room that pieces have beyond what they hold.
+    /// Memory of the entries, bytes, including spare capacity.
     pub(crate) fn bytes(&self) -> usize {
         self.buckets.len() * size_of::<Queue>() + self.len * size_of::<Entry>() * 3 / 2
     }

@@ -10,7 +10,7 @@ pub enum Engine {
     LazyGreedy {
         /// Operator costs count in the heuristic, or every step counts one.
         costs: bool,
-        /// Follows relaxed plans as far as they go (Vidal 2004).
+        /// Uses lookahead states along relaxed plans (Vidal 2004).
         lookahead: bool,
         /// LIFO tie-breaking, or FIFO.
         newest_first: bool,
@@ -30,11 +30,11 @@ pub enum Engine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Proof {
-    /// There is no plan.
+    /// Exhaustion proves that no plan exists.
     Unsolvable,
-    /// There is no plan, where no bound on its cost is given.
+    /// Exhaustion proves that no plan exists, unless the cost is bounded.
     UnsolvableWithoutBound,
-    /// Nothing.
+    /// Exhaustion proves nothing.
     Nothing,
 }
 
@@ -43,13 +43,13 @@ pub enum Proof {
 pub struct Configuration {
     /// Name.
     pub name: &'static str,
-    /// Its algorithm.
+    /// Search algorithm.
     #[serde(flatten)]
     pub engine: Engine,
-    /// The conclusion from its end.
+    /// Conclusion from an exhausted search.
     pub proof: Proof,
-    /// True if a turn takes no more work than one of the first full round: it finds a plan soon, or hardly at
-    /// all.
+    /// True if a turn is limited to the work of the first full round, for searches that succeed
+    /// soon or not at all.
     pub is_capped: bool,
 }
 
@@ -65,7 +65,8 @@ const fn lazy(
     Configuration { name, engine, proof, is_capped: false }
 }
 
-/// Every search. Costs mislead where what is cheap leads nowhere: only the first search counts them.
+/// Configurations of the portfolio. Only the first search counts costs, as cheap operators may lead
+/// nowhere.
 pub const PORTFOLIO: [Configuration; 7] = [
     lazy("lookahead, costs", true, true, false, true),
     lazy("lookahead, LIFO", false, true, true, true),

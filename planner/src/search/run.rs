@@ -1,4 +1,4 @@
-//! The order in which searches are tried, and the improvement of what they find.
+//! Schedule of the portfolio's searches, and the improvement of their plans.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -23,9 +23,9 @@ use super::portfolio::{Engine, FIRST, PORTFOLIO, Proof, ROUND_FACTOR, ROUNDS, SH
 /// Options of a classical search.
 #[derive(Clone, Debug)]
 pub struct ClassicalOptions {
-    /// Keep improving until stopped or nothing cheaper is left.
+    /// Keep improving until stopped or proven optimal.
     pub anytime: bool,
-    /// End with the first plan, as the search has found it.
+    /// Return the first plan, without improvement.
     pub only_first: bool,
     /// True if the task has soft goals: after the first plan, the search goes on as long as improvement is
     /// allowed to.
@@ -45,22 +45,22 @@ pub struct ClassicalOptions {
 /// Result of a classical search.
 #[derive(Clone, Debug)]
 pub struct ClassicalOutcome {
-    /// The reason it ended.
+    /// Reason for the end of the run.
     pub end: ClassicalEnd,
     /// States evaluated.
     pub evaluated: u64,
     /// States expanded.
     pub expanded: u64,
-    /// Work done, as the heuristics count it.
+    /// Work done, in units of the heuristics.
     pub work: u64,
 }
 
 /// The reason a classical search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClassicalEnd {
-    /// The search found what was asked for.
+    /// Search ended with a plan as requested.
     Done,
-    /// The search space is exhausted: there is no plan, or none that is cheaper.
+    /// The search space is exhausted: no plan exists, or none below the bound.
     Exhausted,
     /// Stopped from outside or by the evaluation limit.
     Stopped,
@@ -121,7 +121,7 @@ const LEAST_WORK: u64 = 5_000_000;
 const WORK_PER_OPERATOR: u64 = 1500;
 /// Factor on this work for the search for plans that keep more preferences.
 const SOFT_SHARE: u64 = 20;
-/// Work of the first search before another is tried where nobody asks for less.
+/// Work of the first search before the next is tried, by default.
 pub const FIRST_WORK: u64 = 60_000_000;
 /// Weights of the searches for better plans, one after another (Richter and Westphal 2010).
 const WEIGHTS: [u32; 4] = [5, 3, 2, 1];
@@ -139,7 +139,8 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// From this turn on, a search that runs out of memory is the last one: others may do with less before.
+/// Turn from which a search that runs out of memory ends the run; before, other configurations may
+/// need less.
 const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 
 /// A search for a first plan that can be gone on with.
@@ -147,7 +148,7 @@ enum Kept<'a, 's> {
     Lazy(Box<lazy::Search<'a, 's>>),
     Novelty(Box<novelty::Search<'a, 's>>),
     Horizon(Box<horizon::Search<'a, 's>>),
-    /// One that came to its end.
+    /// Finished search.
     Spent,
 }
 
@@ -290,8 +291,8 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// True if an exhausted search proves that there is no plan: with a bound, only a search that follows
-    /// cheaper ways to known states does.
+    /// True if exhaustion proves that no plan exists; with a cost bound, only searches that reopen
+    /// states can prove this.
     fn proves(&self, place: usize) -> bool {
         match PORTFOLIO[place].proof {
             Proof::Nothing => false,
@@ -349,8 +350,8 @@ impl<'a, 's> Run<'a, 's> {
         end
     }
 
-    /// Improves a plan within a work budget and adopts it if it is the best so far; true if more
-    /// work would change nothing.
+    /// Improves a plan within a work budget and adopts it if best so far; true if more work would
+    /// change nothing.
     fn improve(&mut self, mut plan: Vec<u32>, work: u64) -> bool {
         let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
         improve.evaluation_limit =
@@ -386,7 +387,8 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// Searches with falling weights for plans below the bound, each improved, until there is none.
+    /// Searches with falling weights for plans below the bound and improves each, until none
+    /// exists.
     ///
     /// Where the metric is no sum over the operators, no bound keeps a search from the plan that it found before: once all
     /// of them end so, there is nothing left to try. Ends too once so much work is done in all.
@@ -463,7 +465,7 @@ impl<'a, 's> Run<'a, 's> {
         ClassicalEnd::Done
     }
 
-    /// Searches side by side: what each comes to and takes, up to the first plan.
+    /// Runs searches in parallel; results and counts, up to the first plan.
     fn search_each(&self, strategies: &[Strategy]) -> Vec<(End, Counts)> {
         let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
         let evaluation_limit = limit.saturating_sub(self.counts.evaluated);

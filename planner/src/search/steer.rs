@@ -1,5 +1,5 @@
-//! Lookahead over numbers: what a relaxed plan wants next is made applicable by moving numbers towards its conditions,
-//! in whatever direction they lie by then.
+//! Numeric lookahead: makes the relaxed plan's next operators applicable by changing numbers
+//! towards their conditions.
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::{NumberChange, repetitions};
@@ -13,8 +13,8 @@ const DEPTH: u32 = 4;
 /// Number of passes over all conditions of an operator.
 const ROUNDS: usize = 4;
 
-/// Operators that add to left minus right of a comparison, with the amount, by comparison; NaN if
-/// it depends on the state.
+/// Operators that increase left minus right of each comparison, with the amount; NaN if
+/// state-dependent.
 pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
     let numbers = &task.numbers;
     let mut pairs = Vec::new();
@@ -34,7 +34,8 @@ pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
 }
 
 impl Lookahead {
-    /// Makes the first operator of the rest that lacks nothing but numbers applicable, and applies it.
+    /// Makes applicable the first remaining operator that lacks only numeric conditions, and
+    /// applies it.
     pub(super) fn steer(&mut self, task: &Compiled) -> bool {
         if task.numbers.is_empty() || self.plan.len() >= MOST_STEPS {
             return false;
@@ -64,7 +65,7 @@ impl Lookahead {
         }
     }
 
-    /// Moves numbers towards conditions one after another, each keeping what was settled before it.
+    /// Changes numbers towards conditions one after another, each preserving the earlier ones.
     fn approach_all(&mut self, task: &Compiled, wanted: &[u32], depth: u32) -> bool {
         let mut moved = false;
         for place in 0..wanted.len() {
@@ -73,7 +74,7 @@ impl Lookahead {
         moved
     }
 
-    /// Makes an operator applicable that lacks nothing but numbers; `false` if that fails.
+    /// Makes an operator applicable that lacks only numeric conditions; `false` on failure.
     fn enable(&mut self, task: &Compiled, operator: u32, depth: u32) -> bool {
         let mut wanted: Vec<u32> =
             task.preconditions.get(operator as usize).iter().map(|&f| task.id(f)).collect();
@@ -124,8 +125,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// The applicable operator that achieves a comparison at least cost, and the number of
-    /// applications; operators that break nothing in `keep` are preferred.
+    /// Cheapest applicable operator that achieves a comparison, with its number of applications;
+    /// operators that preserve `keep` are preferred.
     fn best_mover(&self, task: &Compiled, comparison: u32, keep: &[u32]) -> Option<(u32, u32)> {
         let gap = task.numbers.gap(comparison as usize, &self.state);
         let relation = task.numbers.comparisons[comparison as usize].relation;
@@ -166,8 +167,8 @@ impl Lookahead {
         !task.numbers.comparisons[comparison].relation.holds(gap, 0.0)
     }
 
-    /// Applies what the relaxed plan brings a condition about with, made applicable first: as much of it as all that
-    /// uses the number up will need.
+    /// Enables and applies the relaxed plan's supporter of a fact, up to the total consumption of
+    /// the number.
     fn support(&mut self, task: &Compiled, fact: u32, depth: u32) {
         if let Some(entry) = self.moves.iter().find(|r| r.until == fact).copied() {
             if self.enable(task, entry.operator, depth - 1) {

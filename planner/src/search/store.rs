@@ -14,7 +14,7 @@ struct Place {
     mask: u64,
 }
 
-/// Packed states with what led to each.
+/// Packed states with parent, operator and cost.
 pub(crate) struct Store {
     places: Vec<Place>,
     /// Words of the packed variables; the numbers follow, one word each.
@@ -33,7 +33,7 @@ pub(crate) struct Store {
 struct Way {
     parent: u32,
     operator: u32,
-    /// From the first state, in the search's costs.
+    /// Path cost from the initial state, in search costs.
     cost: u32,
     /// True if the successors were generated.
     expanded: bool,
@@ -92,14 +92,14 @@ impl Store {
         self.ways.clear();
     }
 
-    /// Bytes taken, and those that the next growth of the table takes where it is near.
+    /// Memory of the store, and of the table's next growth if near, bytes.
     pub(crate) fn bytes(&self) -> [usize; 2] {
         let table = size_of_val(&self.table[..]);
         let next = if soon(self.ways.len() * 3 / 2, self.table.len()) { 2 * table } else { 0 };
         [self.packed.bytes() + self.ways.bytes() + table, next]
     }
 
-    /// Number of the state and whether it is new. A new one gets the parent, operator and cost.
+    /// Inserts a state with parent, operator and cost; returns its number and true if new.
     pub(crate) fn insert(&mut self, state: &[u32], parent: u32, operator: u32, cost: u32) -> (u32, bool) {
         self.scratch.fill(0);
         for (place, &value) in self.places.iter().zip(state) {
@@ -159,18 +159,18 @@ impl Store {
         self.ways[id as usize].cost
     }
 
-    /// Gives a state a cheaper way to it.
+    /// Records a cheaper path to a state.
     pub(crate) fn improve(&mut self, id: u32, parent: u32, operator: u32, cost: u32) {
         let way = &mut self.ways[id as usize];
         *way = Way { parent, operator, cost, ..*way };
     }
 
-    /// True if its successors were generated.
+    /// True if the state's successors were generated.
     pub(crate) fn is_expanded(&self, id: u32) -> bool {
         self.ways[id as usize].expanded
     }
 
-    /// Notes that its successors were made, or (`false`) must be made again.
+    /// Marks a state as expanded, or (`false`) as to be expanded again.
     pub(crate) fn set_expanded(&mut self, id: u32, expanded: bool) {
         self.ways[id as usize].expanded = expanded;
     }

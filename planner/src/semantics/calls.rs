@@ -17,7 +17,7 @@ pub enum Symbol {
 }
 
 impl Semantics<'_> {
-    /// The exact answer of a call; `None` where an argument of it is undefined.
+    /// Exact answer of a call; `None` if an argument is undefined.
     pub(crate) fn ask(
         &self,
         state: &State,
@@ -46,7 +46,7 @@ impl Semantics<'_> {
         })
     }
 
-    /// The call as the attachment gets it: names, and the facts that it declares to read.
+    /// Call as sent to the attachment: names, and the facts declared in `reads`.
     fn question(
         &self,
         state: &State,
@@ -90,8 +90,8 @@ impl Semantics<'_> {
     }
 }
 
-/// The ground facts and fluents that a declared read covers for a call with these arguments, in the order of the
-/// declaration and of the task's objects. A symbol that the task does not have covers nothing.
+/// Ground facts and fluents that a declared read covers for these arguments, ordered by declaration
+/// and by the task's objects; empty for an unknown symbol.
 pub(crate) fn instances(task: &Task, read: &Read, arguments: &[ObjectId]) -> Vec<(Symbol, Vec<ObjectId>)> {
     match read {
         Read::At(name, positions) => {

@@ -18,9 +18,9 @@ pub struct Why {
     pub condition: String,
     /// Both sides, if the part compares two numbers.
     pub compared: Option<Compared>,
-    /// Values that it depends on, such as `(fuel r)` and `3`.
+    /// Values that the part depends on, such as `(fuel r)` and `3`.
     pub values: Vec<(String, String)>,
-    /// Its span in the task.
+    /// Span of the part in the task.
     pub span: Span,
 }
 
@@ -127,7 +127,7 @@ impl Semantics<'_> {
         Ok(left.zip(right))
     }
 
-    /// The object that a term stands for; `None` where it is undefined.
+    /// Object that a term denotes; `None` if undefined.
     pub fn object(&self, state: &State, term: &Term, binding: &Binding) -> Option<ObjectId> {
         match term {
             Term::Variable(slot) => Some(binding.get(*slot)),
@@ -148,8 +148,8 @@ impl Semantics<'_> {
         state.number(fluent.function, &arguments)
     }
 
-    /// The metric's value in a last state, of a plan that ends at this time and violates each preference so often; `None` without a
-    /// metric, or where a part of it is undefined.
+    /// Metric value of a plan, from its final state, end time and violation counts; `None` without
+    /// a metric or if undefined.
     ///
     /// # Errors
     /// [`CallFailure`] where an attachment gives no answer.
@@ -163,8 +163,8 @@ impl Semantics<'_> {
         self.number(state, &known, &Binding::new(0))
     }
 
-    /// The value of an expression; `None` where a part of it is undefined. `total-time` and `is-violated` have values
-    /// in metrics alone: see [`Semantics::measured`].
+    /// Value of an expression; `None` if undefined. `total-time` and `is-violated` have values in
+    /// metrics alone ([`Semantics::measured`]).
     pub fn number(
         &self,
         state: &State,
@@ -196,7 +196,7 @@ impl Semantics<'_> {
         })
     }
 
-    /// The innermost part that keeps a condition from holding; `None` if it holds.
+    /// Innermost violated part of a condition; `None` if the condition holds.
     pub fn why_not(
         &self,
         state: &State,
@@ -276,7 +276,7 @@ impl Semantics<'_> {
     }
 }
 
-/// A number for people: short, and the word `undefined` where there is none.
+/// Number for people; `undefined` if there is none.
 pub(crate) fn value_text(value: Option<f64>) -> String {
     value.map_or("undefined".to_string(), number_text)
 }

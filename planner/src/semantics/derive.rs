@@ -120,7 +120,7 @@ impl<'j, 'a> Join<'j, 'a> {
         Ok(())
     }
 
-    /// Goes on with an object for a slot, and takes it back.
+    /// Continues with an object bound to a slot, then unbinds it.
     fn try_object(
         &mut self,
         slot: Slot,
@@ -200,7 +200,7 @@ impl<'j, 'a> Join<'j, 'a> {
         })
     }
 
-    /// A variable that an open condition waits for, or else a variable of the head.
+    /// Unbound variable of an open condition, or of the head.
     fn unbound_slot(&self, open: &[&Condition]) -> Option<Slot> {
         let mut found = None;
         for condition in open {

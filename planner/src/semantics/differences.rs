@@ -6,8 +6,8 @@ use crate::state::State;
 use crate::task::{Condition, Quantified, Rule, Slot};
 
 impl Semantics<'_> {
-    /// Adds the differences of the sides of every comparison that a condition speaks of, in an order that no state changes; NaN
-    /// where one is undefined. Those of rules are given by [`Semantics::rule_differences`].
+    /// Adds left minus right of every comparison in a condition, in a state-independent order; NaN
+    /// if undefined. Comparisons in axioms: [`Semantics::rule_differences`].
     pub(crate) fn differences(
         &self,
         state: &State,

@@ -1,4 +1,4 @@
-//! Effects: what they change, computed in the state before any of them happens.
+//! Effects: their changes, evaluated in the state before any of them happens.
 
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::{Answer, FactValue};
@@ -12,7 +12,7 @@ use crate::task::{
 /// Changes made by a happening.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Changes {
-    /// Facts that become false, unless they are added too.
+    /// Facts that become false, unless also added.
     pub deleted: Vec<Fact>,
     /// Facts that become true.
     pub added: Vec<Fact>,
@@ -25,7 +25,7 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// A number or an object of which two changes contradict each other, and the second of them.
+    /// First number or object with contradicting changes, and the span of the second change.
     fn contradiction(&self) -> Option<(&GroundFluent, Span)> {
         let numbers = self.numbers.iter();
         let kinds = numbers.clone().map(|(fluent, assignment, number, _)| (fluent, *assignment, *number));
@@ -43,7 +43,7 @@ impl Changes {
     }
 }
 
-/// An effect that cannot happen: it needs a number that has no value, or two effects contradict each other.
+/// Inapplicable effect: an undefined number, or two contradicting changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
     /// The contradiction, in a sentence.
@@ -52,16 +52,16 @@ pub struct Clash {
     pub span: Span,
 }
 
-/// Effects at the end of a durative action whose conditions speak of earlier times: those that can still happen.
+/// End effects of a durative action with conditions on earlier times that can still hold.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pending {
-    /// Number of the effect, and the objects of its quantified variables.
+    /// Effect number and the objects of its quantified variables.
     instances: Vec<(usize, Vec<ObjectId>)>,
 }
 
 impl Semantics<'_> {
-    /// Adds what effects change to `changes`. `pending` tells for effects with conditions on earlier times which still
-    /// happen; without it they do not.
+    /// Adds the changes of effects to `changes`. `pending`: effects whose earlier-time conditions
+    /// held; without it, such effects do not happen.
     pub fn changes(
         &self,
         state: &State,
@@ -257,7 +257,7 @@ impl Semantics<'_> {
         Some(GroundFluent { function: fluent.function, arguments: arguments.into() })
     }
 
-    /// Makes changes: deletions, then additions, then values; and derives what follows.
+    /// Applies changes: deletes, adds, then values; then re-derives axioms.
     pub fn apply(&self, state: &mut State, changes: &Changes) -> Result<Result<(), Clash>, CallFailure> {
         if let Some((fluent, span)) = changes.contradiction() {
             let reason = format!("two changes of {} at once contradict each other", self.ground_text(fluent));
@@ -298,7 +298,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// Applies an instantaneous action: what it changes, whether or not its condition holds.
+    /// Applies the effects of an instantaneous action without checking its condition.
     pub fn apply_action(
         &self,
         state: &mut State,

@@ -35,7 +35,7 @@ pub struct Binding {
     pub objects: Vec<ObjectId>,
     /// `?duration`, in seconds.
     pub duration_s: Option<f64>,
-    /// Parameters that grounding modules proposed; every call of the action gets them as further arguments.
+    /// Parameters proposed by grounding modules; calls of the action get them as further arguments.
     pub proposals: Vec<Arc<str>>,
 }
 
@@ -80,11 +80,11 @@ impl CallFailure {
 pub struct Misfit {
     /// The mismatch, in a sentence.
     pub reason: String,
-    /// Span in the task of the declaration that it should fit.
+    /// Span of the violated declaration in the task.
     pub span: Option<Span>,
 }
 
-/// A task and its attachments, ready to evaluate.
+/// Evaluator of a task with its attachments.
 pub struct Semantics<'a> {
     /// The task.
     pub task: &'a Task,
@@ -94,7 +94,7 @@ pub struct Semantics<'a> {
     bound: Vec<String>,
     object_names: Vec<Arc<str>>,
     module_names: Vec<Arc<str>>,
-    /// For each predicate, true if something may change it.
+    /// True, by predicate, if some effect or rule may change it.
     changing: Vec<bool>,
     stop: &'a (dyn Fn() -> bool + Sync),
     /// Objects that were tried for quantified variables.
@@ -102,11 +102,11 @@ pub struct Semantics<'a> {
     stopped: AtomicBool,
 }
 
-/// Objects that are tried before it is asked again whether to stop.
+/// Number of objects tried between two checks of the stop signal.
 const TRIED_AT_ONCE: u32 = 4096;
 
 impl<'a> Semantics<'a> {
-    /// A task with its attachments. A module without one fails when it is called.
+    /// Evaluator of a task; a module without an attachment fails when called.
     pub fn new(task: &'a Task, attachments: &'a Attachments) -> Semantics<'a> {
         Self::until(task, attachments, &|| false)
     }

@@ -1,4 +1,4 @@
-//! Conditions with objects for their variables, quantifiers written out and what never changes evaluated away.
+//! Conditions with variables bound to objects, quantifiers expanded and static parts evaluated.
 
 use rustc_hash::FxHashSet;
 
@@ -8,7 +8,7 @@ use crate::task::{
     Task, Term,
 };
 
-/// All of them; constants are folded.
+/// Conjunction, with constants folded.
 pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
     let mut list = Vec::new();
     for part in parts {
@@ -21,7 +21,7 @@ pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
     single(list, Condition::And)
 }
 
-/// One of them; constants are folded.
+/// Disjunction, with constants folded.
 pub(super) fn any(parts: impl IntoIterator<Item = Condition>) -> Condition {
     let mut list = Vec::new();
     for part in parts {
@@ -50,8 +50,8 @@ pub(super) fn is_false(condition: &Condition) -> bool {
     matches!(condition, Condition::Or(parts) if parts.is_empty())
 }
 
-/// The opposite, in negation normal form. Exact for what does not compare numbers: a comparison with an undefined number is
-/// false, and so is its opposite.
+/// Negation in negation normal form. Exact except for comparisons: with an undefined number, a
+/// comparison and its negation are both false.
 pub(crate) fn negated(condition: &Condition) -> Condition {
     match condition {
         Condition::And(parts) => any(parts.iter().map(negated)),
@@ -78,7 +78,7 @@ pub(super) fn each_binding(
 
 /// Constant predicates and functions.
 pub(super) struct Fixed {
-    /// True, by predicate, if nothing changes it.
+    /// True, by predicate, if no effect changes it.
     predicates: Vec<bool>,
     facts: FxHashSet<Fact>,
 }
@@ -159,7 +159,7 @@ impl Fixed {
     }
 }
 
-/// The same words for conditions that say the same in another order.
+/// Canonical text of a condition, independent of the order of its parts.
 pub(super) fn words(condition: &Condition) -> String {
     let list = |name: &str, parts: &[Condition]| {
         let mut list: Vec<String> = parts.iter().map(words).collect();

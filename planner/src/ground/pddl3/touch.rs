@@ -15,10 +15,11 @@ use super::conditions::{all, any};
 #[derive(Debug, Default)]
 pub(super) struct Mentioned {
     atoms: Vec<Atom>,
-    /// Predicates of which every atom may matter, because derived predicates depend on them.
+    /// Predicates of which any atom may be relevant, because derived predicates depend on them.
     predicates: FxHashSet<PredicateId>,
     functions: FxHashSet<FunctionId>,
-    /// Attachments are asked, or the duration, and nothing tells when they change their minds.
+    /// True if the condition depends on attachments or `?duration`, whose changes no effect
+    /// announces.
     pub opaque: bool,
     /// Numbers are compared.
     pub compares: bool,
@@ -58,7 +59,8 @@ impl Mentioned {
         }
     }
 
-    /// True if it changes by itself: while actions run, or at given times.
+    /// True if the condition may change without an action's start or end: by rates or timed
+    /// literals.
     pub(super) fn drifts(&self, task: &Task) -> bool {
         let mut rates = task.actions.iter().flat_map(|action| &action.continuous);
         let timed = |change: &GroundChange| match change {
@@ -92,7 +94,8 @@ impl Mentioned {
     }
 }
 
-/// Unifier of the arguments that an effect writes with the given ones; `None` if there is none.
+/// Condition that unifies the arguments of an effect with the given ones; `None` if they do not
+/// unify.
 fn unified(action: &Action, effect: &Effect, written: &[Term], own: &[Term]) -> Option<Condition> {
     let mut parts = Vec::new();
     for (written, own) in written.iter().zip(own) {

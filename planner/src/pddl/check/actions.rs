@@ -67,7 +67,8 @@ impl Checker<'_> {
         });
     }
 
-    /// Changes of one number or object that happen together, wherever one of them does, and contradict each other.
+    /// Reports simultaneous unconditional changes of one number or object that contradict each
+    /// other.
     fn agree(&mut self, effects: &[Effect]) {
         let is_always = |effect: &Effect| effect.when == Timed::default();
         let together = |one: &Effect, other: &Effect| {
@@ -173,7 +174,7 @@ impl Checker<'_> {
         Some(Timed { start, ..Timed::default() })
     }
 
-    /// Takes the preferences out of a condition; what is left goes to `hard`.
+    /// Separates the preferences of a condition; the remaining parts go to `hard`.
     fn split_preferences<'f>(
         &mut self,
         formula: &'f Formula,
@@ -210,7 +211,7 @@ impl Checker<'_> {
         }
     }
 
-    /// The preference of a name; one without a name is one of its own.
+    /// Preference by name; an unnamed one becomes a preference of its own.
     pub(super) fn preference(&mut self, name: Option<Name>) -> PreferenceId {
         let id = self.task.preferences.len() as u32;
         if let Some(name) = name {

@@ -1,5 +1,5 @@
-//! Checks of conditions on numbers that change at rates, between two happenings: allowed is only what can be
-//! evaluated exactly.
+//! Checks conditions on continuously changing numbers between happenings; only exactly decidable
+//! ones are accepted.
 
 use rustc_hash::FxHashSet;
 
@@ -8,11 +8,12 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::model::walk::{self, Part};
 use crate::task::{Condition, Expression, FunctionId, Modal, PredicateId, Task};
 
-/// Products of no more numbers that change at rates: how they compare is told exactly.
+/// Maximum number of factors that change at rates, in a product whose sign can be decided exactly.
 const MOST_FACTORS: u32 = 2;
 
 impl Checker<'_> {
-    /// Conditions over all compare sums of products of at most two numbers that change at rates, and constraints none of them.
+    /// Requires that over-all conditions compare sums of products of at most two continuously
+    /// changing numbers, and that constraints use none.
     pub(super) fn told_between(&mut self) {
         let flowing: FxHashSet<FunctionId> =
             self.task.actions.iter().flat_map(|a| &a.continuous).map(|rate| rate.fluent.function).collect();
@@ -68,7 +69,7 @@ fn over_all(task: &Task) -> Vec<(&[Expression; 2], Span)> {
     comparisons
 }
 
-/// The conditions with the bodies of all rules that they rest on.
+/// Conditions with the bodies of all axioms that they depend on.
 fn closed<'t>(task: &'t Task, conditions: &[&'t Condition]) -> Vec<&'t Condition> {
     let mut all = conditions.to_vec();
     let mut seen: FxHashSet<PredicateId> = FxHashSet::default();

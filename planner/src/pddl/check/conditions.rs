@@ -8,7 +8,7 @@ use crate::pddl::ast::{self, Comparison, Formula, Name, When};
 use crate::task::{Atom, Condition, Expression, Timed};
 
 impl Checker<'_> {
-    /// A condition, or its negation.
+    /// Condition, or its negation.
     pub(super) fn condition(
         &mut self,
         formula: &Formula,

@@ -83,7 +83,7 @@ impl Checker<'_> {
         found
     }
 
-    /// Reports each cycle of types once, and cuts it.
+    /// Reports each cycle of types once, and breaks it.
     fn type_cycles(&mut self, declared: &[ast::Typed]) {
         for index in 1..self.task.types.len() {
             let start = TypeId(index as u32);
@@ -266,7 +266,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Heads of derived predicates declare them where `:predicates` does not.
+    /// Declares predicates by the heads of derived predicates if `:predicates` lacks them.
     pub(super) fn declare_derived(&mut self, derived: &[ast::Derived]) {
         for rule in derived {
             let name = rule.head.name;

@@ -1,4 +1,5 @@
-//! Terms and numeric expressions: arguments counted and typed, functions told apart by what they yield.
+//! Terms and numeric expressions: arity and type checks; object functions are told from numeric
+//! ones by their result types.
 
 use super::conditions::constant;
 use super::{Checker, Scope};
@@ -7,7 +8,7 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{self, Arithmetic, Name};
 use crate::task::{Call, Expression, Fluent, FunctionId, Parameter, PredicateId, PreferenceId, Term, TypeId};
 
-/// A term by what it yields.
+/// Checked term: object or number.
 pub(super) enum Value {
     /// An object of one of these types.
     Object(Term, Vec<TypeId>),
@@ -26,7 +27,7 @@ pub(super) enum Place {
     Effect,
     /// Conditions and effects of a durative action: `?duration` has a value.
     Durative,
-    /// Bounds of `?duration`, which have their values before it has one.
+    /// Bound on `?duration`, evaluated before `?duration` has a value.
     Bound,
     /// A metric: `total-time` and `is-violated` have values.
     Metric,
@@ -45,7 +46,7 @@ pub(super) fn span_of(term: &ast::Term) -> Span {
 }
 
 impl Checker<'_> {
-    /// An object term with the types that it may be of.
+    /// Object term with its possible types.
     pub(super) fn object_term(&mut self, term: &ast::Term, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
         match term {
             ast::Term::Variable(name) => match scope.find(name.symbol) {

@@ -15,7 +15,7 @@ impl Checker<'_> {
         self.task.goal = Scoped { slots: scope.slots, body: all_of(hard) };
     }
 
-    /// Sorts a goal into what must hold and what is only preferred.
+    /// Splits a goal into hard conditions and preferences.
     fn goal_part(
         &mut self,
         formula: &Formula,

@@ -99,7 +99,7 @@ impl Checker<'_> {
         );
     }
 
-    /// Refuses what a timed literal says of a derived predicate.
+    /// Reports a timed literal over a derived predicate.
     fn is_derived(&mut self, one: &Initial) -> bool {
         let Initial::Literal { name, span, .. } = one else { return false };
         let known = self.predicates.get(&name.symbol).map(|&known| &self.task.predicates[known as usize]);
@@ -189,8 +189,9 @@ impl Checker<'_> {
         }
     }
 
-    /// Problems are shared by variants of a domain: the value of a function that this one lacks is left out, and said
-    /// so, unless it looks like a slip. Whatever else uses the function finds it undeclared.
+    /// Drops the value of an undeclared function with a warning unless the name resembles a
+    /// declared one: problems are shared by variants of a domain. Other uses of the function are
+    /// errors.
     fn unknown_function(&mut self, name: Name) {
         let written = self.name(name.symbol);
         let near = nearest(written, self.task.functions.iter().map(|own| own.name.as_str()));
@@ -204,8 +205,8 @@ impl Checker<'_> {
         }
     }
 
-    /// A value of a function on an object that is not declared is left out, and said so: published problems have such lines. A
-    /// fact about one is a fault.
+    /// Drops a function value on an undeclared object with a warning, as published problems contain
+    /// such lines; a fact on one is an error.
     fn value_of_unknown_object(&mut self, arguments: &[Name]) -> bool {
         let unknown = arguments.iter().find(|name| self.objects[name.symbol.0 as usize].is_none());
         let Some(&name) = unknown else { return false };

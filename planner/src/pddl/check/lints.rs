@@ -1,4 +1,4 @@
-//! Findings on a task that can be read: what it asks for and nothing can bring about.
+//! Findings on a readable task: conditions that nothing can achieve.
 
 use rustc_hash::FxHashSet;
 
@@ -45,7 +45,7 @@ fn not_planned(constraint: &Trajectory) -> Option<Diagnostic> {
     Some(finding.with_help("ask for the same in conditions and the goal"))
 }
 
-/// Durative actions that take away what they need while they run.
+/// Findings on durative actions that delete their own invariants.
 pub(crate) fn defeated(task: &Task) -> Vec<Diagnostic> {
     let finding = |action: &Action| {
         let (atom, effect) = self_defeating(action)?;
@@ -81,7 +81,7 @@ fn objects(atom: &Atom) -> Vec<ObjectId> {
     atom.arguments.iter().filter_map(object).collect()
 }
 
-/// A goal fact that is false at first and that nothing can make true.
+/// Finding on a goal fact that is initially false and has no achiever.
 fn unreachable_goal(task: &Task, goal: &Atom, wanted: &[ObjectId]) -> Option<Diagnostic> {
     let predicate = task.predicate(goal.predicate);
     if predicate.stratum.is_some() {

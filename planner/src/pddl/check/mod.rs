@@ -88,7 +88,7 @@ fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
 }
 
-/// True if a finding misses something that may be declared in the part that was not read.
+/// True if a finding reports a missing name that may be declared in an unread part.
 fn is_missed(finding: &Diagnostic) -> bool {
     let names = ["undeclared-type", "undeclared-predicate", "undeclared-function", "undeclared-object"];
     let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
@@ -195,7 +195,7 @@ impl<'a> Checker<'a> {
         self.symbols.name(symbol)
     }
 
-    /// The text of a place as it was written.
+    /// Source text of a span.
     fn written(&self, span: Span) -> &str {
         let text = self.task.sources.get(span.source as usize).map_or("", |source| source.text.as_str());
         text.get(span.start as usize..span.end as usize).unwrap_or("")
@@ -301,7 +301,8 @@ impl<'a> Checker<'a> {
         objects
     }
 
-    /// Opens a scope with quantified variables; close it by truncating `scope.variables` to the returned length.
+    /// Adds quantified variables to a scope; truncate `scope.variables` to the returned length to
+    /// close it.
     fn quantify(&mut self, variables: &[ast::Typed], scope: &mut Scope) -> (usize, Vec<Quantified>) {
         let before = scope.variables.len();
         let mut quantified = Vec::with_capacity(variables.len());

@@ -1,4 +1,4 @@
-//! Looking names up: what is not declared is reported once, with the nearest declared name.
+//! Name lookup: an undeclared name is reported once, with the nearest declared one.
 
 use rustc_hash::FxHashMap;
 
@@ -79,7 +79,8 @@ impl Checker<'_> {
         self.push(finding);
     }
 
-    /// The variable that is meant where no object has this name and a variable has it behind its question mark; says so.
+    /// Variable meant by a name without its question mark, if no object has the name; reports the
+    /// omission.
     pub(super) fn without_question_mark(&mut self, name: Name, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
         if self.objects[name.symbol.0 as usize].is_some() {
             return None;
@@ -94,7 +95,7 @@ impl Checker<'_> {
         Some(meant)
     }
 
-    /// Help for a name that is not declared and resembles none that is.
+    /// Help for an undeclared name that resembles no declared one.
     fn help_for(&self, kind: &str, section: &str, name: Name) -> String {
         let written = self.name(name.symbol);
         match kind {
@@ -111,7 +112,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Reports a name that is not declared. Gives the declared name that is surely meant, to go on with.
+    /// Reports an undeclared name; returns the declared name that was probably meant.
     fn undeclared(
         &mut self,
         code: &'static str,
@@ -162,7 +163,7 @@ impl Checker<'_> {
         .filter(|span| span.end > 0)
     }
 
-    /// A name declared before. True if it is new.
+    /// Registers a declaration; true if the name is new.
     pub(super) fn declare(
         &mut self,
         kind: &str,

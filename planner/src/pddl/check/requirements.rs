@@ -1,11 +1,11 @@
-//! Parts of the language that are used without the requirement that stands for them.
+//! Language features that are used without the `:requirements` flag that allows them.
 
 use super::Checker;
 use super::conditions::span_of_formula;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{Action, Domain, Effect, Formula, Problem};
 
-/// A language feature, with all requirements that allow it, the narrowest first.
+/// Language feature, with all requirements that allow it, narrowest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Feature {
     Typing,
@@ -53,7 +53,7 @@ impl Feature {
 type Uses = Vec<(Feature, Span)>;
 
 impl Checker<'_> {
-    /// One warning for each requirement that is missing, where it is first needed.
+    /// Warns once per missing requirement, at its first use.
     pub(super) fn requirements(&mut self, domain: &Domain, problem: Option<&Problem>) {
         let mut uses = Uses::new();
         uses.extend(domain.types.first().map(|first| (Feature::Typing, first.name.span)));

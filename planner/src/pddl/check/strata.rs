@@ -1,4 +1,4 @@
-//! Rules of derived predicates, and their strata: no predicate may follow from its own negation.
+//! Stratification of axioms: no predicate may depend on its own negation.
 
 use super::expressions::Place;
 use super::{Checker, Scope};
@@ -41,7 +41,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Gives every derived predicate its stratum, and sorts the rules by it.
+    /// Assigns a stratum to every derived predicate, and sorts the axioms by stratum.
     pub(super) fn order_strata(&mut self) {
         let mut uses = Vec::new();
         for rule in &self.task.rules {

@@ -1,4 +1,4 @@
-//! Warnings about declarations that are never used, and about fluents that are used and never get a value.
+//! Warnings about unused declarations, and about fluents that are used but never get a value.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -16,7 +16,8 @@ fn all<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     walk::aims(task, visit);
 }
 
-/// Predicates and functions that nothing but the initial state speaks of. Attachments may read any.
+/// Predicates and functions that occur in the initial state alone; tasks with attachments are
+/// exempt.
 pub(super) fn unused(task: &Task) -> Vec<Diagnostic> {
     if !task.modules.is_empty() {
         return Vec::new();
@@ -43,7 +44,8 @@ pub(super) fn unused(task: &Task) -> Vec<Diagnostic> {
     predicates.chain(functions).collect()
 }
 
-/// Numbers that are read and that nothing ever gives a value: a whole function, or a single one that the goal or the metric reads.
+/// Numbers that are read but never get a value: a whole function, or a ground one in goal or
+/// metric.
 pub(crate) fn without_value(task: &Task) -> Vec<Diagnostic> {
     let mut given: FxHashSet<FunctionId> =
         task.init.numbers.iter().map(|(fluent, _)| fluent.function).collect();

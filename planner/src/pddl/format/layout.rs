@@ -13,7 +13,7 @@ const BEFORE_COMMENT: usize = 2;
 /// Lists with parts that stand in lines of their own.
 const ACTIONS: [&str; 4] = [":action", ":durative-action", ":process", ":event"];
 
-/// Lists that stand behind these words begin in the same line, however long they are.
+/// Keywords whose arguments begin on the same line, however long they are.
 const STAYING: [&str; 6] = ["not", "at", "over", "preference", ":goal", ":metric"];
 
 /// Sections that are tables: where their author put several blanks between words of a line, these stay.
@@ -32,12 +32,12 @@ pub fn print(roots: &[Node<'_>]) -> String {
     page.finish()
 }
 
-/// A line as it grows.
+/// Line under construction.
 #[derive(Debug, Default)]
 struct Line {
     indent: usize,
     text: String,
-    /// The comment at its end, and the column at which it stood.
+    /// Comment at the line's end, and its original column.
     comment: Option<(String, usize)>,
 }
 
@@ -139,7 +139,7 @@ impl Page {
 
 /// Indentation of the parts of a list in lines of their own.
 enum Indent {
-    /// A step farther in than the line in which it begins.
+    /// One step deeper than the line in which the list begins.
     Body,
     /// Alignment: number of columns behind the opening.
     Aligned(usize),
@@ -167,7 +167,7 @@ fn is_always_broken(children: &[Node<'_>]) -> bool {
     is_head(children, &["define"]) || is_head(children, &ACTIONS)
 }
 
-/// A list in one line; none where its author did not write it so, or a comment stands in it.
+/// List on one line; `None` if the author wrote it over several lines, or a comment is inside.
 fn flat(open: char, children: &[Node<'_>], close: char, in_table: bool) -> Option<String> {
     let mut text = String::from(open);
     for (n, child) in children.iter().enumerate() {
@@ -187,7 +187,7 @@ fn flat(open: char, children: &[Node<'_>], close: char, in_table: bool) -> Optio
     Some(text)
 }
 
-/// Blanks before a node in its line.
+/// Number of blanks before a node within a line.
 fn blanks(node: &Node<'_>, in_table: bool) -> String {
     " ".repeat(if in_table { node.blanks.max(1) } else { 1 })
 }
@@ -202,7 +202,7 @@ fn flat_width(node: &Node<'_>, in_table: bool) -> Option<usize> {
     }
 }
 
-/// The children of a list that takes several lines, with the breaks that it has to have.
+/// Children of a list that takes several lines, with the required line breaks.
 fn broken<'a>(children: &[Node<'a>]) -> Vec<Node<'a>> {
     let mut children = children.to_vec();
     if let Some(first) = children.first_mut() {
@@ -219,14 +219,14 @@ fn broken<'a>(children: &[Node<'a>]) -> Vec<Node<'a>> {
     children
 }
 
-/// At least one break before each from the `from`-th on, but for comments at the end of a line.
+/// Sets at least one line break before each child from index `from` on, except trailing comments.
 fn set_breaks(children: &mut [Node<'_>], from: usize) {
     for child in children.iter_mut().skip(from).filter(|child| !child.is_comment()) {
         child.breaks = child.breaks.max(1);
     }
 }
 
-/// Each part of an action begins a line, its value stands behind its name.
+/// Puts each part of an action on a new line, with its value after its keyword.
 fn parts_apart(children: &mut [Node<'_>]) {
     let is_part = |node: &Node<'_>| {
         node.word().is_some_and(|word| ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(word)))
@@ -243,7 +243,7 @@ fn parts_apart(children: &mut [Node<'_>]) {
     }
 }
 
-/// Breaks a list that its author wrote in one line, and that is too wide for one.
+/// Breaks a list that was written on one line and is too wide for one.
 fn explode(children: &mut [Node<'_>]) {
     let Some(head) = children.first().and_then(Node::word).map(str::to_ascii_lowercase) else { return };
     let beside = match head.as_str() {
@@ -263,8 +263,8 @@ fn explode(children: &mut [Node<'_>]) {
     }
 }
 
-/// The column of each line's comment: comments of neighbouring lines stand below each other, where their author had them if that
-/// is one column.
+/// Column of each line's comment: neighbouring comments are aligned, at the author's column if that
+/// was common.
 fn comment_columns(lines: &[Line]) -> Vec<usize> {
     let mut columns = vec![0; lines.len()];
     let mut from = 0;

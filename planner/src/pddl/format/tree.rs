@@ -1,11 +1,11 @@
-//! Lists, words and comments as they stand in a text, with the line breaks before each.
+//! Lists, words and comments of a text, with the line breaks before each.
 
 /// Node of a text: a word, a comment or a list.
 #[derive(Debug, Clone)]
 pub struct Node<'a> {
-    /// Line breaks before it.
+    /// Number of line breaks before the node.
     pub breaks: usize,
-    /// Blanks before it, if it does not begin a line.
+    /// Number of blanks before the node, unless it begins a line.
     pub blanks: usize,
     /// Content.
     pub what: What<'a>,
@@ -16,14 +16,14 @@ pub struct Node<'a> {
 pub enum What<'a> {
     /// Anything between delimiters.
     Word(&'a str),
-    /// From its semicolon to the end of the line, and the column at which it begins.
+    /// Text from the semicolon to the end of the line, and its column.
     Comment(&'a str, usize),
     /// Opening sign, contents and closing sign.
     List(char, Vec<Node<'a>>, char),
 }
 
 impl<'a> Node<'a> {
-    /// The word that it is.
+    /// Word of the node, if the node is one.
     pub fn word(&self) -> Option<&'a str> {
         match self.what {
             What::Word(word) => Some(word),

@@ -40,7 +40,7 @@ const REQUIREMENTS: &[&str] = &[
     ":grounding-modules",
 ];
 
-/// Requirements that change the meaning of everything else.
+/// Requirements that change the meaning of all other parts, and are refused.
 const REFUSED: &[(&str, &str)] = &[
     (":time", "PDDL+ processes and events"),
     (":processes", "PDDL+ processes and events"),
@@ -140,7 +140,8 @@ impl Parser<'_> {
         declared
     }
 
-    /// Generated files have types without names before them, which say nothing.
+    /// Assigns types to the names before them; types without names, as in generated files, are
+    /// ignored.
     fn give_types(&self, declared: &mut [Typed], from: usize, types: Vec<Name>) {
         for typed in &mut declared[from..] {
             typed.types.clone_from(&types);
@@ -256,7 +257,7 @@ impl Parser<'_> {
         Some(ModuleDeclaration { signature: Signature { name, parameters }, writes, kind, function })
     }
 
-    /// Typed variables among the children of a module, which has no list of its own for them.
+    /// Typed variables among the children of a module, which has no parameter list of its own.
     fn typed_nodes(&mut self, nodes: &[usize]) -> Vec<Typed> {
         let mut declared: Vec<Typed> = Vec::new();
         let mut untyped_from = 0;

@@ -16,7 +16,7 @@ fn assignment(word: &str) -> Option<Assignment> {
 }
 
 impl Parser<'_> {
-    /// An effect. `timed` where parts say when they happen.
+    /// Parses an effect; `timed`: its parts carry time specifiers.
     pub(super) fn effect(&mut self, node: usize, timed: bool) -> Option<Effect> {
         match self.tree.nodes[node].kind {
             Kind::Bracket => return self.call(node).map(Effect::Call),

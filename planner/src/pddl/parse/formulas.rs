@@ -8,7 +8,7 @@ use crate::pddl::nearest;
 
 /// Words that begin a formula and are no predicates.
 const CONNECTIVES: &[&str] = &["and", "or", "not", "imply", "forall", "exists"];
-/// Signs of other languages for what differs.
+/// Inequality operators of other languages.
 const UNEQUAL: &[&str] = &["!=", "/=", "<>", "~="];
 
 pub(super) fn comparison(word: &str) -> Option<Comparison> {
@@ -32,7 +32,7 @@ fn arithmetic(word: &str) -> Option<Arithmetic> {
     })
 }
 
-/// A modal operator and how many times (numbers) and formulas follow it.
+/// Modal operator, with its numbers of times and of formulas.
 fn modal(word: &str) -> Option<(Modal, usize, usize)> {
     Some(match word {
         "always" => (Modal::Always, 0, 1),
@@ -65,7 +65,7 @@ impl Parser<'_> {
         if body.is_some_and(|body| self.word(body).is_some()) { None } else { Some((when, body)) }
     }
 
-    /// A condition, goal or constraint. `timed` where parts say when they hold.
+    /// Parses a condition, goal or constraint; `timed`: its parts carry time specifiers.
     pub(super) fn formula(&mut self, node: usize, timed: bool) -> Option<Formula> {
         match self.tree.nodes[node].kind {
             Kind::Bracket => return self.call(node).map(Formula::Call),
@@ -137,7 +137,8 @@ impl Parser<'_> {
         rest.last().is_some_and(|&last| self.word(last).is_none())
     }
 
-    /// As many parts as the shape has, or a finding that shows the shape.
+    /// Children of a node, if their number is that of the shape; otherwise a finding that shows the
+    /// shape.
     pub(super) fn exactly<const N: usize>(
         &mut self,
         node: usize,

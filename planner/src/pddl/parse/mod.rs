@@ -128,7 +128,7 @@ impl<'a> Parser<'a> {
         self.tree.nodes[node].kind == Kind::Bracket
     }
 
-    /// The text of a node as it was written, cut where it gets long.
+    /// Source text of a node, shortened if long.
     fn written(&self, node: usize) -> String {
         let node = self.tree.nodes[node];
         shortened(&self.text[node.start as usize..node.end as usize])
@@ -145,7 +145,7 @@ impl<'a> Parser<'a> {
         self.findings.push(Diagnostic::error(code, message, span, label));
     }
 
-    /// Something else stands where `what` belongs.
+    /// Reports that `what` was expected at a node.
     fn expected(&mut self, what: &str, node: usize, help: impl Into<String>) {
         let span = self.span(node);
         let message = format!("expected {what}, found {}", self.kind_of(node));
@@ -311,12 +311,13 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// True if the last finding was an unknown section: it may have declared names that are missing later.
+    /// True if the last finding was an unknown section, which may have declared names that are
+    /// missing later.
     fn leaves_unread(&self) -> bool {
         self.findings.last().is_some_and(|finding| finding.code == "unknown-section")
     }
 
-    /// Says that nobody knows a section; gives the keyword that is meant if one is near enough.
+    /// Reports an unknown section; returns the keyword that was probably meant.
     fn unknown_section(
         &mut self,
         section: usize,
@@ -496,7 +497,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Reports a part that no action has; gives the one that is surely meant.
+    /// Reports an unknown part of an action; returns the part that was probably meant.
     fn unknown_part(&mut self, keyword: usize, part: &str) -> Option<&'static str> {
         let message = format!("no part `{part}` is known in an action");
         let span = self.span(keyword);
@@ -509,7 +510,7 @@ impl<'a> Parser<'a> {
         near
     }
 
-    /// A durative action says how long it takes, an instantaneous one must not.
+    /// Checks that a durative action has a duration and an instantaneous one has none.
     fn duration_fits(&mut self, action: &Action, has_duration: bool) {
         let span = action.name.span;
         let name = self.symbols.name(action.name.symbol);

@@ -1,5 +1,5 @@
-//! A task as clauses over what holds and what is done at each step, up to a horizon (Kautz and Selman 1992). Several
-//! operators share a step where they can be applied in a fixed order (exists-step, Rintanen, Heljanko and Niemelä 2006).
+//! SAT encoding of a task up to a horizon (Kautz and Selman 1992). Several operators share a step
+//! if they can be applied in a fixed order (exists-step, Rintanen, Heljanko and Niemelä 2006).
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::clauses::Literal;
@@ -12,7 +12,7 @@ use super::order::{Use, order, uses};
 /// Literals that the clauses of one step may have at most.
 const MOST_LITERALS: usize = 2_000_000;
 
-/// A literal of a step, or of the moment after it.
+/// Literal at a step, or at the state after it.
 #[derive(Clone, Copy, Default)]
 struct Said {
     literal: Literal,
@@ -27,12 +27,12 @@ impl Said {
 
 /// The clauses of one step, to be repeated.
 pub(super) struct Form {
-    /// Variables of a step: facts, operators, and what was taken away so far within the step.
+    /// Variables per step: facts, operators, and auxiliary ones for facts deleted within the step.
     pub stride: usize,
     facts: usize,
     /// Over the facts of any moment.
     always: Lists<Said>,
-    /// Over a step and the facts of the moment after it.
+    /// Clauses over a step and the facts of the state after it.
     step: Lists<Said>,
     /// Operators that add a fact, by fact.
     pub adders: Lists<u32>,
@@ -46,7 +46,8 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// For a task of plain operators; `None` if it is of another kind or too large.
+    /// Encoding of a task without conditional effects or axioms; `None` for others, or if too
+    /// large.
     pub(super) fn new(task: &Compiled, mutex_groups: &[Vec<Fact>]) -> Option<Form> {
         let conditional = task.effects.all().iter().any(|effect| effect.from != effect.to);
         if conditional || !task.axiom_heads.is_empty() || task.some_impossible() {
@@ -138,7 +139,8 @@ impl Form {
         }
     }
 
-    /// No operator is applied once one before it in the order has taken away what it needs.
+    /// Clauses that exclude an operator after an earlier one in the order that deletes one of its
+    /// preconditions.
     fn keep_order(&mut self, order: &[(u32, u32)], uses: &[Vec<Use>]) {
         // By fact: operators of its chain in order, each with its circle.
         let pairs = order.iter().flat_map(|&(operator, circle)| {
@@ -154,7 +156,8 @@ impl Form {
         }
     }
 
-    /// One fact's chain within a circle: who takes it away is told to all that need it and come later.
+    /// Auxiliary chain of one fact within a strong component: a deletion disables all later
+    /// operators that need the fact.
     fn chain(&mut self, chain: &[(u32, u32, bool, bool)]) {
         let Some(last) = chain.iter().rposition(|user| user.2) else { return };
         let mut gone: Option<Said> = None;
@@ -218,19 +221,19 @@ impl Form {
         }
     }
 
-    /// The first moment at which the goal can hold, if it ever can.
+    /// Earliest step at which the goal can hold under delete relaxation; `None` for never.
     pub(super) fn earliest(&self, task: &Compiled) -> Option<usize> {
         let latest = task.goal.iter().map(|&f| self.first_fact[task.id(f) as usize]).max().unwrap_or(0);
         (latest != u32::MAX).then_some(latest as usize)
     }
 }
 
-/// A fact at a step, or (`later`) right after it.
+/// Literal of a fact at a step, or (`later`) right after it.
 fn is(fact: u32, later: bool) -> Said {
     Said { literal: Literal::new(fact, true), later }
 }
 
-/// Earliest steps at which facts can hold, and operators be applied, if nothing is ever deleted.
+/// Earliest steps of facts and operators under delete relaxation.
 fn first_moments(task: &Compiled) -> (Vec<u32>, Vec<u32>) {
     let mut facts = vec![u32::MAX; task.facts];
     let mut operators = vec![u32::MAX; task.operators()];

@@ -1,5 +1,5 @@
-//! An order of goals: one that cannot be brought about any more once another holds comes before that one, also where this is so
-//! only because others come before it (reasonable orders, Koehler and Hoffmann 2000, taken to their closure).
+//! Reasonable goal order: a goal that cannot be achieved any more once another holds comes before
+//! that one (Koehler and Hoffmann 2000, transitively closed).
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::ground::Fact;
@@ -20,7 +20,7 @@ pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<Fact>], adders: &Lis
     arranged(&ways).into_iter().map(|goal| goals[goal as usize]).collect()
 }
 
-/// True, by goal and fact, if they exclude each other.
+/// True, by goal and fact, if goal and fact are mutex.
 fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<Vec<bool>> {
     let with = |&goal: &u32| {
         let mut excluded = vec![false; task.facts];
@@ -36,7 +36,8 @@ fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<V
     goals.iter().map(with).collect()
 }
 
-/// From the ways to bring each goal about, each with the goals that it clashes with: the goals in order.
+/// Goals in order, from the achievers of each goal with the goals that each achiever conflicts
+/// with.
 pub fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
     let goals = ways.len();
     // By goal: those that come before it, directly or not.

@@ -24,7 +24,7 @@ const TURN_WORK: u64 = 400_000;
 const MOST_STEPS: usize = 1_000;
 /// Literals of all steps of a horizon at most.
 const MOST_LITERALS: usize = 4_000_000;
-/// Work that a literal costs when clauses are made, and bytes that it takes.
+/// Work per literal of a new clause.
 const LITERAL_WORK: u64 = 4;
 const LITERAL_BYTES: usize = 16;
 
@@ -35,7 +35,7 @@ struct Horizon {
     agenda: Agenda,
 }
 
-/// The search, which can be gone on with after it ended with [`End::Limit`].
+/// Resumable search; after [`End::Limit`] it can continue.
 pub struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
@@ -66,7 +66,8 @@ impl<'a, 's> Search<'a, 's> {
         self.open.iter().map(|horizon| horizon.solver.bytes()).sum()
     }
 
-    /// Searches on as far as is allowed. Ends with [`End::Exhausted`] where it can do no more, which proves nothing.
+    /// Continues within the limits; [`End::Exhausted`] means that no more can be done, and proves
+    /// nothing.
     pub fn run(&mut self, allowed: Allowed) -> End {
         if !std::mem::replace(&mut self.started, true) {
             self.form = Form::new(self.shared.task, self.shared.mutex_groups);
@@ -87,13 +88,13 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Literals of the next horizon, if there may be one.
+    /// Number of literals of the next horizon; `None` if no further one is allowed.
     fn next_literals(&self) -> Option<usize> {
         let literals = self.next.saturating_mul(self.form.as_ref()?.size());
         (self.next <= MOST_STEPS && literals <= MOST_LITERALS).then_some(literals)
     }
 
-    /// Adds a longer horizon, if there may be one and it can be made within what is allowed.
+    /// Adds a longer horizon if allowed by the limits.
     fn lengthen(&mut self, allowed: &Allowed) -> bool {
         let (Some(form), Some(literals)) = (&self.form, self.next_literals()) else { return false };
         let steps = self.next;
@@ -108,7 +109,7 @@ impl<'a, 's> Search<'a, 's> {
         true
     }
 
-    /// Lets each horizon search on; what this comes to, if it is an end.
+    /// Runs the solver on each horizon in turn; returns the result if conclusive.
     fn turn(&mut self, allowed: &Allowed) -> Option<End> {
         for place in 0..self.open.len() {
             if self.counts.work > allowed.work {

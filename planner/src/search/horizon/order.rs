@@ -1,4 +1,5 @@
-//! An order of operators in which few take away what a later one needs: those that do not can be applied in one step.
+//! Operator order in which few operators delete preconditions of later ones; those that do not can
+//! share a step.
 
 use crate::classical::compiled::Compiled;
 
@@ -7,11 +8,12 @@ use crate::classical::compiled::Compiled;
 pub(super) struct Use {
     pub fact: u32,
     pub needs: bool,
-    /// Takes it away, and not only where the operator could not be applied beside one that needs it.
+    /// True if the operator deletes the fact without needing a fact that makes it mutex with
+    /// operators that need the fact.
     pub takes: bool,
 }
 
-/// Facts that an operator needs, and those that it deletes for others, by operator.
+/// Facts that each operator needs or deletes for others.
 pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
     let used = |operator: usize| {
         let needs = task.preconditions.get(operator);
@@ -33,8 +35,8 @@ pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
     (0..task.operators()).map(used).collect()
 }
 
-/// Operators in order, each with the number of its circle: operators of different circles take nothing away from those
-/// that come later (Rintanen, Heljanko and Niemelä 2006: the strong components of the disabling graph).
+/// Operators in order, each with the number of its strong component in the disabling graph
+/// (Rintanen, Heljanko and Niemelä 2006); operators of different components disable no later ones.
 pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
     // Nodes: operators, then facts. From an operator to what it takes, from a fact to who needs it.
     let operators = uses.len();
@@ -56,7 +58,8 @@ pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
     order
 }
 
-/// Strongly connected component of each node; components reachable from it have lower numbers (Tarjan 1972).
+/// Strongly connected component of each node (Tarjan 1972); components reachable from a node's have
+/// lower numbers.
 pub fn components(edges: &[Vec<u32>]) -> Vec<u32> {
     const OPEN: u32 = u32::MAX;
     let mut found = vec![OPEN; edges.len()];

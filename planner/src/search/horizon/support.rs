@@ -19,7 +19,7 @@ pub(super) struct Agenda {
     seen: Vec<bool>,
     /// Subgoals to be looked at, by moment and rank.
     subgoals: BinaryHeap<Reverse<(usize, u32, u32)>>,
-    /// Conflicts up to when it was begun.
+    /// Number of conflicts when the agenda was built.
     conflicts: u64,
 }
 
@@ -31,7 +31,7 @@ impl Agenda {
     }
 }
 
-/// For plans of so many steps.
+/// Decision heuristic for plans of a given number of steps.
 pub(super) struct Support<'a> {
     pub task: &'a Compiled,
     pub form: &'a Form,
@@ -61,7 +61,7 @@ impl Support<'_> {
         (self.horizon * facts / 16) as u64
     }
 
-    /// The operator to be tried for the earliest subgoal that nothing supports yet, with its step; adds to the work.
+    /// Operator for the earliest unsupported subgoal, with its step; adds to `work`.
     fn open(&mut self, solver: &Solver, work: &mut u64) -> Option<(u32, usize)> {
         while let Some(Reverse((moment, rank, fact))) = self.agenda.subgoals.pop() {
             let adders = self.form.adders.get(fact as usize);
@@ -97,7 +97,7 @@ impl Support<'_> {
         None
     }
 
-    /// All that is still open: each variable keeps its value as long as it can, and no more operators are applied.
+    /// Completes the assignment: variables keep their values, and no more operators are applied.
     fn rest(&self, solver: &Solver, out: &mut Vec<Literal>) {
         let mut held = self.task.initial.clone();
         for moment in 1..=self.horizon {

@@ -1,4 +1,4 @@
-//! Cancels steps that undo one another in plans that count: steps that only change numbers by
+//! Cancels steps that undo each other in counting plans: steps that only change numbers by
 //! constants.
 //!
 //! Other steps are moved to where they can first be taken, so that a number need not come back for them. Then steps
@@ -52,7 +52,8 @@ impl Shifts {
     }
 }
 
-/// The numbers that an operator moves, in order, and by how much; `None` if it does anything else.
+/// Numbers that an operator changes, sorted, with the amounts; `None` if the operator does anything
+/// else.
 fn shift(task: &Compiled, operator: u32) -> Option<(Vec<u32>, Vec<f64>)> {
     let changes = &task.numbers.changes[operator as usize];
     if changes.is_empty() || !task.effects.get(operator as usize).is_empty() {
@@ -78,7 +79,7 @@ fn balance(one: &[f64], other: &[f64]) -> Option<(usize, usize)> {
 }
 
 impl Improve<'_> {
-    /// Takes out of a plan what its steps undo of one another.
+    /// Removes steps of a plan that cancel out.
     pub(super) fn undo(&mut self, plan: &mut Vec<u32>) {
         let task = self.task;
         if task.numbers.is_empty() || plan.len().saturating_mul(task.initial.len()) > MOST_WORDS {
@@ -94,7 +95,7 @@ impl Improve<'_> {
         self.cancel(plan, &shifts, &mut states);
     }
 
-    /// The states along a plan from the last of those that are known on.
+    /// Recomputes the states along a plan from the last valid one on.
     fn follow(&mut self, plan: &[u32], states: &mut Vec<Vec<u32>>) {
         for &operator in &plan[states.len() - 1..] {
             let mut next = Vec::new();
@@ -122,7 +123,7 @@ impl Improve<'_> {
         task.is_goal(&self.state)
     }
 
-    /// Moves every step that is no shift to where it can first be taken.
+    /// Moves every other step to the earliest position where it is applicable.
     fn pull(&mut self, plan: &mut [u32], shifts: &Shifts, states: &mut Vec<Vec<u32>>) {
         for from in 0..plan.len() {
             let operator = plan[from];
@@ -144,7 +145,7 @@ impl Improve<'_> {
         }
     }
 
-    /// Takes out steps with the nearest ones before them that they undo.
+    /// Removes steps together with the nearest earlier ones that they undo.
     fn cancel(&mut self, plan: &mut Vec<u32>, shifts: &Shifts, states: &mut Vec<Vec<u32>>) {
         let mut at = 0;
         'next: while at < plan.len() && !self.over() {
@@ -172,8 +173,8 @@ impl Improve<'_> {
     }
 }
 
-/// The places of the step at hand, of further ones of its kind after it, and of the nearest ones before it that they
-/// undo, in order; `None` if there are too few.
+/// Positions of the given step, of later ones of its kind, and of the nearest earlier ones that
+/// they undo, sorted; `None` if there are too few.
 fn together(plan: &[u32], at: usize, opposite: Opposite) -> Option<Vec<usize>> {
     let behind = (at..plan.len()).filter(|&index| plan[index] == plan[at]).take(opposite.own);
     let ahead = (0..at).rev().filter(|&index| plan[index] == opposite.operator).take(opposite.other);

@@ -3,7 +3,7 @@
 /// A number that is compared: `(>= (presence a-ring ?s) 0.8)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared<'c> {
-    /// Its word.
+    /// Word.
     pub word: &'c str,
     /// Function and its arguments; variables begin with `?`.
     pub of: Vec<&'c str>,

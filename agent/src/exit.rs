@@ -19,7 +19,7 @@ pub enum Exit {
     OutOfTime = 4,
     /// The robot or a store failed for good.
     Broken = 5,
-    /// Its terminal is gone.
+    /// Terminal is gone.
     HungUp = 129,
     /// Stopped by Ctrl-C.
     Interrupted = 130,

@@ -66,9 +66,9 @@ pub struct Weighed {
 pub struct Expected {
     /// Name in PDDL.
     pub name: String,
-    /// Its value now.
+    /// Value now.
     pub now: f64,
-    /// Its value after the plan, if all goes as expected.
+    /// Value after the plan, if all goes as expected.
     pub then: f64,
 }
 

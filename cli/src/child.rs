@@ -29,9 +29,9 @@ struct State {
 pub(crate) struct Ended {
     /// The exit code.
     pub(crate) exit: i32,
-    /// Its standard output.
+    /// Standard output.
     pub(crate) out: String,
-    /// Its narration on standard error.
+    /// Narration on standard error.
     pub(crate) told: String,
 }
 

@@ -26,19 +26,19 @@ use crate::vocabulary::Vocabulary;
 /// An ability of a body, in the words of a domain.
 #[derive(Debug)]
 pub struct Ability {
-    /// The name by which a domain uses it.
+    /// Name used by domains.
     pub name: &'static str,
-    /// Its purpose, in a line.
+    /// Purpose of the ability, in a line.
     pub about: &'static str,
-    /// The words that it states.
+    /// Facts that the ability states.
     pub facts: &'static [Fact],
-    /// The calls that it answers.
+    /// Calls that the ability answers.
     pub calls: &'static [Meaning],
-    /// Skills that it can carry out.
+    /// Skills that the ability carries out.
     pub skills: &'static [SkillWord],
-    /// The words that it reads by name and a domain remembers.
+    /// Remembered words that the ability reads by name.
     pub traces: &'static [Trace],
-    /// The parts of a body without which it can do nothing.
+    /// Parts of a body that the ability needs.
     pub needs: &'static [Part],
     /// Preparation at the beginning of a run, if any.
     pub begins: Option<Begins>,
@@ -46,19 +46,19 @@ pub struct Ability {
     pub fallback: Option<Fallback>,
     /// Final answer of this ability, if it has its own.
     pub answers: Option<Concludes>,
-    /// State with which a run begins, if it has any.
+    /// Initial state of a run, if the ability has state.
     pub recalls: Option<Recalls>,
-    /// Contribution to what later runs remember, if any.
+    /// Contribution to the persistent belief, if any.
     pub keeps: Option<Keeps>,
-    /// Objects that it adds to the problem, if any.
+    /// Objects that the ability adds to the problem, if any.
     pub objects: Option<fn(&Situation) -> Vec<(&'static str, Vec<String>)>>,
-    /// Names that it has come to know, each with its type, if any.
+    /// Names learned by the ability, each with its type, if any.
     pub names: Option<fn(&Known) -> Vec<(&'static str, String)>>,
-    /// The thing of a symbol that it has learned, if it learns things.
+    /// Learned object with a symbol, if the ability learns objects.
     pub thing: Option<fn(&States, &str) -> Option<Thing>>,
     /// Recognition among percepts, in any domain, if any.
     pub again: Option<KnowsAgain>,
-    /// Update from a drive that has come to its end, if it makes use of drives.
+    /// Update after a finished drive, if any.
     pub has_driven: Option<fn(&mut Mind, &Situation)>,
     /// Update from a drive to a pose that has failed; in words, if a second try is not worthwhile.
     pub drive_failed: Option<DriveFailed>,
@@ -67,7 +67,7 @@ pub struct Ability {
 /// State of an ability at the beginning of a run, and the map that the body has made itself, if any.
 pub type Recalls = fn(&Domain, Option<&Past>, &dyn Robot, &mut States) -> Option<Arc<dyn OwnMap>>;
 
-/// Adds to what later runs remember.
+/// Adds to the persistent belief.
 pub type Keeps = fn(&Known, &Past, &mut Remembered);
 
 /// Takes in that a drive to a pose has failed.
@@ -104,36 +104,36 @@ impl Ability {
 pub struct Fact {
     /// The predicate or function.
     pub name: &'static str,
-    /// The types of its arguments.
+    /// Argument types.
     pub types: &'static [&'static str],
-    /// Its meaning, in a line.
+    /// Meaning of the fact, in a line.
     pub about: &'static str,
     /// The instances that hold now, a line of PDDL each.
     pub states: fn(&Situation) -> Vec<String>,
-    /// Bounds on the value that looks may still reveal; none: its value is known.
+    /// Bounds on the value after further looks; `None`: the value is known.
     pub bounds: Option<Bounds>,
 }
 
-/// A word that is remembered of what a skill has done, read by its name.
+/// Remembered word that a skill's outcome sets and an ability reads by name.
 #[derive(Debug)]
 pub struct Trace {
     /// The predicate.
     pub name: &'static str,
-    /// The types of its arguments.
+    /// Argument types.
     pub types: &'static [&'static str],
     /// The skill.
     pub of: &'static str,
-    /// The consequence for a domain that does not remember it, in a line.
+    /// Consequence, in a line, for a domain that does not remember the word.
     pub without: &'static str,
 }
 
-/// Facts on which the answer of a call depends besides its arguments.
+/// Facts, besides the arguments, on which the answer of a call depends.
 #[derive(Debug)]
 pub struct Reads {
     /// The predicate.
     pub word: &'static str,
-    /// Types of the arguments that matter, if not all do: each is the call's only argument of that type;
-    /// `None`: any.
+    /// Types of the relevant arguments, each the call's only argument of that type; `None`: any
+    /// object.
     pub of: &'static [Option<&'static str>],
 }
 
@@ -143,7 +143,8 @@ impl Reads {
         Reads { word, of: &[] }
     }
 
-    /// The same for the planner, of a call with parameters of these types; where a type is not that of one parameter, all of them.
+    /// Read set for the planner, for a call with these parameter types; a type that is ambiguous or
+    /// missing is left open.
     pub fn of_call(&self, vocabulary: &Vocabulary, types: &[String]) -> Read {
         let one = |wanted: &str| {
             let mut fitting = (0..types.len()).filter(|&n| vocabulary.is_a(&types[n], wanted));
@@ -166,11 +167,11 @@ impl Reads {
 pub struct Meaning {
     /// The module's name.
     pub name: &'static str,
-    /// The facts that its answer depends on besides its arguments.
+    /// Facts, besides the arguments, on which the answer depends.
     pub reads: &'static [Reads],
-    /// True if its answer is advice about usefulness, not about possibility.
+    /// True if the answer is advice about usefulness, not about possibility.
     pub is_advice: bool,
-    /// Its meaning, in a line.
+    /// Meaning of the call, in a line.
     pub about: &'static str,
     /// The answer.
     pub answers: fn(&Situation, &Call) -> Result<Answer, CallError>,
@@ -179,26 +180,26 @@ pub struct Meaning {
 /// Something that an ability can carry out.
 #[derive(Debug)]
 pub struct SkillWord {
-    /// The name by which actions use it.
+    /// Name used by actions.
     pub name: &'static str,
     /// Effect on the world.
     pub kind: ActionKind,
-    /// The types of its arguments.
+    /// Argument types.
     pub types: &'static [&'static str],
-    /// Its effect, in a line.
+    /// Effect of the skill, in a line.
     pub about: &'static str,
-    /// Its meaning for the body now, or why it has none.
+    /// Grounds the skill for the body's current state, or states why that is impossible.
     pub ground: Grounding,
-    /// Its cost and expected gain, in words.
+    /// Cost and expected gain, in words.
     pub because: fn(&Situation, &[&str]) -> String,
-    /// Update of the world model from its outcome; in words, if there is anything to say.
+    /// Updates the world model from the outcome; returns a sentence if there is news.
     pub learn: Learn,
-    /// Update of the world model from its failure, besides what the domain says; in words, if a second try is
-    /// not worthwhile.
+    /// Updates the world model from a failure, besides the domain's own lessons; returns a sentence
+    /// if a retry is pointless.
     pub failed: Failed,
 }
 
-/// Finds the meaning of a skill for the body now, or why it has none.
+/// Grounds a skill for the body's current state, or states why that is impossible.
 pub type Grounding = fn(&Situation, &[&str]) -> Result<Box<dyn Skill>, String>;
 
 /// Takes the outcome of a skill in.
@@ -209,25 +210,25 @@ pub type Learn =
 pub type Failed =
     fn(&mut Mind, Eyes<'_>, &Situation, &[&str], &SkillFailure) -> Result<Option<String>, WorldError>;
 
-/// Nothing more follows from a failure.
+/// No update from a failure.
 pub(crate) const NOTHING_MORE: Failed = |_, _, _, _, _| Ok(None);
 
 /// Prepares a run.
 pub type Begins = fn(&mut Mind, &Domain, &Goal);
 
-/// Fallback plans that are surely useful, the best first. Each is a deed, with the drive to it where one is
+/// Fallback plans that are certainly useful, best first; each is a deed, preceded by a drive if
 /// needed.
 pub type Fallback = fn(&Situation) -> Vec<Vec<Deed>>;
 
-/// Answers in the end, by the situation of the last round; none where searching answers.
+/// Final answer from the last round's situation; `None` leaves the answer to *searching*.
 pub type Concludes = fn(&Goal, &Mind, &Situation, &Ended) -> Option<Conclusion>;
 
-/// A skill with its arguments, for an action of the domain to do.
+/// Skill with its arguments, to be carried out by an action of the domain.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Deed {
     /// Name of the skill.
     pub skill: &'static str,
-    /// Its arguments, in its own order.
+    /// Arguments in the skill's order.
     pub arguments: Vec<String>,
 }
 
@@ -237,7 +238,7 @@ impl Deed {
         Self { skill, arguments: arguments.into_iter().map(Into::into).collect() }
     }
 
-    /// The drive to a candidate, and a deed there.
+    /// Deed preceded by the drive to a candidate.
     pub(crate) fn after_drive(self, s: &Situation, to: usize) -> Vec<Deed> {
         let symbol = |n: usize| s.candidates[n].symbol.as_str();
         let drive = (to != s.at).then(|| Deed::new(MOVE, [symbol(s.at), symbol(to)]));
@@ -252,7 +253,7 @@ pub(crate) fn best_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
     all.into_iter().map(|(_, value)| value).collect()
 }
 
-/// Values in the order of what they take, the least first; of equals the earlier first.
+/// Values sorted by duration, stable.
 pub(crate) fn quickest_first<T>(mut all: Vec<(f64, T)>) -> Vec<T> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(_, value)| value).collect()

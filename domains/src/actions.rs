@@ -13,29 +13,29 @@ use crate::config::{ActionConfig, ActionKind, Config};
 use crate::load::Domain;
 use crate::situation::Situation;
 
-/// A call that was carried out whole, as it stood in the plan.
+/// Completed call with its step in the plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
     /// The call.
     pub call: Call,
-    /// The plan's step; times count from when the first of those that were carried out together began.
+    /// Step of the plan; times count from the start of the first step carried out together.
     pub step: Step,
 }
 
-/// A skill with its arguments by name.
+/// Skill with named arguments.
 pub(crate) struct Grounded {
-    /// Its skill.
+    /// Skill.
     pub word: &'static SkillWord,
     arguments: Vec<String>,
 }
 
 impl Grounded {
-    /// The names of its arguments.
+    /// Names of the arguments.
     pub fn arguments(&self) -> Vec<&str> {
         self.arguments.iter().map(String::as_str).collect()
     }
 
-    /// The reason for doing it now.
+    /// Reason for the skill in this situation.
     pub fn because(&self, situation: &Situation) -> String {
         (self.word.because)(situation, &self.arguments())
     }
@@ -67,7 +67,7 @@ pub(crate) fn because(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).because.map(|text| substitute(domain, call, &text, None))
 }
 
-/// The `step`-th part of a call; none where it has no such part.
+/// Part `step` of a call; `None` past the last part.
 pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grounded> {
     let config = config(domain, call);
     let texts = config.does.texts();
@@ -81,8 +81,8 @@ pub(crate) fn grounded(domain: &Domain, call: &Call, step: usize) -> Option<Grou
     Some(Grounded { word, arguments: tokens.collect() })
 }
 
-/// Effect of an action on the world: that of its program as declared, else the strongest among its skills. What is not
-/// known to leave the world as it is changes it.
+/// Effect of an action on the world: as declared for its program, else the strongest of its skills.
+/// Unless known otherwise, an action is changing.
 pub fn kind(config: &Config, action: &str) -> ActionKind {
     let own = config.action.get(action);
     if let Some(own) = own.filter(|own| own.program.is_some()) {
@@ -97,16 +97,17 @@ pub fn kind(config: &Config, action: &str) -> ActionKind {
     skills.into_iter().map(kind).max().unwrap_or(ActionKind::Changing)
 }
 
-/// An action of the domain that does a deed, with its arguments as far as the deed names them.
+/// Action of the domain that carries out a deed, with the arguments that the deed determines.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Performer {
     /// Name of the action.
     pub action: String,
-    /// Its arguments.
+    /// Arguments of the action; `None` where the deed leaves them open.
     pub arguments: Vec<Option<String>>,
 }
 
-/// The actions that do a deed, those first that do nothing else. What changes the world does no deed that leaves it as it is.
+/// Actions that carry out a deed; those that do nothing else first. A changing action does not
+/// stand in for a deed that changes nothing.
 pub fn performers(domain: &Domain, deed: &Deed) -> Vec<Performer> {
     let own =
         abilities::skill(&domain.config.uses, deed.skill).map_or(ActionKind::Changing, |skill| skill.kind);
@@ -138,7 +139,7 @@ pub(crate) fn doer<'a>(domain: &'a Domain, skill: &str) -> Option<&'a descry_pla
     actions.find(|action| texts(&domain.config, &action.name, &[]).iter().any(is_it))
 }
 
-/// The skills of an action as texts; none where a program carries it out.
+/// Skill texts of an action; `None` for a program's action.
 fn texts(config: &Config, action: &str, parameters: &[String]) -> Vec<String> {
     let own = config.action.get(action);
     if own.is_some_and(|own| own.program.is_some()) {
@@ -151,7 +152,8 @@ fn texts(config: &Config, action: &str, parameters: &[String]) -> Vec<String> {
     }
 }
 
-/// Values that a deed gives to an action's parameters, if a skill of the action is that deed.
+/// Argument values from unifying a deed with one of an action's skills; `None` if they do not
+/// unify.
 fn unified(text: &str, deed: &Deed, parameters: &[String]) -> Option<Vec<Option<String>>> {
     let mut tokens = text.split_whitespace();
     if tokens.next() != Some(deed.skill) {
@@ -176,7 +178,7 @@ pub(crate) fn only_looking(config: &Config, task: &mut Task) {
     task.actions.retain(|action| kind(config, &action.name) < ActionKind::Changing);
 }
 
-/// The main part of a call: the one that its action is named after, else the first.
+/// Main part of a call: the skill with the action's name, else the first one.
 pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
     let parts = || (0..).map_while(|step| grounded(domain, call, step));
     parts().find(|part| part.word.name == call.action).or_else(|| parts().next())
@@ -200,7 +202,7 @@ pub(crate) fn taught(
     config.teaches.iter().filter(fits).map(|t| substitute(domain, call, &t.says, by)).collect()
 }
 
-/// A text over the variables of an action with a call's objects in their place; `?by` stands for what was in the way.
+/// Text with an action's variables replaced by a call's objects; `?by` is the blocking object.
 fn substitute(domain: &Domain, call: &Call, text: &str, by: Option<&str>) -> String {
     let parameters = domain.vocabulary.action(&call.action).unwrap_or_default();
     let value = |variable: &str| {
@@ -220,7 +222,7 @@ fn substitute(domain: &Domain, call: &Call, text: &str, by: Option<&str>) -> Str
     out + rest
 }
 
-/// An outcome as it is recorded.
+/// Outcome in recorded form.
 pub(crate) fn outcome(outcome: &Outcome) -> Value {
     match outcome {
         Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
@@ -254,7 +256,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
 pub(crate) struct Bound {
     pub situation: Arc<Situation>,
     pub meaning: &'static Meaning,
-    /// The facts that its answer depends on, as the planner is told.
+    /// Facts that the answer depends on, as declared to the planner.
     pub reads: Vec<Read>,
 }
 

@@ -1,4 +1,4 @@
-//! Final answers: about the goal, with the place of what was found and the evidence.
+//! Final answers about the goal, with the place of the found object and the evidence.
 
 mod judged;
 mod own;
@@ -66,7 +66,8 @@ pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
     }
 }
 
-/// In an answer, `{changes <surface>}` stands for what has changed there since an earlier run, `{changes}` for all surfaces.
+/// Placeholder in answers: `{changes <surface>}` gives the changes on a surface since an earlier
+/// run, `{changes}` those on all surfaces.
 pub(crate) const CHANGES: &str = "changes";
 
 /// Context of an answer.
@@ -81,22 +82,22 @@ pub(crate) struct Asker<'a> {
     pub s: &'a Situation,
     /// The domain's wording of PDDL.
     pub saying: &'a Saying,
-    /// Atoms that the phrase's own answer may list; none: it lists nothing.
+    /// Atoms that the phrase's own answer may list; `None` if it lists nothing.
     pub listed: Option<&'a Listed>,
 }
 
-/// All that is believed of the objects that were seen, whether the goal asks about them or not.
+/// Beliefs about all seen objects, requested or not.
 pub(crate) struct Listed {
-    /// The round's problem with every object for a thing, and every kind of the domain.
+    /// Problem of the round with an object for every thing and every kind of the domain.
     pub task: Task,
-    /// Its calls, bound.
+    /// Bound calls of the task.
     pub attachments: Attachments,
-    /// Things by symbol: the number of the object, and what it is called.
+    /// Things by symbol: object number and name.
     pub things: BTreeMap<String, (u64, String)>,
 }
 
 impl Asker<'_> {
-    /// The goal holds: what was asked for, and where.
+    /// Answer for a goal that holds: the requested object and its place.
     fn reached(&self) -> (Verdict, String) {
         let s = self.s;
         if let Some(unknown) = self.nowhere() {
@@ -191,8 +192,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Sentence about a room in which no surface is known where the requested kind could stand; none if there
-    /// is one.
+    /// Sentence about a room without a known surface for the requested kind; `None` if there is a
+    /// surface.
     fn nowhere(&self) -> Option<String> {
         let asked = self.s.kinds.iter().zip(&self.goal.asked.kinds);
         let mut rooms = asked.flat_map(|(kind, (_, rooms))| rooms.iter().flatten().map(move |r| (kind, r)));
@@ -205,7 +206,8 @@ impl Asker<'_> {
         ))
     }
 
-    /// No plan is left: what is known of what was asked for, and what keeps one from saying more.
+    /// Answer when no plan is left: the knowledge about the goal, and the reason for what is
+    /// missing.
     fn gave_up(&self, planner_says: &str, is_proven: bool) -> (Verdict, String) {
         let s = self.s;
         let culprit = culprit::of_drives(self.domain, self.round);
@@ -287,8 +289,8 @@ impl Asker<'_> {
         (Verdict::Impossible, self.impossible(&says))
     }
 
-    /// Sentence that answers a question about kinds with no: all of them are known, and the condition is
-    /// false; none if it is another question.
+    /// Sentence that answers a question about kinds with no, if all members are known and the
+    /// condition is false.
     fn no_of_kinds(&self) -> Option<String> {
         let s = self.s;
         let is_of_kinds = self.goal.question && !s.kinds.is_empty() && self.own().next().is_none();
@@ -305,7 +307,7 @@ impl Asker<'_> {
         })
     }
 
-    /// The reason looks for a thing prove nothing: they showed nothing that it could stand on, or too few
+    /// Reason why looks for a thing prove nothing: no supporting surface was seen, or too few views
     /// agree.
     fn nothing_seen(&self, thing: &Thing) -> Option<String> {
         let asked = || self.mind.regions.iter().enumerate().filter(|(on, _)| thing.may_be_on(*on));
@@ -331,7 +333,7 @@ impl Asker<'_> {
         format!("{known}{lacks}nothing that can be done brings about {wanted}{says}")
     }
 
-    /// Places of the things that were asked for by name, of those whose place is sure.
+    /// Places of the things requested by name whose place is certain.
     fn surely(&self) -> Vec<String> {
         let is_sure = |what: usize| {
             let anywhere = (0..self.s.surfaces.len()).map(|on| self.s.presence(what, on));
@@ -343,7 +345,7 @@ impl Asker<'_> {
             .collect()
     }
 
-    /// The things that were asked for by name.
+    /// Things requested by name.
     fn own(&self) -> impl Iterator<Item = (usize, &Thing)> {
         self.s.things.iter().enumerate().filter(|(_, t)| t.track.is_none())
     }
@@ -361,7 +363,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Addition that a thing may also be another known object that no look tells apart; empty where looks do.
+    /// Addition that a thing may be another known object, indistinguishable by looks; empty if
+    /// distinguishable.
     fn or_other(&self, thing: &Thing) -> String {
         let [model] = thing.models.as_slice() else { return String::new() };
         let mut others = self.domain.objects.iter().filter(|o| o.name != model.name && is_alike(o, model));
@@ -384,7 +387,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Place where a thing surely stands, outside the places it was asked about.
+    /// Place of a thing that certainly stands outside the requested places.
     fn elsewhere(&self, thing: &Thing) -> Option<String> {
         thing.on.as_ref()?;
         let anywhere = Thing { on: None, ..thing.clone() };
@@ -408,7 +411,7 @@ impl Asker<'_> {
         self.s.belief.tracks.iter().filter(is).map(named).collect()
     }
 
-    /// Sure members of the kinds of which not all are known; empty if there are none.
+    /// Certain members of incompletely known kinds; empty if there are none.
     fn known_members(&self) -> String {
         let s = self.s;
         let is_open = |&n: &usize| s.completeness(n) < s.wanted_of(n);

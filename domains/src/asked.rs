@@ -1,4 +1,4 @@
-//! Subjects of a goal: a visitor of its parsed condition.
+//! Subjects of a goal, collected by a visitor of its parsed condition.
 
 use descry_planner::Source;
 use descry_planner::task::{Comparison, Condition, Expression, PredicateId, Quantified, Task, Term};
@@ -11,19 +11,19 @@ use crate::mentions::mentions;
 use crate::objective::Asked;
 use crate::vocabulary::Vocabulary;
 
-/// The function that says how sure it is that a thing is on a surface: a question about that surface alone.
+/// Function for the certainty that a thing is on a surface; a question about that surface alone.
 const PRESENCE: &str = "presence";
-/// The function that says how exactly it is known where a thing stands, wherever that is: it asks about no place.
+/// Function for the certainty of a thing's position, which asks about no particular surface.
 const PLACED: &str = "placed";
-/// The function that says how sure it is what stands on a surface.
+/// Function for the certainty of the objects on a surface.
 const CLARITY: &str = "clarity";
 /// The predicate that says in which room a surface is.
 const IN: &str = "in";
-/// Words about seen objects: the less was seen, the fewer of them hold.
+/// Words about seen objects that need sightings to hold.
 const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
 
-/// Parses a condition over the words of a domain and the names of a lexicon. A name that nobody knows yet, such as a pose of the
-/// body, is an object of the type that its word wants.
+/// Parses a condition over the domain's words and the lexicon's names. An unknown name, such as a
+/// pose of the body, becomes an object of the expected type.
 ///
 /// # Errors
 /// The findings of the planner, drawn under the condition.
@@ -85,10 +85,10 @@ enum Argument {
 /// The arguments that stand in the slots of a condition.
 type Scope = Vec<Argument>;
 
-/// A variable, and the room in which it is.
+/// Variable with the room that restricts it.
 type Within = (Argument, String);
 
-/// Direction in which a part of a condition counts: more of it is wanted, less of it, or both.
+/// Polarity of a part of a condition: wanted greater, smaller, or both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Wanted {
     more: bool,
@@ -108,9 +108,9 @@ struct Visit<'t> {
     task: &'t Task,
     vocabulary: &'t Vocabulary,
     asked: Asked,
-    /// Things of which it is asked how exactly their places are known.
+    /// Things whose positional certainty is requested.
     placed: Vec<String>,
-    /// Surfaces of which something is said of whichever things there are.
+    /// Surfaces that the goal asks about for arbitrary things.
     whole: Vec<String>,
     /// The derived words whose rules are being read.
     open: Vec<PredicateId>,
@@ -179,7 +179,7 @@ impl<'t> Visit<'t> {
         }
     }
 
-    /// The rules of a derived word, with its arguments.
+    /// Visits the rules of a derived word with its arguments.
     fn rules(&mut self, predicate: PredicateId, arguments: &[Argument], wanted: Wanted, within: &[Within]) {
         if self.open.contains(&predicate) {
             return;
@@ -292,7 +292,7 @@ impl<'t> Visit<'t> {
     }
 }
 
-/// Notes that something is asked about in some places, or wherever it is.
+/// Notes that the goal asks about something in some places, or anywhere.
 fn note(all: &mut Vec<(String, Option<Vec<String>>)>, name: String, places: Option<Vec<String>>) {
     match all.iter_mut().find(|(known, _)| *known == name) {
         None => all.push((name, places)),

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub enum Ended {
     /// The goal holds.
     Reached,
-    /// There is no plan, and why.
+    /// No plan exists, with reasons.
     NoPlan(Vec<NoPlan>),
-    /// The search for a plan came to no end, and no single step is surely worth it.
+    /// Planning was cut off, and no single step is certainly useful.
     Undecided(String),
     /// A limit of looks, plans or time was reached.
     Limit(String),
@@ -25,40 +25,40 @@ pub enum Ended {
 pub enum Verdict {
     /// The goal is reached with the confidence that was asked for.
     Achieved,
-    /// Every useful pose has been tried: it is not there.
+    /// Every useful viewpoint was tried: the object is not there.
     NotFound,
-    /// Nothing that the body can do would settle it.
+    /// Nothing that the body can do would settle the goal.
     CannotTell,
-    /// The requested facts are known, and nothing that the body can do brings about the goal.
+    /// The requested facts are known, and nothing that the body can do achieves the goal.
     Impossible,
-    /// The body or the store failed, or what is done changes nothing.
+    /// The body or the store failed, or actions have no effect.
     Failed,
 }
 
 /// An object, as believed at the end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Believed {
-    /// The known object that it most likely is; none: unknown.
+    /// Most likely known object; `None`: unknown.
     pub label: Option<String>,
-    /// Its kind.
+    /// Kind of the object.
     pub kind: Option<String>,
     /// Probability of that.
     pub confidence: f64,
-    /// The middle of its body, in the map; none in the hand.
+    /// Centre of the body in the map; `None` while in the hand.
     #[serde(default)]
     pub position_m: Option<[f64; 3]>,
-    /// Standard deviation of that, in the direction in which it is known worst; none if nothing is known of it.
+    /// Standard deviation of the position in its least certain direction; `None` if unknown.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
     /// Sides of its footprint and height.
     pub size_m: [f64; 3],
-    /// The surface that it stands on, as people call it.
+    /// Spoken name of the supporting surface.
     #[serde(default)]
     pub on: Option<String>,
     /// The room that this is in.
     #[serde(default, rename = "in")]
     pub room: Option<String>,
-    /// True if the goal asks about it.
+    /// True if the goal asks about the object.
     #[serde(default)]
     pub asked: bool,
 }
@@ -72,11 +72,11 @@ pub struct Conclusion {
     pub why: String,
     /// Confidence of the answer, 0 to 1.
     pub confidence: f64,
-    /// Probability that what was looked for is there after all.
+    /// Probability that the sought object is there after all.
     pub remaining: Option<f64>,
     /// The requested object, if the goal is about a single one.
     pub object: Option<String>,
-    /// The requested object as it is believed to stand, if it is.
+    /// Requested object as believed to stand, if found.
     pub found: Option<Believed>,
     /// Everything that is believed.
     pub objects: Vec<Believed>,

@@ -1,4 +1,5 @@
-//! A number that forbids every drive: the reason why there is no plan, before what attachments refuse.
+//! Numeric condition that forbids every drive, reported as the reason for no plan before refusals
+//! by attachments.
 
 use descry_planner::semantics::{Binding, Compared};
 use descry_planner::state::State;
@@ -13,8 +14,7 @@ use crate::round::Round;
 /// Drives that are looked at, at most.
 const DRIVES: usize = 20_000;
 
-/// The comparison that comes nearest to holding, where no action of moving can be taken for numbers alone; none where one can, or
-/// something else forbids them.
+/// Numeric comparison nearest to holding, if numbers alone forbid every moving action; else `None`.
 pub fn of_drives(domain: &Domain, round: &Round) -> Option<Compared> {
     let semantics = Semantics::new(&round.task, &round.attachments);
     let state = semantics.initial().ok()?;
@@ -40,7 +40,8 @@ fn lacks(compared: &Compared) -> f64 {
     sides.map_or(f64::INFINITY, |(left, right)| (left - right).abs())
 }
 
-/// The reasons why there is no plan, with a number that forbids every drive in the place of what attachments refuse.
+/// Reasons for no plan; a numeric condition that forbids every drive replaces the refusals of
+/// attachments.
 pub fn reasons(domain: &Domain, round: &Round, all: Vec<NoPlan>) -> Vec<NoPlan> {
     let Some(compared) = of_drives(domain, round) else { return all };
     let message = format!("no drive can be taken: {}", told(&compared, &|text| text.to_string()));
@@ -77,7 +78,7 @@ fn words(comparison: descry_planner::task::Comparison) -> &'static str {
     }
 }
 
-/// The ways to take an action of moving.
+/// Instances of moving actions.
 struct Drives<'a> {
     semantics: &'a Semantics<'a>,
     state: &'a State,
@@ -124,7 +125,7 @@ impl Drives<'_> {
         false
     }
 
-    /// True if the duration of the action is finite: it is infinite where no route leads there.
+    /// True if the action's duration is finite, that is, a route exists.
     fn lasts(&self, binding: &Binding) -> bool {
         let mut bounds = self.action.duration.iter().flatten();
         bounds.all(|bound| {

@@ -1,10 +1,10 @@
-//! Objects as a problem declares them: what has one symbol is one object, of every type that it is spoken of by. A table, a thing
-//! that is called "table", and a kind of the name of a thing do not exclude each other.
+//! Object declarations of a problem: one symbol is one object, of every type it is used with. A
+//! table, an object called "table", and a kind with an object's name may share a symbol.
 
 use crate::vocabulary::Vocabulary;
 
-/// The lines that declare objects, each a symbol and a type, and their symbols. Types that the domain does not have declare nothing; what is
-/// of a type is of its supertypes, and the domain's constants are declared already.
+/// Declaration lines (symbol and type) and the declared symbols. Types unknown to the domain are
+/// skipped; supertypes are implied, and domain constants are already declared.
 pub fn lines<'a>(
     objects: impl IntoIterator<Item = (&'a str, &'a str)>,
     vocabulary: &Vocabulary,

@@ -8,7 +8,7 @@ use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
 
-/// A drive ended: the body stands where it was to go.
+/// Handles a finished drive: the body is at its destination.
 pub(crate) fn has_driven(
     mind: &mut Mind,
     _: Eyes<'_>,

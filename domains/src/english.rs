@@ -1,6 +1,6 @@
 //! English around the words of a domain: courtesies, function words, and verbs that mean the same.
 
-/// Openings that ask, and add nothing to what is asked.
+/// Opening phrases of requests, without meaning of their own.
 const OPENINGS: [&str; 28] = [
     "please",
     "hey",
@@ -32,7 +32,7 @@ const OPENINGS: [&str; 28] = [
     "to",
 ];
 
-/// Endings that add nothing to what is asked.
+/// Closing phrases of requests, without meaning of their own.
 const ENDINGS: [&str; 8] = ["please", "for me", "for us", "thanks", "thank you", "now", "right now", ","];
 
 /// Contractions that occur in requests and questions.
@@ -63,7 +63,8 @@ const SAME: [&[&str]; 12] = [
     &["is", "are"],
 ];
 
-/// Words of one field: nearer to each other than to any other, though they request different things.
+/// Semantic fields: words of one field are similar to each other, although they request different
+/// things.
 const RELATED: [&[&str]; 2] = [
     &["find", "see", "spot", "show", "locate", "seek", "where", "look for", "search for", "check"],
     &[
@@ -72,21 +73,21 @@ const RELATED: [&[&str]; 2] = [
     ],
 ];
 
-/// Words before a noun that do not tell which object is meant.
+/// Determiners, which do not identify an object.
 const DETERMINERS: [&str; 9] = ["the", "any", "an", "a", "my", "our", "your", "some", "either"];
 
-/// Words that deny what stands beside them.
+/// Negation words.
 const DENIALS: [&str; 12] = [
     "not", "never", "no", "nor", "neither", "nothing", "nowhere", "without", "except", "cannot", "avoid",
     "stop",
 ];
 
-/// True if a word denies what stands beside it.
+/// True for a negation word.
 pub(crate) fn is_denial(word: &str) -> bool {
     DENIALS.contains(&word) || word.ends_with("n't") || word.ends_with("n’t")
 }
 
-/// True if the words before a name say that something leaves it: "from the", "off the", "out of".
+/// True if the words before a name denote a source: "from the", "off the", "out of".
 pub(crate) fn is_left(before: &[String]) -> bool {
     let mut words = before.iter().rev().map(String::as_str).skip_while(|word| DETERMINERS.contains(word));
     match words.next() {
@@ -95,7 +96,7 @@ pub(crate) fn is_left(before: &[String]) -> bool {
     }
 }
 
-/// The words of a text in lower case, without the signs around them; a comma is a word of its own.
+/// Words of a text in lower case, without punctuation; a comma is a word of its own.
 pub(crate) fn words(said: &str) -> Vec<String> {
     let mut all = Vec::new();
     for word in said.split_whitespace() {
@@ -107,7 +108,7 @@ pub(crate) fn words(said: &str) -> Vec<String> {
     all
 }
 
-/// Words without the commas between them.
+/// Words without commas.
 pub(crate) fn unlisted(words: &[String]) -> Vec<String> {
     words.iter().filter(|word| *word != ",").cloned().collect()
 }
@@ -210,7 +211,7 @@ fn in_one(lists: &[&[&str]], one: &str, other: &str) -> bool {
     lists.iter().any(|list| list.contains(&one) && list.contains(&other))
 }
 
-/// A name without the determiners before it.
+/// Name without leading determiners.
 pub(crate) fn without_determiners(words: &[String]) -> &[String] {
     let mut rest = words;
     while let Some((_, behind)) = rest.split_first().filter(|(word, behind)| {
@@ -221,7 +222,7 @@ pub(crate) fn without_determiners(words: &[String]) -> &[String] {
     rest
 }
 
-/// True if a name is made of words alone that join and end what is said.
+/// True if a name consists of function words only.
 pub(crate) fn is_function_word(name: &str) -> bool {
     words(name).iter().all(|word| ["and", "or", "it", "not", "please"].contains(&word.as_str()))
 }
@@ -236,7 +237,7 @@ pub(crate) fn forms(pattern: &[String]) -> Vec<Vec<String>> {
     vec![pattern.to_vec(), indirect]
 }
 
-/// A word without the signs around it.
+/// Word without surrounding punctuation.
 pub(crate) fn bare(word: &str) -> &str {
     word.trim_matches(|c: char| "\"'.,!?".contains(c))
 }
@@ -245,13 +246,13 @@ pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
-/// A position for people, to the centimetre: nothing is called minus nothing.
+/// Position for people, to the centimetre, without negative zeros.
 pub fn position(metres: [f64; 3]) -> String {
     let [x, y, z] = metres.map(|m| (m * 100.0).round() / 100.0 + 0.0);
     format!("({x:.2}, {y:.2}, {z:.2}) m")
 }
 
-/// One of something, with its article: a cup, an apple.
+/// Name with its indefinite article: a cup, an apple.
 pub fn one(name: &str) -> String {
     let is_vowel = name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O', 'U']);
     format!("{} {name}", if is_vowel { "an" } else { "a" })

@@ -18,7 +18,7 @@ pub enum WorldError {
 }
 
 impl WorldError {
-    /// A skill came back with what another brings about.
+    /// Error of a skill that returned another skill's outcome.
     pub(crate) fn strange(outcome: &Outcome) -> Self {
         WorldError::Bug(format!("a skill came back with {outcome:?}"))
     }

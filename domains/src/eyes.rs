@@ -16,7 +16,7 @@ use crate::mind::Mind;
 pub struct Eyes<'a> {
     /// Everything that is sensed and believed.
     pub record: &'a Record,
-    /// Tells which object a segment is.
+    /// Recogniser of segments.
     pub recogniser: &'a dyn Recogniser,
     /// The known objects.
     pub objects: &'a [ObjectModel],
@@ -24,11 +24,12 @@ pub struct Eyes<'a> {
     pub robot: &'a dyn Robot,
     /// Thresholds of confidence.
     pub thresholds: Thresholds,
-    /// Says of objects that were seen what else they may be.
+    /// Recognisers of learned objects.
     pub again: &'a [KnowsAgain],
 }
 
-/// Says of the percepts on a surface what else they may be, from its views and these merged.
+/// Adds learned objects to the percepts on a surface, from the surface's views and their merged
+/// cloud.
 pub type KnowsAgain = fn(&mut Mind, usize, (&[View], &Merged), Vec<Percept>) -> Vec<Percept>;
 
 /// Records a document.

@@ -1,12 +1,12 @@
-//! Functions of the process that runs the agent, in the places of the programs that a domain names.
+//! In-process functions that replace the programs named by a domain.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde_json::Value;
 
-/// A function in the place of a program. It gets the questions that the program would get, without their
-/// `id`, and its answers are recorded as those of a program are.
+/// Function that replaces a program: same questions without `id`, and its answers are recorded like
+/// a program's.
 pub trait Function: std::fmt::Debug + Send + Sync {
     /// The `value` of the answer.
     ///
@@ -15,7 +15,7 @@ pub trait Function: std::fmt::Debug + Send + Sync {
     fn answer(&self, question: &Value) -> Result<Value, String>;
 }
 
-/// Functions by the names of what they answer for.
+/// Functions by the names of their words, actions or calls.
 pub type NamedFunctions = BTreeMap<String, Arc<dyn Function>>;
 
 /// The functions that stand in for programs of a domain.
@@ -30,7 +30,7 @@ pub struct Functions {
 }
 
 impl Functions {
-    /// The function for a table of `domain.toml` and a name in it.
+    /// Function for a table of `domain.toml` and a name in this table.
     pub fn of(&self, table: &str, name: &str) -> Option<Arc<dyn Function>> {
         let named = match table {
             "attachments" => &self.calls,

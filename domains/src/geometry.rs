@@ -1,6 +1,6 @@
-//! Static geometry of a map, kept from round to round: walls, cameras at the viewpoints, and the viewpoints
-//! that see each surface. Whatever changes, such as a surface that grows or a door that turns out shut, is
-//! worked out anew; all else is taken over.
+//! Static geometry of a map, cached from round to round: walls, cameras at the viewpoints, and the
+//! viewpoints that see each surface. Only changed parts, such as a grown surface or a shut door,
+//! are recomputed.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -31,9 +31,9 @@ pub(crate) struct Sight {
     is_charted: bool,
     /// Pose of the camera by viewpoint.
     pub cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,
-    /// Viewpoints that see any of it, in order.
+    /// Viewpoints that see any part of the surface, in order.
     pub viewers: OnceLock<Vec<usize>>,
-    /// Values worked out for it, kept as long as nothing here changes.
+    /// Derived values of the surface, kept while its geometry is unchanged.
     pub derived: Derived,
 }
 
@@ -53,7 +53,7 @@ impl Geometry {
         &self.sights[on]
     }
 
-    /// The same geometry for what is known now.
+    /// Geometry updated to the current knowledge.
     pub(crate) fn renewed(
         &self,
         viewpoints: &[Candidate],

@@ -22,14 +22,14 @@ pub enum GoalError {
     /// No phrase of the domain fits.
     #[error("\"{said}\" is not a goal that the domain {domain} understands\n{suggestions}")]
     NoPhrase {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
         /// The domain's name.
         domain: String,
         /// The phrases that would have been understood, a line each.
         suggestions: String,
     },
-    /// A phrase fits, but a slot holds a word that nothing is called.
+    /// A phrase fits, but a slot holds an unknown name.
     #[error("nothing is called \"{found}\" in the domain {domain}\n{suggestions}")]
     NoSuchName {
         /// Content of the slot.
@@ -63,7 +63,7 @@ pub enum GoalError {
         /// The words after "within".
         found: String,
     },
-    /// The deadline that was asked for is a number of nothing.
+    /// The deadline has no unit.
     #[error(
         "\"within {found}\" does not say of what\n  seconds or minutes were expected, as in \"within {found} seconds\" or \"within {found} minutes\""
     )]
@@ -74,18 +74,19 @@ pub enum GoalError {
     /// A confidence or deadline is given more than once.
     #[error("\"{condition}\" is said twice\n  expected it once, as in \"find cup A {condition} {example}\"")]
     SaidTwice {
-        /// Its first words.
+        /// First words of the condition.
         condition: &'static str,
-        /// An example of the words after them.
+        /// Example of the words that follow.
         example: &'static str,
     },
-    /// "and" beside "or", two lists of names, and "or" between what is to be known as a whole may be meant in several ways.
+    /// Ambiguous conjunction: "and" beside "or", two lists of names, or "or" between facts to be
+    /// found out.
     #[error("\"{said}\" may be meant in several ways\n  say it with \"and\" alone, or as goals of their own")]
     Several {
         /// The words as they were given.
         said: String,
     },
-    /// A word denies what is asked for, and no phrase of the domain has that word.
+    /// A word negates the request, and no phrase of the domain has that word.
     #[error(
         "\"{said}\" says by \"{word}\" what is not to be\n  expected what is to be found, known or brought about; a run is stopped with Ctrl-C\n{suggestions}"
     )]
@@ -105,7 +106,7 @@ pub enum GoalError {
         /// The words as they were given.
         said: String,
     },
-    /// One thing is asked for in two places at once.
+    /// One object is requested in two places at once.
     #[error(
         "\"{said}\" has {thing} in two places at once: {places}\n  expected one place for a thing; join places by \"or\" if either will do"
     )]
@@ -145,7 +146,7 @@ pub fn read(said: &str, domain: &Domain, lexicon: &Lexicon) -> Result<Goal, Goal
     }
 }
 
-/// Nothing fits: the nearest goals, and what could be said.
+/// Error for words without a matching phrase: the nearest goals, and what could be said.
 fn not_understood(said: &str, plain: &[String], reader: Reader<'_>) -> GoalError {
     let Reader { domain, lexicon, misses, .. } = reader;
     // The nearest goal would be the opposite.
@@ -239,8 +240,8 @@ fn condition(clause: &Clause<'_>, threshold: f64, domain: &Domain) -> Result<Str
     sentence::restricted(&means, &clause.within, domain).ok_or_else(nowhere)
 }
 
-/// Answers of the clauses, with the values of their slots: one after the other where the clauses are joined
-/// by "and"; none if they are alternatives, or if one of them has none.
+/// Answer templates of the clauses with their slot values: in sequence for "and"; none for
+/// alternatives, or if a clause has none.
 fn answers(sentence: &Sentence<'_>) -> Result<Answers, GoalError> {
     let is_joined = sentence.joint == Joint::And;
     let of = |pick: &dyn Fn(&Answers) -> &Option<String>| -> Result<Option<String>, GoalError> {
@@ -261,7 +262,7 @@ fn answers(sentence: &Sentence<'_>) -> Result<Answers, GoalError> {
     })
 }
 
-/// An answer with what fills its slots: symbols in braces, where the state is asked, and names elsewhere.
+/// Answer template with filled slots: symbols inside braces, names elsewhere.
 fn answer_of(text: &str, slots: &[Filled]) -> Result<String, String> {
     let mut out = String::new();
     let mut rest = text;
@@ -274,7 +275,7 @@ fn answer_of(text: &str, slots: &[Filled]) -> Result<String, String> {
     Ok(out + &put_in(rest, slots, |f| f.name.clone())?)
 }
 
-/// The ways in which words fit a pattern with slots, each slot with what it holds; a slot takes one word or more.
+/// All matches of words with a pattern, each with the content of every slot (one word or more).
 pub fn fits<'a>(
     pattern: &[&'a str],
     words: &[String],
@@ -297,12 +298,12 @@ pub fn fits<'a>(
     (1..=words.len()).flat_map(with).collect()
 }
 
-/// The words and slots of a phrase, without the signs around them.
+/// Words and slots of a phrase, without punctuation.
 pub fn pattern(say: &str) -> Vec<&str> {
     say.split_whitespace().map(bare).filter(|word| !word.is_empty()).collect()
 }
 
-/// The types that the phrases of a domain speak of, things first; the kinds are the things, in the plural.
+/// Types used in the domain's phrases, things first; kinds are things in the plural.
 pub fn spoken_types(domain: &Domain) -> Vec<&str> {
     let slots = domain.config.goal.iter().flat_map(|g| slots_of(&g.say)).map(type_of_slot);
     let mut types: Vec<&str> = slots.filter(|of| *of != "kind" && *of != "threshold").collect();

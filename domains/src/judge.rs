@@ -1,4 +1,4 @@
-//! Three-valued truth of a goal against what is believed: what nobody has looked at is neither true nor false.
+//! Three-valued truth of a goal under the belief: unobserved facts are unknown.
 //!
 //! A word is known or lies in a [`Range`]: facts about seen objects are bounded by what looks have left open; what a program or the
 //! body states is known; a remembered word is known where only looking and moving set it, where `init` speaks of it, and where an
@@ -25,11 +25,11 @@ use crate::words::Words;
 /// Truth of a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Truth {
-    /// It does not hold.
+    /// The condition is false.
     False,
-    /// It may hold or not.
+    /// The condition may be true or false.
     Unknown,
-    /// It holds.
+    /// The condition is true.
     True,
 }
 
@@ -50,29 +50,29 @@ impl Truth {
 /// Truth of a condition, with the word that decides it or leaves it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judgement {
-    /// Its truth value.
+    /// Truth value.
     pub value: Truth,
-    /// The word; none where a condition of no words decides.
+    /// Deciding word; `None` for a condition without words.
     pub word: Option<Decisive>,
 }
 
-/// A word with its objects that decides a condition, or leaves it open.
+/// Word with its objects that decides a condition or leaves it open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decisive {
     /// Name of the word.
     pub word: String,
-    /// Its objects: symbols of the problem; none where nobody has seen such an object, or it is none of the problem.
+    /// Objects as symbols of the problem; `None` for an unseen object, or one outside the problem.
     pub objects: Vec<Option<String>>,
-    /// True if it is a number.
+    /// True for a numeric word.
     pub is_number: bool,
-    /// True if looks tell its value.
+    /// True if looks tell the word's value.
     pub is_seen: bool,
-    /// True if it holds, as believed now; for a number, true if it has a value.
+    /// True if the word holds as believed now; for a number, true if it has a value.
     pub holds: bool,
 }
 
 impl Decisive {
-    /// The word as it is written in PDDL, where all its objects are of the problem.
+    /// Word in PDDL, if all its objects are in the problem.
     pub fn pddl(&self) -> Option<String> {
         let objects: Option<Vec<&str>> = self.objects.iter().map(Option::as_deref).collect();
         Some(format!("({})", [&[self.word.as_str()], objects?.as_slice()].concat().join(" ")))
@@ -84,7 +84,7 @@ impl Judgement {
         Judgement { value, word: None }
     }
 
-    /// True if looks may decide it.
+    /// True if looks may decide the word.
     pub fn is_open_to_looks(&self) -> bool {
         self.value == Truth::Unknown && self.word.as_ref().is_some_and(|word| word.is_seen)
     }
@@ -110,7 +110,7 @@ pub struct Judge<'a> {
 }
 
 impl<'a> Judge<'a> {
-    /// A judge of the conditions of a round's task; none where an attachment fails.
+    /// Judge of the conditions of a round's task; fails if an attachment fails.
     pub fn new(
         domain: &'a Domain,
         words: &'a Words,
@@ -179,7 +179,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Judges a condition for each object of some variables; `decides` is the value for which one of them suffices.
+    /// Judges a condition for all objects of some variables; `decides`: value of one instance that
+    /// suffices.
     fn each(
         &self,
         decides: Truth,
@@ -253,7 +254,7 @@ impl<'a> Judge<'a> {
         Judgement { value, word: Some(word) }
     }
 
-    /// A derived word holds where one of its rules does.
+    /// Judges a derived word: true if one of its rules holds.
     fn derived(
         &self,
         predicate: PredicateId,
@@ -367,7 +368,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Bounds that looks give for a word; none where looks do not tell it.
+    /// Bounds on a word after further looks; `None` if looks do not tell the word.
     fn bounds(&self, name: &str) -> Option<Bounds> {
         let word = self.vocabulary.iter().find(|word| word.name == name)?;
         match origin::of(self.domain, word) {
@@ -413,7 +414,7 @@ impl<'a> Judge<'a> {
         held.object().map(|id| self.semantics.task.object(id).name.clone())
     }
 
-    /// Objects that terms denote; none where one of them is undefined.
+    /// Objects denoted by terms; `None` if one is undefined.
     fn referents(&self, terms: &[Term], scope: &[Bound<'a>]) -> Option<Vec<Held<'a>>> {
         terms.iter().map(|term| self.referent(term, scope)).collect()
     }
@@ -429,7 +430,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The objects in the slots; none where one of them is no object of the problem.
+    /// Binding of the slots; `None` if an object is not in the problem.
     fn binding(&self, scope: &[Bound<'a>]) -> Option<Binding> {
         let mut binding = Binding::new(scope.len());
         for (slot, held) in binding.objects.iter_mut().zip(scope) {
@@ -452,13 +453,14 @@ impl Held<'_> {
     }
 }
 
-/// True if a remembered word tells only of what the robot has done: no action that changes the world sets it.
+/// True if a remembered word depends on the robot's own actions alone: no changing action sets it.
 pub(crate) fn is_own(domain: &Domain, word: &str) -> bool {
     let changers = domain.vocabulary.changers(word);
     changers.into_iter().all(|action| actions::kind(&domain.config, action) < ActionKind::Changing)
 }
 
-/// Judges several parts of which one that is as `decides` says decides; among those that leave it open, what looks tell comes first.
+/// Judges several parts; one with the value `decides` suffices. Among open parts, those that looks
+/// can tell come first.
 fn all(decides: Truth, parts: impl Iterator<Item = Judgement>) -> Judgement {
     let mut left: Option<Judgement> = None;
     for part in parts {

@@ -18,48 +18,48 @@ use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 use crate::viewpoint::Candidate;
 
-/// Something that is looked for: a known object, or a kind of them.
+/// Search target: a known object, or a kind of objects.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Thing {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// The name by which percepts know it.
+    /// Name used by percepts.
     pub name: String,
-    /// The models that it may be.
+    /// Models of the objects that may be the target.
     pub models: Vec<ObjectModel>,
-    /// The surfaces that it is asked about; none: wherever it is.
+    /// Surfaces that the goal restricts the target to; `None`: anywhere.
     pub on: Option<Vec<usize>>,
-    /// The number of the one object that is meant, where it is one that has been seen.
+    /// Track number, if the target is one particular seen object.
     pub track: Option<u64>,
 }
 
 impl Thing {
-    /// The probability that an object is it, where it is asked about.
+    /// Probability that a tracked object is the target, within the requested places.
     pub fn probability(&self, track: &Track, surfaces: &[KnownSurface]) -> f64 {
         let meant = self.track.is_none_or(|id| id == track.id);
         let asked = self.on.as_ref().is_none_or(|on| on.iter().any(|&n| surfaces[n].symbol == track.on));
         if meant && asked { track.probability_of(&self.name) } else { 0.0 }
     }
 
-    /// True if it may be on a surface, as far as it is asked about.
+    /// True if the target may be on a surface, given the requested places.
     pub fn may_be_on(&self, surface: usize) -> bool {
         self.track.is_none() && self.on.as_ref().is_none_or(|on| on.contains(&surface))
     }
 }
 
-/// A door, as far as it is known.
+/// Door with its believed state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownDoor {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// The door as the map has it.
+    /// Door of the map.
     pub door: descry_robots::Door,
 }
 
 /// The object in the hand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Held {
-    /// The number of the track that it was.
+    /// Track number that the object had.
     pub track: u64,
 }
 
@@ -70,7 +70,7 @@ pub struct Known {
     pub robot: Arc<dyn Robot>,
     /// Belief state about objects.
     pub belief: Arc<Belief>,
-    /// Everything to stand things on.
+    /// All supporting surfaces.
     pub surfaces: Vec<KnownSurface>,
     /// Free, occupied and unobserved space around each surface.
     pub spaces: Vec<Arc<Space>>,
@@ -80,19 +80,20 @@ pub struct Known {
     pub at: usize,
     /// The one from which the last look was taken; in the beginning where the body stood.
     pub looked_from: usize,
-    /// Since when the body stands where it does.
+    /// Time since which the body has been at its pose.
     pub stands_since_ns: i64,
-    /// Localisation error there, as the last look from there shows it: `map_from_localised`. None before one.
+    /// Localisation error `map_from_localised` at the current pose, from the last look; `None`
+    /// before a look there.
     pub errs_by: Option<Isometry3<f64>>,
     /// Requested objects.
     pub things: Vec<Thing>,
     /// Kinds of which all members are requested.
     pub kinds: Vec<Thing>,
-    /// The surfaces of which it is asked what stands there.
+    /// Surfaces whose objects are requested.
     pub asked: Vec<usize>,
     /// Confidence that is required, 0 to 1.
     pub threshold: f64,
-    /// Seconds until the deadline, if there is one.
+    /// Time until the deadline, seconds, if there is one.
     pub time_left_s: Option<f64>,
     /// Looks that have been taken: candidate and surface.
     pub observed: BTreeSet<(usize, usize)>,
@@ -104,7 +105,7 @@ pub struct Known {
     pub pushes_left: usize,
     /// Doors that the map knows.
     pub doors: Vec<KnownDoor>,
-    /// Those that are believed to be shut, by number.
+    /// Indices of the doors believed shut.
     pub shut: BTreeSet<usize>,
     /// The object in the hand.
     pub held: Option<Held>,
@@ -114,21 +115,21 @@ pub struct Known {
     pub own_map: Arc<dyn OwnMap>,
     /// State of each ability.
     pub states: States,
-    /// Prior weight of each thing, then each kind, then anything on each surface, relative to another
-    /// surface.
+    /// Prior weight of each thing, then each kind, then any object, on each surface, relative to
+    /// another surface.
     pub expected: Vec<Vec<f64>>,
     /// Geometry of the map, kept from round to round.
     pub geometry: Arc<Geometry>,
 }
 
 impl Known {
-    /// The body has moved, until now: how localisation errs where it stands is to be seen.
+    /// Resets the localisation error after the body has moved.
     pub fn has_moved(&mut self) {
         (self.stands_since_ns, self.errs_by) = (self.robot.now_ns(), None);
     }
 }
 
-/// True if two known objects have one shape and size: only their names distinguish them.
+/// True if two known objects have equal shape and size, and differ in name alone.
 pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     let named = ObjectModel {
         name: one.name.clone(),
@@ -139,7 +140,7 @@ pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     named == *one
 }
 
-/// A thing that a goal asks for, from the models of the domain: one of the known objects, or a kind of them.
+/// Search target of a goal from the domain's models: a known object, or a kind.
 pub fn thing(domain: &Domain, wanted: &str) -> Thing {
     let single = domain.objects.iter().find(|o| symbol(&o.name) == wanted);
     let models: Vec<ObjectModel> = match single {

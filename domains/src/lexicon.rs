@@ -1,4 +1,4 @@
-//! Names of things: of the objects of every type, from the domain and from the body's map.
+//! Names of the objects of every type, from the domain and from the body's map.
 
 use std::collections::BTreeMap;
 
@@ -17,7 +17,7 @@ pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SEN
 /// Advice for names that are not distinct.
 pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
 
-/// Something that can be named: its PDDL symbol, and what it is called, the usual name first.
+/// Named object: PDDL symbol and spoken names, the usual one first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Named {
     /// The PDDL symbol.
@@ -46,7 +46,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// Those that a body's map knows.
+    /// Names from a body's map.
     pub fn of_body(robot: &dyn Robot) -> Self {
         Self {
             surfaces: robot.surfaces().iter().map(|s| s.name.clone()).collect(),
@@ -56,14 +56,15 @@ impl Places {
         }
     }
 
-    /// Those of the domain's usual scene, as far as it can be read.
+    /// Names from the domain's default scene, if readable.
     pub fn of_scene(domain: &Domain) -> Self {
         let name = &domain.config.scene;
         let spec = domain.scenes.get(name).and_then(|text| SceneSpec::parse(name, text).ok());
         spec.map_or_else(Self::default, |spec| Self::of_spec(&spec))
     }
 
-    /// Two places of one type, or one, that nothing tells apart or names: letters and digits alone do.
+    /// Message about places of one type without distinguishing names, if any; only letters and
+    /// digits distinguish.
     pub fn unclear(&self) -> Option<String> {
         let all = [
             ("surface", &self.surfaces),
@@ -82,7 +83,7 @@ impl Places {
         })
     }
 
-    /// Those of a scene.
+    /// Names from a scene.
     pub fn of_spec(spec: &SceneSpec) -> Self {
         Self {
             surfaces: spec.surfaces.iter().map(|s| s.name.clone()).collect(),
@@ -140,7 +141,7 @@ impl Lexicon {
         Self { by_type }
     }
 
-    /// With the names of the things that earlier runs have learned.
+    /// Adds the names of objects learned in earlier runs.
     pub fn remembering(mut self, past: Option<&Past>) -> Self {
         past.iter().flat_map(|p| &p.remembered.things).for_each(|thing| self.learn("thing", &thing.name));
         self
@@ -170,7 +171,7 @@ impl Lexicon {
         self.by_type.keys().map(String::as_str)
     }
 
-    /// Usual name of a symbol; the symbol itself if it has no name.
+    /// Usual name of a symbol; the symbol itself if unnamed.
     pub fn name_of<'a>(&'a self, symbol: &'a str) -> &'a str {
         let all = self.by_type.iter().filter(|(of, _)| *of != "kind").flat_map(|(_, list)| list);
         let found = all.into_iter().find(|n| n.symbol == symbol);
@@ -200,7 +201,7 @@ fn things(objects: &[ObjectModel]) -> Vec<Named> {
     things
 }
 
-/// The names of a thing, each in the plural too.
+/// Names of an object, each also in the plural.
 fn in_plural(thing: &Named) -> Named {
     let plurals = thing.names.iter().map(|name| plural(name));
     Named { symbol: thing.symbol.clone(), names: plurals.chain(thing.names.iter().cloned()).collect() }

@@ -1,4 +1,4 @@
-//! A domain's folder: the PDDL text, what may be said, the known objects and the scenes.
+//! Domain folder: PDDL text, phrases, known objects and scenes.
 
 pub mod error;
 #[doc(hidden)]
@@ -40,7 +40,7 @@ pub const DEFAULT: &str = "tabletop";
 pub struct Domain {
     /// `domain.pddl`.
     pub pddl: Source,
-    /// Its vocabulary.
+    /// Vocabulary.
     pub vocabulary: Vocabulary,
     /// `domain.toml`, as text.
     pub toml: Source,
@@ -56,14 +56,14 @@ pub struct Domain {
     pub folder: Option<PathBuf>,
     /// The texts that all this was read from.
     pub files: Files,
-    /// Functions in the places of its programs.
+    /// In-process functions that replace programs.
     pub functions: Functions,
-    /// Recording of its programs' answers, for writing and for replay.
+    /// Tape of the programs' answers, for recording and replay.
     pub tape: Option<Arc<dyn Tape>>,
 }
 
 impl Domain {
-    /// Loads a built-in domain by its name, or any other from its folder.
+    /// Loads a built-in domain by name, or another domain from its folder.
     ///
     /// # Errors
     /// [`LoadError`] names the file, the place in it and what was expected.
@@ -84,7 +84,7 @@ impl Domain {
         from_files(on_disk(folder)?, Some(folder.to_path_buf()))
     }
 
-    /// The programs that it names: what each is for, and its command.
+    /// Programs named by the domain: purpose and command of each.
     pub fn programs(&self) -> Vec<(&str, &[String])> {
         let calls = self.config.attachments.iter().map(|(name, p)| (name.as_str(), p.program.as_slice()));
         let words = self.config.word.iter().map(|(name, word)| (name.as_str(), &word.program));
@@ -121,7 +121,7 @@ pub fn parse_objects(files: &Files) -> Result<Vec<ObjectModel>, LoadError> {
     Ok(read.into_iter().map(|(_, object)| object).collect())
 }
 
-/// The files of a domain by their path within its folder, each with the name that errors show.
+/// Files of a domain by relative path, each with its name for errors and its text.
 pub type Files = BTreeMap<String, (String, String)>;
 
 fn embedded(domain: &str, folder: &Dir<'_>) -> Files {
@@ -176,7 +176,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> LoadError {
     }
 }
 
-/// Reads a domain from its texts; programs that it names are run in `folder`.
+/// Reads a domain from its texts; its programs run in `folder`.
 ///
 /// # Errors
 /// [`LoadError`] names the file, the place in it and what was expected.
@@ -219,14 +219,14 @@ pub fn from_files(files: Files, folder: Option<PathBuf>) -> Result<Domain, LoadE
     })
 }
 
-/// A scene, and each of its later visits, where it has some, under a name of its own: `room-visit-2`.
+/// Scene and its later visits, each under a name of its own: `room-visit-2`.
 fn visits(name: &str, text: &str) -> Vec<(String, String)> {
     let count = text.parse::<toml::Table>().ok().and_then(|t| t.get("visits")?.as_integer()).unwrap_or(1);
     let later = (2..=count).map(|n| (format!("{name}-visit-{n}"), format!("visit = {n}\n{text}")));
     std::iter::once((name.to_string(), text.to_string())).chain(later).collect()
 }
 
-/// A shape as a run has learned it.
+/// Shape as learned by a run.
 fn shape(path: &str, text: &str) -> Result<KnownShape, LoadError> {
     serde_json::from_str(text).map_err(|e| LoadError::File {
         path: path.into(),

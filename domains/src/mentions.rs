@@ -1,4 +1,5 @@
-//! Atoms and values named in a text of PDDL that may have faults: for findings, not for what a condition means.
+//! Atoms and values named in a PDDL text that may have errors; for findings, without evaluating the
+//! text.
 
 /// Every list of plain symbols in a text: `(on cup-a ?s)`, `(confidence cup-a)`.
 pub(crate) fn mentions(text: &str) -> Vec<Vec<String>> {

@@ -19,7 +19,7 @@ pub struct Mind {
     pub known: Known,
     /// The values of remembered and fixed words.
     pub words: Words,
-    /// Looks at each surface, and what was changed there.
+    /// Looks and changes, by surface.
     pub regions: Vec<Region>,
     /// Last merge, if other surfaces may be in the same views.
     pub merged: Option<LastMerged>,
@@ -31,7 +31,7 @@ pub struct Mind {
     pub disturbed: usize,
     /// Driven so far, metres.
     pub distance_m: f64,
-    /// Last reading of each sense of the body, by its symbol.
+    /// Last reading of each sense, by symbol.
     pub readings: BTreeMap<String, serde_json::Value>,
 }
 
@@ -42,19 +42,21 @@ pub struct Region {
     pub looks: Vec<RecordedView>,
     /// State of their last merge, reused by the next one.
     pub merger: Merger,
-    /// The views that its space holds, by their times, and from where they saw it.
+    /// Views in the observed space: timestamp and camera pose of each.
     pub taken_in: Vec<(i64, Isometry3<f64>)>,
     /// Places where something has moved.
     pub changes: Vec<Change>,
     /// The number of looks taken in all.
     pub taken: usize,
-    /// The reason the last look showed no surface; none if it did.
+    /// Reason why the last look showed no surface; `None` if it did.
     pub nothing: Option<String>,
-    /// As many of its views as agree contradict them: which are wrong is not known.
+    /// True if contradicting views are as many as agreeing ones, so that the wrong ones are
+    /// unknown.
     pub disputed: bool,
-    /// The contradiction between its looks and the map, or among them, for which they prove nothing; none if there is none.
+    /// Contradiction between the looks and the map, or among the looks, by which they prove
+    /// nothing; `None` if consistent.
     pub contradiction: Option<Contradiction>,
-    /// Objects believed to stand there before any look of this run.
+    /// Objects believed to be there before the run's first look.
     pub expected: Option<Vec<Track>>,
 }
 
@@ -63,22 +65,22 @@ pub struct Region {
 pub struct RecordedView {
     /// When.
     pub stamp_ns: i64,
-    /// Its record.
+    /// Record.
     pub record: RecordId,
-    /// From how far away it shows the middle of its surface, as far as that is known, metres.
+    /// Distance of the camera from the surface's centre, if known, metres.
     pub away_m: f64,
-    /// Alignment of this view alone with the outline of its surface on the map.
+    /// Alignment of this view alone with the map's outline.
     pub laid: Laid,
 }
 
 /// Alignment of a view with the outline of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Laid {
-    /// As localisation has it: the map has no outline, or nobody has tried.
+    /// As localised: there is no outline, or no alignment was tried.
     AsLocalised,
     /// Moved by this, `map_from_localised`.
     By(Isometry3<f64>),
-    /// Not at all: by itself the view shows no such surface, or not where localisation can be.
+    /// None: the view alone shows no such surface, or none within the localisation error.
     Nowhere,
 }
 
@@ -93,7 +95,7 @@ impl Mind {
         mind
     }
 
-    /// Takes from the remembered words what rounds are grounded in.
+    /// Updates the inputs of a round from the remembered words.
     pub fn attend(&mut self) {
         let (known, words) = (&mut self.known, &self.words);
         let candidate = |name: &String| known.candidates.iter().position(|c| c.symbol == *name);
@@ -127,13 +129,13 @@ impl Mind {
 /// Last merge of views of a surface without an outline on the map.
 pub struct LastMerged {
     pub(crate) options: MergeOptions,
-    /// When its views were taken, and from where.
+    /// Timestamps and poses of the views.
     pub(crate) views: Vec<(i64, Isometry3<f64>)>,
     pub(crate) merged: Merged,
 }
 
 impl RecordedView {
-    /// Localised camera pose of a view that may have been aligned with the outline of its surface.
+    /// Localised camera pose of a view, before alignment with a surface's outline.
     pub(crate) fn localised(&self, view: &View) -> Isometry3<f64> {
         match self.laid {
             Laid::By(map_from_localised) => map_from_localised.inverse() * view.world_from_camera,

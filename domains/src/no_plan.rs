@@ -1,11 +1,11 @@
-//! The reasons there is no plan, in a sentence.
+//! Reasons for no plan, as a sentence.
 
 use descry_planner::{NoPlan, Refusal};
 
 /// Meaning of a domain's call, in words; `None`: not known.
 pub type Meanings<'a> = &'a dyn Fn(&str) -> Option<String>;
 
-/// The reasons why there is no plan. Refused calls are told by what they ask, and counted: which of them comes first says nothing.
+/// Sentence about the reasons for no plan; refused calls are grouped by meaning and counted.
 pub fn told(reasons: &[NoPlan], meanings: Meanings<'_>) -> String {
     reasons.iter().map(|reason| one(reason, meanings)).collect::<Vec<_>>().join("; ")
 }

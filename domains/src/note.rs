@@ -1,4 +1,4 @@
-//! Notes on what a world has learned, for people and for the record.
+//! Notes on world-model updates, for people and for the record.
 
 use std::fmt;
 
@@ -30,16 +30,16 @@ pub enum Note {
     },
     /// A surface that no map knows has come into view.
     Surface {
-        /// As it is called from now on.
+        /// New name.
         name: String,
-        /// The middle of what is seen of it, in the map.
+        /// Centre of the observed part, in the map.
         at_m: [f64; 3],
         /// Area of that, square metres.
         area_m2: f64,
     },
     /// The laser has swept.
     Swept {
-        /// Things on the floor, and the knowledge of their shapes.
+        /// Objects on the floor, with what is known of their shapes.
         things: Vec<OnTheFloor>,
     },
     /// A look was taken into the map.
@@ -54,43 +54,43 @@ pub enum Note {
         open_m2: f64,
         /// Floor that is unknown and may be seen from somewhere, square metres.
         unseen_m2: f64,
-        /// Level surfaces to put things on.
+        /// Level supporting surfaces.
         surfaces: Vec<String>,
-        /// Correction of the body's believed pose by what it sees, metres and radians.
+        /// Correction of the body's believed position by perception, metres.
         moved_m: f64,
-        /// See there.
+        /// Correction of the body's believed heading, radians.
         turned_rad: f64,
     },
     /// A place was visited.
     Visited {
-        /// From where.
+        /// Waypoint of the visit.
         waypoint: String,
         /// The number of visits so far, this one too; 0 if this visit could not be compared.
         visits: usize,
-        /// Correction of the body's believed pose by what it saw, metres and radians.
+        /// Correction of the body's believed position by perception, metres.
         moved_m: f64,
-        /// See there.
+        /// Correction of the body's believed heading, radians.
         turned_rad: f64,
-        /// The reason it could not be compared.
+        /// Reason why the visit could not be compared.
         strange: Option<String>,
         /// Objects that appeared.
         came: Vec<String>,
         /// Objects that are gone.
         gone: Vec<String>,
     },
-    /// Somebody has moved something: what was seen before the last view no longer holds.
+    /// A person moved something: observations before the last view are invalid.
     Changed {
         /// The evidence.
         because: String,
     },
-    /// Nothing could be made of what has been seen so far.
+    /// The views so far showed no usable scene.
     Nothing {
         /// The reason.
         because: String,
         /// Advice on settings; empty: none.
         #[serde(default, skip_serializing_if = "String::is_empty")]
         advice: String,
-        /// True if the view is left out for good; else further views may still make use of it.
+        /// True if the view is dropped for good; otherwise, further views may make it usable.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         is_left_out: bool,
     },
@@ -100,14 +100,14 @@ pub enum Note {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum LeftOut {
-    /// Its number, from 1, and why.
+    /// Number of the view, from 1, with the reason.
     View {
         /// The number.
         view: usize,
         /// The reason, said after the number.
         why: String,
     },
-    /// As an earlier version said it.
+    /// Text of an earlier version.
     Said(String),
 }
 
@@ -124,16 +124,16 @@ impl fmt::Display for LeftOut {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum BeliefChange {
-    /// Change of the confidence in the place of a thing.
+    /// Change of the confidence in an object's place.
     Confidence {
-        /// The thing.
+        /// Name of the object.
         of: String,
         /// Before.
         before: f64,
         /// After.
         after: f64,
     },
-    /// As an earlier version said it.
+    /// Text of an earlier version.
     Said(String),
 }
 
@@ -148,23 +148,23 @@ impl fmt::Display for BeliefChange {
     }
 }
 
-/// A thing on the floor, as a laser sees it.
+/// Object on the floor, as seen by the laser.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum OnTheFloor {
-    /// Knowledge of its shape.
+    /// Shape knowledge of an object.
     Thing {
-        /// In a line.
+        /// Text, one line.
         text: String,
-        /// True if no sweep was taken from near it.
+        /// True if no sweep was taken near the object.
         is_far: bool,
     },
-    /// As an earlier version said it.
+    /// Text of an earlier version.
     Said(String),
 }
 
 impl OnTheFloor {
-    /// The knowledge of its shape, in a line.
+    /// Shape knowledge, in a line.
     pub fn text(&self) -> &str {
         match self {
             OnTheFloor::Thing { text, .. } | OnTheFloor::Said(text) => text,
@@ -173,7 +173,7 @@ impl OnTheFloor {
 }
 
 impl Note {
-    /// A word for what it is about.
+    /// Heading word of the note.
     pub fn head(&self) -> &'static str {
         match self {
             Note::Perceived { .. } | Note::Surface { .. } | Note::Nothing { .. } => "see",
@@ -252,7 +252,7 @@ impl fmt::Display for Note {
     }
 }
 
-/// The pillars and round walls of a map, after its walls; nothing if there are none.
+/// Pillars and round walls of a map, appended to its walls; empty if there are none.
 pub(crate) fn and_round(cylinders: usize) -> String {
     match cylinders {
         0 => String::new(),

@@ -2,12 +2,12 @@
 
 use crate::config::Answers;
 
-/// A goal that a person gave, with what it means in the planner's language.
+/// Goal as given by a person, with its PDDL meaning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goal {
-    /// The words as they were given.
+    /// Words as given.
     pub said: String,
-    /// The phrase of `domain.toml` that they matched.
+    /// Matched phrase of `domain.toml`.
     pub phrase: String,
     /// The goal condition in PDDL.
     pub pddl: String,
@@ -21,14 +21,14 @@ pub struct Goal {
     pub answer: Answers,
     /// The confidence that ends the search, 0 to 1.
     pub threshold: f64,
-    /// Seconds on the body's clock after which it must be over.
+    /// Deadline, seconds on the body's clock.
     pub deadline_s: Option<f64>,
 }
 
-/// A slot of a phrase and what fills it.
+/// Slot of a phrase with its value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Filled {
-    /// As it stands in the phrase: `thing`, or `first:thing`.
+    /// Slot as written in the phrase: `thing`, or `first:thing`.
     pub slot: String,
     /// Index among several slots of the same name, from 0.
     pub number: usize,
@@ -41,23 +41,24 @@ pub struct Filled {
 /// The objects that a goal's condition speaks of.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Asked {
-    /// Things that are looked for, each with the surfaces, or rooms, on which it is asked about; none: wherever it is.
+    /// Requested things, each with the surfaces or rooms it is asked about; `None`: anywhere.
     pub things: Vec<(String, Option<Vec<String>>)>,
-    /// Kinds of which all are asked for, each with the rooms in which it is asked about; none: wherever they are.
+    /// Kinds requested completely, each with its rooms; `None`: anywhere.
     pub kinds: Vec<(String, Option<Vec<String>>)>,
-    /// Surfaces of which it is asked what stands there.
+    /// Surfaces whose objects are requested.
     pub surfaces: Vec<String>,
-    /// True if the condition wants something of seen objects to be false, or a certainty about them to be
+    /// True if the condition wants a fact about seen objects to be false, or a certainty to be
     /// small.
     pub denies: bool,
-    /// True if it asks for more than looking can tell.
+    /// True if the goal needs more than looking.
     pub more: bool,
-    /// Words of the condition with their objects, in its order; those behind derived words too. Variables are left as `?`.
+    /// Words of the condition with their objects, in order, including those behind derived words;
+    /// variables are `?`.
     pub words: Vec<(String, Vec<String>)>,
 }
 
 impl Asked {
-    /// The objects of a word, each time that the condition has it.
+    /// Objects of each occurrence of a word in the condition.
     pub fn of_word<'a>(&'a self, word: &'a str) -> impl Iterator<Item = &'a [String]> {
         self.words.iter().filter(move |(name, _)| name == word).map(|(_, objects)| objects.as_slice())
     }

@@ -9,17 +9,17 @@ use crate::vocabulary::Word;
 /// The source of a word's value in a run.
 #[derive(Debug, Clone, Copy)]
 pub enum Origin {
-    /// A fact of an ability states it, from what is known now.
+    /// Stated by an ability's fact from the current belief.
     Sensed(&'static Fact),
-    /// A program states it.
+    /// Stated by a program.
     SensedByProgram,
-    /// It starts as the domain or the store says and changes as the effects of carried-out actions say.
+    /// Initialised by the domain or the store, and changed by the effects of completed actions.
     Remembered,
-    /// It never changes.
+    /// Never changed.
     Fixed,
-    /// It changes within a plan alone.
+    /// Changed within a plan only.
     Planned,
-    /// The domain's own rules derive it.
+    /// Derived by the domain's rules.
     Derived,
 }
 
@@ -46,7 +46,7 @@ pub fn of(domain: &Domain, word: &Word) -> Origin {
     }
 }
 
-/// The names of the words of a domain that are remembered, and of those that are fixed.
+/// Names of the domain's remembered and fixed words.
 pub fn remembered(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let is_remembered = |w: &Word| matches!(of(domain, w), Origin::Remembered);

@@ -1,4 +1,4 @@
-//! Map that a body makes itself, as far as driving and looking depend on it.
+//! Interface to a map of the body's own making, as far as driving and looking need it.
 
 use descry_perception::nalgebra::Point2;
 use descry_robots::{Description, Failure, Place, Robot, Travel};
@@ -7,10 +7,10 @@ use crate::surface::KnownSurface;
 
 /// Map that a body makes itself.
 pub trait OwnMap: Send + Sync {
-    /// Level surfaces to put things on, as far as they were seen.
+    /// Level supporting surfaces, as observed.
     fn surfaces(&self) -> Vec<KnownSurface>;
 
-    /// Travel from one place to each of the others: on this map if there is one, else on the body's own.
+    /// Travel times from one place to others: on the own map if there is one, else by the body.
     ///
     /// # Errors
     /// Each entry by itself, as [`Robot::travel`].
@@ -22,7 +22,7 @@ pub trait OwnMap: Send + Sync {
         shut: &[String],
     ) -> Vec<Result<Travel, Failure>>;
 
-    /// The places to drive to one after the other on the way on this map; none without a map, or where no way leads.
+    /// Waypoints of a route on the own map; `None` without a map or route.
     fn way(&self, from: &Place, to: &Place) -> Option<Vec<Place>>;
 
     /// True if routes are planned on the floor of this map.
@@ -34,12 +34,12 @@ pub trait OwnMap: Send + Sync {
     /// True if a wall or a pillar of this map stands between two places.
     fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool;
 
-    /// Sentence about frontiers of the map, where unseen floor begins without a wall; none if there is no
-    /// frontier, or nothing was mapped.
+    /// Sentence about frontiers of the map, where unobserved floor begins without a wall; `None`
+    /// without frontiers or map.
     fn goes_on(&self, body: &Description) -> Option<String>;
 }
 
-/// No map of the body's own making: ways are those of the body.
+/// Absent own map: routes come from the body.
 pub struct NoMap;
 
 impl OwnMap for NoMap {

@@ -1,4 +1,5 @@
-//! An attachment that is a program: it reads questions and writes answers, one JSON object a line.
+//! Attachment implemented by a program: reads questions and writes answers, one JSON object per
+//! line.
 //!
 //! A question is `{"id": 7, "module": "path-cost", "kind": "cost", "arguments": ["a", "b"], "readings": [...],
 //! "level": "exact"}`; its answer is `{"id": 7, "value": 3.2}` or `{"id": 7, "error": "why not"}`. A value is a number
@@ -30,7 +31,7 @@ use crate::function::Function;
 
 /// The number of last lines on standard error that are shown when a program ends.
 const LAST_WORDS: usize = 5;
-/// Maximum length of such a line, bytes.
+/// Maximum length of an answer line, bytes.
 const MOST_WORD_BYTES: u64 = 1 << 10;
 /// A line of answer is at most so long: some ten thousand proposals.
 const MOST_LINE_BYTES: u64 = 1 << 20;
@@ -38,7 +39,7 @@ const MOST_LINE_BYTES: u64 = 1 << 20;
 const LINES_AHEAD: usize = 16;
 /// Maximum memory of a program's process, bytes.
 const MOST_DATA_BYTES: u64 = 4 << 30;
-/// A program that has closed its output has so long to end by itself.
+/// Grace period for a program to exit after closing its output.
 const END_WAIT: Duration = Duration::from_millis(500);
 /// Environment variables that a program gets, beside `LC_…`: locations and the language.
 const SEEN: [&str; 12] = [
@@ -56,9 +57,9 @@ const SEEN: [&str; 12] = [
     "TERM",
 ];
 
-/// Keeps what programs answer, and has what they answered in an earlier life of the same run.
+/// Tape that records programs' answers and replays those of an earlier session of the run.
 pub trait Tape: std::fmt::Debug + Send + Sync {
-    /// The answers to `asked`: those of the tape, or else those that `live` gets from the program, which are kept.
+    /// Answers to `asked`: from the tape, or from the program by `live`, then recorded.
     ///
     /// # Errors
     /// Why there are none.
@@ -74,7 +75,7 @@ pub struct ProgramAttachment {
     running: Mutex<Option<Running>>,
 }
 
-/// The process and the threads that keep its pipes from blocking either side.
+/// Process, with the threads that keep its pipes from blocking.
 struct Running {
     child: Child,
     questions: Sender<String>,
@@ -108,7 +109,7 @@ struct Said {
 }
 
 impl ProgramAttachment {
-    /// Binds a program that is run in `folder` (none: the current one). It is started by its first question.
+    /// Binds a program to run in `folder` (`None`: the current one); its first question starts it.
     pub fn new(program: Program, folder: Option<PathBuf>) -> Self {
         Self { program, folder, function: None, tape: None, running: Mutex::new(None) }
     }
@@ -299,7 +300,7 @@ impl ProgramAttachment {
 }
 
 impl Running {
-    /// Waits a moment for the program to end, and ends what is left of it and of what it has started.
+    /// Waits briefly for the program to exit, then kills its process group.
     fn end(&mut self) -> std::io::Result<ExitStatus> {
         let deadline = Instant::now() + END_WAIT;
         while self.child.try_wait()?.is_none() && Instant::now() < deadline {
@@ -424,7 +425,7 @@ fn read_said(said: Said, line: &str) -> Result<Result<Answer, CallError>, CallEr
     }
 }
 
-/// An answer as a program gives it.
+/// Answer in a program's JSON form.
 pub fn written(answer: &Result<Answer, CallError>) -> Value {
     match answer {
         Ok(Answer::Number(cost)) if cost.is_infinite() => json!({ "value": "inf" }),
@@ -442,7 +443,7 @@ fn written_error(error: &CallError) -> Value {
     }
 }
 
-/// The error that was [`written`], if it was one.
+/// Error of an answer in the form of [`written`], if any.
 fn read_error(answer: &Value) -> Option<CallError> {
     let text = |key: &str| answer[key].as_str().map(str::to_owned);
     let timed_out = || answer["timed_out_s"].as_f64().map(|limit_s| CallError::TimedOut { limit_s });
@@ -451,7 +452,7 @@ fn read_error(answer: &Value) -> Option<CallError> {
     timed_out().or_else(wrong).or_else(other)
 }
 
-/// Reads back answers as [`written`], at most `most` of them.
+/// Reads at most `most` answers in the form of [`written`].
 fn read_answers(answers: Value, most: usize) -> Result<Vec<Result<Answer, CallError>>, CallError> {
     let line = answers.to_string();
     let said: Vec<Value> =

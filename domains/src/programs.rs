@@ -13,7 +13,7 @@ use crate::program::ProgramAttachment;
 use crate::vocabulary::Word;
 use crate::words;
 
-/// Every program of a domain, started by its first question.
+/// All programs of a domain, each started by its first question.
 pub struct Programs {
     calls: Vec<(String, Arc<ProgramAttachment>)>,
     facts: BTreeMap<String, ProgramAttachment>,
@@ -26,7 +26,7 @@ pub struct ProgramAction {
 }
 
 impl Programs {
-    /// Those that a domain names.
+    /// Programs named by a domain.
     pub fn of(domain: &Domain) -> Self {
         let bind = |p: Program, table: &str, name: &str| {
             let function = domain.functions.of(table, name);
@@ -55,7 +55,7 @@ impl Programs {
         }
     }
 
-    /// The program behind an action, if it has one.
+    /// Program of an action, if it has one.
     pub fn action(&self, name: &str) -> Option<&ProgramAction> {
         self.actions.get(name)
     }

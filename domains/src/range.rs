@@ -1,13 +1,13 @@
-//! Values that a word may turn out to have, for all that was looked at.
+//! Range of values that a word may take after further looks.
 
 use descry_memory::belief::Track;
 
 use crate::situation::Situation;
 
-/// Range of the value of a word. A predicate has the value 1 where it holds and 0 elsewhere.
+/// Range of a word's value; predicates are 1 if true and 0 if false.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Value as believed now: what is at least this much is believed to be.
+    /// Value as believed now.
     pub believed: f64,
     /// Least value that further looks may leave.
     pub least: f64,
@@ -18,11 +18,11 @@ pub struct Range {
 /// Object that a word is said of.
 #[derive(Debug, Clone, Copy)]
 pub enum Referent<'a> {
-    /// An object of the problem, by its symbol.
+    /// Object of the problem, by symbol.
     Named(&'a str),
-    /// An object that was seen and is none of the things that are asked about.
+    /// Seen object outside the requested things.
     Seen(&'a Track),
-    /// A thing or a surface that nobody has seen.
+    /// Unseen thing or surface.
     Unseen,
 }
 
@@ -30,9 +30,9 @@ pub enum Referent<'a> {
 pub type Bounds = fn(&Situation, &[Referent<'_>]) -> Range;
 
 impl Range {
-    /// A probability of which nothing is known.
+    /// Unknown probability.
     pub const UNKNOWN: Range = Range { believed: 0.0, least: 0.0, greatest: 1.0 };
-    /// A number of which nothing is known.
+    /// Unknown number.
     pub const UNDEFINED: Range =
         Range { believed: f64::NEG_INFINITY, least: f64::NEG_INFINITY, greatest: f64::INFINITY };
 
@@ -41,14 +41,14 @@ impl Range {
         Range { believed: value, least: value, greatest: value }
     }
 
-    /// A certainty that looks may raise: one that is as great as was asked for stays.
+    /// Certainty that looks may raise; fixed once it reaches `wanted`.
     pub fn certainty(value: f64, wanted: f64) -> Range {
         // As the problem of a round states it.
         let value = (value * 1e6).round() / 1e6;
         Range { believed: value, least: if value >= wanted { value } else { 0.0 }, greatest: 1.0 }
     }
 
-    /// Truth of a predicate that holds with a probability: settled where the probability, or its complement,
+    /// Truth of a predicate with a probability; settled if the probability, or its complement,
     /// reaches `wanted`.
     pub fn settled(probability: f64, wanted: f64) -> Range {
         match probability {
@@ -63,7 +63,7 @@ impl Range {
         self.least == self.greatest
     }
 
-    /// A function of two values that is monotonic in each: the extremes of its corners.
+    /// Range of a function that is monotonic in both values: the extremes of its corners.
     pub fn combined(self, other: Range, function: impl Fn(f64, f64) -> f64) -> Range {
         let corners = [
             (self.least, other.least),

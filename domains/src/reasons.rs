@@ -11,7 +11,7 @@ use crate::surface::KnownSurface;
 
 /// A probability that is said with an answer.
 pub const WORTH_SAYING: f64 = 0.01;
-/// The reason the absence of a thing cannot be claimed; none if it can.
+/// Reason why the absence of a thing cannot be claimed; `None` if it can.
 pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     if let Some(late) = out_of_time(s) {
         return Some(late);
@@ -50,13 +50,12 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
 }
 
-/// Never more than it is: what is wanted may be just above.
+/// Probability rounded down, so that it never seems to reach a threshold just above.
 fn floored(p: f64) -> f64 {
     (p * 100.0).floor() / 100.0
 }
 
-/// The known object that a track is likelier to be than the thing, with its probability; empty if there is
-/// none.
+/// Known object that a track more likely is, with its probability; empty if there is none.
 pub fn rather(track: &Track, thing: &Thing) -> String {
     let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
     likelier(&track.probabilities, track.probability_of(&thing.name), is_it)
@@ -69,7 +68,7 @@ pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str)
     most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {:.2}", floored(*p)))
 }
 
-/// Sentence about a surface that was searched for a thing and may not be a surface at all.
+/// Sentence about a searched surface that may not be a supporting surface.
 pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     let asked = s.surfaces.iter().enumerate().filter(|(n, _)| thing.may_be_on(*n));
     asked.into_iter().find_map(|(_, k)| {
@@ -98,12 +97,12 @@ pub fn left_in_all(s: &Situation) -> Option<String> {
     more.filter(|_| !is_seen).or_else(|| left_of_kinds(s))
 }
 
-/// The first kind of which not all are found.
+/// First kind that is incompletely found.
 fn open_kind(s: &Situation) -> Option<usize> {
     (0..s.kinds.len()).find(|&of| s.completeness(of) < s.wanted_of(of))
 }
 
-/// The object whose membership of a kind is least certain, and its probability; none if all are
+/// Object whose membership of a kind is least certain, with its probability; `None` if all are
 /// certain enough.
 fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
     let sure = |p: f64| p.max(1.0 - p);
@@ -112,8 +111,8 @@ fn least_sure(s: &Situation, of: usize) -> Option<(&Track, f64)> {
     least.filter(|(_, p)| sure(*p) < s.threshold)
 }
 
-/// The reason the list of a kind is incomplete: the least sure object, and the chance of more where nothing
-/// was seen.
+/// Reason why the list of a kind is incomplete: the least certain member, and the chance of unseen
+/// ones.
 fn left_of_kinds(s: &Situation) -> Option<String> {
     let open = open_kind(s)?;
     let kind = &s.kinds[open];
@@ -130,17 +129,16 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     Some(format!("all {}{place} are found with {all:.2} only{about}{advice}", plural(&kind.name)))
 }
 
-/// Advice where no look can bring about what is asked for: what was seen from all sides leaves `most`, and
-/// `now` is reached.
+/// Advice when looks cannot reach the requested confidence: `most` is reachable, `now` is reached.
 pub fn at_most(most: f64, now: f64) -> String {
     let said =
         if now > 0.5 { format!("; with a confidence of {now:.2} it could be said") } else { String::new() };
     format!(", and what was seen from all sides leaves no more than {:.2}{said}", floored(most))
 }
 
-/// Subject of the doubt about a kind: the least sure object, or all of them where each is sure enough by
-/// itself and together they leave more open than the unseen places do; and these places, if they alone exceed
-/// the allowed doubt or there is no such object.
+/// Subject of the doubt about a kind: the least certain object, or all objects if each is certain
+/// enough but their joint doubt dominates; and the unseen places, if they alone exceed the allowed
+/// doubt or there is no such object.
 pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
@@ -156,7 +154,7 @@ pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is
     least.or_else(all_seen).into_iter().chain(more.clone()).collect()
 }
 
-/// The rooms in which a kind is asked about, in words; empty if it is asked about wherever it is.
+/// Rooms that a question about a kind names, in words; empty if none.
 pub fn in_room(s: &Situation, kind: &Thing) -> String {
     let mut rooms: Vec<&str> = Vec::new();
     for room in kind.on.iter().flatten().filter_map(|&on| s.surfaces[on].room.as_deref()) {
@@ -172,12 +170,11 @@ fn out_of_time(s: &Situation) -> Option<String> {
         .then(|| "there is no time left for the looks that would settle it".into())
 }
 
-/// A chance below this is not told from none.
+/// Smallest probability reported; smaller ones count as none.
 const LEAST_SAID: f64 = 0.001;
 
-/// Coverage of the places where a thing could be: the seen share of each surface, the number of places it was
-/// seen from, and the remaining probability `left` that the thing is there after all; `looks` gives the
-/// number of looks at each.
+/// Coverage of a thing's possible places: seen share and viewpoints of each surface, and the
+/// remaining probability `left` that the thing is there; `looks`: number of looks at each surface.
 pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
     let of = |on: usize, surface: &KnownSurface| -> Option<String> {
         let share = doubt.share_seen(on)?;
@@ -194,7 +191,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
     format!("{}; a chance of {left} is left", parts.join(", "))
 }
 
-/// Sentence about space for a thing that no look can show; none if its probability is negligible.
+/// Sentence about possible places that no look can show; `None` if negligible.
 fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     let (hidden, places) = doubt.out_of_sight(s);
     let middle =

@@ -7,16 +7,16 @@ use descry_planner::{Attachments, Source, Task};
 
 use crate::situation::Situation;
 
-/// The planning problem of one round, and what its calls are bound to.
+/// Planning problem of one round, with its bound calls.
 pub struct Round {
     /// Snapshot from which the calls are answered.
     pub situation: Arc<Situation>,
     /// The problem.
     pub task: Task,
-    /// Its calls, bound.
+    /// Bound calls.
     pub attachments: Attachments,
     /// The problem's text.
     pub problem: Source,
-    /// Its record.
+    /// Record of the problem.
     pub record: RecordId,
 }

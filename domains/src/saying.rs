@@ -1,5 +1,5 @@
-//! Wording of PDDL for people: the domain's `[said]` has a line for an action, a word or a call. An
-//! expression without a line is shown as it is written.
+//! Verbalisation of PDDL by the domain's `[said]` lines for actions, words and calls; an expression
+//! without a line is shown in PDDL.
 
 use std::collections::BTreeMap;
 
@@ -44,11 +44,11 @@ impl Mood {
     }
 }
 
-/// Variables in scope, each with its type and its name in the sentence.
+/// Variables in scope: type and spoken name of each.
 type Bound<'t> = [(&'t str, String)];
 
 impl Saying {
-    /// As a domain has it, with the names of its places.
+    /// Verbaliser of a domain, with its place names.
     pub fn of(domain: &Domain, places: &Places) -> Self {
         Saying::of_lexicon(domain, &Lexicon::new(domain, places))
     }
@@ -120,12 +120,12 @@ impl Saying {
         parameters.iter().fold(text.clone(), general)
     }
 
-    /// Name of an object, if people have one for it.
+    /// Spoken name of an object, if any.
     pub fn name_of(&self, symbol: &str) -> String {
         self.name(symbol, NAMED[0], &[])
     }
 
-    /// An expression, said; none if a part of it cannot be.
+    /// Verbalised expression; `None` if a part has no wording.
     fn told(&self, written: &Written<'_>, bound: &Bound<'_>) -> Option<String> {
         let Written::List(parts) = written else { return None };
         let (Written::One(head), arguments) = parts.split_first()? else { return None };
@@ -182,7 +182,7 @@ impl Saying {
         Some(format!("{} is {is}{}", side(a)?, side(b)?))
     }
 
-    /// Parts of a sentence about all, or about one, of a type: its subject and its statement.
+    /// Parts of a quantified sentence over a type: subject and statement.
     fn quantified(
         &self,
         over: &Written<'_>,
@@ -202,7 +202,7 @@ impl Saying {
         Some((of, self.told(body, &inner)?))
     }
 
-    /// The type of a variable, by where it stands in what is said of it.
+    /// Type of a variable, from its position in the body.
     fn type_of(&self, variable: &str, body: &Written<'_>) -> Option<String> {
         let Written::List(parts) = body else { return None };
         let here = || {
@@ -213,7 +213,7 @@ impl Saying {
         here().or_else(|| parts.iter().find_map(|part| self.type_of(variable, part)))
     }
 
-    /// The domain's line for an action, a word or a call, with the names of what it is about.
+    /// The domain's line for an action, word or call, with the names of its arguments.
     fn form(&self, head: &str, arguments: &[Written<'_>], bound: &Bound<'_>) -> Option<String> {
         let (parameters, text) = self.forms.get(head)?;
         if parameters.len() != arguments.len() {
@@ -250,7 +250,7 @@ impl Saying {
     }
 }
 
-/// The expression that a text begins with, and what follows it; none if its brackets do not fit.
+/// First expression of a text, and the remainder; `None` for unbalanced brackets.
 fn expression(text: &str) -> Option<(Written<'_>, &str)> {
     let close = match text.chars().next()? {
         '(' => ')',

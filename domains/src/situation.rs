@@ -12,27 +12,27 @@ use crate::config::Thresholds;
 use crate::known::Known;
 use crate::states::Derived;
 
-/// Snapshot of the world model that grounds the symbols of one planning round: all that is [`Known`], and
-/// values derived from it. Nothing in it moves anything.
+/// Snapshot of the world model that grounds one planning round: [`Known`] and values derived from
+/// it. Nothing in it moves anything.
 pub struct Situation {
     known: Known,
     /// Thresholds of confidence.
     pub thresholds: Thresholds,
     travel: Travel,
-    /// Values worked out from it, as they are asked for.
+    /// Derived values, computed on demand.
     pub(crate) derived: Derived,
 }
 
 /// A candidate to drive from, and the doors that are shut then.
 type Departure = (usize, Vec<usize>);
 
-/// Lookups and ways that are computed on demand and kept.
+/// Lookups and routes, computed on demand and cached.
 #[derive(Default)]
 struct Travel {
     /// Candidates by their symbols.
     candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
-    /// Candidates that the plans of the round are made with, once they are chosen, in order.
+    /// Candidates of the round's plans, once chosen, in order.
     focused: OnceLock<Vec<usize>>,
     /// Travel to these alone.
     travel_to_focused_s: Vec<OnceLock<Vec<f64>>>,
@@ -50,7 +50,7 @@ impl std::ops::Deref for Situation {
 }
 
 impl Situation {
-    /// Grounds a round in what is known.
+    /// Grounds a round in the current knowledge.
     pub fn new(mut known: Known, thresholds: Thresholds) -> Self {
         known.geometry =
             Arc::new(known.geometry.renewed(&known.candidates, &known.surfaces, &known.shut, &|surface| {
@@ -85,7 +85,7 @@ impl Situation {
         find(self.surfaces.iter().map(|s| &s.symbol), name, "a surface")
     }
 
-    /// The thing of a symbol.
+    /// Index of the thing with a symbol.
     ///
     /// # Errors
     /// [`CallError::Failed`] if there is none.
@@ -101,7 +101,7 @@ impl Situation {
         find(self.doors.iter().map(|d| &d.symbol), name, "a door")
     }
 
-    /// Seconds that a drive takes on the map, past the doors that are believed to be shut; infinite where no route leads.
+    /// Driving time on the map past doors believed shut, seconds; infinite where no route leads.
     pub fn travel_s(&self, from: usize, to: usize) -> f64 {
         let whole = &self.travel.travel_s[from];
         let focused = self.travel.focused.get().filter(|_| whole.get().is_none());
@@ -112,7 +112,7 @@ impl Situation {
         whole.get_or_init(|| self.travel_row(from, 0..self.candidates.len(), &self.shut))[to]
     }
 
-    /// The same where other doors are shut than now.
+    /// Driving time past a given set of shut doors, seconds; infinite where no route leads.
     pub fn travel_past_s(&self, from: usize, to: usize, shut: &BTreeSet<usize>) -> f64 {
         if *shut == self.shut {
             return self.travel_s(from, to);
@@ -128,7 +128,7 @@ impl Situation {
         row[to]
     }
 
-    /// Notes the candidates that plans of this round are made with: ways between these are asked for together.
+    /// Sets the candidates of the round's plans; routes between them are computed together.
     pub(crate) fn focus_on(&self, candidates: Vec<usize>) {
         self.travel.focused.get_or_init(|| candidates);
     }
@@ -140,13 +140,12 @@ impl Situation {
         travel.into_iter().map(|t| t.map_or(f64::INFINITY, |t| t.duration_s)).collect()
     }
 
-    /// True if the body can drive to a candidate from where it stands without opening anything.
+    /// True if the body can drive to a candidate from its pose without opening anything.
     pub fn can_drive_to(&self, to: usize) -> bool {
         to == self.at || (!self.out_of_reach.contains(&to) && self.travel_s(self.at, to).is_finite())
     }
 
-    /// True if the body can get to a candidate from where it stands, through doors that it would have to open
-    /// too.
+    /// True if the body can reach a candidate from its pose, opening doors if needed.
     pub fn can_reach(&self, to: usize) -> bool {
         let through_doors =
             || !self.shut.is_empty() && self.travel_past_s(self.at, to, &BTreeSet::new()).is_finite();
@@ -182,12 +181,12 @@ impl Situation {
         self.surfaces.iter().position(|s| s.symbol == track.on)
     }
 
-    /// Position of a point of the map in the localised frame, in which the body moves its hand.
+    /// Point of the map in the localised frame, in which the hand moves.
     pub(crate) fn as_localised(&self, p: &Point3<f64>) -> Point3<f64> {
         self.errs_by.map_or(*p, |map_from_localised| map_from_localised.inverse() * p)
     }
 
-    /// The looks that the plan takes before a call, by the `observed` facts that the call reads.
+    /// Looks that the plan takes before a call, from the `observed` facts in the call's readings.
     pub(crate) fn planned_looks(&self, call: &Call) -> Vec<(usize, usize)> {
         let look = |r: &descry_planner::Reading| {
             let from = self.candidate(r.arguments.first()?).ok()?;
@@ -198,7 +197,7 @@ impl Situation {
     }
 }
 
-/// The atoms of a predicate that hold among the facts that a call reads.
+/// True atoms of a predicate among a call's readings.
 pub(crate) fn holding<'a>(
     call: &'a Call,
     predicate: &'a str,
@@ -206,7 +205,7 @@ pub(crate) fn holding<'a>(
     call.readings.iter().filter(move |r| &*r.symbol == predicate && r.value == FactValue::Truth(true))
 }
 
-/// The number of a symbol among those of a kind.
+/// Index of a symbol among objects of one kind.
 pub(crate) fn find<'a>(
     mut symbols: impl Iterator<Item = &'a String>,
     name: &str,

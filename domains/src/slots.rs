@@ -1,4 +1,4 @@
-//! Slots of phrases, and texts with what fills them in their place.
+//! Slots of phrases, and texts with filled slots.
 
 use crate::objective::Filled;
 
@@ -22,8 +22,8 @@ pub fn slots_of(text: &str) -> Vec<&str> {
     slots
 }
 
-/// Puts what fills the slots into a text: the first of a name in the place of its first mention, and so on; where the text mentions
-/// it more or less often than the phrase has it, each mention stands for the only one.
+/// Fills slots in a text: the n-th value of a name replaces its n-th mention; if the counts differ,
+/// every mention stands for the only value.
 ///
 /// # Errors
 /// A slot that the phrase does not have, or of which it has several and the text not as many.

@@ -1,11 +1,11 @@
-//! Values kept by their types: the state of each ability, and what is worked out from a snapshot.
+//! Values keyed by type: states of abilities, and values derived from a snapshot.
 
 use std::any::Any;
 use std::sync::{Arc, OnceLock};
 
 /// State of an ability; every snapshot has a copy.
 pub trait State: Any + Default + Clone + Send + Sync {
-    /// The state of a run in which the ability knows nothing.
+    /// Initial state, without any knowledge.
     fn nothing() -> &'static Self;
 }
 
@@ -33,7 +33,7 @@ struct Kept {
 }
 
 impl States {
-    /// The state of a type; nothing where none was ever changed.
+    /// State of a type; the initial one if never changed.
     pub fn get<T: State>(&self) -> &T {
         match &self.0 {
             Some(kept) => kept.value.downcast_ref().unwrap_or_else(|| kept.others.get()),
@@ -57,7 +57,7 @@ impl States {
     }
 }
 
-/// Values worked out from a snapshot, one of each type, each when it is first asked for.
+/// Values derived from a snapshot, one per type, computed on first access.
 #[derive(Default)]
 pub struct Derived(OnceLock<Box<Made>>);
 

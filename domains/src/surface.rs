@@ -1,4 +1,4 @@
-//! Something to stand things on, and what lies over it.
+//! Supporting surface, and the points over it.
 
 use descry_memory::belief::Track;
 use descry_perception::locate::Certainty;
@@ -10,34 +10,34 @@ use crate::symbol::symbol;
 /// localisation along a surface errs by two or three centimetres.
 const WALL_M: f64 = 0.03;
 
-/// Something to stand things on, as far as it is known.
+/// Supporting surface, as far as known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownSurface {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// As people call it.
+    /// Spoken name.
     pub name: String,
-    /// The room that it is in, as people call it, if the map knows.
+    /// Spoken name of the surface's room, if mapped.
     pub room: Option<String>,
-    /// Outline of that room's floor, within its walls, anticlockwise, metres; empty where the map has none.
+    /// Outline of the room's floor within its walls, anticlockwise, metres; empty if unmapped.
     pub floor: Vec<Point3<f64>>,
-    /// Convex outline in the map, metres; empty while nothing is known of it.
+    /// Convex outline in the map, metres; empty while unknown.
     pub outline: Vec<Point3<f64>>,
     /// Unit normal, away from the floor.
     pub up: Vector3<f64>,
-    /// True if the outline is complete (from the map), false if it is that of the seen part.
+    /// True if the outline is complete (from the map); false if it covers the seen part.
     pub whole: bool,
     /// The reason it may be no surface to stand things on, in words after its name, if it may.
     pub doubtful: Option<String>,
-    /// Certainty of its alignment with the outline of the map; none without such an outline, or while nothing
-    /// was seen.
+    /// Certainty of the alignment with the map's outline; `None` without an outline, or before a
+    /// look.
     pub placed: Option<Certainty>,
-    /// Distance by which looks show it beside the place that the map has it at, metres: which of the two is wrong is not known.
+    /// Displacement between the observed and the mapped surface, metres; either may be wrong.
     pub displaced_m: f64,
 }
 
 impl KnownSurface {
-    /// The middle of the outline; none while nothing is known.
+    /// Centre of the outline; `None` while unknown.
     pub fn centre(&self) -> Option<Point3<f64>> {
         if self.outline.is_empty() {
             return None;
@@ -46,7 +46,7 @@ impl KnownSurface {
         Some(Point3::from(sum / self.outline.len() as f64))
     }
 
-    /// True if it is in one of some rooms, by their symbols.
+    /// True if the surface is in one of the rooms (by symbol).
     pub(crate) fn is_in(&self, rooms: &[String]) -> bool {
         self.room.as_deref().is_some_and(|own| rooms.contains(&symbol(own)))
     }
@@ -56,13 +56,13 @@ impl KnownSurface {
         is_over(&self.outline, &self.up, point, margin_m)
     }
 
-    /// True if a point belongs to a wall of its room, or lies beyond it; `blur_m` is the extra thickness of a
-    /// blurred wall, metres.
+    /// True if a point belongs to a wall of the surface's room, or lies beyond; `blur_m`: extra
+    /// wall thickness by blur, metres.
     pub(crate) fn is_of_wall(&self, point: &Point3<f64>, blur_m: f64) -> bool {
         self.floor.len() >= 3 && !is_over(&self.floor, &Vector3::z(), point, -WALL_M - blur_m)
     }
 
-    /// True if a point lies over the measured footprint of an object that stands here, or over the circle
+    /// True if a point lies over the measured footprint of an object here, or over the circle
     /// around its size.
     pub(crate) fn is_of(&self, track: &Track, point: &Point3<f64>, margin_m: f64) -> bool {
         if track.footprint_m.len() >= 3 {

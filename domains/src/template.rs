@@ -11,7 +11,7 @@ static TEMPLATE: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/template");
 /// Name of the template in its own files.
 const NAME: &str = "new-domain";
 
-/// The files of a new domain: the path of each in the domain's folder, and its text.
+/// Files of a new domain: relative path and text of each.
 pub fn files(name: &str) -> Vec<(PathBuf, String)> {
     fn walk(dir: &Dir<'_>, name: &str, files: &mut Vec<(PathBuf, String)>) {
         for file in dir.files() {

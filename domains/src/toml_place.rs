@@ -18,14 +18,14 @@ impl<'a> TomlPlaces<'a> {
         Self { text }
     }
 
-    /// A value by the keys that lead to it, the elements of lists by number; where one is missing, the deepest that is there. A table
-    /// is shown by its key.
+    /// Span of a value by its key path (list elements by index), or of the deepest existing prefix;
+    /// for a table, the span of its key.
     pub(crate) fn at(&self, path: &[&str]) -> Span {
         let found = DeTable::parse(self.text).ok().and_then(|table| deepest(table.get_ref(), path));
         span(found.unwrap_or_else(|| 0..self.text.lines().next().map_or(0, str::len)))
     }
 
-    /// A part of a value; all of it where the part does not stand there.
+    /// Span of a part of a value; the whole value if the part is missing.
     pub fn within(&self, path: &[&str], part: &str) -> Span {
         let whole = self.at(path);
         let (start, end) = (whole.start as usize, whole.end as usize);

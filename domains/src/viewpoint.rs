@@ -5,8 +5,8 @@ use descry_robots::Place;
 /// Somewhere to stand and look from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// Its pose or station.
+    /// Pose or station.
     pub place: Place,
 }

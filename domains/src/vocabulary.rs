@@ -1,4 +1,4 @@
-//! The words that a domain declares, and where each has its meaning from.
+//! Words declared by a domain, with their origins.
 
 use std::collections::BTreeSet;
 
@@ -19,15 +19,15 @@ pub struct Vocabulary {
 /// A predicate or a function.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Word {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// The types of its arguments, by name; a type that is `either` of several by the first.
+    /// Argument types by name; for an `either`, the first type.
     pub types: Vec<String>,
-    /// True if it is a numeric function.
+    /// True for a numeric function.
     pub is_number: bool,
-    /// True if rules of the domain derive it.
+    /// True if defined by rules.
     pub is_derived: bool,
-    /// Span of its declaration.
+    /// Span of the declaration.
     pub span: Span,
 }
 
@@ -53,7 +53,7 @@ impl Vocabulary {
         self.task.types.iter().any(|t| t.name == name)
     }
 
-    /// True if a type is the other or a subtype of it.
+    /// True if a type equals another or is a subtype of it.
     pub fn is_a(&self, name: &str, other: &str) -> bool {
         let Some(found) = self.task.types.iter().find(|t| t.name == name) else { return false };
         found.ancestors.iter().any(|id| self.task.type_of(*id).name == other)
@@ -86,13 +86,14 @@ impl Vocabulary {
         self.words().into_iter().find(|w| w.name == name)
     }
 
-    /// The types of an action's parameters, by name, with the parameters' names; none if there is no such action.
+    /// Parameters of an action: type and name of each; `None` for an unknown action.
     pub fn action(&self, name: &str) -> Option<Vec<(String, String)>> {
         let action = self.task.actions.iter().find(|a| a.name == name)?;
         Some(action.parameters.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
     }
 
-    /// The parameters of an action, a predicate, a function or a call, in their order: name and type; none if nothing is called so.
+    /// Parameters of an action, predicate, function or call, in order: name and type; `None` for an
+    /// unknown name.
     pub fn parameters(&self, name: &str) -> Option<Vec<(String, String)>> {
         let task = &self.task;
         let action = task.actions.iter().find(|a| a.name == name).map(|a| &a.parameters);
@@ -103,7 +104,7 @@ impl Vocabulary {
         Some(found.iter().map(|p| (p.name.clone(), self.type_name(&p.types))).collect())
     }
 
-    /// The domain's constants of a type or a subtype of it.
+    /// Constants of a type or its subtypes.
     pub fn constants(&self, of: &str) -> Vec<String> {
         let is = |types: &[TypeId]| types.iter().any(|id| self.is_a(&self.task.type_of(*id).name, of));
         self.task.objects.iter().filter(|o| is(&o.types)).map(|o| o.name.clone()).collect()
@@ -132,7 +133,7 @@ impl Vocabulary {
         self.task.actions.iter().any(|action| compares(&action.condition.start, &is_it))
     }
 
-    /// True if an action's effects give a word a value regardless of its earlier value.
+    /// True if an action assigns a word regardless of the earlier value.
     pub fn is_given(&self, word: &str) -> bool {
         self.given.contains(word)
     }
@@ -142,7 +143,7 @@ impl Vocabulary {
     }
 }
 
-/// The name behind `(define (domain`; the reading itself says what is wrong where there is none.
+/// Name in `(define (domain`; missing names are reported by the parser.
 fn domain_name(text: &str) -> String {
     let lower: String =
         text.lines().map(|l| l.split(';').next().unwrap_or_default()).collect::<Vec<_>>().join(" ");
@@ -176,7 +177,7 @@ fn reads(expression: &Expression, is_it: &dyn Fn(&Fluent) -> bool) -> bool {
     }
 }
 
-/// The words that such effects of actions change.
+/// Words changed by action effects accepted by `is_such`.
 fn changed(task: &Task, is_such: impl Fn(&Change) -> bool) -> BTreeSet<String> {
     let effects = task.actions.iter().flat_map(|a| a.effects.start.iter().chain(&a.effects.end));
     effects.filter(|effect| is_such(&effect.change)).flat_map(|e| changed_by(task, &e.change)).collect()

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use descry_robots::nalgebra::{Point2, Vector2};
 use descry_robots::{Door, Room};
 
-/// Distance from the end of a line of sight within which a point stands before the wall behind it, metres.
+/// Distance from the end of a line of sight within which a wall does not block it, metres.
 const BEFORE_M: f64 = 0.05;
 /// Maximum thickness of a wall, metres: the outlines of two rooms lie at most this far from the middle of
 /// the door between them.
@@ -14,8 +14,8 @@ const THICK_M: f64 = 0.3;
 const CELL_M: f64 = 2.0;
 const MOST_CELLS: f64 = 256.0;
 
-/// Walls of a map, found by place: the cost of a line of sight depends on its length, not on the size of
-/// the map.
+/// Walls of a map in a spatial index: the cost of a line of sight depends on its length, not on the
+/// map's size.
 #[derive(Debug, Default)]
 pub struct Walls {
     walls: Vec<Wall>,
@@ -33,12 +33,12 @@ pub struct Walls {
 struct Wall {
     from: Point2<f64>,
     to: Point2<f64>,
-    /// Doors near enough to lead through it, by number.
+    /// Indices of doors that may lead through the wall.
     doors: Vec<usize>,
 }
 
 impl Walls {
-    /// Walls of rooms, and the doors that lead through them.
+    /// Walls of rooms, and the doors through them.
     pub fn new(rooms: &[Room], doors: &[Door]) -> Walls {
         let outlines = rooms.iter().map(|room| &room.outline_m).filter(|outline| outline.len() >= 3);
         let sides = outlines
@@ -63,7 +63,7 @@ impl Walls {
         Walls { walls, ..indexed }
     }
 
-    /// True if the way between two places leads through a wall anywhere but at a door that is not `shut`.
+    /// True if the line between two points crosses a wall other than at a door that is not `shut`.
     pub fn stand_between(&self, shut: &BTreeSet<usize>, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let way = to - from;
         let far = way.norm() - BEFORE_M;
@@ -95,7 +95,7 @@ impl Walls {
     }
 }
 
-/// Doors near enough to a wall to lead through it, by number.
+/// Indices of doors near enough to a wall to lead through it.
 fn doors_near(doors: &[Door], a: &Point2<f64>, b: &Point2<f64>) -> Vec<usize> {
     let side = b - a;
     let distance_m = |door: &Door| {

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::load::Domain;
 use crate::vocabulary::{Vocabulary, Word};
 
-/// The instances of remembered and fixed words that hold or have a value, each word by itself.
+/// Instances of remembered and fixed words that hold or have a value, by word.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Words {
     held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
-    /// Words of which `init` says something.
+    /// Words that `init` mentions.
     begun: BTreeSet<String>,
     /// Instances that this run has given a value, or said not to hold.
     told: BTreeSet<(String, Vec<String>)>,
@@ -75,7 +75,7 @@ impl Words {
         self.held.remove(name);
     }
 
-    /// True if `init` speaks of a word: its other atoms do not hold in the beginning.
+    /// True if `init` mentions a word, so that its other atoms are initially false.
     pub fn is_spoken_of(&self, name: &str) -> bool {
         self.begun.contains(name)
     }
@@ -85,7 +85,7 @@ impl Words {
         self.told.contains(&(name.to_string(), arguments.to_vec()))
     }
 
-    /// The arguments of which a word holds or has a value.
+    /// Arguments of a word's instances that hold or have a value.
     pub fn instances(&self, name: &str) -> impl Iterator<Item = &[String]> {
         self.held.get(name).into_iter().flat_map(|i| i.keys().map(Vec::as_slice))
     }
@@ -95,8 +95,9 @@ impl Words {
         self.held.get(name).is_some_and(|i| i.contains_key(arguments))
     }
 
-    /// Takes over what actions changed: what held of some words before them and after them by the task's own semantics. What
-    /// skills have said themselves in the meantime stays, as do instances whose objects the task does not know.
+    /// Applies the changes of actions, as the difference of readings before and after by the task's
+    /// semantics. Changes stated by skills meanwhile stay, as do instances with objects outside the
+    /// task.
     pub fn take_over(&mut self, before: &[Reading], after: &[Reading]) {
         for gone in before.iter().filter(|r| !after.contains(r)) {
             self.set(&gone.symbol, names(gone), None);
@@ -111,7 +112,7 @@ impl Words {
         }
     }
 
-    /// The lines of PDDL that state them, for objects that are known.
+    /// PDDL lines that state the words, for known objects.
     pub fn lines(&self, vocabulary: &Vocabulary, is_known: impl Fn(&str) -> bool) -> Vec<String> {
         let mut lines = Vec::new();
         for (name, instances) in &self.held {
@@ -133,10 +134,10 @@ fn names(reading: &Reading) -> Vec<String> {
     reading.arguments.iter().map(ToString::to_string).collect()
 }
 
-/// An instance of a word: its name, its arguments, and its value (none: it does not hold).
+/// Word instance: name, arguments, value (`None`: false).
 type Instance = (String, Vec<String>, Option<f64>);
 
-/// Reads one atom, its negation, or one value: `(a b)`, `(not (a b))`, `(= (f a) 3)`.
+/// Parses one atom, negated atom, or value: `(a b)`, `(not (a b))`, `(= (f a) 3)`.
 pub fn read(text: &str) -> Result<Vec<Instance>, String> {
     let spaced = text.to_lowercase().replace('(', " ( ").replace(')', " ) ");
     let tokens: Vec<&str> = spaced.split_whitespace().collect();

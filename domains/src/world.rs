@@ -1,5 +1,5 @@
-//! A running domain: the problem now, what its calls mean, what an action is for the body, what an outcome teaches, what is
-//! answered. It is all that the loop sees of a domain.
+//! Running domain: current problem, meanings of calls, grounding of actions, learning from
+//! outcomes, and answers. The loop sees nothing else of a domain.
 
 mod end;
 mod fallback;
@@ -46,13 +46,13 @@ use crate::viewpoint::Candidate;
 use crate::words::{self, Words};
 use crate::{abilities, declared};
 
-/// Message where there is nothing to choose.
+/// Message when no choice is left.
 const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 
 /// Parts of a world.
 #[derive(Clone)]
 pub struct Setting<'a> {
-    /// The domain: its vocabulary and actions.
+    /// Domain: vocabulary and actions.
     pub domain: &'a Domain,
     /// The goal that is pursued.
     pub goal: &'a Goal,
@@ -60,13 +60,13 @@ pub struct Setting<'a> {
     pub robot: Arc<dyn Robot>,
     /// Everything that is sensed, done and believed.
     pub record: &'a Record,
-    /// Tells which object a segment is.
+    /// Recogniser of segments.
     pub recogniser: &'a dyn Recogniser,
     /// Persistent belief from earlier runs.
     pub past: Option<Past>,
 }
 
-/// The world model of a run, with its goal, policy and programs.
+/// World model of a run, with goal, policy and programs.
 pub struct World<'a> {
     setting: Setting<'a>,
     chooser: Chooser,
@@ -81,23 +81,23 @@ pub struct World<'a> {
     given_up: Option<String>,
     /// The deed that is planned towards.
     heading_for: Option<Deed>,
-    /// True if the steps are a policy's, which does not claim that they will be enough.
+    /// True if the steps come from a policy, which does not claim that they suffice.
     is_unasked: bool,
-    /// Deeds that nothing leads to, and that cannot be done.
+    /// Deeds that cannot be reached or carried out.
     barred: BTreeSet<Deed>,
 }
 
-/// Who says what to do next.
+/// Choice of the next steps, and its maker.
 pub enum Choice {
     /// The planner.
     Planner,
     /// Somebody has chosen these steps.
     Steps(Plan),
-    /// Somebody has chosen these steps; how to get to where they begin, the planner says.
+    /// Chosen steps; the planner finds the way to their start.
     Towards {
-        /// The round's problem with getting there for its goal.
+        /// Planning problem of reaching the start, as goal.
         task: Box<Task>,
-        /// Steps to take there.
+        /// Steps to carry out there.
         then: Plan,
     },
     /// Somebody gives up.
@@ -105,7 +105,7 @@ pub enum Choice {
 }
 
 impl<'a> World<'a> {
-    /// A world that has seen nothing yet, the body standing where it says.
+    /// Initial world without observations, with the body at its own pose estimate.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain cannot be used with this body.
@@ -212,7 +212,7 @@ impl<'a> World<'a> {
         Ok(Round { situation, task, attachments, problem, record })
     }
 
-    /// Takes from memory, clock and belief what the next round is grounded in.
+    /// Updates the inputs of the next round from memory, clock and belief.
     fn attend(&mut self) {
         let Setting { domain, goal, robot, .. } = &self.setting;
         let gone_s = (robot.now_ns() - self.began_ns) as f64 * 1e-9;
@@ -271,7 +271,8 @@ impl<'a> World<'a> {
         Ok(Source::new(format!("{name}.pddl"), text))
     }
 
-    /// The goal of this round: what was asked for, and of kinds of which nothing was seen to be as sure of that as one must be to say so.
+    /// Goal of this round: the requested condition, with the confidence of *not there* required for
+    /// kinds without a seen member.
     fn goal_now(&self, s: &Situation) -> String {
         let goal = &self.setting.goal;
         let surer = |(of, (kind, rooms)): (usize, &(String, Option<Vec<String>>))| {
@@ -287,7 +288,7 @@ impl<'a> World<'a> {
         if surer.is_empty() { goal.pddl.clone() } else { format!("(and {}{surer})", goal.pddl) }
     }
 
-    /// Every call, bound to a situation. A program of the domain's own replaces what is built in.
+    /// Binds every call to a situation; a program of the domain overrides the built-in answer.
     fn bind(&self, situation: &Arc<Situation>) -> Attachments {
         let started = Instant::now();
         let vocabulary = &self.setting.domain.vocabulary;
@@ -305,7 +306,7 @@ impl<'a> World<'a> {
         attachments
     }
 
-    /// Who says what to do next: the planner, or while something is looked for a policy that has chosen.
+    /// Choice of the next steps: by the planner, or by a policy while an object is sought.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
@@ -340,14 +341,14 @@ impl<'a> World<'a> {
         }
     }
 
-    /// No plan leads to what was chosen: it is not chosen again.
+    /// Bars the last choice, because no plan leads to it.
     pub fn bar(&mut self) {
         self.barred.extend(self.heading_for.take());
         self.is_unasked = false;
     }
 
-    /// True if the steps are taken regardless of their expected gain: a policy chooses one look at a time and
-    /// does not claim that it will be enough.
+    /// True if the steps are taken regardless of expected gain: a policy chooses single looks and
+    /// does not claim that they suffice.
     pub fn takes_steps_unasked(&self) -> bool {
         self.is_unasked
     }
@@ -362,7 +363,7 @@ impl<'a> World<'a> {
         self.plans += 1;
     }
 
-    /// The reason for a call: its cost and expected gain.
+    /// Reason for a call: cost and expected gain.
     pub fn explain(&self, round: &Round, call: &Call) -> String {
         match actions::because(self.setting.domain, call) {
             Some(said) => said,
@@ -393,7 +394,8 @@ impl<'a> World<'a> {
         actions::grounded(self.setting.domain, call, step)
     }
 
-    /// Takes in what a part of a call brought about. Returns what came of it in words; empty if its notes say it.
+    /// Updates the world model from the outcome of a call's part; returns a sentence, empty if its
+    /// notes say everything.
     ///
     /// # Errors
     /// [`WorldError::Store`] if the record fails.
@@ -422,8 +424,8 @@ impl<'a> World<'a> {
         Ok(said)
     }
 
-    /// Calls were carried out whole: what they promise of remembered words comes about, and what they must bring about is asked
-    /// for. Returns those that did not do what they should.
+    /// Handles completed calls: applies their effects on remembered words and checks their required
+    /// effects. Returns the calls whose check failed.
     ///
     /// # Errors
     /// [`WorldError`] as for [`World::round`].
@@ -464,7 +466,7 @@ impl<'a> World<'a> {
         Ok(unmet)
     }
 
-    /// True if a condition holds as things are believed now.
+    /// True if a condition holds under the current belief.
     fn holds_now(&mut self, condition: &str) -> Result<bool, WorldError> {
         self.attend();
         let domain = self.setting.domain;
@@ -479,7 +481,7 @@ impl<'a> World<'a> {
         Ok(monitor(&task, &self.bind(&situation), &Plan::default()).is_ok())
     }
 
-    /// Takes in what the failure of a call teaches. Returns what is concluded from it.
+    /// Updates the world model from a call's failure; returns the conclusion in words.
     ///
     /// # Errors
     /// [`WorldError::Store`] if the record fails.
@@ -584,9 +586,9 @@ fn context<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
 
 /// A part of a call for the body.
 pub struct Job {
-    /// The skill to run, or the reason it has no meaning now.
+    /// Skill to run, or the failure if the call cannot be grounded.
     pub skill: Result<Box<dyn Skill>, SkillFailure>,
-    /// Time for it, on the body's clock.
+    /// Time limit on the body's clock, seconds.
     pub limit_s: f64,
 }
 

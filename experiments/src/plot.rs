@@ -108,7 +108,7 @@ impl Plot {
         }
     }
 
-    /// Its heading.
+    /// Heading.
     pub fn title(&self) -> &str {
         match self {
             Self::Lines { title, .. } | Self::Dots { title, .. } => title,

@@ -8,9 +8,9 @@ use crate::overrides;
 /// An experiment file as it was read.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// Its path, as given.
+    /// Path, as given.
     pub path: PathBuf,
-    /// Its text.
+    /// Text.
     pub text: String,
 }
 

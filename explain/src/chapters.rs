@@ -31,7 +31,7 @@ pub struct Chapter {
     pub because: String,
     /// The greatest of the numbers of an unmet existential condition, with its name.
     pub most: Option<(String, f64)>,
-    /// Its steps.
+    /// Steps.
     pub steps: Vec<Step>,
     /// The calls of its steps.
     pub calls: Vec<Call>,

@@ -83,11 +83,11 @@ pub enum Form {
 /// Description of a blob, without its bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlobInfo {
-    /// Its name within the record.
+    /// Name within the record.
     pub name: String,
-    /// Its form.
+    /// Form.
     pub form: Form,
-    /// Its length, bytes.
+    /// Length, bytes.
     pub bytes: u64,
     /// Layout: fields and stride of a cloud, size and encoding of an image.
     #[serde(default, skip_serializing_if = "Value::is_null")]
@@ -99,7 +99,7 @@ pub struct BlobInfo {
 /// Fields that a newer format adds are ignored by older readers, fields that an older format lacked take their default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Document {
-    /// Its number.
+    /// Number.
     pub id: RecordId,
     /// Kind: `cloud`, `scan`, `image`, `transforms`, `log`, or any word.
     pub kind: String,
@@ -126,10 +126,10 @@ pub struct Document {
     /// True if it is never pruned, because the recording cannot be understood without it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kept: bool,
-    /// Its content.
+    /// Content.
     #[serde(default, skip_serializing_if = "Value::is_null")]
     pub body: Value,
-    /// Its blobs.
+    /// Blobs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blobs: Vec<BlobInfo>,
 }
@@ -137,13 +137,13 @@ pub struct Document {
 /// A blob to be recorded.
 #[derive(Clone, Debug)]
 pub struct Blob<'a> {
-    /// Its name within the record.
+    /// Name within the record.
     pub name: String,
-    /// Its form.
+    /// Form.
     pub form: Form,
     /// See [`BlobInfo::layout`].
     pub layout: Value,
-    /// Its bytes.
+    /// Bytes.
     pub data: Cow<'a, [u8]>,
 }
 
@@ -258,9 +258,9 @@ impl Draft<'_> {
 /// A ball in the world, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Near {
-    /// Its centre.
+    /// Centre.
     pub place_m: [f64; 3],
-    /// Its radius.
+    /// Radius.
     pub radius_m: f64,
 }
 

@@ -98,9 +98,9 @@ pub enum Error {
     /// A remote store failed.
     #[error("the store at {place}: {because}")]
     Remote {
-        /// Its address.
+        /// Address.
         place: String,
-        /// Its reason.
+        /// Reason.
         because: String,
     },
     /// The data cannot be recorded.
@@ -122,11 +122,11 @@ pub enum Error {
     NoBlob {
         /// The record.
         id: u64,
-        /// Its kind.
+        /// Kind.
         kind: String,
         /// The blob asked for.
         name: String,
-        /// Its blobs.
+        /// Blobs.
         has: String,
     },
     /// Nothing near enough in time.

@@ -16,7 +16,7 @@ pub struct Visited {
     pub at: [f64; 3],
     /// Time of the last visit, seconds since 1970.
     pub last_unix_s: f64,
-    /// Its static structure.
+    /// Static structure.
     #[serde(serialize_with = "write_room", deserialize_with = "read_room")]
     pub room: MetaRoom,
 }
@@ -24,7 +24,7 @@ pub struct Visited {
 /// A learned object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LearnedThing {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Time of learning, seconds since 1970.
     pub learned_unix_s: f64,
@@ -52,7 +52,7 @@ fn once() -> u32 {
 pub struct Place {
     /// Time of the sighting, seconds since 1970.
     pub unix_s: f64,
-    /// Its centre, map frame, metres.
+    /// Centre, map frame, metres.
     pub at_m: Point3<f64>,
     /// Symbol of the supporting surface.
     pub on: String,

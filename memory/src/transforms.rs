@@ -35,9 +35,9 @@ pub enum TransformError {
     /// A link has no measurement near that time.
     #[error("the link `{parent}` <- `{child}` was not measured near {stamp_ns} ns: {}", gap_text(*stamp_ns, *before_ns, *after_ns, *max_gap_ns))]
     Gap {
-        /// Its parent frame.
+        /// Parent frame.
         parent: String,
-        /// Its child frame.
+        /// Child frame.
         child: String,
         /// The time, nanoseconds.
         stamp_ns: i64,
@@ -61,11 +61,11 @@ pub enum TransformError {
     /// An invalid transform.
     #[error("the transform `{parent}` <- `{child}` at {stamp_ns} ns {what}")]
     Invalid {
-        /// Its parent frame.
+        /// Parent frame.
         parent: String,
-        /// Its child frame.
+        /// Child frame.
         child: String,
-        /// Its time, nanoseconds.
+        /// Time, nanoseconds.
         stamp_ns: i64,
         /// Fault of the transform.
         what: &'static str,

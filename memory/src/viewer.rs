@@ -18,7 +18,7 @@ pub struct Labelled {
     pub text: String,
     /// Pose of the box centre in the common frame.
     pub frame_from_box: Isometry3<f64>,
-    /// Its sides, metres.
+    /// Sides, metres.
     pub size_m: Vector3<f64>,
     /// Red, green, blue and opacity, 0 to 1.
     pub colour: [f64; 4],

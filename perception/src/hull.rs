@@ -11,9 +11,9 @@ pub struct Hull {
     pub plane: Plane,
     /// Origin of the plane's own coordinates.
     pub origin: Point3<f64>,
-    /// Its first axis, a unit vector.
+    /// First axis, a unit vector.
     pub u: Vector3<f64>,
-    /// Its second axis; `u`, `v`, normal are right-handed.
+    /// Second axis; `u`, `v`, normal are right-handed.
     pub v: Vector3<f64>,
     /// Corners in those coordinates, anticlockwise seen from where the normal points, metres. Two for points on a line, one for one place.
     pub corners: Vec<Point2<f64>>,

@@ -92,7 +92,7 @@ pub struct ViewFit {
 /// The report of one of the five steps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Points after it.
     pub points: usize,

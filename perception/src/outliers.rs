@@ -9,7 +9,7 @@ pub struct Kept {
     pub indices: Vec<u32>,
     /// Mean over the cloud of the mean distance to the neighbours, metres.
     pub mean_m: f64,
-    /// Its standard deviation, metres.
+    /// Standard deviation, metres.
     pub sigma_m: f64,
     /// Points whose neighbours are on average farther than this were dropped, metres.
     pub limit_m: f64,

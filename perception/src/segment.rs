@@ -67,7 +67,7 @@ impl Default for SceneOptions {
 pub struct Segment {
     /// Indices into the cloud that was segmented, ascending.
     pub indices: Vec<u32>,
-    /// Its points in the surface's frame (z is the height above the surface), metres, in the order of `indices`.
+    /// Points in the surface's frame (z is the height above the surface), metres, in the order of `indices`.
     #[serde(skip)]
     pub points: Vec<Point3<f64>>,
     /// Height of what it stands on above the surface, metres: 0 on the surface itself, more on another object.

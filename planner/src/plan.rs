@@ -26,7 +26,7 @@ pub struct Step {
 /// A plan, in order of time.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Plan {
-    /// Its steps.
+    /// Steps.
     pub steps: Vec<Step>,
     /// Cost, if known.
     pub cost: Option<f64>,

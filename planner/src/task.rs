@@ -92,9 +92,9 @@ pub struct Task {
 /// A type.
 #[derive(Debug, Clone)]
 pub struct Type {
-    /// Its name, lower case.
+    /// Name, lower case.
     pub name: String,
-    /// Its direct supertypes; none for `object` alone.
+    /// Direct supertypes; none for `object` alone.
     pub parents: Vec<TypeId>,
     /// The type itself, then all its supertypes.
     pub ancestors: Vec<TypeId>,
@@ -107,7 +107,7 @@ pub struct Type {
 /// An object or constant.
 #[derive(Debug, Clone)]
 pub struct Object {
-    /// Its name, lower case.
+    /// Name, lower case.
     pub name: String,
     /// Its declared types (more than one after `either`: it is of all of them).
     pub types: Vec<TypeId>,
@@ -118,7 +118,7 @@ pub struct Object {
 /// A variable with the alternatives of its type.
 #[derive(Debug, Clone)]
 pub struct Parameter {
-    /// Its name, with the question mark.
+    /// Name, with the question mark.
     pub name: String,
     /// An object fits that is of one of these.
     pub types: Vec<TypeId>,
@@ -131,9 +131,9 @@ pub struct Parameter {
 /// A predicate.
 #[derive(Debug, Clone)]
 pub struct Predicate {
-    /// Its name, lower case.
+    /// Name, lower case.
     pub name: String,
-    /// Its parameters.
+    /// Parameters.
     pub parameters: Vec<Parameter>,
     /// The stratum of its rules, if it is derived: rules of stratum `n` use negated derived atoms only of lower strata.
     pub stratum: Option<u32>,
@@ -144,9 +144,9 @@ pub struct Predicate {
 /// A function.
 #[derive(Debug, Clone)]
 pub struct Function {
-    /// Its name, lower case.
+    /// Name, lower case.
     pub name: String,
-    /// Its parameters.
+    /// Parameters.
     pub parameters: Vec<Parameter>,
     /// `None` for numbers, else the types of the objects that are its values.
     pub result: Option<Vec<TypeId>>,
@@ -157,11 +157,11 @@ pub struct Function {
 /// A semantic module of PDDL/M.
 #[derive(Debug, Clone)]
 pub struct Module {
-    /// Its name, case kept.
+    /// Name, case kept.
     pub name: String,
     /// Kind.
     pub kind: CallKind,
-    /// Its parameters: slots `0..parameters.len()` of `writes`.
+    /// Parameters: slots `0..parameters.len()` of `writes`.
     pub parameters: Vec<Parameter>,
     /// Terms that an effect module writes, over its parameters, in the order of its answers.
     pub writes: Vec<Written>,
@@ -187,7 +187,7 @@ pub enum Written {
 pub struct ModuleOption {
     /// The token `init@lib`, case kept.
     pub function: String,
-    /// Its arguments, case kept.
+    /// Arguments, case kept.
     pub arguments: Vec<String>,
     /// Span.
     pub span: Span,
@@ -218,7 +218,7 @@ pub enum Term {
 pub struct Atom {
     /// The predicate.
     pub predicate: PredicateId,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Term>,
     /// Span.
     pub span: Span,
@@ -229,7 +229,7 @@ pub struct Atom {
 pub struct Fluent {
     /// The function.
     pub function: FunctionId,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Term>,
     /// Span.
     pub span: Span,
@@ -240,7 +240,7 @@ pub struct Fluent {
 pub struct Call {
     /// The module.
     pub module: ModuleId,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Term>,
     /// Span.
     pub span: Span,
@@ -282,9 +282,9 @@ impl Condition {
 /// A quantified variable and its slot.
 #[derive(Debug, Clone)]
 pub struct Quantified {
-    /// Its slot.
+    /// Slot.
     pub slot: Slot,
-    /// Its name, type and objects.
+    /// Name, type and objects.
     pub parameter: Parameter,
 }
 
@@ -342,15 +342,15 @@ impl Default for Condition {
 /// An action.
 #[derive(Debug, Clone)]
 pub struct Action {
-    /// Its name, lower case.
+    /// Name, lower case.
     pub name: String,
-    /// Its parameters: slots `0..parameters.len()`.
+    /// Parameters: slots `0..parameters.len()`.
     pub parameters: Vec<Parameter>,
     /// Slots in all, quantified variables included.
     pub slots: usize,
     /// `None` for an instantaneous action. Bounds on the duration of a durative one (all must hold).
     pub duration: Option<Vec<DurationBound>>,
-    /// Its precondition.
+    /// Precondition.
     pub condition: Timed<Condition>,
     /// Effects at start and at end (`over_all` is always empty).
     pub effects: Timed<Vec<Effect>>,
@@ -429,7 +429,7 @@ pub struct Rate {
 pub struct Rule {
     /// The predicate of the head.
     pub predicate: PredicateId,
-    /// Its variables: slots `0..parameters.len()`.
+    /// Variables: slots `0..parameters.len()`.
     pub parameters: Vec<Parameter>,
     /// Slots in all.
     pub slots: usize,
@@ -444,7 +444,7 @@ pub struct Rule {
 pub struct Fact {
     /// The predicate.
     pub predicate: PredicateId,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Box<[ObjectId]>,
 }
 
@@ -453,7 +453,7 @@ pub struct Fact {
 pub struct GroundFluent {
     /// The function.
     pub function: FunctionId,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Box<[ObjectId]>,
 }
 
@@ -501,9 +501,9 @@ pub struct Trajectory {
     pub forall: Vec<Quantified>,
     /// The operator.
     pub operator: Modal,
-    /// Its times, in seconds.
+    /// Times, in seconds.
     pub times_s: Vec<f64>,
-    /// Its one or two conditions.
+    /// One or two conditions.
     pub conditions: Vec<Condition>,
     /// Slots in all.
     pub slots: usize,
@@ -516,7 +516,7 @@ pub struct Trajectory {
 /// A named preference. Its goal conditions are here; those on trajectories and actions point to it.
 #[derive(Debug, Clone)]
 pub struct Preference {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Conditions on the last state: each counts one violation for each binding of its quantified variables.
     pub goals: Vec<PreferredGoal>,

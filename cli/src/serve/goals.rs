@@ -43,7 +43,7 @@ pub(super) struct Goal {
     pub(super) run: Option<String>,
     /// The process that pursues it.
     pub(super) process: Option<u32>,
-    /// Its report, as from `descry do --json`.
+    /// Report, as from `descry do --json`.
     pub(super) report: Option<Value>,
 }
 

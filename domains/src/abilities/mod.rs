@@ -1,4 +1,5 @@
-//! Abilities: what a domain takes by name. Each is a list of facts, calls and skills, with the functions behind them.
+//! Abilities, used by domains by name: each is a list of facts, calls and skills, with the
+//! functions behind them.
 
 pub mod carrying;
 pub mod learning;
@@ -30,14 +31,14 @@ pub fn used(names: &[String]) -> impl Iterator<Item = &'static Ability> + '_ {
         .map(|(_, a)| a)
 }
 
-/// The meaning of a domain's call, if an ability answers it.
+/// Meaning of a domain's call, if an ability answers the call.
 pub fn meaning(config: &crate::config::Config, call: &str) -> Option<String> {
     let is_own = config.attachments.contains_key(call);
     let mut calls = used(&config.uses).flat_map(|ability| ability.calls);
     calls.find(|c| c.name == call && !is_own).map(|c| c.about.to_string())
 }
 
-/// The fact of a name among those of the abilities that a domain uses.
+/// Fact with this name among the abilities that a domain uses.
 pub fn fact(uses: &[String], name: &str) -> Option<&'static Fact> {
     used(uses).flat_map(|a| a.facts).find(|f| f.name == name)
 }

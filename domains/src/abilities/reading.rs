@@ -1,4 +1,5 @@
-//! *reading*: the body's other senses. What they say stands in the record, and the programs behind facts are told of it.
+//! *reading*: the body's other senses. Readings go into the record and to the programs behind
+//! facts.
 
 use descry_skills::{Outcome, Read};
 use serde_json::json;

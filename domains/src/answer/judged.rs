@@ -1,4 +1,5 @@
-//! Answers that follow from the three-valued judgement of the goal: what is open and why, and what speaks against it.
+//! Answers from the three-valued judgement of the goal: open conditions with reasons, and
+//! counter-evidence.
 
 use descry_memory::belief::Track;
 
@@ -18,7 +19,7 @@ impl Asker<'_> {
         judge.map_or(Judgement { value: Truth::Unknown, word: None }, |judge| judge.goal())
     }
 
-    /// The reason it cannot be told if the goal holds.
+    /// Reason why the truth of the goal cannot be told.
     pub(super) fn open(&self, word: Option<&Decisive>) -> String {
         let Some(word) = word else {
             return format!("it cannot be told whether {}", self.saying.say(&self.goal.pddl));
@@ -63,7 +64,7 @@ impl Asker<'_> {
         format!("it cannot be told that {thing} is not on the {surface}: {why}")
     }
 
-    /// The reason looks at a surface tell too little.
+    /// Reason why looks at a surface are insufficient.
     fn why_open(&self, on: usize) -> Option<String> {
         let there = Thing { on: Some(vec![on]), ..Thing::default() };
         let looks = self.mind.regions[on].taken;
@@ -73,7 +74,7 @@ impl Asker<'_> {
         unseen.or_else(|| self.nothing_seen(&there)).or_else(|| reasons::may_be_none(self.s, &there))
     }
 
-    /// Sentence about a shut door, which stays shut during a question; none if no door is in the way.
+    /// Sentence about a shut door, which a question leaves shut; `None` if no door is in the way.
     pub(super) fn closed(&self) -> Option<String> {
         let s = self.s;
         let shut: Vec<&str> = s.shut.iter().map(|&door| s.doors[door].door.name.as_str()).collect();
@@ -84,7 +85,7 @@ impl Asker<'_> {
             .then(|| format!("for the {} {are} shut, and a question opens nothing", shut.join(" and the ")))
     }
 
-    /// Sentence about a word that no look tells and nothing else has told.
+    /// Sentence about a word that looks cannot tell and no other source states.
     fn untold(&self, word: &Decisive) -> String {
         let said = word.pddl().map_or_else(|| word.word.clone(), |pddl| self.saying.say(&pddl));
         match word.is_number {
@@ -137,7 +138,8 @@ impl Asker<'_> {
         format!(": {} is {}{}", self.saying.say(&pddl), self.value(&atom), self.source(word))
     }
 
-    /// Who says what a word is where no look does; empty where that is the body, a program, or what was done in this run.
+    /// Source of a word that looks cannot tell; empty if the source is the body, a program, or an
+    /// action of this run.
     pub(super) fn source(&self, decisive: &Decisive) -> &'static str {
         let name = &decisive.word;
         let Some(word) = self.domain.vocabulary.word(name) else { return "" };
@@ -152,7 +154,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Place of an object that the goal wants not to stand there.
+    /// Place of an object that the goal wants absent from there.
     fn stands_against(&self, word: &Decisive) -> Option<String> {
         let s = self.s;
         if !self.goal.asked.denies {
@@ -191,8 +193,8 @@ impl Asker<'_> {
         }
     }
 
-    /// Sentence that another object of the same kind may stand where it is asked about, though the place of
-    /// one is known.
+    /// Sentence that another object of the kind may stand at the requested place, though one is
+    /// known elsewhere.
     fn another(&self) -> Option<String> {
         let s = self.s;
         let is_known = |what: usize, on: usize| s.presence(what, on) >= s.threshold;

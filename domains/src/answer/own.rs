@@ -1,4 +1,5 @@
-//! The phrase's own answer, its words filled in with what holds now, and what changed since an earlier run.
+//! Answer text of a phrase, with placeholders filled from the current belief and changes since an
+//! earlier run.
 
 use std::collections::BTreeSet;
 
@@ -38,13 +39,13 @@ impl Asker<'_> {
         Some(out + rest)
     }
 
-    /// Changes on a surface since an earlier run looked at it.
+    /// Changes on a surface since an earlier run.
     fn changes(&self, surface: &str) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         changes(&past.remembered, &self.s.belief.tracks, surface, self.lexicon.name_of(surface))
     }
 
-    /// Changes on all surfaces that an earlier run looked at, and the surfaces that none did.
+    /// Changes on all surfaces seen by an earlier run, and the surfaces that no earlier run saw.
     fn all_changes(&self) -> String {
         let Some(past) = &self.s.past else { return "nothing is remembered of earlier".into() };
         let (known, new): (Vec<_>, Vec<_>) =
@@ -96,7 +97,7 @@ impl Asker<'_> {
     }
 }
 
-/// Names in their order, those that are the same together: `2 cups, mug`.
+/// Names in order, equal ones counted: `2 cups, mug`.
 fn counted(names: Vec<String>) -> String {
     let mut all: Vec<(String, usize)> = Vec::new();
     for name in names {
@@ -110,7 +111,7 @@ fn counted(names: Vec<String>) -> String {
     all.into_iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// Changes on a surface since an earlier run looked at it; `name` is what people call it.
+/// Changes on a surface since an earlier run; `name`: spoken name of the surface.
 pub fn changes(past: &Remembered, now: &[Track], surface: &str, name: &str) -> String {
     if !past.has_looked_at(surface) {
         return never_seen(name);

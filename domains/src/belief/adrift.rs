@@ -1,5 +1,5 @@
-//! Localisation uncertainty of objects along a surface of the map: seen ends of the surface are aligned with
-//! its outline, and where none was seen, localisation's error remains.
+//! Localisation uncertainty of objects along a surface: observed edges are aligned with the map's
+//! outline, and along unobserved directions localisation's error remains.
 
 use std::sync::OnceLock;
 
@@ -12,7 +12,8 @@ use crate::belief::hypothesis::{Basis, Hypothesis};
 use crate::situation::{Situation, cells};
 use crate::surface::KnownSurface;
 
-/// A thing that is farther than this from where it is said to stand is not there, metres: nobody would grasp it.
+/// Maximum position error of an object that counts as located, metres: a grasp would miss it
+/// beyond.
 const OFF_M: f64 = 0.03;
 /// Probability of a displacement below which it is neglected.
 const NEGLIGIBLE: f64 = 0.01;
@@ -35,7 +36,7 @@ pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f6
     }
 }
 
-/// The probability that an object stands elsewhere along its surface than is believed, as far as some look can tell more of that.
+/// Probability that an object is displaced along its surface, as far as looks can still reduce it.
 pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
     let Some(on) = s.surface_of(track) else { return 0.0 };
     let (Some(_), sigma_m) = worst(&s.surfaces[on], track) else { return 0.0 };
@@ -43,7 +44,7 @@ pub(crate) fn chance_off(s: &Situation, track: &Track) -> f64 {
     if chance < NEGLIGIBLE || s.unseen_ends(on).is_empty() { 0.0 } else { chance }
 }
 
-/// The share of the sides of its surface that would tell where things stand along it, which a look shows beyond those before it.
+/// Share of a surface's locating edges that a look shows beyond the earlier looks.
 pub(crate) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize, usize)]) -> f64 {
     let ends = s.unseen_ends(look.1);
     let told = |(from, on): (usize, usize), end| s.would_settle(from, on, end, None);
@@ -52,7 +53,7 @@ pub(crate) fn share_shown(s: &Situation, look: (usize, usize), before: &[(usize,
     fresh / ends.len().max(1) as f64
 }
 
-/// Hypotheses about unseen ends of a surface that must be seen to locate an object along it, each with its
+/// Hypotheses about unseen edges of a surface that must be seen to locate an object, each with its
 /// share of the object's weight.
 pub(super) fn ends_of(s: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let weight = weight * chance_off(s, track);
@@ -66,8 +67,8 @@ pub(super) fn ends_of(s: &Situation, track: &Track, weight: f64) -> Vec<Hypothes
     }
 }
 
-/// The sides of a surface that tell where it lies in the direction in which that is known worst, have not been seen, and that a look
-/// which can be taken shows.
+/// Unseen edges of a surface that constrain its least certain direction and are visible from a
+/// feasible look.
 pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     let surface = &s.surfaces[on];
     let Some((placed, centre)) = surface.placed.as_ref().zip(surface.centre()) else { return Vec::new() };
@@ -82,7 +83,7 @@ pub(crate) fn unseen_ends(s: &Situation, on: usize) -> Vec<Hypothesis> {
     ends.filter(|end| looks().any(|from| s.would_settle(from, on, end, None) > 0.0)).collect()
 }
 
-/// An edge of a surface, if it constrains a direction and most of it is unseen.
+/// Edge of a surface, if it constrains a direction and is mostly unseen.
 fn end(
     s: &Situation,
     on: usize,
@@ -113,7 +114,7 @@ fn end(
 }
 
 impl Situation {
-    /// The sides of a surface that a look could show for it to be known better where what was seen of it lies on the map.
+    /// Unseen edges of a surface that a look could show to locate the surface better.
     pub(crate) fn unseen_ends(&self, on: usize) -> &[Hypothesis] {
         let ends: &Ends = self.derived.get(&|| Ends(cells(self.surfaces.len())));
         ends.0[on].get_or_init(|| unseen_ends(self, on))

@@ -1,4 +1,4 @@
-//! Confidence in the places of things, in the completeness of kinds, and in what stands on surfaces.
+//! Confidence in the places of things, the completeness of kinds, and the objects on surfaces.
 
 use descry_memory::belief::Track;
 
@@ -7,9 +7,8 @@ use crate::known::Thing;
 use crate::situation::Situation;
 
 impl Situation {
-    /// Confidence in the place of a thing, 0 to 1: the probability of the likeliest object that it may be,
-    /// where it is asked about, times the probability that this object stands where it is believed to, as far
-    /// as looks can tell.
+    /// Confidence in the place of a thing, 0 to 1: probability of its likeliest object at the
+    /// requested places, times the probability that this object is not displaced.
     pub fn confidence(&self, what: usize) -> f64 {
         let thing = &self.things[what];
         let there = |t| match thing.probability(t, &self.surfaces) {
@@ -19,15 +18,15 @@ impl Situation {
         self.belief.tracks.iter().map(there).fold(0.0, f64::max)
     }
 
-    /// The object that a thing most probably is, if that is more likely than not.
+    /// Object that a thing most probably is, if above one half.
     pub(crate) fn best(&self, what: usize) -> Option<&Track> {
         let p = |t: &Track| self.things[what].probability(t, &self.surfaces);
         let best = self.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
         best.filter(|t| p(t) > 0.5)
     }
 
-    /// Confidence in the position of a thing along its surface, 0 to 1; 1 where no such object is believed
-    /// in.
+    /// Confidence in the position of a thing along its surface, 0 to 1; 1 if no object is believed
+    /// to be the thing.
     pub fn placed(&self, what: usize) -> f64 {
         self.best(what).map_or(1.0, |track| 1.0 - adrift::chance_off(self, track))
     }
@@ -41,13 +40,14 @@ impl Situation {
             .fold(0.0, f64::max)
     }
 
-    /// The probability that a thing is what was lost out of the hand, where it lies no look at a surface shows.
+    /// Probability that a thing was lost out of the hand and lies where no look at a surface shows
+    /// it.
     pub fn chance_lost(&self, what: usize) -> f64 {
         let lost = self.belief.mislaid.iter().filter(|t| t.on.is_empty());
         lost.map(|t| self.things[what].probability(t, &self.surfaces)).fold(0.0, f64::max)
     }
 
-    /// The probability that a thing is there, where it is asked about: as one of the objects that were seen, or hidden.
+    /// Probability that a thing is at the requested places, as a seen object or hidden.
     pub fn chance_there(&self, what: usize) -> f64 {
         let thing = &self.things[what];
         let none_is =
@@ -72,8 +72,8 @@ impl Situation {
         self.belief.tracks.iter().map(sure).product::<f64>() * (1.0 - self.doubt_of(of).hidden)
     }
 
-    /// Completeness that looks can still bring about: of an object that was seen from all sides, none tells
-    /// more.
+    /// Maximum completeness reachable by looks; objects seen from all sides gain nothing from
+    /// further looks.
     pub fn most_complete(&self, of: usize) -> f64 {
         let sure = |p: f64| p.max(1.0 - p);
         let told = self.belief.tracks.iter().filter(|track| doubt::is_seen_around(self, track));
@@ -85,19 +85,19 @@ impl Situation {
         self.most_complete(of) >= self.wanted_of(of)
     }
 
-    /// True if a seen object is believed to be of a kind, where it is asked about.
+    /// True if a seen object is believed to be of a kind at the requested places.
     pub fn has_member(&self, of: usize) -> bool {
         self.belief.tracks.iter().any(|t| self.kinds[of].probability(t, &self.surfaces) > 0.5)
     }
 
-    /// Confidence required to say that all of a kind are found. To say that there is none, at least the
-    /// confidence of *not there* is required.
+    /// Confidence required to claim that all of a kind are found; at least that of *not there* if
+    /// none exists.
     pub fn wanted_of(&self, of: usize) -> f64 {
         let is_empty = self.completeness(of) >= self.threshold && !self.has_member(of);
         if is_empty { self.threshold.max(1.0 - self.thresholds.not_there) } else { self.threshold }
     }
 
-    /// Probability that a thing is on a surface: as one of the objects that were seen, or hidden.
+    /// Probability that a thing is on a surface, as a seen object or hidden.
     pub(crate) fn chance_on(&self, what: usize, on: usize) -> f64 {
         let name = &self.things[what].name;
         let none_is = self.on_surface(on).map(|t| 1.0 - t.probability_of(name)).product::<f64>();
@@ -114,7 +114,7 @@ impl Situation {
         !self.spaces[on].seen_from().is_empty()
     }
 
-    /// Objects that were seen and are none of the things of the problem.
+    /// Seen objects that are none of the problem's things.
     pub(crate) fn strangers(&self) -> impl Iterator<Item = &Track> {
         let is_thing = |track: &Track| {
             let is_it = |thing: &Thing| match thing.track {

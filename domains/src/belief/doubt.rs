@@ -21,17 +21,17 @@ use crate::surface::KnownSurface;
 
 /// Sides from which an object is looked at.
 const SECTORS: usize = 8;
-/// An object that is believed less than this to be the thing is no longer asked about.
+/// Probability below which an object is no longer a candidate for a thing.
 const NEGLIGIBLE: f64 = 0.02;
-/// Size of an object of which nothing is known: a small cup, height and diameter.
+/// Size of an object without any model, height and diameter: a small cup, metres.
 const SMALL_M: (f64, f64) = (0.10, 0.07);
 
-/// Everything that is in doubt about a thing or a surface.
+/// Doubt about a thing or a surface: weighted hypotheses.
 #[derive(Debug)]
 pub struct Doubt {
     /// The possibilities.
     pub hypotheses: Vec<Hypothesis>,
-    /// The probability that it, or anything, is where nothing has been seen.
+    /// Probability that the thing, or any object, is in unseen space.
     pub hidden: f64,
     /// Some surface is not known yet: every look may settle everything.
     pub anywhere: bool,
@@ -46,19 +46,19 @@ pub struct Doubt {
 /// Hypotheses on one surface.
 #[derive(Debug, Default)]
 struct Part {
-    /// Places where it can stand at all, and those where it may stand unseen; none if it is not asked about
-    /// there.
+    /// Possible places of the thing, and those where it may stand unseen; `None` outside the
+    /// requested surfaces.
     hidden: Option<Arc<Hidden>>,
     /// Indices of the hypotheses of hidden places.
     places: Range<usize>,
     /// Indices of the other hypotheses.
     objects: Vec<usize>,
-    /// Settled shares of all of them, by viewer.
+    /// Settled shares of all hypotheses, by viewer.
     told: OnceLock<Vec<OnceLock<Arc<[f64]>>>>,
 }
 
 impl Part {
-    /// Indices of its hypotheses, in order.
+    /// Indices of the surface's hypotheses, in order.
     fn all(&self) -> impl Iterator<Item = usize> + '_ {
         self.places.clone().chain(self.objects.iter().copied())
     }
@@ -77,12 +77,12 @@ pub struct Taken<'a> {
 #[derive(Debug, Clone, Copy, Default)]
 struct Reach {
     weight: f64,
-    /// Each possibility counted only as far as the look tells it that shows it most clearly.
+    /// Hypotheses weighted by the clearest look at each.
     as_told: f64,
 }
 
 impl Doubt {
-    /// Uncertainty about a thing: where it may be hidden, and which objects may be it.
+    /// Doubt about a thing: hidden places, and objects that may be the thing.
     pub(crate) fn about(situation: &Situation, what: usize) -> Self {
         let thing = &situation.things[what];
         let p = |track: &Track| thing.probability(track, &situation.surfaces);
@@ -99,7 +99,7 @@ impl Doubt {
         doubt
     }
 
-    /// Uncertainty about a thing on one surface.
+    /// Doubt about a thing on one surface.
     pub(crate) fn about_on(situation: &Situation, what: usize, on: usize) -> Self {
         let thing = Thing { on: Some(vec![on]), ..situation.things[what].clone() };
         let mut doubt = Self::hidden(situation, &thing, &situation.expected[what]);
@@ -113,8 +113,8 @@ impl Doubt {
         doubt
     }
 
-    /// Uncertainty about which objects are of a kind: where more of it may be hidden, and which objects may
-    /// be of it.
+    /// Doubt about the members of a kind: hidden places for more, and objects that may belong to
+    /// it.
     pub(crate) fn of(situation: &Situation, of: usize) -> Self {
         let kind = &situation.kinds[of];
         let mut doubt = Self::hidden(situation, kind, &situation.expected[situation.things.len() + of]);
@@ -125,7 +125,7 @@ impl Doubt {
         doubt
     }
 
-    /// Uncertainty about a surface: what may be hidden there, and what the objects on it are.
+    /// Doubt about a surface: hidden objects, and identities of the seen ones.
     pub(crate) fn on(situation: &Situation, on: usize) -> Self {
         let mut doubt = Self::hidden_on(situation, &[(on, 1.0)], SMALL_M);
         for track in situation.on_surface(on) {
@@ -134,7 +134,7 @@ impl Doubt {
         doubt
     }
 
-    /// Hypotheses of places where a thing may be hidden, on the surfaces that it is asked about.
+    /// Hypotheses of hidden places of a thing on the requested surfaces.
     fn hidden(situation: &Situation, thing: &Thing, expected: &[f64]) -> Self {
         // Of a kind the smallest may be where the largest has no room.
         let sizes = thing.models.iter().map(size_m);
@@ -146,9 +146,9 @@ impl Doubt {
         doubt
     }
 
-    /// Shifts the hypotheses of a thing that was touched to the surroundings of its old place, until these
-    /// have been seen: with the probability that the touched object was the thing; with the rest all is as if
-    /// there were no such object. A thing lost out of the hand lies where no look at a surface shows it.
+    /// Moves the hypotheses of a touched object to unseen space around its old place, with the
+    /// probability that the touched object was the thing. An object lost out of the hand lies where
+    /// no look at a surface shows it.
     fn expect_again(&mut self, situation: &Situation, thing: &Thing) {
         for track in &situation.belief.mislaid {
             let p = thing.probability(track, &situation.surfaces);
@@ -169,8 +169,9 @@ impl Doubt {
         }
     }
 
-    /// The share of the doubt that a look, a candidate and a surface, would settle beyond what the plan does before it, 0 to 1. Doubt that no
-    /// look can settle does not count; none is worth a look where what can be settled is negligible.
+    /// Share of the doubt, 0 to 1, that a look (candidate, surface) would settle beyond the earlier
+    /// steps of the plan. Doubt that no look can settle is excluded; zero if what looks can settle
+    /// is negligible.
     pub fn share_settled(&self, situation: &Situation, look: (usize, usize), before: Taken<'_>) -> f64 {
         if self.anywhere {
             return if before.looks.is_empty() { 1.0 } else { 0.0 };
@@ -221,8 +222,8 @@ impl Doubt {
         self.anywhere || self.is_worth_it(situation, self.within_reach(situation, None).weight, None)
     }
 
-    /// True if looks that settle so much matter: by themselves, or because with them it could be said that
-    /// nothing is hidden.
+    /// True if looks that settle this weight matter: by themselves, or because they would allow the
+    /// claim that nothing is hidden.
     fn is_worth_it(&self, situation: &Situation, weight: f64, moved: Option<usize>) -> bool {
         let t = &situation.thresholds;
         let most = t.remaining + t.out_of_sight;
@@ -259,15 +260,16 @@ impl Doubt {
         part.all().enumerate().map(|(i, n)| self.hypotheses[n].weight * best(i)).sum()
     }
 
-    /// The share of the places on a surface where it could not stand unseen, 0 to 1; none if it is not asked about there or
-    /// nothing is known of the surface.
+    /// Share of places on a surface where the thing cannot stand unseen, 0 to 1; `None` outside the
+    /// requested surfaces or for an unknown surface.
     pub fn share_seen(&self, on: usize) -> Option<f64> {
         let part = self.parts.get(&on)?;
         let places = part.hidden.as_ref()?.all;
         Some(1.0 - part.places.len() as f64 / places.max(1) as f64)
     }
 
-    /// The probability that it is on a surface where it was not seen, and the part of that where something was measured.
+    /// Probability that the thing is hidden on a surface, and the part at places with unexplained
+    /// measurements.
     pub fn hidden_share(&self, on: usize) -> (f64, f64) {
         let places = self.parts.get(&on).map(|part| part.places.clone()).unwrap_or_default();
         let places = &self.hypotheses[places];
@@ -281,7 +283,7 @@ impl Doubt {
         if self.anywhere { self.hidden } else { all.min(1.0) }
     }
 
-    /// Probability mass in hidden places that no look can show, and those places.
+    /// Probability of hidden places that no look can show, and these places.
     pub fn out_of_sight(&self, situation: &Situation) -> (f64, Vec<Point3<f64>>) {
         let shown = self.shown(situation, None);
         let hidden = self.hypotheses.iter().zip(shown).filter(|(h, _)| h.facing.is_none());
@@ -289,7 +291,7 @@ impl Doubt {
         (unseeable.iter().map(|h| h.weight).sum(), unseeable.iter().map(|h| h.centre).collect())
     }
 
-    /// For each hypothesis, true if a look that can be reached settles any of it.
+    /// For each hypothesis, true if a reachable look settles any of it.
     fn shown(&self, situation: &Situation, moved: Option<usize>) -> Vec<bool> {
         let mut shown = vec![false; self.hypotheses.len()];
         for (&on, part) in &self.parts {
@@ -300,8 +302,7 @@ impl Doubt {
         shown
     }
 
-    /// Settled shares of every look at a surface that is open, can be reached and sees it, in the order of the
-    /// part's hypotheses.
+    /// Settled shares of every reachable look accepted by `open` at a surface, in hypothesis order.
     fn looks_at<'d>(
         &'d self,
         situation: &'d Situation,
@@ -315,8 +316,8 @@ impl Doubt {
             .map(move |look| self.told(situation, look, moved))
     }
 
-    /// Share of each hypothesis of a surface that a look (a candidate and a surface) settles, in the order of
-    /// the part's hypotheses; a look that does not see the surface settles none.
+    /// Share of each hypothesis of a surface that a look (candidate, surface) settles, in
+    /// hypothesis order; zero if the look does not see the surface.
     fn told(&self, situation: &Situation, (from, on): (usize, usize), moved: Option<usize>) -> Arc<[f64]> {
         let Some(part) = self.parts.get(&on) else { return Arc::default() };
         let Ok(viewer) = situation.viewers(on).binary_search(&from) else {
@@ -340,7 +341,7 @@ impl Doubt {
         Arc::clone(told)
     }
 
-    /// The same once an obstacle is moved.
+    /// Settled share of each hypothesis once an obstacle is moved.
     fn told_without(
         &self,
         situation: &Situation,
@@ -359,8 +360,8 @@ impl Doubt {
         told
     }
 
-    /// Hypotheses of a hidden body of a size on some surfaces, each surface with the factor by which it is
-    /// more likely than another, however large they are; uniform on each surface.
+    /// Hypotheses of a hidden body of a size on some surfaces, each with a prior factor independent
+    /// of its area; uniform on each surface.
     fn hidden_on(situation: &Situation, surfaces: &[(usize, f64)], size_m: (f64, f64)) -> Self {
         let mut all = 0.0;
         let mut anywhere = false;
@@ -396,7 +397,7 @@ impl Doubt {
         }
     }
 
-    /// Adds hypotheses about what was seen.
+    /// Adds hypotheses about seen objects.
     fn suppose(&mut self, more: Vec<Hypothesis>) {
         for hypothesis in more {
             self.parts.entry(hypothesis.on).or_default().objects.push(self.hypotheses.len());
@@ -410,8 +411,8 @@ impl Doubt {
     }
 }
 
-/// Probability below which what can be settled is not worth a look; what can be seen only by moving something asks for less,
-/// since it can be settled in no other way.
+/// Probability below which doubt is not worth a look; lower for doubt that only moving an obstacle
+/// can settle.
 fn negligible(situation: &Situation, moved: Option<usize>) -> f64 {
     if moved.is_some() { situation.thresholds.out_of_sight } else { situation.thresholds.remaining }
 }
@@ -427,7 +428,7 @@ fn size_m(model: &ObjectModel) -> (f64, f64) {
     (model.height_m.middle(), across)
 }
 
-/// Sides of an object that no view has shown, each with its share of the object's weight.
+/// Unseen sides of an object as hypotheses, each with its share of the object's weight.
 fn unseen_sides(situation: &Situation, track: &Track, weight: f64) -> Vec<Hypothesis> {
     let Some(on) = situation.surface_of(track) else { return Vec::new() };
     let centre = middle(&situation.surfaces[on], track);
@@ -450,7 +451,7 @@ fn middle(surface: &KnownSurface, track: &Track) -> Point3<f64> {
     track.position_m + surface.up * (track.size_m[2] / 2.0)
 }
 
-/// Sides of an object that no view has shown, as unit vectors away from it.
+/// Unseen sides of an object, as unit vectors pointing outwards.
 fn open_sides(surface: &KnownSurface, track: &Track) -> Vec<Vector3<f64>> {
     let (e1, e2) = across(surface);
     let centre = middle(surface, track);
@@ -467,12 +468,12 @@ fn open_sides(surface: &KnownSurface, track: &Track) -> Vec<Vector3<f64>> {
     sides.filter(|side| !seen_from(side)).collect()
 }
 
-/// True if an object was seen from all sides: looks tell no more of what it is.
+/// True if an object was seen from all sides, so that further looks add nothing about its identity.
 pub(crate) fn is_seen_around(situation: &Situation, track: &Track) -> bool {
     situation.surface_of(track).is_some_and(|on| open_sides(&situation.surfaces[on], track).is_empty())
 }
 
-/// Doubts of a situation, worked out as they are asked for.
+/// Doubts of a situation, computed on demand.
 struct Doubts {
     about: Vec<OnceLock<Doubt>>,
     on: Vec<OnceLock<Doubt>>,
@@ -491,7 +492,8 @@ impl Situation {
         })
     }
 
-    /// Everything that is in doubt about what is asked for: things, kinds and surfaces; where nothing is asked for, every surface.
+    /// All doubts relevant to the goal: things, kinds and surfaces; all surfaces if nothing is
+    /// requested.
     pub fn doubts(&self) -> Vec<&Doubt> {
         let things = (0..self.things.len()).map(|what| self.doubt_about(what));
         let kinds = (0..self.kinds.len()).map(|of| self.doubt_of(of));
@@ -525,14 +527,14 @@ impl Situation {
         self.doubts_kept().on[on].get_or_init(|| Doubt::on(self, on))
     }
 
-    /// True if a look from a candidate may settle a doubt about the requested objects, once an obstacle has
-    /// been moved out of the way.
+    /// True if a look from a candidate may settle a relevant doubt, after an obstacle has been
+    /// moved.
     pub fn worth_a_look(&self, from: usize, on: usize, moved: Option<usize>) -> bool {
         let taken = Taken { looks: &[], moved };
         self.doubts().iter().any(|doubt| doubt.share_settled(self, (from, on), taken) > 0.0)
     }
 
-    /// True if looks would settle enough doubt once an obstacle were out of the way.
+    /// True if looks would settle enough doubt after an obstacle is moved.
     pub(crate) fn would_uncover(&self, what: usize) -> bool {
         self.doubts().iter().any(|doubt| doubt.can_be_settled_without(self, what))
     }

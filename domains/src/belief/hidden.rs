@@ -1,5 +1,5 @@
-//! Places on a surface where something of a size may stand unseen, and the share of each that a look
-//! settles. They are kept from round to round as long as nothing that was seen there changes.
+//! Places on a surface where an object of a size may stand unseen, and the share of each that a
+//! look settles. Cached from round to round while the observations there stay unchanged.
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -11,8 +11,8 @@ use crate::belief::unnoticed::{Unnoticed, around, grid, unseen_volume};
 use crate::situation::Situation;
 use crate::surface::KnownSurface;
 
-/// Likelihood ratio of an object where something unexplained was measured, against a place of which nothing
-/// is known: the measurement is of something, if not of the requested object.
+/// Likelihood ratio of an object at an unexplained measurement against an unobserved place: the
+/// measurement belongs to some object, perhaps to another.
 const MEASURED_WEIGHT: f64 = 50.0;
 
 /// Hidden places on one surface, the latest for each size.
@@ -42,9 +42,9 @@ impl Given {
 /// Places on one surface where something of a size may stand unseen.
 #[derive(Debug)]
 pub(crate) struct Hidden {
-    /// Number of places where it can stand at all.
+    /// Number of places where the object can stand.
     pub all: usize,
-    /// A hypothesis for each place where it may stand unseen, weighted by how likely it is there.
+    /// Hypotheses of the places where the object may stand unseen, with weights.
     pub hypotheses: Vec<Hypothesis>,
     /// Share of each hypothesis that a look settles, by viewer.
     told: Vec<OnceLock<Arc<[f64]>>>,
@@ -86,8 +86,8 @@ impl Hidden {
         Hidden { all: places.len(), hypotheses, told }
     }
 
-    /// Share of each hypothesis that a look from a viewer settles; `viewer` is its number among those of the
-    /// surface.
+    /// Share of each hypothesis that a look settles; `viewer`: index among the surface's
+    /// viewpoints.
     pub fn told(&self, situation: &Situation, viewer: usize, on: usize) -> &Arc<[f64]> {
         let from = situation.viewers(on)[viewer];
         let settled = |h: &Hypothesis| situation.would_settle(from, on, h, None);

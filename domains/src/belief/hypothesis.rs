@@ -7,24 +7,24 @@ use descry_perception::nalgebra::{Point3, Vector3};
 pub struct Hypothesis {
     /// Probability of the hypothesis.
     pub weight: f64,
-    /// The surface on which it stands.
+    /// Surface of the hypothesis.
     pub on: usize,
-    /// Its position.
+    /// Position of the hypothesised object.
     pub centre: Point3<f64>,
-    /// Points that must be seen to settle it.
+    /// Points that must be seen to settle the hypothesis.
     pub points: Vec<Point3<f64>>,
-    /// The side from which it must be seen, as a unit vector away from it; none if any will do.
+    /// Side that must be seen, as an outward unit vector; `None`: any side.
     pub facing: Option<Vector3<f64>>,
-    /// The reason it is possible.
+    /// Reason for the hypothesis.
     pub ground: Basis,
 }
 
 /// The reason a hypothesis is possible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
-    /// Nothing is known of the place.
+    /// Unobserved place.
     NotSeen,
-    /// Something was measured there that no object explains.
+    /// Measurement that no object explains.
     Measured,
     /// An object that was seen and may be the requested one.
     Object,

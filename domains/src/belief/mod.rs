@@ -1,4 +1,4 @@
-//! Belief in a situation: what may stand where, what a look would settle, how sure it is.
+//! Belief of a situation: possible places of objects, information gain of looks, and certainty.
 
 pub(crate) mod adrift;
 mod confidence;

@@ -1,4 +1,4 @@
-//! Objects that hide what no look can show, and how a push would move them.
+//! Objects that occlude space no look can show, and how a push would move them.
 
 use std::sync::OnceLock;
 
@@ -21,30 +21,30 @@ const MARGIN_M: f64 = 0.03;
 /// Sideways push with this component towards the body (tangent of the angle), so that the object
 /// leaves its neighbours.
 const OUTWARDS: f64 = 0.5;
-/// Distance between the places along a push at which it is asked whether they are free, metres.
+/// Spacing of the positions along a push that are checked for free space, metres.
 const STEP_M: f64 = 0.02;
 
 /// An object that may be pushed aside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Obstacle {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
     /// The number of its track.
     pub track: u64,
-    /// The surface that it stands on.
+    /// Surface that the obstacle stands on.
     pub on: usize,
     /// Centre of its footprint.
     pub at: Point3<f64>,
-    /// Unit normal of what it stands on.
+    /// Unit normal of the support.
     pub up: Vector3<f64>,
-    /// Radius of the circle around its footprint, and its height, metres.
+    /// Radius of the circle around the footprint, and height, metres.
     pub radius_m: f64,
     /// See above.
     pub height_m: f64,
 }
 
 impl Obstacle {
-    /// True if a point lies within the upright cylinder around it.
+    /// True if a point lies within the upright cylinder around the obstacle.
     pub(crate) fn covers(&self, p: &Point3<f64>) -> bool {
         let d = p - self.at;
         let above = d.dot(&self.up);
@@ -53,13 +53,15 @@ impl Obstacle {
             && (d - self.up * above).norm() < self.radius_m + MARGIN_M
     }
 
-    /// The radius and the height of the upright cylinder around it in which a push over a distance may change anything, metres.
+    /// Radius and height of the cylinder within which a push over this distance may change the
+    /// scene, metres.
     pub fn reach_of_push(&self, distance_m: f64) -> (f64, f64) {
         (self.radius_m + distance_m + MARGIN_M, self.height_m + MARGIN_M)
     }
 }
 
-/// The objects behind which something may be hidden that matters and that no look alone can show; none while one can.
+/// Obstacles that hide relevant space which no look alone can show; empty while a look can settle
+/// doubt.
 pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     let alone = situation.doubts().into_iter().any(|doubt| doubt.can_be_settled(situation));
     let body = situation.robot.description();
@@ -82,8 +84,9 @@ pub(crate) fn all(situation: &Situation) -> Vec<Obstacle> {
     situation.belief.tracks.iter().filter(small).filter_map(known).collect()
 }
 
-/// The push with which a body at a candidate moves an obstacle aside: it touches the side that faces it and moves that
-/// across its line of sight and a little towards itself, to the side that is freer. None where the arm does not reach.
+/// Push by which a body at a candidate moves an obstacle aside: touches the facing side and moves
+/// it across the line of sight and slightly towards the body, to the freer side. `None` if out of
+/// the arm's reach.
 pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<Push> {
     let Place::Pose(base) = &situation.candidates[from].place else { return None };
     if situation.stuck.contains(&(obstacle.track, from)) {
@@ -119,7 +122,7 @@ fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, 
 }
 
 impl Situation {
-    /// The objects that may be pushed aside to see what they hide; none while looking alone can settle anything.
+    /// Obstacles worth pushing aside; empty while a look alone can settle doubt.
     pub fn obstacles(&self) -> &[Obstacle] {
         let obstacles: &Obstacles = self.derived.get(&Obstacles::default);
         obstacles.0.get_or_init(|| all(self))
@@ -137,7 +140,8 @@ impl Situation {
         )
     }
 
-    /// The obstacle that the plan pushes aside before a call, by the `pushed` facts that the call reads.
+    /// Obstacle that the plan pushes aside before a call, from the `pushed` facts in the call's
+    /// readings.
     pub(crate) fn planned_push(&self, call: &Call) -> Option<usize> {
         holding(call, "pushed").find_map(|r| self.obstacle(r.arguments.first()?).ok())
     }

@@ -1,4 +1,4 @@
-//! Lines of sight: which looks show which surfaces, and how much of a hypothesis they settle.
+//! Visibility: which looks show which surfaces, and how much of a hypothesis they settle.
 
 use descry_perception::nalgebra::{Isometry3, Point2, Point3, Vector3};
 use descry_perception::noise::axial_sigma_m;
@@ -7,8 +7,7 @@ use crate::belief::hypothesis::Hypothesis;
 use crate::belief::obstacle::Obstacle;
 use crate::situation::Situation;
 
-/// Distance before the middle of a place that may hold something at which the line of sight to it ends,
-/// metres.
+/// Distance before a hypothesis's centre at which its line of sight ends, metres.
 const BEFORE_M: f64 = 0.05;
 /// Distance before it within which something unseen may stand in the way; and the mean free path of sight
 /// through unseen space among the things on a surface, metres.
@@ -30,7 +29,8 @@ impl Situation {
         })
     }
 
-    /// True if a look from a candidate shows any of a surface. While nothing is known of the surface, it may.
+    /// True if a look from a candidate shows any part of a surface, or may while the surface is
+    /// unknown.
     pub fn sees(&self, from: usize, on: usize) -> bool {
         self.viewers(on).binary_search(&from).is_ok()
     }

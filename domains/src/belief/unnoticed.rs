@@ -1,4 +1,4 @@
-//! Places where an object could stand unnoticed, as no view has shown them.
+//! Unobserved places where an object could stand unnoticed.
 
 use descry_memory::belief::Track;
 use descry_memory::space::{Cell, Space};
@@ -8,20 +8,21 @@ use crate::surface::KnownSurface;
 
 /// Distance between places where a hidden object may stand.
 const GRID_M: f64 = 0.05;
-/// Extent of a surface that is assumed beyond its seen part, metres.
+/// Margin beyond the seen part of a surface in which the surface may continue, metres.
 const BEYOND_M: f64 = 0.3;
-/// Share of an object's volume that must be unseen for it to stand there unnoticed.
+/// Minimum unobserved share of an object's volume for the object to stand there unnoticed.
 const UNSEEN_SHARE: f64 = 0.6;
-/// Share of an object's volume that may have been seen free by noise although the object stands
+/// Maximum share of an object's volume that noise may have shown free although the object stands
 /// there.
 const FREE_SHARE: f64 = 0.15;
-/// Number of an object's five sample columns that may fall into a solid body by error, if the
-/// object only stands close to it.
+/// Maximum number of an object's five sample columns inside a solid body that count as errors, for
+/// an object close to it.
 const GRAZED: usize = 2;
-/// Share of an object's volume in which something was measured that no object explains, for it to be likely that one stands there.
+/// Minimum share of an object's volume with unexplained measurements that makes an object there
+/// likely.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;
-/// Share of an object's volume that may have been seen free where so much was measured: from afar a rim is cut off and noise frays
-/// what is left.
+/// Maximum free share of an object's volume at such measurements: from afar, rims are cut off and
+/// noise frays the rest.
 const FRAYED_SHARE: f64 = 0.5;
 /// Height above an object's foot, in heights of the object, from which a measured column is too high to be of
 /// the object; and the distance from a wall, in voxels, within which it belongs to the wall. Within a voxel
@@ -32,9 +33,10 @@ const WALL_BLUR: f64 = 3.0;
 const SURE: f64 = 0.8;
 /// Length, in diameters of the requested object, above which an unidentified object may be several.
 const LARGE: f64 = 2.0;
-/// Height above an unseen place in which the top of a body that fills it is searched for, metres.
+/// Height above an unseen place in which the top of a solid body is sought, metres.
 const ROOF_M: f64 = 0.5;
-/// The columns of an object's volume that are asked for, in diameters from its middle, and the levels, in heights from its foot.
+/// Sample columns of an object's volume: offsets in diameters from the axis. Levels: in heights
+/// from the foot.
 const COLUMNS: [(f64, f64); 5] = [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)];
 const LEVELS: [f64; 3] = [0.25, 0.6, 0.95];
 
@@ -45,7 +47,8 @@ pub(super) fn across(surface: &KnownSurface) -> (Vector3<f64>, Vector3<f64>) {
     (first, surface.up.cross(&first))
 }
 
-/// Places on a surface where the middle of an object can be; beyond the outline too while that is not all of it.
+/// Grid of possible object centres on a surface; extends beyond the outline while that is
+/// incomplete.
 pub(crate) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> {
     let Some(centre) = surface.centre() else { return Vec::new() };
     let (e1, e2) = across(surface);
@@ -60,7 +63,7 @@ pub(crate) fn grid(surface: &KnownSurface, diameter_m: f64) -> Vec<Point3<f64>> 
         .collect()
 }
 
-/// The places that stand for a square of the grid, nearest to its middle first.
+/// Places that represent a grid cell, nearest to the centre first.
 pub(crate) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterator<Item = Point3<f64>> {
     const STEPS: [f64; 4] = [-0.125, 0.125, -0.375, 0.375];
     let (e1, e2) = across(surface);
@@ -71,14 +74,15 @@ pub(crate) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterat
 
 /// An object that could stand at a place unnoticed.
 pub struct Unnoticed {
-    /// Its points that no view settled.
+    /// Unobserved points of the volume.
     pub points: Vec<Point3<f64>>,
-    /// True if enough was measured there, beyond all believed objects, that something surely stands there.
+    /// True if unexplained measurements make an object there likely.
     pub likely: bool,
 }
 
-/// An object that stood at a place, if it could stand there unnoticed. What was measured there and belongs to no object that is believed
-/// in may be its own; close to one it may as well be that one's.
+/// Unobserved volume of an object at a place, if it could stand there unnoticed. Measurements that
+/// belong to no believed object may be its own; those close to a believed object may belong to
+/// that.
 pub fn unseen_volume(
     surface: &KnownSurface,
     space: &Space,

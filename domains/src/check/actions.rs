@@ -27,7 +27,8 @@ const FAILURES: [&str; 12] = [
 ];
 
 impl Check<'_> {
-    /// Every action is carried out by a skill, several, or a program; what stands in `domain.toml` about it makes sense.
+    /// Checks that every action has a skill, several, or a program, and that the actions' entries
+    /// in `domain.toml` are valid.
     pub(super) fn actions(&self) -> Vec<Diagnostic> {
         let mut list = Vec::new();
         let actions = &self.domain.vocabulary.task.actions;
@@ -46,7 +47,7 @@ impl Check<'_> {
         list
     }
 
-    /// Words that an ability reads by name, and that the domain does not remember.
+    /// Checks for words that an ability reads by name and the domain does not remember.
     pub(super) fn traces(&self) -> Vec<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
         let is_type = |of: &&str| vocabulary.task.types.iter().any(|known| known.name == **of);
@@ -215,7 +216,8 @@ impl Check<'_> {
         Some(self.error("not-remembered", message, self.toml.at(path), help))
     }
 
-    /// A text over an action's variables with an object of its own in the place of each, and these objects with their types.
+    /// Text over an action's variables with a distinct object for each, and these objects with
+    /// their types.
     fn over(&self, action: &str, text: &str) -> (String, Vec<(String, String)>) {
         let parameters = self.domain.vocabulary.action(action).unwrap_or_default();
         let mut objects: Vec<(String, String)> =
@@ -231,7 +233,7 @@ impl Check<'_> {
         (condition, objects)
     }
 
-    /// Every call is answered, and what answers one is called.
+    /// Checks that every call has an answerer, and that every answerer has a call.
     pub(super) fn calls(&self) -> Vec<Diagnostic> {
         let known: Vec<&str> =
             abilities::used(&self.domain.config.uses).flat_map(|a| a.calls).map(|c| c.name).collect();

@@ -7,13 +7,13 @@ use crate::declared;
 use crate::mentions::mentions;
 
 impl Check<'_> {
-    /// The fault of the expression that plans are to minimise, if any.
+    /// Checks the expression to be minimised.
     pub(super) fn minimise(&self) -> Option<Diagnostic> {
         let expression = &self.domain.config.minimise;
         self.aim(&["minimise"], "", &format!("(:goal (and)) (:metric minimize {expression})"))
     }
 
-    /// The fault of a condition over the domain's words, its objects and a few more (name and type), if any.
+    /// Checks a condition over the domain's words, its objects and further ones (name, type).
     pub(super) fn condition(
         &self,
         path: &[&str],

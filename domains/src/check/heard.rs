@@ -1,5 +1,4 @@
-//! Checks of the wording of phrases: it can be said, it differs from other phrases, and its slots have
-//! meanings.
+//! Checks the wording of phrases: it can be spoken, differs from other phrases, and uses its slots.
 
 use descry_planner::{Diagnostic, Span};
 
@@ -10,7 +9,7 @@ use crate::mentions::mentions;
 use crate::slots::{slots_of, type_of_slot};
 
 impl Check<'_> {
-    /// Faults of the `n`-th phrase that make parts of it unheard.
+    /// Faults of the `n`-th phrase by which a part would never be understood.
     pub(super) fn unheard(&self, n: usize, phrase: &GoalPhrase) -> Vec<Diagnostic> {
         let unused = slots_of(&phrase.say).into_iter().filter(|slot| !is_used(phrase, slot));
         let unused = unused.map(|slot| {
@@ -79,7 +78,7 @@ impl Check<'_> {
     }
 }
 
-/// The words of a phrase, and the types of what fills its slots.
+/// Words of a phrase, with slots replaced by their types.
 fn shape(say: &str) -> Vec<String> {
     let word = |word: &str| match word.strip_prefix('<').and_then(|word| word.strip_suffix('>')) {
         Some(slot) => format!("<{}>", type_of_slot(slot)),

@@ -1,5 +1,5 @@
-//! Checks of what looks can tell: an action that looks where a goal needs one, questions that nothing
-//! answers, objects that nothing tells apart.
+//! Checks of looks: goals that need a looking action the domain lacks, questions nothing answers,
+//! and indistinguishable objects.
 
 use descry_planner::{Diagnostic, Source, Span};
 
@@ -48,7 +48,7 @@ impl Check<'_> {
         list
     }
 
-    /// Faults of a phrase that asks for looks which nothing can take, or for facts that no look tells.
+    /// Faults of a phrase that needs looks which no action takes, or facts that no look tells.
     pub(super) fn untellable(&self, n: &str, phrase: &GoalPhrase, filled: &[Filled]) -> Vec<Diagnostic> {
         let means = phrase.means.replace("<threshold>", "0.5");
         let Ok(goal) = put_in(&means, filled, |f| f.symbol.clone()) else { return Vec::new() };
@@ -78,7 +78,7 @@ impl Check<'_> {
         Some(Diagnostic::warning("no-look", message, place, "here").with_help(help))
     }
 
-    /// Fault of a question about something that no look tells and no other source states.
+    /// Fault of a question about a word that neither looks nor another source tell.
     fn never_told(&self, phrase: &GoalPhrase, asked: &Asked, place: Span) -> Option<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let is_told = |name: &String| {

@@ -1,5 +1,5 @@
-//! Checks of a domain's folder as a whole: every action is carried out by something, every call is answered,
-//! every phrase means something. Each finding is drawn under the text that it is about.
+//! Checks of a domain's folder as a whole: every action has an executor, every call an answerer,
+//! every phrase a meaning. Findings point at the text.
 
 mod actions;
 mod conditions;
@@ -27,7 +27,7 @@ pub fn runnable(domain: &Domain) -> Result<(), Findings> {
     if findings.list.is_empty() { Ok(()) } else { Err(findings) }
 }
 
-/// Everything that is to be said about a domain's folder, faults and warnings.
+/// All findings about a domain's folder, errors and warnings.
 pub fn findings(domain: &Domain) -> Findings {
     let places = Places::of_scene(domain);
     let lexicon = Lexicon::new(domain, &places);
@@ -105,7 +105,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// Suggestion for an unknown name: the nearest of the known names, and all of them.
+    /// Suggestion for an unknown name: the nearest known name, and all known names.
     fn known<'n>(&self, found: &str, names: impl IntoIterator<Item = &'n str>) -> String {
         let names: Vec<&str> = names.into_iter().collect();
         let near = |name: &&&str| strsim::levenshtein(name, found) <= 3.min(found.len() / 2);
@@ -114,7 +114,8 @@ impl Check<'_> {
         format!("{hint}known: {}", if names.is_empty() { "none".into() } else { names.join(", ") })
     }
 
-    /// A program can be started: a command that is there, and the file that it is given. A function needs neither.
+    /// Checks that a program can be started: its command and script file exist. Functions need
+    /// neither.
     fn program(&self, path: &[&str], program: &[String]) -> Option<Diagnostic> {
         let here = self.toml.at(path);
         let Some((command, arguments)) = program.split_first() else {

@@ -1,4 +1,4 @@
-//! Every phrase means a goal of this domain, and its answers are about its slots.
+//! Checks that every phrase means a goal of the domain, and that its answers use its slots.
 
 use descry_planner::Diagnostic;
 
@@ -103,7 +103,7 @@ impl Check<'_> {
         if faults.is_empty() { Ok(filled) } else { Err(faults) }
     }
 
-    /// Slots that nothing can fill, where that does not depend on the body.
+    /// Slots that nothing can fill, independent of the body.
     fn unnamed(&self, n: &str, filled: &[Filled]) -> Vec<Diagnostic> {
         let is_body_s = |of: &str| {
             of == SENSE || ["surface", "room", "door"].contains(&of) && self.places.surfaces.is_empty()
@@ -136,7 +136,8 @@ impl Check<'_> {
         self.error("slots", because, place, "a slot is one of those of `say`")
     }
 
-    /// An answer: slots of the phrase, and in braces atoms of which one argument may be asked for.
+    /// Checks an answer text: slots of the phrase, and atoms in braces with at most one queried
+    /// argument.
     fn answer(
         &self,
         path: &[&str],

@@ -29,7 +29,8 @@ fn byte(text: &str, line: usize, column: usize) -> usize {
 }
 
 impl Check<'_> {
-    /// The usual scene is there; every scene can be read; surfaces, rooms and objects that are named are there.
+    /// Checks that the default scene exists, and that every scene can be read and names existing
+    /// surfaces, rooms and objects.
     pub(super) fn scenes(&self) -> Vec<Diagnostic> {
         let (domain, config) = (self.domain, &self.domain.config);
         let mut list = Vec::new();

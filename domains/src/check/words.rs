@@ -1,4 +1,5 @@
-//! Every word has its value from somewhere; what is said of words and objects in `domain.toml` makes sense.
+//! Checks that every word has a source of values, and that the entries on words and objects in
+//! `domain.toml` are valid.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +11,12 @@ use crate::symbol::{SENSE, symbol};
 use crate::vocabulary::Word;
 use crate::{abilities, words};
 
-/// Types whose objects come from the body's map, from `objects/` and from what is seen.
+/// Types of objects that come from the body's map, from `objects/` and from sightings.
 const GIVEN: [&str; 8] = ["pose", "surface", "room", "door", "thing", "kind", "obstacle", SENSE];
 
 impl Check<'_> {
-    /// Checks that words stated by an ability have its types, and that words nothing changes have a
-    /// beginning.
+    /// Checks that words stated by an ability have the ability's types, and that words nothing
+    /// changes have an initial value.
     pub(super) fn words(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -87,7 +88,7 @@ impl Check<'_> {
         list
     }
 
-    /// Checks that each line of `[said]` is about an action, a word or a call, and about its parameters.
+    /// Checks that each line of `[said]` names an action, word or call, and uses its parameters.
     fn said(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -109,7 +110,7 @@ impl Check<'_> {
         list
     }
 
-    /// The variables of a text for people are parameters of what it is about.
+    /// Checks that the variables of a text for people are parameters of its action, word or call.
     pub(super) fn marks(
         &self,
         name: &str,
@@ -150,7 +151,7 @@ impl Check<'_> {
         lines.flatten().any(|(name, ..)| name == word.name)
     }
 
-    /// Checks that `init` is about words that are not sensed, and about existing objects.
+    /// Checks that `init` has existing objects, and words that are not sensed.
     fn init(&self) -> Vec<Diagnostic> {
         let (vocabulary, config) = (&self.domain.vocabulary, &self.domain.config);
         let mut list = Vec::new();
@@ -197,7 +198,7 @@ impl Check<'_> {
         list
     }
 
-    /// Types of which a person may name objects as he likes are types.
+    /// Checks that the types with freely named objects exist.
     pub(super) fn open(&self) -> Vec<Diagnostic> {
         let vocabulary = &self.domain.vocabulary;
         let types = || vocabulary.task.types.iter().map(|t| t.name.as_str());
@@ -256,7 +257,7 @@ impl Check<'_> {
     }
 }
 
-/// Fault of a number that is compared before anything has given it a value.
+/// Fault of a number that is compared before it has a value.
 fn not_begun(word: &Word) -> Diagnostic {
     let name = &word.name;
     let arguments = if word.types.is_empty() { "" } else { " …" };

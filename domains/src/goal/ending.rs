@@ -10,9 +10,9 @@ pub(super) struct Wanted {
     pub(super) deadline_s: Option<f64>,
 }
 
-/// Behind these words a goal says how sure it must be.
+/// Words that introduce the requested confidence.
 pub(crate) const CONFIDENCE: [&str; 2] = ["with", "confidence"];
-/// Behind this word a goal says how soon it must be.
+/// Word that introduces the deadline.
 pub(crate) const DEADLINE: [&str; 1] = ["within"];
 
 /// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.

@@ -1,5 +1,4 @@
-//! Suggestions for words that are no goal: the phrases of the domain that are nearest to the words, with the
-//! names that were given.
+//! Suggestions for unmatched words: the domain's nearest phrases, with the given names.
 
 use std::ops::Range;
 
@@ -11,7 +10,7 @@ use crate::slots::type_of_slot;
 
 /// Suggestions at most.
 const SHOWN: usize = 2;
-/// Words of a long sentence for which a goal is suggested: its first.
+/// Number of leading words considered in a long sentence.
 const HEARD: usize = 24;
 /// Score that a name costs which was not said. From: fitted, `domains/tests/phrases.toml`.
 const MADE_UP: f64 = 0.8;
@@ -23,19 +22,19 @@ const MISTYPED: f64 = 0.34;
 struct Mention {
     of_type: String,
     name: String,
-    /// Its words, by position.
+    /// Word positions of the name.
     at: Range<usize>,
     is_exact: bool,
-    /// True if something leaves it: "from the desk".
+    /// True if the name is a source: "from the desk".
     is_left: bool,
 }
 
-/// A phrase, as near to the words as it comes.
+/// Phrase with its similarity to the words.
 struct Candidate {
     text: String,
-    /// Words that neither the phrase nor a name in it has.
+    /// Words that occur neither in the phrase nor in a name.
     left: Vec<String>,
-    /// True if every name in it was said, and there is one.
+    /// True if all names in the phrase were given, at least one.
     is_named: bool,
     score: f64,
 }

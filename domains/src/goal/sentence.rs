@@ -22,7 +22,7 @@ pub(super) enum Joint {
     Or,
 }
 
-/// A phrase with what fills its slots, and where it is restricted to.
+/// Phrase with its slot values and place restriction.
 #[derive(Debug, Clone)]
 pub(super) struct Clause<'a> {
     pub(super) phrase: &'a GoalPhrase,
@@ -38,21 +38,21 @@ pub(super) struct Restriction {
     symbol: String,
 }
 
-/// Clauses and how they are joined.
+/// Clauses and their conjunction.
 #[derive(Debug, Clone)]
 pub(super) struct Sentence<'a> {
     pub(super) joint: Joint,
     pub(super) clauses: Vec<Clause<'a>>,
 }
 
-/// A slot that holds words which nothing is called.
+/// Slot content that is no known name.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Miss {
     pub(super) of_type: String,
     pub(super) found: String,
 }
 
-/// Meaning of a name in a slot, with the place it is restricted to.
+/// Meaning of a name in a slot, with its place restriction.
 #[derive(Clone)]
 struct Noun {
     symbol: String,
@@ -218,7 +218,8 @@ impl<'a> Reader<'a> {
         clauses.iter().all(can_be).then_some(Sentence { joint, clauses })
     }
 
-    /// Names joined by "and" or "or"; a place behind the last holds for those before it that have none.
+    /// Names joined by "and" or "or"; a place after the last applies to earlier names without a
+    /// place.
     fn nouns(&mut self, of_type: &str, words: &[String]) -> Option<(Joint, Vec<Noun>)> {
         if let Some(noun) = self.noun(of_type, words) {
             return Some((Joint::And, vec![noun]));
@@ -244,7 +245,7 @@ impl<'a> Reader<'a> {
         Some((first, nouns))
     }
 
-    /// A name, and the place behind it.
+    /// Name followed by its place.
     fn noun(&self, of_type: &str, words: &[String]) -> Option<Noun> {
         self.called(of_type, words).or_else(|| {
             (1..words.len().saturating_sub(1)).find_map(|at| {
@@ -254,8 +255,9 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Meaning of the words after a conjunction, beside the noun before it: another place ("in the kitchen or
-    /// the study"), or a name behind a repeated preposition ("on the desk or on the counter").
+    /// Meaning of the words after a conjunction, given the noun before: another place ("in the
+    /// kitchen or the study"), or a name after a repeated preposition ("on the desk or on the
+    /// counter").
     fn elsewhere(&self, of_type: &str, words: &[String], before: &Noun) -> Option<Noun> {
         let (first, rest) = words.split_first()?;
         let is_again = ["in", "on", "to", "inside"].contains(&first.as_str());
@@ -311,7 +313,7 @@ pub(super) fn named<'l>(all: &'l [Named], words: &[String]) -> Option<&'l Named>
     if bare.is_empty() { None } else { is(&whole).or_else(|| is(&bare)) }
 }
 
-/// "it" is what the clause before speaks of.
+/// Words with "it" replaced by the previous clause's object.
 fn resolved(words: &[String], before: &Sentence<'_>) -> Vec<String> {
     let last = before.clauses.last().and_then(|clause| clause.slots.first()).map(|f| f.name.to_lowercase());
     let is_one = before.clauses.len() == 1;
@@ -322,8 +324,8 @@ fn resolved(words: &[String], before: &Sentence<'_>) -> Vec<String> {
     words.iter().flat_map(of).collect()
 }
 
-/// A meaning that holds in some places alone: whichever object it speaks of is that place, or stands to it as the domain's word of that
-/// preposition says; none where it speaks of no such object.
+/// Meaning restricted to some places: every object quantified over is such a place, or related to
+/// one by the domain's word for the preposition; `None` if the meaning has no such object.
 pub(super) fn restricted(means: &str, within: &[Restriction], domain: &Domain) -> Option<String> {
     within.iter().try_fold(means.to_string(), |means, place| {
         let (before, behind) = means.split_once("(exists (?")?;
@@ -371,7 +373,7 @@ impl Sentence<'_> {
         }
     }
 
-    /// Checks that a task has no thing in two places: whoever says so means another thing, or either place.
+    /// Checks that no thing is requested in two places at once.
     ///
     /// # Errors
     /// [`GoalError::TwoPlaces`] with the thing and its places.

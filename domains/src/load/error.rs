@@ -25,7 +25,7 @@ pub enum LoadError {
         /// Expected content.
         expected: &'static str,
     },
-    /// A TOML file says what cannot be understood; the drawing points at the place.
+    /// A TOML file is invalid; the drawing points at the place.
     #[error("{path}\n{drawn}")]
     Toml {
         /// The file.
@@ -33,10 +33,10 @@ pub enum LoadError {
         /// The error under the text.
         drawn: String,
     },
-    /// The PDDL text has faults, or a value of `domain.toml` lies outside what makes sense.
+    /// The PDDL text has errors, or a value in `domain.toml` is out of range.
     #[error("{}", .findings.render(false))]
     Findings {
-        /// Each with its place.
+        /// Findings with their places.
         findings: Findings,
     },
 }

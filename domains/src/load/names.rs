@@ -1,5 +1,5 @@
-//! Checks of object files: a name means one object, or one kind of them, and letters and digits alone distinguish names; a body has
-//! sensible measures.
+//! Checks of object files: names are unambiguous (only letters and digits distinguish) and bodies
+//! have plausible sizes.
 
 use descry_perception::recognise::{ModelError, ObjectModel};
 use descry_planner::{Diagnostic, Findings, Source, Span};
@@ -9,10 +9,11 @@ use crate::load::error::LoadError;
 use crate::symbol::symbol;
 use crate::toml_place::TomlPlaces;
 
-/// An object's file and what it says.
+/// Object file and its parsed model.
 pub(super) type Read<'a> = (&'a (String, String), ObjectModel);
 
-/// Checks the objects of a folder: every name can be said and means one thing, and every body has sensible measures.
+/// Checks the objects of a folder: every name can be spoken and is unambiguous, and every body has
+/// a plausible size.
 ///
 /// # Errors
 /// [`LoadError::Findings`] points at everything that is wrong, file by file.
@@ -63,7 +64,7 @@ fn unsayable(name: &str) -> Option<(String, String)> {
     is_function_word(name).then(|| (message(), "give it the name of a thing".into()))
 }
 
-/// The names of an object, each with where it stands in its file.
+/// Names of an object, each with its key path in the file.
 fn names(object: &ObjectModel) -> impl Iterator<Item = (Vec<String>, &String)> {
     let phrases = object.phrases.iter().enumerate();
     let phrases = phrases.map(|(n, phrase)| (vec!["phrases".to_string(), n.to_string()], phrase));
@@ -81,7 +82,7 @@ fn another(others: &[Read<'_>], name: &str) -> Option<(String, String)> {
     ))
 }
 
-/// Fault of a name that is that of a kind with other members.
+/// Fault of a name that is also a kind with other members.
 fn several(objects: &[Read<'_>], own: usize, name: &str) -> Option<(String, String)> {
     let others = objects.iter().enumerate().filter(|(n, _)| *n != own).map(|(_, (_, other))| other);
     let other = others.into_iter().find(|other| symbol(&other.kind) == symbol(name))?;

@@ -1,4 +1,4 @@
-//! Files that programs consist of, as far as their command lines tell.
+//! Source files of programs, found from their command lines.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use descry_robots::input::{MOST_TEXT_BYTES, read_bytes};
 use super::Domain;
 
 impl Domain {
-    /// The texts of its programs ([`program_texts`]).
+    /// Source texts of the domain's programs ([`program_texts`]).
     pub fn program_texts(&self) -> BTreeMap<PathBuf, String> {
         let folder = self.folder.as_deref().unwrap_or(Path::new("."));
         let commands = self.programs().into_iter().map(|(_, command)| command);

@@ -1,4 +1,4 @@
-//! Poses to look from: the stations of a body that has some, else a ring around each surface.
+//! Viewpoints: the stations of a body if it has any, else a ring around each surface.
 
 use descry_perception::nalgebra::{Point2, Point3, Vector3};
 use descry_robots::{Place, Pose2, PoseEstimate, Robot};
@@ -10,10 +10,10 @@ use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 use crate::viewpoint::Candidate;
 
-/// Steps by which a pose of a ring is moved outwards until the footprint fits.
+/// Radial offsets tried for a ring pose until the footprint fits, metres.
 const OUTWARDS_M: [f64; 7] = [0.0, 0.1, 0.2, -0.1, 0.3, -0.2, 0.4];
 
-/// The poses to look from, and which of them the body stands at.
+/// Viewpoints, and the one at which the body stands.
 pub fn candidates(
     robot: &dyn Robot,
     own_map: &dyn OwnMap,
@@ -62,7 +62,7 @@ fn station_symbol(name: &str) -> String {
     if is_number { symbol(&format!("station {name}")) } else { symbol(name) }
 }
 
-/// Poses around a point that face it, numbered from 1; where no distance fits, the pose is left out.
+/// Poses around a point that face it, numbered from 1; a pose is dropped if no offset fits.
 pub(crate) fn ring(
     robot: &dyn Robot,
     own_map: &dyn OwnMap,
@@ -86,7 +86,7 @@ pub(crate) fn ring(
         .collect()
 }
 
-/// Everything to stand things on: what the body's map knows, or where it knows nothing what the domain names.
+/// Supporting surfaces: those of the body's map, or else those named by the domain.
 pub fn surfaces(domain: &Domain, robot: &dyn Robot) -> Vec<KnownSurface> {
     let up = robot.description().up.unwrap_or_else(Vector3::z);
     let floor = |name: &Option<String>| {

@@ -1,4 +1,4 @@
-//! Invalidation of observed space where an object was moved, by the body or by someone else.
+//! Invalidates observed space around an object that was moved, by the body or by a person.
 
 use descry_perception::View;
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -7,11 +7,11 @@ use serde::Serialize;
 /// A place where something has moved: an upright cylinder.
 #[derive(Debug, Clone, Serialize)]
 pub struct Change {
-    /// Until when what was seen there is void.
+    /// Time before which observations of the place are invalid.
     pub stamp_ns: i64,
-    /// The middle of its foot, in the map.
+    /// Centre of the foot in the map.
     pub foot: Point3<f64>,
-    /// Its axis, a unit vector.
+    /// Axis of the cylinder, a unit vector.
     pub up: Vector3<f64>,
     /// Radius of the cylinder, metres.
     pub radius_m: f64,
@@ -20,7 +20,7 @@ pub struct Change {
 }
 
 impl Change {
-    /// Takes what a view shows of the place out of it, and what it saw through the place, as if the camera had no return there.
+    /// Removes the returns of a view on the place and through it, as if there were no return.
     pub fn blank(&self, view: &mut View) {
         let eye = Point3::from(view.world_from_camera.translation.vector);
         for p in view.cloud.points.iter_mut().filter(|p| p.x.is_finite()) {

@@ -1,5 +1,5 @@
-//! Consistency of the looks at a surface with the map and with each other: looks of a camera or a body that is not as stated
-//! prove nothing.
+//! Consistency of a surface's views with the map and with each other: views of a miscalibrated
+//! camera or a mislocalised body prove nothing.
 
 use std::sync::Arc;
 
@@ -18,18 +18,19 @@ use crate::symbol::symbol;
 
 /// Cameras nearer to each other than this look from one place, metres.
 const ONE_PLACE_M: f64 = 0.1;
-/// Fewest views of which the majority tells which are wrong.
+/// Minimum number of views for a majority to identify the wrong ones.
 const FEWEST: usize = 3;
 
-/// Keeps what was believed to stand on a surface before the first look of the run at it.
+/// Saves the belief about a surface before the run's first look at it.
 pub(super) fn keep_expected(mind: &mut Mind, on: usize) {
     let Mind { known, regions, .. } = mind;
     let there = || known.belief.tracks.iter().filter(|t| t.on == known.surfaces[on].symbol).cloned();
     regions[on].expected.get_or_insert_with(|| there().collect());
 }
 
-/// The contradiction of all looks at a surface with the map's outline and height of it, if a fault of camera or poses is likelier
-/// than what is stated. None for a surface that the map does not have; where only the place is off, places there become as uncertain.
+/// Contradiction between all looks at a surface and the map's outline and height, if a camera or
+/// pose fault is likelier than the stated errors. `None` for an unmapped surface; a mere
+/// displacement makes places there uncertain instead.
 pub(super) fn with_map(mind: &mut Mind, eyes: Eyes<'_>, on: usize, views: &[View]) -> Option<Contradiction> {
     let lie = judged(eyes, &mind.known.surfaces[on], &mind.regions[on], views);
     let (contradiction, displaced_m) = match lie {
@@ -66,15 +67,14 @@ fn judged(eyes: Eyes<'_>, known: &KnownSurface, region: &Region, views: &[View])
     judge(&looks, &map, asked, &[(1, shifted(1)), (-1, shifted(-1))]).filter(Inconsistency::is_likely)
 }
 
-/// The contradiction among views, if as many as agree are at odds with them.
+/// Contradiction among views, if inconsistent ones are as many as consistent ones.
 pub(super) fn among(fits: &[ViewFit]) -> Option<Contradiction> {
     let agreeing = fits.iter().filter(|fit| fit.used).count();
     let at_odds = fits.iter().filter(|fit| fit.is_at_odds).count();
     (agreeing + at_odds >= FEWEST && at_odds >= agreeing).then_some(Contradiction::Apart)
 }
 
-/// Looks at a surface contradict the map or each other: what they showed counts no longer, and what was expected there before them
-/// is believed again.
+/// Discards a surface's contradictory looks and restores the belief from before them.
 pub(super) fn prove_nothing(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -2,12 +2,12 @@
 
 use descry_perception::consistency::Fault;
 
-/// A reason why the looks at a surface prove nothing.
+/// Reason why the looks at a surface prove nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Contradiction {
     /// Camera or poses are not as stated.
     Fault(Fault),
-    /// As many views as agree cannot be where they are said to be.
+    /// The views inconsistent with their stated poses are as many as the consistent ones.
     Apart,
 }
 

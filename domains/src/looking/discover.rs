@@ -1,4 +1,5 @@
-//! Surfaces that no map knows: which of those in view is the one that was looked at, and which are others.
+//! Surfaces outside the map: associates the visible ones with the surface that was looked at and
+//! with others.
 //!
 //! Without a map a look shows whatever stands in front of the camera. Each surface to stand things on is one of its own, with its
 //! own views, belief and space: what is asked for may be on any of them.
@@ -14,7 +15,7 @@ use crate::note::Note;
 use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 
-/// Least area of a surface that is taken up beside the one that is looked at, square metres.
+/// Minimum area of an additional surface, square metres.
 const LEAST_M2: f64 = 0.1;
 /// Height difference below which two surfaces are level with each other, metres.
 const LEVEL_M: f64 = 0.08;
@@ -24,8 +25,8 @@ const BESIDE_M: f64 = 0.05;
 const ORDINALS: [&str; 9] =
     ["second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
 
-/// The surface that is looked at, and the others to stand things on that are in view. As long as nothing is known of the former it is
-/// the best of all that no other is known to be.
+/// Surface that was looked at, and the other supporting surfaces in view. An unknown one becomes
+/// the best surface that is not known as another.
 pub(super) fn look(
     merged: &Merged,
     options: &SurfaceOptions,
@@ -44,7 +45,7 @@ pub(super) fn look(
     Ok((surface, others))
 }
 
-/// Takes up what was found beside a surface that is looked at, with its views; returns which surfaces are new.
+/// Adds surfaces found beside the one looked at, with their views; returns the new ones.
 pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mut Vec<Note>) -> Vec<usize> {
     let fresh = |s: &Surface, mind: &Mind| !mind.known.surfaces.iter().any(|known| is_one(s, known));
     let mut new = Vec::new();
@@ -92,7 +93,8 @@ pub(super) fn adopt(mind: &mut Mind, on: usize, others: Vec<Surface>, notes: &mu
     new
 }
 
-/// Two of those taken up may turn out to be one: the later is given up, and what stood on it is looked for on the other.
+/// Joins two discovered surfaces that turn out to be one: the later is dropped, and its objects are
+/// sought on the other.
 pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
     let known = &mind.known.surfaces;
     let Some(last) = (on + 1..known.len()).rev().find(|&n| !known[n].whole && is_one(surface, &known[n]))
@@ -110,7 +112,7 @@ pub(super) fn join(mind: &mut Mind, on: usize, surface: &Surface) {
     mind.attend();
 }
 
-/// True if a found surface is a known one: level with it, and overlapping it.
+/// True if a found surface is a known one: level with it and overlapping.
 fn is_one(found: &Surface, known: &KnownSurface) -> bool {
     let Some(centre) = known.centre() else { return false };
     let middle = found.surface_from_world.inverse() * Point3::origin();

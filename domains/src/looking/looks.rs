@@ -12,7 +12,7 @@ use crate::situation::{Situation, cells};
 /// Duration of a look, seconds, as in the domain.
 pub(crate) const LOOK_S: f64 = 2.0;
 
-/// Looks that settle what matters in the time that is left, by how much they settle a second, the most first.
+/// Useful looks that fit into the remaining time, by settled doubt per second, best first.
 pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     // Where all of a kind are wanted, what else is in doubt of each of them is not asked about.
     let is_open = |&of: &usize| s.completeness(of) < s.wanted_of(of);
@@ -32,7 +32,7 @@ pub fn looks(s: &Situation) -> Vec<(usize, usize)> {
     best_first(worth.map(|(look, settles)| (settles / takes_s(look.0), look)).collect())
 }
 
-/// The same as deeds.
+/// Useful looks as deeds, best first.
 pub(crate) fn look_deeds(s: &Situation) -> Vec<Vec<Deed>> {
     looks(s).into_iter().map(|(from, on)| look(s, from, on).after_drive(s, from)).collect()
 }
@@ -42,7 +42,7 @@ pub(crate) fn look(s: &Situation, from: usize, on: usize) -> Deed {
     Deed::new(OBSERVE, [s.candidates[from].symbol.as_str(), s.surfaces[on].symbol.as_str()])
 }
 
-/// A plan and then another, whose steps begin when those of the first have ended.
+/// Concatenation of two plans; the second starts when the first has ended.
 pub fn one_then(mut first: Plan, second: Plan) -> Plan {
     let ends_s = first.makespan_s().unwrap_or(0.0);
     let later = |step: Step| Step { start_s: step.start_s.map(|start_s| start_s + ends_s), ..step };
@@ -51,8 +51,8 @@ pub fn one_then(mut first: Plan, second: Plan) -> Plan {
 }
 
 impl Situation {
-    /// Time to go to a surface and look at it, seconds, doors left out. It is counted from the place of the
-    /// last look, so that it stays the same while the body moves.
+    /// Time for going to a surface and looking, without doors, seconds; from the place of the last
+    /// look, so that the value stays constant while the body moves.
     pub fn going_there_s(&self, on: usize) -> f64 {
         let kept: &GoingThere = self.derived.get(&|| GoingThere(cells(self.surfaces.len())));
         *kept.0[on].get_or_init(|| {

@@ -13,19 +13,19 @@ use crate::symbol::symbol;
 
 /// Height band around a surface of the map in which points are merged, metres.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
-/// Height difference within which a level surface is that of the map, metres: beyond it, the surface is
-/// another, or the body is lost.
+/// Maximum height difference between an observed level surface and that of the map, metres; beyond
+/// it, the surface is another or the body is lost.
 const SAME_HEIGHT_M: f64 = 0.08;
-/// Most angle between a surface of the map and level, as seen: localisation and the camera's mounting err by a degree or two. A
-/// steeper plane cuts through the wall behind a board and through what stands on it.
+/// Maximum tilt of an observed map surface, radians: localisation and camera mounting err by a
+/// degree or two; a steeper plane cuts through walls and objects.
 const LEVEL_RAD: f64 = 0.045;
 /// Margin around the outline on the map in which points of a surface may lie, metres: localisation errs by
 /// centimetres and degrees.
 const BESIDE_M: f64 = 0.25;
 
-/// Options for merging and segmenting a body's views of a surface (a symbol; none: of any). The search is
-/// limited to the height of the surface on the map, if known, and to objects that can stand on it; without
-/// any map, everything in range is merged.
+/// Options for merging and segmenting a body's views of a surface (`None`: any), limited to the
+/// map's surface height if known, and to objects that fit on it; without a map, everything in range
+/// is merged.
 pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptions) {
     let up = robot.description().up.map(Unit::new_normalize);
     let asked = robot.surfaces().iter().filter(|hint| on.is_none_or(|on| symbol(&hint.name) == on));
@@ -40,8 +40,8 @@ pub fn options(robot: &dyn Robot, on: Option<&str>) -> (MergeOptions, SceneOptio
     (MergeOptions { up, height_band_m, ..MergeOptions::default() }, scene)
 }
 
-/// The same for one surface: one that the map has is merged and looked for where its outline is, and one that was seen faces up as it was seen
-/// to, where the body does not say which way is up.
+/// Options for merging and segmenting one surface: a mapped one within its outline; a seen one with
+/// its observed normal if the body does not know the up direction.
 pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptions, SceneOptions) {
     let (merging, mut seeking) = options(robot, Some(&known.symbol));
     if !known.whole {
@@ -55,7 +55,8 @@ pub(super) fn options_at(robot: &dyn Robot, known: &KnownSurface) -> (MergeOptio
     (MergeOptions { region, ..merging }, SceneOptions { surface, ..seeking })
 }
 
-/// The views of a surface in one cloud. Without a map one view is of all surfaces in it: what the last of them was made of is had again.
+/// Merged views of a surface. Without a map, one view covers all its surfaces; the last merge is
+/// reused.
 pub(super) fn merged(
     mind: &mut Mind,
     on: usize,

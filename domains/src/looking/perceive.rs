@@ -1,5 +1,5 @@
-//! Perception of a view: recorded, read back with the others of its surface by timestamp, merged, recognised,
-//! believed.
+//! Perception of a view: recorded, read back with the surface's other views by timestamp, merged,
+//! recognised, and added to the belief.
 
 use std::sync::Arc;
 
@@ -36,8 +36,8 @@ use crate::surface::KnownSurface;
 
 /// Distance within which a remembered object is the one seen again, metres.
 const SAME_M: f64 = 0.10;
-/// The multi-view perception of paper 004, section V, on one surface: restore its views by their timestamps, merge, recognise,
-/// believe.
+/// Multi-view perception of one surface (Niemueller et al., section V): restores its views by
+/// timestamp, merges, recognises, and updates the belief.
 pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note>) -> Result<(), WorldError> {
     let _span = tracing::info_span!("perceive", on = %mind.known.surfaces[on].symbol).entered();
     consistent::keep_expected(mind, on);
@@ -116,7 +116,8 @@ pub fn perceive(mind: &mut Mind, eyes: Eyes<'_>, on: usize, notes: &mut Vec<Note
     }
 }
 
-/// The merged views of a surface, the surface in them, and other surfaces that were not known yet; why there is none otherwise.
+/// Merged views of a surface, the surface found in them, and newly found surfaces; else the reason
+/// for failure.
 fn made_out(
     mind: &mut Mind,
     on: usize,
@@ -132,7 +133,8 @@ fn made_out(
     found.map(|(surface, others)| (merged, surface, others)).map_err(|nothing| nothing.to_string())
 }
 
-/// Things on a surface were moved while nobody looked: only its newest view still holds, and looks at it may be taken again.
+/// Handles objects moved while unobserved: only the newest view of the surface stays valid, and
+/// looks may be repeated.
 fn begin_again(mind: &mut Mind, on: usize) {
     let region = &mut mind.regions[on];
     let last = region.looks.len().saturating_sub(1);
@@ -145,8 +147,8 @@ fn begin_again(mind: &mut Mind, on: usize) {
     mind.attend();
 }
 
-/// Lays each new view of a surface that the map has on its outline by itself. Views of a long surface from its two ends share little
-/// that would hold them together along it; the ends that each shows do.
+/// Aligns each new view of a mapped surface with its outline individually. Views of a long surface
+/// from its two ends share little; the edges in each hold them.
 fn place_looks(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -166,8 +168,8 @@ fn place_looks(
     Ok(())
 }
 
-/// Leaves out the views in which the surface could not be made out and that were taken from much farther away than one in which it could:
-/// too little in them would hold them to the others, and they blur what those show. False if the newest is gone.
+/// Drops views in which the surface could not be found, if taken from much farther away than one in
+/// which it was: they blur the others. False if the newest is dropped.
 fn keep_placed(looks: &mut Vec<RecordedView>) -> bool {
     let newest = looks.last().map(|look| look.stamp_ns);
     let sigma_m = |look: &RecordedView| axial_sigma_m(look.away_m, 0.0).unwrap_or_default();
@@ -178,14 +180,14 @@ fn keep_placed(looks: &mut Vec<RecordedView>) -> bool {
     looks.last().map(|look| look.stamp_ns) == newest
 }
 
-/// Margin around a surface within which the centre of an object on it must lie, metres; an object farther out
-/// stands beside it.
+/// Margin around a surface within which the centre of an object on it must lie, metres; an object
+/// farther out stands beside the surface.
 const OVER_M: f64 = 0.06;
 /// Ratio of noise above which a view blurs a better one.
 const BLURRED: f64 = 2.0;
 
-/// Leaves out each view of a surface of the map that its outline and the other views have moved farther than localisation errs: it was
-/// laid somewhere along them. False if none is left out, or nothing would be left; the newest may be gone.
+/// Drops each view of a mapped surface that outline and other views moved beyond the localisation
+/// error, as it slid along them. False if nothing was dropped, or nothing would remain.
 fn without_astray(
     mind: &mut Mind,
     body: &Description,
@@ -209,16 +211,16 @@ fn without_astray(
     true
 }
 
-/// Localisation error `map_from_localised`, from the registration of the newest view; none if the view is not
-/// registered, or was taken before the body came to its present place.
+/// Localisation error `map_from_localised` from the registration of the newest view; `None` if
+/// unregistered, or taken before the body came to its present pose.
 fn errs_by(region: &Region, views: &[View], merged: &Merged, since_ns: i64) -> Option<Isometry3<f64>> {
     let (look, view) = region.looks.last().zip(views.last()).filter(|(look, _)| look.stamp_ns >= since_ns)?;
     let fit = merged.fits.last().filter(|fit| fit.used)?;
     Some(fit.world_from_camera * look.localised(view).inverse())
 }
 
-/// Reads the views of a surface back from the record by their timestamps, with the transforms of those times. What a view shows
-/// of a place where something has moved since is left out.
+/// Reads the views of a surface from the record by timestamp, with their transforms; observations
+/// of places changed since are removed.
 fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldError> {
     let map = &eyes.robot.description().frames.map;
     let region = &mind.regions[on];
@@ -234,7 +236,8 @@ fn restore(mind: &Mind, eyes: Eyes<'_>, on: usize) -> Result<Vec<View>, WorldErr
     region.looks.iter().map(restored).collect()
 }
 
-/// Something on a surface was moved: what was seen in the cylinder around it holds no longer, and looks may be taken again.
+/// Handles a moved object: invalidates observations in the cylinder around it, and allows repeated
+/// looks.
 pub fn something_moved(
     mind: &mut Mind,
     record: &Record,
@@ -270,8 +273,8 @@ pub fn pushed(
     something_moved(mind, eyes.record, obstacle.on, change)
 }
 
-/// Updates a surface from the scene: its height and tilt, its outline if the map has none, and the doubt that
-/// it is a surface at all.
+/// Updates a surface from the scene: height and tilt, outline if unmapped, and doubt about being a
+/// supporting surface.
 fn note_surface(known: &mut KnownSurface, scene: &Scene) {
     let seen = &scene.surface;
     known.doubtful = if known.whole { None } else { seen.doubt() };
@@ -358,7 +361,7 @@ fn believe(
     Ok(note)
 }
 
-/// An object as viewers show it: known things green, others grey.
+/// Object as drawn by viewers: known ones green, others grey.
 fn labelled(track: &Track, up: &Vector3<f64>) -> Labelled {
     let middle = track.position_m + up * (track.size_m[2] / 2.0);
     let (name, p) = match track.label() {
@@ -388,8 +391,8 @@ pub fn in_a_line(p: &Percept) -> String {
     format!("{name:16} {probability:.2} {at}, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen")
 }
 
-/// Takes what the views of a surface saw into its space. One that was left out may have been taken up since, and the other way round,
-/// and one that lay there may lie elsewhere now: then the space is made anew.
+/// Adds the views of a surface to its observed space; rebuilds the space if a view was dropped,
+/// restored or moved.
 fn take_in(mind: &mut Mind, on: usize, views: &[View], merged: &Merged) {
     let (region, space) = (&mut mind.regions[on], Arc::make_mut(&mut mind.known.spaces[on]));
     let used: Vec<(i64, &View, Isometry3<f64>)> = region
@@ -425,7 +428,7 @@ fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
     (a.translation.vector - b.translation.vector).norm() + 2.0 * turn_rad < voxel_m
 }
 
-/// Depth map of the newest view at its registered pose; none if it could not be aligned.
+/// Depth map of the newest view at its registered pose; `None` if unregistered.
 fn newest(views: &[View], merged: &Merged) -> Option<DepthMap> {
     let (fit, view) = merged.fits.last().filter(|fit| fit.used).zip(views.last())?;
     DepthMap::from_view(view, &fit.world_from_camera)
@@ -438,14 +441,14 @@ fn sightings(percepts: &[Percept]) -> Vec<Sighting> {
     named.map(|(p, object)| Sighting { object, confidence: p.clamp(0.0, 1.0) }).collect()
 }
 
-/// The convex outline of what was measured of an object, seen from above, on what it stands on.
+/// Convex outline of an object's points projected onto its support.
 fn footprint(p: &Percept, up: &Vector3<f64>, merged: &Merged) -> Vec<Point3<f64>> {
     let below = Plane { normal: *up, offset_m: up.dot(&p.position_m.coords) };
     let points = p.indices.iter().map(|&n| &merged.cloud.points[n as usize]);
     Hull::around(below, points).map_or_else(Vec::new, |hull| hull.corners_in_space())
 }
 
-/// The cameras that saw an object: those that measured the side of its body which faces them.
+/// Cameras that saw an object, that is, measured the facing side of its body.
 fn seen_from(p: &Percept, up: &Vector3<f64>, visibility: &Visibility) -> Vec<Point3<f64>> {
     let middle = p.position_m + up * (p.size_m[2] / 2.0);
     let radius = p.size_m[0].min(p.size_m[1]) / 2.0;

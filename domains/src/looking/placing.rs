@@ -1,4 +1,4 @@
-//! Alignment of a surface's views with its outline on the map, which corrects localisation's error.
+//! Aligns a surface's views with the map's outline, which corrects localisation.
 
 use descry_perception::View;
 use descry_perception::locate::{Certainty, Located, endings, locate};
@@ -12,7 +12,8 @@ use crate::looking::merging::options_at;
 use crate::mind::Laid;
 use crate::surface::KnownSurface;
 
-/// Lays a merged surface on the outline that the map has of it: that mends what is left of localisation's error. Says how well.
+/// Aligns a merged surface with the map's outline, correcting the remaining localisation error;
+/// returns the certainty.
 pub(super) fn lay_on_map(
     body: &Description,
     known: &KnownSurface,
@@ -27,8 +28,7 @@ pub(super) fn lay_on_map(
     (merged.moved(&map_from_world), surface.moved(&map_from_world), located.certainty)
 }
 
-/// Alignment of a view with the outline of a surface on the map; nowhere, if it would be farther off than
-/// localisation errs.
+/// Alignment of a view with a mapped surface's outline; `Nowhere` if beyond the localisation error.
 pub(super) fn of_view(
     body: &Description,
     known: &KnownSurface,
@@ -55,14 +55,15 @@ fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &
 /// the alignment.
 const ASTRAY: f64 = 4.0;
 
-/// True if a camera is registered farther from its localised pose than localisation errs.
+/// True if a camera is registered beyond the localisation error from its localised pose.
 pub(crate) fn is_astray(body: &Description, localised: &Isometry3<f64>, moved: &Isometry3<f64>) -> bool {
     let shift = moved.translation.vector - localised.translation.vector;
     let turn = moved.rotation.rotation_to(&localised.rotation);
     shift.norm() > ASTRAY * body.pose_sigma_m || turn.angle() > ASTRAY * body.pose_sigma_rad
 }
 
-/// A view as it lies on the outline that the map has of a surface; as localisation has it where there is none, or nothing of it is seen.
+/// View aligned with the map's outline of a surface; as localised if there is no outline, or none
+/// is visible.
 pub(crate) fn laid(eyes: Eyes<'_>, surface: &KnownSurface, view: View) -> View {
     if !surface.whole {
         return view;

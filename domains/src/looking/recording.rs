@@ -1,4 +1,4 @@
-//! Recording of a view: its transforms, its colours and its cloud.
+//! Records a view: transforms, colours and cloud.
 
 use descry_memory::{Bounds, Image, Meta, Record, RecordId, Sensing};
 use descry_robots::Sensed;
@@ -8,8 +8,8 @@ use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::mind::{Laid, Mind, RecordedView};
 
-/// Puts a view of some surfaces into the record: its transforms, its colours and its cloud together, so that none is ever without
-/// the others. When this returns it survives a crash.
+/// Records a view of some surfaces, with transforms, colours and cloud atomically; durable on
+/// return.
 pub fn view(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -58,7 +58,7 @@ pub fn view(
     Ok(id)
 }
 
-/// Records the colours of a frame, if it has some.
+/// Records the colours of a frame, if any.
 fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), WorldError> {
     let Some(colour) = &sensed.colour else { return Ok(()) };
     let image = Image::Raw {
@@ -71,7 +71,7 @@ fn put_colour(record: &Record, frame: &str, sensed: &Sensed) -> Result<(), World
     Ok(record.put_image_soon(sensed.stamp_ns, frame, image, meta)?)
 }
 
-/// The part of the map that a frame shows; none if nothing returned.
+/// Bounds in the map of a frame's points; `None` without returns.
 fn extent(sensed: &Sensed) -> Option<Bounds> {
     let points =
         sensed.cloud.points.iter().map(|p| p.cast::<f64>()).filter(|p| p.iter().all(|x| x.is_finite()));

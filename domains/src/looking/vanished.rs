@@ -1,5 +1,5 @@
-//! Objects that were believed to stand on a surface and are not found there: gone, moved, or erased by views
-//! that do not fit.
+//! Believed objects of a surface that are not found any more: gone, moved, or erased by
+//! misregistered views.
 
 use descry_memory::belief::{Belief, Track};
 use descry_perception::nalgebra::Vector3;
@@ -8,13 +8,13 @@ use descry_perception::visibility::{DepthMap, Seen, Visibility};
 use crate::mind::Mind;
 use crate::surface::KnownSurface;
 
-/// Probability from which a requested object is missed when it is gone.
+/// Minimum probability at which a requested object is reported missing.
 const PERHAPS: f64 = 0.2;
-/// An object that is less probable to be what is asked about is not missed when a merge does not find it again.
+/// Minimum probability of being requested at which a lost object is kept in the belief.
 const UNLIKELY: f64 = 0.02;
 
-/// Sentence about a requested object whose place the newest view looks through: somebody has moved it; none
-/// if there is no such object.
+/// Sentence about a requested object whose place the newest view looks through, because a person
+/// moved it; `None` if there is none.
 pub(super) fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &DepthMap) -> Option<String> {
     let known = &mind.known;
     let up = known.surfaces[on].up;
@@ -31,8 +31,7 @@ pub(super) fn taken_away(mind: &Mind, on: usize, gone_before: usize, newest: &De
     })
 }
 
-/// Takes out of a belief what is remembered of earlier runs on a surface and stands where no view has looked yet: of that the views
-/// say nothing.
+/// Sets aside remembered objects of earlier runs at places that no view has seen yet.
 pub(super) fn set_aside_unseen(
     belief: &mut Belief,
     surface: &KnownSurface,
@@ -49,9 +48,8 @@ pub(super) fn set_aside_unseen(
     unseen
 }
 
-/// Takes back into a belief what may be something that is asked about and was not found in the merge, though the newest view does not look
-/// through its place and nothing that was found stands there, but a large thing into which it may be blurred: views that lie beside each
-/// other rub it out.
+/// Restores requested objects that the merge did not find, if the newest view does not look through
+/// their place, and nothing but a large object, into which they may be blurred, was found there.
 pub fn keep_unrefuted(
     belief: &mut Belief,
     gone_before: usize,
@@ -83,7 +81,8 @@ fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
     [0.3, 0.5, 0.7].into_iter().all(free)
 }
 
-/// A side counts as seen if a surface was measured this near to where it should be.
+/// Maximum distance between a measured surface and an object's expected side for the side to count
+/// as seen, metres.
 pub(super) const SIDE_TOLERANCE_M: f64 = 0.03;
-/// Points this near to a surface lie on it.
+/// Maximum distance of points on a surface, metres.
 pub(super) const ON_SURFACE_M: f64 = 0.012;

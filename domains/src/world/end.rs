@@ -1,4 +1,4 @@
-//! End of a run: the check that nothing is left to do, the persistent belief, the answer.
+//! End of a run: final check for remaining work, persistent belief, answer.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -20,8 +20,8 @@ use crate::situation::Situation;
 use crate::symbol::symbol;
 
 impl World<'_> {
-    /// The reason the run cannot go on, if it cannot: a limit is reached, or steps fail for good or change
-    /// nothing.
+    /// Reason why the run cannot go on, if any: a limit is reached, or steps fail for good or
+    /// change nothing.
     pub fn exhausted(&mut self, round: &Round) -> Option<Ended> {
         if let Some(why) = self.given_up.take() {
             return Some(Ended::Failed(why));
@@ -93,8 +93,8 @@ impl World<'_> {
         })
     }
 
-    /// All that is believed, where the phrase's own answer lists some of it: of each object that was seen what it is and where it
-    /// stands, of every kind.
+    /// Whole belief, if the phrase's answer lists parts of it: identity and place of each seen
+    /// object, and every kind.
     fn listed(&self) -> Option<Listed> {
         let Setting { domain, goal, .. } = &self.setting;
         let lists = |answer: &Option<String>| answer.as_ref().is_some_and(|text| text.contains('{'));

@@ -11,8 +11,8 @@ use crate::round::Round;
 use crate::{abilities, culprit};
 
 impl World<'_> {
-    /// Step that is surely useful, for when the planner has reached its limit of states; or else a look
-    /// behind a shut door.
+    /// Certainly useful step after the planner has hit its state limit, or else a look behind a
+    /// shut door.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
@@ -30,7 +30,7 @@ impl World<'_> {
         }
     }
 
-    /// A look behind what is shut.
+    /// Look behind a shut door.
     fn behind(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         loop {
@@ -46,7 +46,7 @@ impl World<'_> {
         }
     }
 
-    /// The reasons why there is no plan, the one that forbids every drive first.
+    /// Reasons for no plan; a condition that forbids every drive comes first.
     pub fn reasons(&self, round: &Round, all: Vec<NoPlan>) -> Vec<NoPlan> {
         culprit::reasons(self.setting.domain, round, all)
     }
@@ -68,8 +68,8 @@ impl World<'_> {
         self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
     }
 
-    /// Look to take before a goal that holds by absence of evidence is accepted: the one that settles most of
-    /// the contrary evidence, or else one behind a shut door, if the answer is not known.
+    /// Look to take before accepting a goal that holds by absence of evidence: the one that settles
+    /// most of the contrary evidence, or else one behind a shut door, while the answer is unknown.
     ///
     /// # Errors
     /// [`WorldError::Domain`] if the domain has no word for being at a pose.
@@ -85,8 +85,8 @@ impl World<'_> {
         }
     }
 
-    /// Look that may still help where there is no plan, as the time is too short for any or no look promises
-    /// the goal: the one that settles most per second, if it ends in time.
+    /// Look that may still help without a plan, if time is too short or no look promises the goal:
+    /// the one with the highest gain per second that ends in time.
     ///
     /// # Errors
     /// Never: it is chosen as [`World::fallback`] is.

@@ -1,5 +1,5 @@
-//! Viewpoints that a plan is made with. Drives lead from every viewpoint to every other: where there are
-//! many, the planner is asked with those that matter next, and with more only if no plan is found.
+//! Restriction of planning to relevant viewpoints: drives connect every pair of viewpoints, so with
+//! many the planner first gets the most relevant ones, and more only if no plan is found.
 //!
 //! A surface near by stands with all of its viewpoints, one far away with as many as settle what can be
 //! settled there, until plans lead to it.
@@ -17,21 +17,22 @@ use crate::situation::Situation;
 
 /// Maximum number of viewpoints, by stage; a map with no more than the first is planned on as a whole.
 const MOST_VIEWPOINTS: [usize; 2] = [64, 160];
-/// Share of what all looks at a surface can settle that its viewpoints of the second stage settle.
+/// Share of the doubt settleable by a surface's looks that its viewpoints of the second stage
+/// cover.
 const COVERED: f64 = 0.98;
-/// Words about viewpoints that say of none that something is to be done there.
+/// Words about viewpoints that do not by themselves make a viewpoint relevant.
 const OF_ANY: [&str; 4] = ["at", "observed", "out-of-reach", "beside"];
 
 /// A task with some of the viewpoints.
 pub struct Focus<'t> {
     /// The task.
     pub task: Cow<'t, Task>,
-    /// True if every viewpoint that is left out is of no use now: without a plan here there is none.
+    /// True if all omitted viewpoints are useless now, so that the lack of a plan is conclusive.
     pub is_whole: bool,
 }
 
 impl World<'_> {
-    /// The task with the viewpoints of a stage, from 0; none where there is no such stage.
+    /// Task restricted to the viewpoints of a stage (from 0); `None` past the last stage.
     pub fn focus<'t>(&self, round: &Round, task: &'t Task, stage: usize) -> Option<Focus<'t>> {
         let s = &*round.situation;
         if s.candidates.len() <= MOST_VIEWPOINTS[0] {
@@ -58,13 +59,13 @@ impl World<'_> {
     }
 }
 
-/// Words of a condition, variables and numbers among them.
+/// Words of a condition, including variables and numbers.
 fn words(condition: &str) -> impl Iterator<Item = &str> {
     condition.split(|c: char| c.is_whitespace() || c == '(' || c == ')')
 }
 
-/// Viewpoints that belong to every stage: where the body stands, beside shut doors, and those that are named
-/// or of which the domain says something.
+/// Viewpoints of every stage: at the body, beside shut doors, and those that the goal or the domain
+/// names.
 fn always(s: &Situation, task: &Task, named: &BTreeSet<&str>) -> BTreeSet<usize> {
     let mut always = BTreeSet::from([s.at]);
     for &door in &s.shut {
@@ -80,8 +81,8 @@ fn always(s: &Situation, task: &Task, named: &BTreeSet<&str>) -> BTreeSet<usize>
     always
 }
 
-/// Surfaces where something may be done, each with the seconds that count for going there: first those that
-/// are named and those where the requested things are believed to stand, then the others.
+/// Surfaces with possible work, each with the time for going there, seconds: first the named ones
+/// and those of the requested things, then the others.
 fn ranked(s: &Situation, named: &BTreeSet<&str>) -> Vec<(f64, usize)> {
     let is_named = |on: usize| named.contains(s.surfaces[on].symbol.as_str());
     let is_believed = |on: usize| (0..s.things.len()).any(|what| s.presence(what, on) > 0.5);
@@ -100,14 +101,13 @@ fn ranked(s: &Situation, named: &BTreeSet<&str>) -> Vec<(f64, usize)> {
     ranked
 }
 
-/// True if something may be done at a viewpoint of a surface: it can be reached, and a look is left or the
-/// hand has work.
+/// True if a viewpoint of a surface is useful: reachable, and with a look or a manipulation left.
 fn may_do(s: &Situation, from: usize, on: usize) -> bool {
     let is_work = s.held.is_some() || s.on_surface(on).next().is_some();
     s.can_reach(from) && (is_work || !s.observed.contains(&(from, on)))
 }
 
-/// Viewpoints of a surface whose looks together settle nearly all that looks can settle there, of any doubt.
+/// Viewpoints of a surface that together settle nearly all doubt that looks can settle there.
 fn covering(s: &Situation, on: usize) -> Vec<usize> {
     let open: Vec<usize> = s
         .viewers(on)

@@ -1,4 +1,4 @@
-//! Parts of a world and its rounds: places, things, prior expectations and recalled objects.
+//! Parts of a world and its rounds: places, things, priors and recalled objects.
 
 use descry_memory::belief::Belief;
 use descry_robots::{PoseEstimate, Robot};
@@ -18,7 +18,7 @@ use crate::viewpoint::Candidate;
 
 /// Maximum probability of a remembered object, as a share of the required confidence.
 const RECALLED: f64 = 0.9;
-/// Distances from a door at which the body may stand to open it, metres.
+/// Distances from a door at which the body may open it, metres, in order of preference.
 const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 
 /// The objects of the problem, by type.
@@ -42,7 +42,7 @@ pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<
     objects
 }
 
-/// The things that are asked for, each on the surfaces of the places where it is asked about.
+/// Requested things, each restricted to the surfaces of its places.
 pub(super) fn things(
     domain: &Domain,
     goal: &Goal,
@@ -57,7 +57,7 @@ pub(super) fn things(
     goal.asked.things.iter().map(of).collect()
 }
 
-/// A thing that is asked for: one of the domain's objects or kinds, or one that was learned.
+/// Requested thing: one of the domain's objects or kinds, or a learned object.
 fn asked_for(domain: &Domain, states: &States, name: &str) -> Result<Thing, WorldError> {
     let known = known::thing(domain, name);
     let learned = abilities::ALL.iter().filter_map(|ability| ability.thing).find_map(|of| of(states, name));
@@ -71,8 +71,8 @@ fn asked_for(domain: &Domain, states: &States, name: &str) -> Result<Thing, Worl
     }
 }
 
-/// Remembered objects of earlier runs that may still stand where they were seen: their probability is below
-/// certainty, so that they are looked at again.
+/// Remembered objects of earlier runs at their last places, with probability below certainty, so
+/// that they are looked at again.
 pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[KnownSurface]) -> Belief {
     let mut belief = Belief::default();
     if let Some(past) = past {
@@ -82,7 +82,7 @@ pub(super) fn recalled(past: Option<&Past>, goal: &Goal, surfaces: &[KnownSurfac
     belief
 }
 
-/// The surfaces of places that are named by their symbols: surfaces, or rooms with all that is in them.
+/// Surfaces named directly or by their rooms.
 fn places_of(
     places: &[String],
     rooms: &[Named],
@@ -101,7 +101,7 @@ fn places_of(
     Ok(on)
 }
 
-/// The kinds of which all are asked for, each on the surfaces of the rooms in which it is asked about.
+/// Kinds requested completely, each restricted to the surfaces of its rooms.
 pub(super) fn kinds(domain: &Domain, goal: &Goal, surfaces: &[KnownSurface]) -> Vec<Thing> {
     let of = |(kind, rooms): &(String, Option<Vec<String>>)| {
         let of_rooms =
@@ -112,7 +112,7 @@ pub(super) fn kinds(domain: &Domain, goal: &Goal, surfaces: &[KnownSurface]) -> 
     goal.asked.kinds.iter().map(of).collect()
 }
 
-/// The objects that were seen and may be of a kind that is asked for, each as a thing of its own.
+/// Seen objects that may belong to a requested kind, as things of their own.
 pub(super) fn members(known: &Known) -> Vec<Thing> {
     let of = |kind: &Thing| -> Vec<Thing> {
         let is = |t: &&descry_memory::belief::Track| t.probability_of(&kind.name) > 0.5;
@@ -126,7 +126,7 @@ pub(super) fn members(known: &Known) -> Vec<Thing> {
     known.kinds.iter().flat_map(of).collect()
 }
 
-/// Prior weight of each thing, then each kind, on each surface, relative to elsewhere.
+/// Prior weight of each thing, then of each kind, on each surface, relative to other places.
 pub(super) fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
     let weight = |what: &Thing, on: usize| -> f64 {
         let surface = &known.surfaces[on];
@@ -174,7 +174,7 @@ pub(super) fn no_surface(name: &str, surfaces: &[KnownSurface]) -> WorldError {
     ))
 }
 
-/// The doors that the map knows; poses on both sides of each are added to those that the body can be sent to.
+/// Doors of the map; adds poses on both sides of each to the candidates.
 pub(super) fn doors(robot: &dyn Robot, here: &PoseEstimate, poses: &mut Vec<Candidate>) -> Vec<KnownDoor> {
     let mut known = Vec::new();
     for door in robot.doors() {

@@ -1,4 +1,5 @@
-//! Steps that do not come from the planner: the domain's own actions that do what is wanted, where the domain lets them.
+//! Steps chosen without the planner: the domain's own actions that carry out a deed, where their
+//! conditions hold.
 
 use descry_planner::semantics::Binding;
 use descry_planner::task::{Action, Comparison, Condition, Quantified, Scoped, Slot, When};
@@ -16,8 +17,8 @@ const GAP_S: f64 = 0.001;
 const BINDINGS: usize = 64;
 
 impl World<'_> {
-    /// A look that a policy has chosen: at once, or by a plan that opens, unlocks or charges what it must on the way. None where no
-    /// action can take it: it is not chosen again.
+    /// Choice for a policy's look: at once, or by a plan that opens, unlocks or charges what is
+    /// needed first. `None` if no action can take the look, which is then not chosen again.
     pub(super) fn head_for(
         &mut self,
         round: &Round,
@@ -43,8 +44,8 @@ impl World<'_> {
         all.iter().find_map(|deeds| self.directly(round, deeds, false)).map(Choice::Steps)
     }
 
-    /// The deeds as steps of the domain's own actions whose conditions hold, one after the other; none where there are no such actions.
-    /// `is_unadvised` where what a call says to be worth it does not matter.
+    /// Deeds as consecutive steps of the domain's actions whose conditions hold; `None` if there
+    /// are no such actions. `is_unadvised`: ignores calls that advise on usefulness.
     pub(super) fn directly(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Plan> {
         let freed = is_unadvised.then(|| self.without_advice(&round.task));
         let task = freed.as_ref().unwrap_or(&round.task);
@@ -86,7 +87,7 @@ impl World<'_> {
         plans.into_iter().next()
     }
 
-    /// A plan towards where the first action that does the last deed may be taken, and that action.
+    /// Plan towards the place of the last deed's first applicable action, with that action.
     pub(super) fn towards(&self, round: &Round, deeds: &[Deed], is_unadvised: bool) -> Option<Choice> {
         let freed = is_unadvised.then(|| self.without_advice(&round.task));
         let mut task = freed.unwrap_or_else(|| round.task.clone());
@@ -104,7 +105,7 @@ impl World<'_> {
         Some(Choice::Towards { task: Box::new(task), then: Plan { steps: vec![step], ..Plan::default() } })
     }
 
-    /// The domain's own actions that do a deed, with all their arguments, those first that do nothing else.
+    /// Actions that carry out a deed with all their arguments; those that do nothing else first.
     fn calls(&self, task: &Task, deed: &Deed) -> Vec<(String, Vec<String>)> {
         let known = |action: &Performer| task.actions.iter().find(|a| a.name == action.action);
         let performers = actions::performers(self.setting.domain, deed);
@@ -115,7 +116,7 @@ impl World<'_> {
         performers.into_iter().flat_map(of).collect()
     }
 
-    /// A task in whose actions no call advises what is worth it.
+    /// Task without advisory calls in its actions.
     fn without_advice(&self, task: &Task) -> Task {
         let config = &self.setting.domain.config;
         let advises = |name: &str| {
@@ -152,7 +153,7 @@ fn startable(action: &Action, binding: &Binding) -> Scoped<Condition> {
     Scoped { slots: action.slots, body }
 }
 
-/// The ways to call an action: what a deed leaves open is any object that fits.
+/// Argument bindings of an action; parameters left open by the deed take any fitting object.
 fn bindings(task: &Task, action: &Action, performer: &Performer) -> Vec<(String, Vec<String>)> {
     let mut all: Vec<Vec<String>> = vec![Vec::new()];
     for (parameter, given) in action.parameters.iter().zip(&performer.arguments) {

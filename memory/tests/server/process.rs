@@ -24,7 +24,7 @@ pub fn skipped(why: &str) {
 pub struct Process {
     child: Child,
     port: u16,
-    /// Its program.
+    /// Program.
     pub program: PathBuf,
     _storage: TempDir,
 }
@@ -62,7 +62,7 @@ impl Process {
         Ok(process)
     }
 
-    /// Its address.
+    /// Address.
     pub fn address(&self) -> String {
         format!("mongodb://127.0.0.1:{}", self.port)
     }

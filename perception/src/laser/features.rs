@@ -28,7 +28,7 @@ pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
 /// Feature distribution of a class of shapes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureClass {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Instances it was learnt from.
     pub instances: usize,

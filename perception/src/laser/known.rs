@@ -16,9 +16,9 @@ const WIDTHS: usize = 18;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Named")]
 pub struct KnownShape {
-    /// Its name; several may share one.
+    /// Name; several may share one.
     pub name: String,
-    /// Its model.
+    /// Model.
     pub model: ShapeModel,
     /// Features of the model's hull, kept so that many known shapes are gone through quickly.
     #[serde(skip)]

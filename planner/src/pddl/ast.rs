@@ -12,7 +12,7 @@ pub struct Symbol(pub u32);
 pub struct Name {
     /// The case-folded name.
     pub symbol: Symbol,
-    /// Its span in the source.
+    /// Span in the source.
     pub span: Span,
 }
 
@@ -28,9 +28,9 @@ pub struct Typed {
 /// A declared predicate, or the head of a derived one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signature {
-    /// Its name.
+    /// Name.
     pub name: Name,
-    /// Its parameters.
+    /// Parameters.
     pub parameters: Vec<Typed>,
 }
 
@@ -61,7 +61,7 @@ pub struct ModuleDeclaration {
 pub struct ModuleOption {
     /// The token `init@lib`.
     pub function: Name,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Name>,
 }
 
@@ -70,7 +70,7 @@ pub struct ModuleOption {
 pub struct Call {
     /// The module's name.
     pub name: Name,
-    /// Its arguments.
+    /// Arguments.
     pub arguments: Vec<Term>,
     /// The whole call.
     pub span: Span,
@@ -89,7 +89,7 @@ pub enum Term {
     Apply {
         /// The function.
         name: Name,
-        /// Its arguments.
+        /// Arguments.
         arguments: Vec<Term>,
         /// The whole term.
         span: Span,
@@ -173,7 +173,7 @@ pub enum Formula {
     Atom {
         /// The predicate.
         name: Name,
-        /// Its arguments.
+        /// Arguments.
         arguments: Vec<Term>,
         /// The whole atom.
         span: Span,
@@ -197,9 +197,9 @@ pub enum Formula {
     Modal {
         /// The operator.
         operator: Modal,
-        /// Its numbers (times).
+        /// Numbers (times).
         times_s: Vec<f64>,
-        /// Its formulas.
+        /// Formulas.
         formulas: Vec<Formula>,
         /// The whole constraint.
         span: Span,
@@ -262,7 +262,7 @@ pub enum Effect {
         negated: bool,
         /// The predicate.
         name: Name,
-        /// Its arguments.
+        /// Arguments.
         arguments: Vec<Term>,
         /// The whole literal.
         span: Span,
@@ -300,19 +300,19 @@ pub struct DurationBound {
 /// An action, instantaneous or durative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Action {
-    /// Its name.
+    /// Name.
     pub name: Name,
     /// True if it was declared `:durative-action`.
     pub durative: bool,
-    /// Its parameters.
+    /// Parameters.
     pub parameters: Vec<Typed>,
     /// Calls of grounding modules.
     pub grounding: Vec<Call>,
     /// Bounds on its duration.
     pub duration: Vec<DurationBound>,
-    /// Its precondition.
+    /// Precondition.
     pub condition: Option<Formula>,
-    /// Its effect.
+    /// Effect.
     pub effect: Option<Effect>,
     /// The whole declaration.
     pub span: Span,
@@ -321,7 +321,7 @@ pub struct Action {
 /// A derived predicate's rule.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derived {
-    /// Its head.
+    /// Head.
     pub head: Signature,
     /// The condition under which the head is true.
     pub body: Formula,
@@ -334,7 +334,7 @@ pub struct Derived {
 pub struct Domain {
     /// True if a part of the domain could not be parsed.
     pub unread: bool,
-    /// Its name.
+    /// Name.
     pub name: Option<Name>,
     /// Declared requirements.
     pub requirements: Vec<Name>,
@@ -367,7 +367,7 @@ pub enum Initial {
         negated: bool,
         /// The predicate.
         name: Name,
-        /// Its arguments.
+        /// Arguments.
         arguments: Vec<Name>,
         /// The whole literal.
         span: Span,
@@ -376,9 +376,9 @@ pub enum Initial {
     Value {
         /// The function.
         name: Name,
-        /// Its arguments.
+        /// Arguments.
         arguments: Vec<Name>,
-        /// Its value.
+        /// Value.
         value: InitialValue,
         /// The whole equation.
         span: Span,
@@ -412,7 +412,7 @@ pub struct Metric {
 pub struct Problem {
     /// True if a part of the problem could not be parsed.
     pub unread: bool,
-    /// Its name.
+    /// Name.
     pub name: Option<Name>,
     /// Name of the domain that the problem refers to.
     pub domain: Option<Name>,
@@ -422,7 +422,7 @@ pub struct Problem {
     pub module_options: Vec<ModuleOption>,
     /// `:moduleexitoptions`
     pub module_exit_options: Vec<ModuleOption>,
-    /// Its objects.
+    /// Objects.
     pub objects: Vec<Typed>,
     /// The initial state, timed literals included.
     pub initial: Vec<Initial>,

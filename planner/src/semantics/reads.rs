@@ -21,7 +21,7 @@ pub struct Touched {
     fluents: FxHashSet<GroundFluent>,
     /// Predicates of which any instance may matter: those that a derived fact depends on.
     predicates: FxHashSet<PredicateId>,
-    /// Its write set.
+    /// Write set.
     pub changes: Changes,
 }
 

@@ -90,7 +90,7 @@ pub struct Situation {
 pub struct Step {
     /// The action; meaningless for timed effects.
     pub act: u32,
-    /// Its part; [`Part::Free`] is the next timed effect.
+    /// Part; [`Part::Free`] is the next timed effect.
     pub part: Part,
     /// The parameter that its grounding module proposed.
     pub proposal: Option<Arc<str>>,

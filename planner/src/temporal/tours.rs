@@ -143,7 +143,7 @@ impl<'w, 'a> Tours<'w, 'a> {
 }
 
 impl Tour {
-    /// Its stops with one left out, with some of them the other way round, and with one earlier or later.
+    /// Stops with one left out, with some of them the other way round, and with one earlier or later.
     fn orders(&self) -> impl Iterator<Item = Vec<Stop>> + '_ {
         let all = self.stops.len();
         let less = (0..all).map(|n| {

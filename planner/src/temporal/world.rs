@@ -108,7 +108,7 @@ pub struct World<'a> {
     pub task: &'a Task,
     /// The ground task.
     pub ground: &'a GroundTask,
-    /// Its calls.
+    /// Calls.
     pub calls: Calls<'a>,
     /// Durative actions first, in the ground task's order, then instantaneous ones, then durative ones again that take longer.
     pub acts: Vec<Act<'a>>,

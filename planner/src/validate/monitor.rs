@@ -21,7 +21,7 @@ pub struct Broken {
     pub reason: String,
     /// The same with the values that decide it.
     pub cause: Cause,
-    /// Its span in the task's texts.
+    /// Span in the task's texts.
     pub span: Span,
     /// Findings about the unmet condition, to be drawn under the text of the task.
     #[serde(skip)]

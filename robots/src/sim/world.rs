@@ -81,7 +81,7 @@ impl Object {
 /// A door in its wall.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HungDoor {
-    /// Its opening.
+    /// Opening.
     pub doorway: Doorway,
     /// True while the panel fills the opening.
     pub shut: bool,
@@ -134,7 +134,7 @@ pub const LABEL_OBJECT: u16 = 3;
 pub struct Solid {
     /// Pose of its frame.
     pub map_from_solid: Isometry3<f64>,
-    /// Its surfaces.
+    /// Surfaces.
     pub parts: Vec<Primitive>,
     /// Their colours, in the same order; empty: all have `colour`.
     pub paints: Vec<Paint>,

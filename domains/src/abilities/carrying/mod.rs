@@ -1,4 +1,5 @@
-//! *carrying*: a hand that takes one thing and puts it down where there is room. It needs *searching*, which knows where things stand.
+//! *carrying*: picks up one object and puts it down on free space. Needs *searching* for the
+//! objects' places.
 
 mod spot;
 
@@ -20,16 +21,17 @@ use crate::mind::Mind;
 use crate::note::Note;
 use crate::situation::Situation;
 
-/// Distance within which the hand may touch what stands beside the object that it takes, metres.
+/// Margin around the picked-up object within which the hand may touch its neighbours, metres.
 const TOUCHED_M: f64 = 0.03;
-/// Distance from its place within which an object that slipped out of the hand may lie, metres.
+/// Radius around the original place within which an object that slipped out of the hand may lie,
+/// metres.
 const SLIPPED_M: f64 = 0.15;
 /// Standard deviations of localisation to allow for, and the distance from which things are looked at,
 /// metres.
 const ASTRAY: f64 = 2.0;
 const FROM_M: f64 = 1.2;
 
-/// The skill that puts down what is in the hand.
+/// Skill that puts down the held object.
 const PUT_DOWN: &str = "put-down";
 
 /// The ability *carrying*.
@@ -105,7 +107,8 @@ pub const ABILITY: Ability = Ability {
     ..Ability::named("carrying", "takes one thing into the hand and puts it down elsewhere")
 };
 
-/// The look that tells most a second; with something in the hand, it is put down first, where that takes least.
+/// Fallback: the look with the highest gain per second; a held object is first put down where that
+/// is quickest.
 fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let Some(track) = held(s) else { return looks::look_deeds(s) };
     let Some(thing) = s.things.iter().find(|thing| is_held(s, thing, track)) else { return Vec::new() };
@@ -139,7 +142,8 @@ fn thing_name<'a>(s: &'a Situation, symbol: &'a str) -> &'a str {
     s.thing(symbol).map_or(symbol, |n| &s.things[n].name)
 }
 
-/// `(hand-free)`: who has no hand looks unhindered; that it takes nothing, `[can-grasp]` says.
+/// `(hand-free)`: also true of a body without a hand, which can still look; `[can-grasp]` excludes
+/// picking up.
 fn hand_free(s: &Situation) -> Vec<String> {
     if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
@@ -150,7 +154,7 @@ fn held(s: &Situation) -> Option<&Track> {
     s.belief.tracks.iter().find(|t| t.id == held.track)
 }
 
-/// The object on a surface that a thing most likely is.
+/// Object on a surface that is most likely the thing.
 fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Track> {
     let thing = &s.things[s.thing(thing).ok()?];
     let there = s.belief.tracks.iter().filter(|t| t.on == surface);
@@ -188,7 +192,7 @@ fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
     d_m <= reach_m && (d_m + astray_m(body) <= reach_m || is_nearest())
 }
 
-/// `[can-grasp ?from ?what ?on]`: what has not been found yet may stand anywhere on the surface.
+/// `[can-grasp ?from ?what ?on]`: an object not found yet may stand anywhere on the surface.
 fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
@@ -212,7 +216,7 @@ fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
 }
 
-/// Position at which the thing in the hand is put down.
+/// Position at which the held object is put down.
 fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let on = s.surface(arguments[2]).map_err(|e| e.to_string())?;
@@ -221,7 +225,7 @@ fn place(s: &Situation, arguments: &[&str]) -> Result<Point3<f64>, String> {
         .ok_or_else(|| format!("there is no free place within reach on {}", arguments[2]))
 }
 
-/// Voids what was seen of the place of an object.
+/// Invalidates the observed space around an object's place.
 fn void(mind: &mut Mind, eyes: Eyes<'_>, track: &Track, more_m: f64) -> Result<(), WorldError> {
     let Some(on) = mind.known.surfaces.iter().position(|k| k.symbol == track.on) else { return Ok(()) };
     let body = eyes.robot.description();
@@ -254,7 +258,7 @@ fn picked_up(
     Ok(format!("the hand is closed to {:.3} m around it", grasped.width_m))
 }
 
-/// A grasp that failed may have moved what it was to take.
+/// Handles a failed pick-up: the grasp may have moved the object.
 fn pick_up_failed(
     mind: &mut Mind,
     eyes: Eyes<'_>,

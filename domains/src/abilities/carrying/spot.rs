@@ -6,17 +6,17 @@ use descry_perception::nalgebra::{Point3, Vector3};
 use super::{distance_m, reaches};
 use crate::situation::Situation;
 
-/// Radius of a thing that is not known yet: that of a cup with its handle, metres.
+/// Radius assumed for an unknown object, that of a cup with its handle, metres.
 pub(super) const USUAL_RADIUS_M: f64 = 0.06;
-/// Least gap to what stands there and to the edge, metres.
+/// Minimum gap to other objects and to the surface's edge, metres.
 const GAP_M: f64 = 0.05;
 /// Distance of the places that are tried, metres.
 const GRID_M: f64 = 0.04;
 /// Heights above the surface at which a place must have been seen free, metres.
 const FREE_AT_M: [f64; 2] = [0.04, 0.10];
 
-/// The place on a surface nearest to the body at a candidate that is within reach and free: nothing is believed there, and it was
-/// seen empty, or `if_unseen` has not been seen at all. None if there is none.
+/// Free place on a surface nearest to the body and within reach from a viewpoint: seen empty, or
+/// with `if_unseen` not seen at all; `None` if there is none.
 pub(super) fn free(
     s: &Situation,
     from: usize,

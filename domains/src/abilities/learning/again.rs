@@ -1,5 +1,5 @@
-//! Learned things known again on a surface, in any domain: what one of its views suggests is held against all of them, and what is left explains
-//! the objects that stand there.
+//! Recognition of learned objects on a surface, in any domain: candidates from single views are
+//! verified against all views, and the verified ones explain the tracked objects.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::mind::Mind;
 use crate::states::state;
 use crate::surface::KnownSurface;
 
-/// Returns farther than this tell nothing, metres.
+/// Maximum range of depth returns used for recognition, metres.
 const RANGE_M: f64 = 3.0;
 /// The number of newest cameras from which the merged views are examined.
 const TOGETHER: usize = 3;
@@ -24,14 +24,14 @@ const TOGETHER: usize = 3;
 const GUESSES: usize = 12;
 /// Guesses nearer to each other than this are one, metres and radians.
 const SAME: (f64, f64) = (0.03, 0.35);
-/// Less probability than this says nothing.
+/// Minimum probability of a reported candidate.
 const LEAST: f64 = 0.05;
-/// Distance from a learned object's surface within which points belong to it, metres: alignment of
-/// views leaves half of that.
+/// Distance from a learned model's surface within which points belong to the object, metres; half
+/// of it is left by view alignment.
 const OF_IT_M: f32 = 0.015;
-/// An object of which this share of the points is of a thing is that thing.
+/// Minimum share of an object's points that a learned model must explain to name the object.
 const SHARE: f64 = 0.6;
-/// Margins within which the centre of a thing on a surface may lie beside the surface, and above it, metres.
+/// Margin around a surface within which an object's centre may lie, metres.
 const BESIDE_M: f64 = 0.03;
 const ABOVE_M: (f64, f64) = (-0.02, 0.6);
 /// Prior probability that some object is the sought thing before it was looked at; and probability that a
@@ -39,8 +39,8 @@ const ABOVE_M: (f64, f64) = (-0.02, 0.6);
 /// which is 1 of 2.5.
 const PRIOR: f64 = 0.3;
 const MISSED: f64 = 0.4;
-/// Share of an object's sides below which its model may lack a part, so that the object may be
-/// larger.
+/// Minimum share of observed sides of a complete model; below it, the object may be larger than the
+/// model.
 const HALF: f64 = 0.5;
 /// An object longer than the learned one by this margin, metres, is another one; so is a well seen
 /// object that, with all neighbours that may be parts of it, has less than this share of the
@@ -54,18 +54,18 @@ pub const NOT_IT: f64 = 0.002;
 #[derive(Clone, Default)]
 struct Glances {
     by_time: BTreeMap<i64, Arc<Glance>>,
-    /// Number of disturbances of the scene when they were taken.
+    /// Number of scene disturbances when the glance was taken.
     disturbed: usize,
 }
 
 state!(Glances);
 
-/// Forgets recognition results: what is known has changed.
+/// Clears cached recognition results, because the set of learned objects has changed.
 pub(super) fn forget(mind: &mut Mind) {
     mind.known.states.get_mut::<Glances>().by_time.clear();
 }
 
-/// Recognition results that still hold; those are void that were taken before something moved.
+/// Cached recognition results that are still valid; those from before a disturbance are not.
 fn glances(mind: &mut Mind) -> BTreeMap<i64, Arc<Glance>> {
     let disturbed = mind.disturbed;
     let kept: &mut Glances = mind.known.states.get_mut();
@@ -74,33 +74,33 @@ fn glances(mind: &mut Mind) -> BTreeMap<i64, Arc<Glance>> {
     if still_hold { held } else { BTreeMap::new() }
 }
 
-/// A learned thing somewhere.
+/// Recognised learned object.
 pub struct Found {
-    /// Its number among [`News::things`].
+    /// Index in [`News::things`].
     pub thing: usize,
-    /// Its pose, with the confidence of the match.
+    /// Pose and confidence of the match.
     pub judged: Judged,
-    /// Its surface there.
+    /// Model surface at that pose.
     pub cloud: Cloud,
     tree: Neighbours,
 }
 
 impl Found {
-    /// The share of some points (world) that are of it.
+    /// Share of the given points (world) that the object explains.
     pub fn share_of(&self, points: &[Point3<f32>]) -> f64 {
         let near = |p: &&Point3<f32>| self.tree.nearest(p, OF_IT_M).is_some();
         points.iter().filter(near).count() as f64 / points.len().max(1) as f64
     }
 }
 
-/// Views, each with where its camera stood, and which way is up there if that is known.
+/// Views with their camera poses, and the up direction if known.
 type Shown<'a> = (&'a [(&'a View, Isometry3<f64>)], Option<Vector3<f64>>);
 
 /// A guess, and where in the world that is.
 type Placed = (Guess, Isometry3<f64>);
 
-/// Learned things that views show, each with the pose of its camera, the surest first; no place holds two.
-/// Candidates are those of each view and those `suggested` by all of them; `holds` tells where things may be.
+/// Learned objects recognised in the views (with camera poses), most confident first, without
+/// overlaps. Candidates come from single views and from `suggested`; `holds` restricts positions.
 pub(super) fn find(
     mind: &mut Mind,
     (views, up): Shown<'_>,
@@ -151,8 +151,8 @@ pub(super) fn find(
     apart
 }
 
-/// Options of recognition for a world with this upward direction. Things were learned with z up: in a world
-/// with another up they may stand any way.
+/// Recognition options for the given up direction. Models have z up; without a known up direction,
+/// any orientation is tried.
 fn options(up: Option<Vector3<f64>>) -> KnowOptions {
     /// Farther from z is another up, radians.
     const LEVEL_RAD: f64 = 0.1;
@@ -164,8 +164,8 @@ fn placed(glance: &Glance, world_from_camera: &Isometry3<f64>) -> Vec<Placed> {
     glance.guesses.iter().map(|guess| (*guess, world_from_camera * guess.camera_from_model)).collect()
 }
 
-/// Candidates from the merged views of a surface, as the newest of their cameras would see them: with less
-/// noise than in any single view.
+/// Candidates from the merged cloud, rendered from the newest camera: less noisy than a single
+/// view.
 fn together(
     models: &Models,
     surface: &KnownSurface,
@@ -206,14 +206,14 @@ fn is_same(a: &Isometry3<f64>, b: &Isometry3<f64>) -> bool {
     (a.translation.vector - b.translation.vector).norm() < SAME.0 && a.rotation.angle_to(&b.rotation) < SAME.1
 }
 
-/// True if the centre of something may be that of a thing on a surface.
+/// True if an object with this centre may stand on the surface.
 pub(super) fn stands_on(surface: &KnownSurface, middle: &Point3<f64>) -> bool {
     let above_m = surface.outline.first().map_or(0.0, |p| surface.up.dot(&(middle - p)));
     surface.covers(middle, BESIDE_M) && (ABOVE_M.0..ABOVE_M.1).contains(&above_m)
 }
 
-/// Says of each object on a surface which learned thing it may be; what several objects are of one thing is one. `merged` is the cloud of all views, which
-/// the percepts index.
+/// Assigns learned objects to the percepts on a surface; percepts of one object are merged.
+/// `merged`: cloud of all views, indexed by the percepts.
 pub(super) fn explain(
     mind: &mut Mind,
     on: usize,
@@ -265,7 +265,8 @@ pub(super) fn explain(
     explained
 }
 
-/// Greatest extent of an object together with its near neighbours, which may be parts of one thing, metres.
+/// Greatest extent of a percept together with near neighbours that may belong to the same object,
+/// metres.
 fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);
     let near = |p: &&Percept| {
@@ -277,7 +278,8 @@ fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     wide_m.hypot(high_m)
 }
 
-/// Sets the place of a thing that was recognised: its centre above its support, and its sides.
+/// Sets position and size of a percept from the recognised model: centre above the support, and
+/// sides.
 fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     let middle = Point3::from(found.judged.world_from_model.translation.vector);
     let up_m = surface.up.dot(&(middle - percept.position_m));
@@ -288,8 +290,8 @@ fn place(percept: &mut Percept, found: &Found, surface: &KnownSurface) {
     }
 }
 
-/// Spreads probability over the learned things: the one that was found there, or those that looks may have missed at something which is so long with all
-/// that may be of it, metres.
+/// Sets name probabilities of a percept: the recognised object, or (`Err`: extent with neighbours,
+/// metres) those that recognition may have missed.
 pub fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     let mut of_things: Vec<(String, f64)> = Vec::new();
     let is = found.ok().map(|f| (f.thing, f.judged.confidence.clamp(0.0, 0.999)));
@@ -320,8 +322,9 @@ pub fn name(percept: &mut Percept, news: &News, found: Result<&Found, f64>) {
     }
 }
 
-/// The probability that an object is a thing which looks at it have not told. With all that may be of it, it is so long at most, metres. A look at
-/// a side that was never seen tells nothing, and what was seen from few sides may be longer than is known.
+/// Probability that recognition missed the learned object in this percept, whose extent with
+/// neighbours is at most `together_m`. Views of sides that were never learned carry no evidence,
+/// and an incompletely seen object may be larger than known.
 pub fn missed(percept: &Percept, thing: &LearnedThing, together_m: Option<f64>) -> f64 {
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let longest_m = f64::from((high - low).norm());

@@ -1,4 +1,4 @@
-//! The call that *learning* answers, and what is done where the planner finds no plan.
+//! Call of *learning*, and the fallback when the planner finds no plan.
 
 use std::collections::BTreeSet;
 
@@ -37,7 +37,7 @@ fn gain(s: &Situation, novelty: &Novelty, from: &str, before: &[&str]) -> f64 {
     fresh.len() as f64 / DIRECTIONS as f64
 }
 
-/// The reason for a look from there.
+/// Reason for a look from a pose.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     let Some(novelty) = s.news().novelty(arguments[1]) else { return String::new() };
     format!(

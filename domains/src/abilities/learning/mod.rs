@@ -1,5 +1,5 @@
-//! *learning*: places are visited again and again, what is new there is looked at from all around and becomes a model, and is known again by it
-//! (Fäulhammer et al., *Autonomous Learning of Object Models on a Mobile Robot*).
+//! *learning*: revisits places, models novel objects from views all around, and recognises them
+//! later (Fäulhammer et al., *Autonomous Learning of Object Models on a Mobile Robot*).
 
 #[doc(hidden)]
 pub mod again;
@@ -107,7 +107,8 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// Two waypoints a surface, on opposite sides of it: what one look hides the other shows.
+/// Two waypoints per surface on opposite sides, so that one look sees the space hidden from the
+/// other.
 fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candidate> {
     let number = |c: &Candidate| c.symbol.strip_prefix(&format!("{surface}-"))?.parse::<usize>().ok();
     let ring: Vec<(usize, &Candidate)> = candidates.iter().filter_map(|c| Some((number(c)?, c))).collect();
@@ -126,7 +127,7 @@ fn waypoints(candidates: &[Candidate], surface: &str, poses: usize) -> Vec<Candi
     }
 }
 
-/// A run begins: which places are visited, and how they looked before.
+/// Initial state of a run: waypoints to visit, and their state at earlier visits.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     if goal.asked.of_word(PATROLLED).next().is_none() {
         return;
@@ -153,12 +154,12 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     mind.known.news_mut().places = places;
 }
 
-/// The word for a place that was visited, by which a goal asks for visits.
+/// Predicate of a visited place, used by goals that ask for visits.
 const PATROLLED: &str = "patrolled";
-/// A waypoint that is farther off than this from where it was is another, metres.
+/// Maximum distance between waypoints of two runs that count as the same, metres.
 const SAME_PLACE_M: f64 = 0.02;
 
-/// Modelling task for a novel object; its first look is the one that noticed it.
+/// Modelling task for a novel object; the first view is the one in which the object was detected.
 fn modelling(s: &Situation, what: &str) -> Result<Model, String> {
     let novelty = s.news().novelty(what).ok_or_else(|| format!("`{what}` is nothing new"))?;
     Ok(Model {

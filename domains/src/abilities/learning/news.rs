@@ -21,7 +21,8 @@ use crate::symbol::symbol;
 
 /// Number of viewing directions around an object that are distinguished.
 pub(super) const DIRECTIONS: usize = 36;
-/// A look shows what lies so far to either side of where it comes from, directions: 15 degrees.
+/// Number of directions (15 degrees each) to either side of the viewing direction that a look
+/// covers.
 const TO_EITHER_SIDE: usize = 1;
 
 /// Visited places, novel objects and learned things.
@@ -29,15 +30,15 @@ const TO_EITHER_SIDE: usize = 1;
 pub struct News {
     /// Places to visit, by the symbols of their poses.
     pub places: Vec<Place>,
-    /// Novel objects that are no learned things.
+    /// Novel objects that match no learned one.
     pub novelties: Vec<Novelty>,
-    /// Changes in which there is nothing to be learned.
+    /// Changes without anything to learn.
     pub changes: Vec<Difference>,
-    /// Things that were learned, the oldest first: those of earlier runs, then those of this one.
+    /// Learned objects, oldest first: those of earlier runs, then those of this run.
     pub things: Vec<LearnedThing>,
-    /// The number of things that this run has learned.
+    /// Number of objects learned in this run.
     pub learned: usize,
-    /// The same made ready to be known again; none if nothing was learned.
+    /// Learned objects prepared for recognition; `None` if nothing was learned.
     pub models: Option<Arc<Models>>,
     /// Records of the looks that novelties are learned from.
     pub records: Vec<RecordId>,
@@ -46,13 +47,13 @@ pub struct News {
 /// A place that is visited.
 #[derive(Clone)]
 pub struct Place {
-    /// The symbol of its waypoint.
+    /// Symbol of the waypoint.
     pub waypoint: String,
-    /// The symbol of the surface that is looked at from there.
+    /// Symbol of the surface that is seen from the waypoint.
     pub on: String,
-    /// Its static structure, by earlier visits and this one; none before the first.
+    /// Static structure of the place from all visits; `None` before the first.
     pub room: Option<Arc<MetaRoom>>,
-    /// True if it has been visited in this run.
+    /// True if visited in this run.
     pub is_visited: bool,
     /// The reason a visit could not be compared with earlier ones.
     pub strange: Option<String>,
@@ -61,94 +62,94 @@ pub struct Place {
 /// Something new on a surface.
 #[derive(Clone)]
 pub struct Novelty {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// The symbol of the surface that it stands on.
+    /// Symbol of the surface that the object stands on.
     pub on: String,
-    /// Its middle, in the map.
+    /// Centre in the map.
     pub centre: Point3<f64>,
-    /// Sides of the box around what was noticed of it, metres.
+    /// Size of the bounding box of the detected part, metres.
     pub size_m: [f64; 3],
-    /// Looks at the object; the first one noticed it.
+    /// Views of the object; the first is the one in which it was detected.
     pub looks: Vec<NoveltyView>,
-    /// Its pixels in that.
+    /// Pixels of the object in that first view.
     pub mask: Arc<Vec<bool>>,
-    /// On each line around it where to stand, by the symbol of the pose; none where the body does not fit.
+    /// Stand on each line around the object, by pose symbol; `None` where the body does not fit.
     pub stands: Vec<Option<String>>,
-    /// For each of them, true if the route to the next one is no detour.
+    /// For each stand, true if the route to the next one is no detour.
     pub joined: Vec<bool>,
-    /// The learned thing that it was taken for, though too few of the sides of that are known: its index in
-    /// [`News::things`].
+    /// Index in [`News::things`] of the learned object that matches but is known from too few
+    /// sides.
     pub taken_for: Option<usize>,
-    /// Its fate.
+    /// Outcome for the object.
     pub fate: Fate,
 }
 
 /// A look at something new.
 #[derive(Clone)]
 pub struct NoveltyView {
-    /// The symbol of the pose that it was taken from.
+    /// Symbol of the pose of the view.
     pub from: String,
-    /// The view that shows it.
+    /// View of the object.
     pub view: Arc<View>,
 }
 
 /// The fate of a novel object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fate {
-    /// It is still to be learned.
+    /// Not learned yet.
     Open,
-    /// It was learned.
+    /// Learned in this run.
     Learned {
-        /// Its name.
+        /// Name.
         name: String,
         /// Looks that fit, and of how many.
         looks: (usize, usize),
-        /// Share of the directions around it from which it was seen.
+        /// Share of directions around the object from which it was seen.
         sides: f64,
     },
-    /// It is something that was learned before.
+    /// Matches an object learned before.
     Known {
-        /// Its name.
+        /// Name.
         name: String,
         /// Probability of that.
         confidence: f64,
-        /// Result of modelling it, in words, if it was looked at from around.
+        /// Modelling result, in words, if it was viewed from all around.
         model: Option<String>,
     },
-    /// It cannot be learned.
+    /// Cannot be learned, with the reason.
     GivenUp(String),
 }
 
-/// A change in which there is nothing to be learned.
+/// Change without anything to learn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Difference {
     /// Something that was learned has come or has been moved.
     Came {
-        /// Its name.
+        /// Name of the object.
         name: String,
-        /// Its present position.
+        /// Present position.
         at: Point3<f64>,
-        /// Its position before.
+        /// Position before.
         before: Point3<f64>,
     },
-    /// Something that was learned is not where it was seen.
+    /// A learned object is no longer where it was seen.
     Left {
-        /// Its name.
+        /// Name.
         name: String,
-        /// Its former position.
+        /// Former position.
         at: Point3<f64>,
     },
     /// Something of the static structure is gone.
     Gone {
-        /// Its middle.
+        /// Middle.
         at: Point3<f64>,
         /// Sides of the box around it, metres.
         size_m: [f64; 3],
     },
     /// Something has come that stands on no surface.
     Beside {
-        /// Its middle.
+        /// Middle.
         at: Point3<f64>,
         /// Sides of the box around it, metres.
         size_m: [f64; 3],
@@ -162,7 +163,7 @@ impl News {
         News { models: Models::of(&things), things, ..News::default() }
     }
 
-    /// Adds what was learned and visited to what later runs remember.
+    /// Adds learned objects and visited places to the persistent belief.
     pub(super) fn keep(known: &Known, past: &Past, later: &mut Remembered) {
         let news = known.news();
         later.things.clone_from(&news.things);
@@ -183,15 +184,14 @@ impl News {
         self.novelties.iter().find(|n| n.symbol == of)
     }
 
-    /// A name that nothing learned has yet.
+    /// Name that no learned object has yet.
     pub(super) fn free_name(&self) -> String {
         let is_free = |n: &usize| self.thing(&symbol(&format!("thing {n}"))).is_none();
         let number = (self.things.len() + 1..).find(is_free).unwrap_or_default();
         format!("thing {number}")
     }
 
-    /// Visits for a later run to remember: places visited in this run as they are now, the others as they
-    /// were.
+    /// Visits for later runs to remember: places of this run as they are now, others as remembered.
     fn visited(&self, before: Vec<Visited>, at: impl Fn(&str) -> Option<[f64; 3]>, now: f64) -> Vec<Visited> {
         let seen: Vec<Visited> = self
             .places
@@ -210,12 +210,12 @@ impl News {
 }
 
 impl Novelty {
-    /// Radius of its footprint around its centre, metres.
+    /// Radius of the footprint around the centre, metres.
     pub(super) fn radius_m(&self) -> f64 {
         0.5 * self.size_m[0].hypot(self.size_m[1])
     }
 
-    /// The direction of a place around it, one of [`DIRECTIONS`].
+    /// Direction from the object to a point, one of [`DIRECTIONS`].
     fn direction(&self, from: &Point3<f64>) -> usize {
         let off = from - self.centre;
         let turn = off.y.atan2(off.x).rem_euclid(TAU);
@@ -228,13 +228,14 @@ impl Novelty {
         (0..=2 * TO_EITHER_SIDE).map(move |k| (middle + k) % DIRECTIONS)
     }
 
-    /// The directions from which it was seen, as a thing that stands turned by so much has them: a bit each.
+    /// Directions from which the object was seen, in the frame of the object turned by
+    /// `turned_rad`; one bit each.
     pub(super) fn directions(&self, turned_rad: f64) -> u64 {
         let turned = (turned_rad.rem_euclid(TAU) / TAU * DIRECTIONS as f64).round() as usize;
         self.seen().iter().fold(0, |all, k| all | 1 << ((k + DIRECTIONS - turned % DIRECTIONS) % DIRECTIONS))
     }
 
-    /// The directions from which it was seen.
+    /// Directions from which the object was seen.
     pub(super) fn seen(&self) -> BTreeSet<usize> {
         let eye = |l: &NoveltyView| Point3::from(l.view.world_from_camera.translation.vector);
         self.looks.iter().map(eye).flat_map(|eye| self.shown(&eye)).collect()
@@ -251,7 +252,7 @@ impl Novelty {
         }
     }
 
-    /// The stands from which it may still be looked at.
+    /// Stands from which the object may still be viewed.
     pub(super) fn open_stands<'a>(&'a self, s: &'a Situation) -> impl Iterator<Item = &'a String> + 'a {
         let can_go = |pose: &&String| s.candidate(pose).is_ok_and(|n| !s.out_of_reach.contains(&n));
         self.stands.iter().flatten().filter(can_go).filter(|pose| self.looks.iter().all(|l| l.from != **pose))
@@ -265,16 +266,16 @@ impl Novelty {
     }
 }
 
-/// Learned things made ready to be known again.
+/// Learned objects prepared for recognition.
 pub struct Models {
     /// Their surfaces and features.
     pub(super) known: Library,
-    /// Index in [`News::things`] of each model; things of which too little was seen have none.
+    /// Index in [`News::things`] of each model; incompletely seen objects have no model.
     pub(super) things: Vec<usize>,
 }
 
 impl Models {
-    /// Makes things ready; none if there is none.
+    /// Prepares learned objects for recognition; `None` if there are none.
     pub(super) fn of(things: &[LearnedThing]) -> Option<Arc<Models>> {
         let mut models = Models { known: Library::default(), things: Vec::new() };
         for (n, thing) in things.iter().enumerate() {
@@ -286,7 +287,7 @@ impl Models {
     }
 }
 
-/// Object model of a learned thing for visibility questions: a body of its size.
+/// Object model of a learned object, for visibility: a body of the same size.
 fn model(thing: &LearnedThing) -> ObjectModel {
     /// Tolerance of a size comparison: the object may rest on another side, and edges are measured
     /// this accurately.
@@ -309,7 +310,8 @@ fn model(thing: &LearnedThing) -> ObjectModel {
     }
 }
 
-/// Symbol of a name as people say it, without a leading article: two names with the same one cannot be told apart.
+/// Symbol of a spoken name, without a leading article; names with equal symbols cannot be
+/// distinguished.
 pub fn called(name: &str) -> String {
     symbol(crate::english::without_article(&name.to_lowercase()))
 }
@@ -322,13 +324,13 @@ impl Known {
         self.states.get()
     }
 
-    /// The same, to be changed.
+    /// Mutable access to novel objects and learned objects.
     pub(super) fn news_mut(&mut self) -> &mut News {
         self.states.get_mut()
     }
 }
 
-/// The learned thing of a symbol, to be looked for.
+/// Learned object with a symbol, as a search target.
 pub(super) fn thing(states: &States, symbol: &str) -> Option<Thing> {
     let learned = states.get::<News>().thing(symbol)?;
     let (name, models) = (learned.name.clone(), vec![model(learned)]);

@@ -11,19 +11,22 @@ use crate::mind::Mind;
 use crate::situation::Situation;
 use crate::viewpoint::Candidate;
 
-/// Lines around something, on each of which a stand is looked for: 30 degrees from each to the next (paper: 20 lines, and a look every 15 degrees).
+/// Number of lines around an object, on each of which a stand is sought: one every 30 degrees
+/// (paper: 20 lines, and a look every 15 degrees).
 const LINES: usize = 12;
-/// Least and greatest height of what the body could run into, metres: where it is told by two degrees wrongly, the floor two metres off seems so high.
+/// Height band of obstacles to the body, metres; with a tilt error of two degrees, the floor two
+/// metres away seems as high as the lower bound.
 const BAND_M: (f64, f64) = (0.15, 1.5);
-/// The number of returns of one look in a cell of the floor plan, and the side of the cell in metres, from
-/// which the cell counts as occupied: beside depth edges some returns hang in the air, each by itself.
+/// Minimum number of returns of one look in a cell that makes the cell occupied; at depth edges,
+/// single returns hang in the air.
 const RETURNS: usize = 8;
 const CELL_M: f32 = 0.05;
-/// Kept between the footprint and what was seen, metres: about two standard deviations of localisation.
+/// Clearance between the footprint and observed obstacles, metres: about two standard deviations of
+/// localisation.
 const CLEAR_M: f64 = 0.06;
 
-/// Finds where to stand around something, and makes each a pose that the body can be sent to, by the lines around it; and whether the way from each to
-/// the next is no detour.
+/// Finds stands around a point, one per line, and adds them as poses; also, for each pair of
+/// neighbours, true if the route between them is no detour.
 pub(super) fn make(
     mind: &mut Mind,
     robot: &dyn Robot,
@@ -66,7 +69,7 @@ pub(super) fn make(
     (poses.into_iter().map(|pose| pose.map(|p| p.symbol)).collect(), joined)
 }
 
-/// Position of a place on the floor, if it is a pose.
+/// Floor position of a place, if the place is a pose.
 fn at(place: &Place) -> Option<Point2<f64>> {
     match place {
         Place::Pose(pose) => Some(pose.point()),
@@ -74,7 +77,7 @@ fn at(place: &Place) -> Option<Point2<f64>> {
     }
 }
 
-/// Obstacles for the body near a place: seen points, and those of its map.
+/// Obstacles near a place: observed points, and those of the body's map.
 fn obstacles(
     robot: &dyn Robot,
     centre: &Point3<f64>,
@@ -108,7 +111,7 @@ fn point(s: &Situation, pose: &str) -> Option<Point2<f64>> {
     at(&s.candidates[s.candidate(pose).ok()?].place)
 }
 
-/// The stands that can be reached as far as is known, by the lines: those that were given up are left out.
+/// Reachable stands by line, except those given up.
 fn left(s: &Situation, novelty: &Novelty) -> Vec<Option<String>> {
     let can_go = |pose: &&String| s.candidate(pose).is_ok_and(|n| !s.out_of_reach.contains(&n));
     novelty.stands.iter().map(|stand| stand.as_ref().filter(can_go).cloned()).collect()
@@ -127,7 +130,7 @@ fn strings(s: &Situation, novelty: &Novelty) -> Vec<Vec<String>> {
     strung.iter().map(|string| string.iter().filter_map(named).collect()).collect()
 }
 
-/// Pairs of neighbours between which the way is no detour.
+/// Neighbouring stands with a route that is no detour.
 pub(super) fn neighbours(s: &Situation, novelty: &Novelty) -> Vec<(String, String)> {
     let strings = strings(s, novelty);
     let mut pairs: Vec<(String, String)> = strings
@@ -144,7 +147,8 @@ pub(super) fn neighbours(s: &Situation, novelty: &Novelty) -> Vec<(String, Strin
     pairs
 }
 
-/// The stands to which one may drive from anywhere: the ends of strings and, around what comes next, the nearest that is still open.
+/// Stands that may be approached from anywhere: ends of connected chains and, around the next
+/// object, the nearest open stand.
 pub(super) fn ways_in(s: &Situation, novelty: &Novelty, is_next: bool) -> Vec<String> {
     let strings = strings(s, novelty);
     let mut ends: Vec<String> =

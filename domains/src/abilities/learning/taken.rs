@@ -1,4 +1,4 @@
-//! Updates from a visit, from a look at a novel object, and from its model.
+//! World-model updates from a visit, from a view of a novel object, and from its model.
 
 use std::sync::Arc;
 
@@ -27,7 +27,8 @@ use crate::surface::KnownSurface;
 /// Search radius for the localisation error between two visits, metres: localisation errs by centimetres and
 /// by degrees, which at a distance of two metres are centimetres, too.
 const SEARCH_M: f32 = 0.15;
-/// Share of differences above which a visit is rejected: the body is elsewhere than it believes.
+/// Share of differences above which a visit is rejected, because the body is not where it believes
+/// to be.
 const STRANGE: f64 = 0.3;
 /// Limits for an object on a surface: the height of its lowest point above the surface, and the distance of
 /// its centre beside the surface, metres.
@@ -35,21 +36,23 @@ const ON_M: f64 = 0.06;
 const BESIDE_M: f64 = 0.05;
 /// Second-longest side below which a change counts as an edge that was measured differently, metres.
 const SLIVER_M: f64 = 0.04;
-/// So is what is this wide and this many times as long: the edge of a table, a leg.
+/// Minimum width and aspect ratio of an object that counts as a table edge or a leg.
 const EDGE_M: f64 = 0.08;
 const LONG: f64 = 6.0;
-/// Distance from a novel object, beyond its radius, within which an appeared part belongs to it, metres.
+/// Distance beyond a novel object's radius within which an appeared part belongs to the object,
+/// metres.
 const OF_IT_M: f64 = 0.1;
-/// Maximum gap below a piece that hangs over a new object and is still taken to be part of it,
-/// metres: a camera from above cannot see into the gap.
+/// Maximum gap below a piece that hangs over a new object and still counts as part of it, metres; a
+/// camera from above cannot see into the gap.
 const OVER_IT_M: f32 = 0.1;
-/// Things nearer to each other than this are one, metres.
+/// Distance below which two detections are the same object, metres.
 const SAME_M: f64 = 0.12;
 /// Minimum confidence, and minimum share of explained points, to identify an object with a learned
 /// one.
 const SURE: f64 = 0.8;
 const EXPLAINED: f64 = 0.5;
-/// A thing of which less of its sides was seen is looked at from around again when it is met.
+/// Minimum share of observed sides of a complete model; a less completely known object is viewed
+/// from all around when met again.
 const KNOWN_ROUND: f64 = 0.8;
 /// Ratio, and margin in metres, between the model's and the noticed size above which the model
 /// includes something it stands on or beside.
@@ -62,7 +65,7 @@ const LOOKED_AT: u32 = 50;
 /// Distance behind a point from which a depth reading counts as looking through it, metres.
 const BEYOND_M: f64 = 0.03;
 
-/// Records a view of something that is learned from, and reads it back by its time.
+/// Records a view used for learning, and reads it back by its timestamp.
 fn remember(mind: &mut Mind, eyes: Eyes<'_>, sensed: &Sensed) -> Result<View, WorldError> {
     let id = recording::view(mind, eyes, &[], sensed)?;
     let news = mind.known.news_mut();
@@ -72,7 +75,7 @@ fn remember(mind: &mut Mind, eyes: Eyes<'_>, sensed: &Sensed) -> Result<View, Wo
     Ok(eyes.record.view_at(sensed.stamp_ns, &eyes.robot.description().frames.map)?)
 }
 
-/// A place was visited: what is new there, and what is gone.
+/// Handles a visit: detects novel and vanished objects.
 pub(super) fn visit(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -121,12 +124,12 @@ pub(super) fn visit(
     Ok(told.note(&off))
 }
 
-/// The reason a visit cannot be compared with earlier ones, if any. If aligning it moved it farther than
-/// localisation errs, the alignment is wrong or the body is lost: either way, everything that always stood
-/// there would look new a few centimetres beside. If it has no alignment, its place relative to the earlier
-/// visits is unknown.
+/// Reason why a visit cannot be compared with earlier ones, if any: alignment moved it beyond the
+/// localisation error (the alignment is wrong or the body is lost, and all static structure would
+/// look new), or no alignment was found.
 pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, view: &View) -> Option<String> {
-    /// However exact a body is, no visit is laid more exactly than this, metres and radians: half of what is compared.
+    /// Minimum assumed alignment error of a visit, metres and radians: half of the comparison
+    /// tolerance.
     const LAID: (f64, f64) = (0.005, 0.005);
     let [sigma_m, sigma_rad] = [body.pose_sigma_m.max(LAID.0), body.pose_sigma_rad.max(LAID.1)];
     let body = &Description { pose_sigma_m: sigma_m, pose_sigma_rad: sigma_rad, ..body.clone() };
@@ -138,7 +141,7 @@ pub fn misfit(body: &Description, localised: &Isometry3<f64>, visit: &Visit, vie
     (off >= STRANGE).then(|| format!("{:.0} % of what is seen differs from what was there", 1e2 * off))
 }
 
-/// The share of what is seen that came.
+/// Share of the view that appeared since earlier visits.
 fn differing(visit: &Visit, view: &View) -> f64 {
     let came: usize = visit.appeared.iter().map(|a| a.mask.iter().filter(|m| **m).count()).sum();
     came as f64 / view.cloud.count_finite().max(1) as f64
@@ -164,7 +167,8 @@ impl Told {
     }
 }
 
-/// Takes in what a visit shows: things that were learned stand where they are known again, the rest of what came to a surface is new.
+/// Updates from a visit: recognised learned objects are located; other appeared objects on a
+/// surface are novel.
 fn take_in(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -227,8 +231,8 @@ fn take_in(
     }
 }
 
-/// Appeared objects, those that stand on a surface first. A thing whose top hides its middle, as the shade of
-/// a lamp does, appears in pieces: a piece on no surface belongs to the object beneath it.
+/// Appeared objects, those on a surface first. An object whose top occludes its middle, such as a
+/// lamp, appears in pieces; a piece on no surface is merged with the object beneath.
 fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
     let came = appeared.into_iter().filter(|a| !is_sliver(&a.cloud));
     let (mut all, aloft): (Vec<Appeared>, Vec<Appeared>) =
@@ -247,8 +251,8 @@ fn whole(surfaces: &[KnownSurface], appeared: Vec<Appeared>) -> Vec<Appeared> {
     all
 }
 
-/// True if a piece hangs over another one: the middle of either is above or below the other, and the gap
-/// between them is small.
+/// True if a piece hangs over another: their centres overlap from above, with a small gap between
+/// them.
 pub fn is_over(piece: &Cloud, below: &Cloud) -> bool {
     let (Some(above), Some(under)) = (piece.bounds(), below.bounds()) else { return false };
     let holds = |(low, high): (Point3<f32>, Point3<f32>), (l, h): (Point3<f32>, Point3<f32>)| {
@@ -284,7 +288,7 @@ fn is_on(surface: &KnownSurface, cloud: &Cloud) -> bool {
     surface.covers(&middle, BESIDE_M) && lowest.abs() < ON_M.max(0.25 * height(&middle.cast()).abs())
 }
 
-/// Keeps a change unless it is known.
+/// Adds a change unless it is already listed.
 fn change(mind: &mut Mind, change: Difference) {
     let at = |c: &Difference| match c {
         Difference::Came { at, .. }
@@ -302,7 +306,7 @@ fn change(mind: &mut Mind, change: Difference) {
     }
 }
 
-/// True if a learned thing was already known there in this run, from another waypoint.
+/// True if a learned object was already recognised there in this run from another waypoint.
 fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
     let (at, size_m) = extent(cloud);
@@ -310,7 +314,7 @@ fn is_known_there(mind: &Mind, cloud: &Cloud) -> bool {
     mind.known.news().things.iter().any(|t| t.seen.unix_s == now_unix_s && (t.seen.at_m - at).norm() < near_m)
 }
 
-/// Something that was learned stands there. Nothing that was noticed there before is new.
+/// Records a recognised learned object at its place; detections there are no longer novel.
 fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     let at = Point3::from(f.judged.world_from_model.translation.vector);
     let now_unix_s = mind.known.past.as_ref().map_or(0.0, |p| p.now_unix_s);
@@ -332,7 +336,8 @@ fn known_again(mind: &mut Mind, surface: &KnownSurface, f: &Found) -> String {
     format!("{name} ({p:.2}), {there}, at ({:.2}, {:.2}) m", at.x, at.y)
 }
 
-/// Something is to be looked at from around: it is new, or of what it is `taken_for` too little is known. Its symbol, if nobody had noticed it.
+/// Registers an object to be viewed from all around, novel or incompletely known (`taken_for`);
+/// returns the symbol if it was not registered before.
 pub fn new(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -369,7 +374,7 @@ pub fn new(
     Some(symbol)
 }
 
-/// Things that were learned and stood on a surface, and that this look has looked through.
+/// Learned objects on a surface that this view has looked through, now gone.
 fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
     let is_there = |t: &&LearnedThing| t.seen.on == on;
     let of = |t: &LearnedThing| (t.name.clone(), t.seen.at_m, t.cloud.clone());
@@ -413,8 +418,8 @@ fn novelty<'a>(mind: &'a mut Mind, what: &str) -> Result<&'a mut Novelty, WorldE
     found.ok_or_else(|| WorldError::Bug(format!("`{what}` is gone")))
 }
 
-/// Improves the model of a known thing by looks from around it, where both match in one surface. Returns a
-/// sentence about the result.
+/// Extends the model of a known object by views from all around, if model and views match; returns
+/// a sentence about the result.
 fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -> String {
     let news = mind.known.news_mut();
     let thing = &mut news.things[f.thing];
@@ -455,7 +460,7 @@ fn given_up(mind: &mut Mind, what: &str, because: String) -> Result<String, Worl
     Ok(said)
 }
 
-/// Things that are known have changed: they are made ready to be known again.
+/// Prepares the learned objects for recognition after a change.
 fn make_ready(mind: &mut Mind) {
     let news = mind.known.news_mut();
     news.models = Models::of(&news.things);
@@ -510,7 +515,8 @@ pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Resul
     Ok(said + &left_out.collect::<String>())
 }
 
-/// A model of something new, made of the looks that fit out of so many, is kept under a name of its own. Says so.
+/// Stores the model of a novel object, from the registered views, under a new name; returns a
+/// sentence.
 fn keep(
     mind: &mut Mind,
     what: &str,

@@ -1,4 +1,4 @@
-//! *moving*: where the body stands, what a drive costs, doors. Every domain has it.
+//! *moving*: pose of the body, cost of drives, doors. Part of every domain.
 
 mod at;
 mod path_cost;
@@ -117,7 +117,7 @@ fn beside(s: &Situation) -> Vec<String> {
     s.doors.iter().flat_map(symbols).collect()
 }
 
-/// `(in ?surface ?room)`: what the map says.
+/// `(in ?surface ?room)`, from the map.
 fn in_room(s: &Situation) -> Vec<String> {
     // Of a room that the map does not have nothing can be said.
     let has = |name: &&String| s.robot.rooms().iter().any(|room| room.name == **name);

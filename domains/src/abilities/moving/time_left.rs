@@ -1,4 +1,4 @@
-//! `(time-left)`: that the deadline has not passed, until it does.
+//! `(time-left)`: true until the deadline has passed.
 
 use crate::situation::Situation;
 

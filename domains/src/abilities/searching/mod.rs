@@ -1,4 +1,5 @@
-//! *searching*: poses to look from, looks, what is in doubt and what a look would settle, pushing aside what hides it.
+//! *searching*: viewpoints, looks, doubts and how much of them a look settles, and pushing
+//! obstacles aside.
 
 mod calls;
 mod facts;
@@ -78,7 +79,7 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// A look ended: record the view, and believe what it shows with the others.
+/// Handles a finished look: records the view and updates the belief from all views of the surface.
 fn seen(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -124,7 +125,8 @@ fn pushed(
     Ok(format!("the hand moved {:.2} m with it", pushed.moved_m))
 }
 
-/// A push that failed: something may have moved nevertheless, and pushing that from there again leads to nothing.
+/// Handles a failed push: an object may have moved nevertheless, and the same push is not tried
+/// again.
 fn push_failed(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -1,4 +1,4 @@
-//! The calls that *shapes* answers: what a scan from a pose is expected to bring, and what it costs to get there.
+//! Calls of *shapes*: expected information gain of scans, and driving costs.
 
 use descry_planner::{Answer, Call, CallError};
 
@@ -66,7 +66,8 @@ fn circle_cost(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(way.map_or(f64::INFINITY, |way| poses::seconds(s, from, &way))))
 }
 
-/// A thing is scanned from the poses around it; what stands before the body, from where it stands first.
+/// `[can-scan]`: an object is scanned from the poses around it; the nearest object first from the
+/// current pose.
 fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let pose = argument(call, 0)?;
     Ok(Answer::Truth(match named(s, call, 1)? {
@@ -75,7 +76,7 @@ fn can_scan(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     }))
 }
 
-/// Numbers of the poses around a thing from which the plan scans it before a call.
+/// Indices of the poses around a thing from which the plan scans before a call.
 fn planned(s: &Situation, call: &Call, thing: &FloorThing) -> Vec<usize> {
     let taken = |pose: &str| s.floor().sweeps.iter().any(|(_, from)| from == pose);
     let poses = holding(call, "scanned").filter_map(|r| r.arguments.first());
@@ -101,7 +102,7 @@ fn expected_sureness(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(hope(s, call, thing)))
 }
 
-/// Expected gain in confidence about a thing from the scans of a plan.
+/// Expected confidence in a thing after the scans of a plan.
 fn hope(s: &Situation, call: &Call, thing: &FloorThing) -> f64 {
     let (known, scans) = (s.floor().known.len(), planned(s, call, thing));
     if scans.is_empty() && thing.taken_for.is_some() {
@@ -134,10 +135,10 @@ fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
 }
 
-/// Minimum expected reduction of an outline's looseness for a scan to be worth its drive, metres.
+/// Minimum expected reduction of an outline's looseness that justifies a scan, metres.
 const WORTH_M: f64 = 0.001;
 
-/// The quickest of the single scans and alignments that promise anything for what is asked.
+/// Fallback: the quickest single scan or alignment with an expected gain.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     // What nobody has learned is known by no scan.
     if s.floor().sought.as_ref().is_some_and(|shape| !s.floor().knows(shape)) {
@@ -178,7 +179,7 @@ pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     quickest_first(scans.chain(surveys).map(deeds).collect())
 }
 
-/// The reason for a scan from there.
+/// Reason for a scan from a pose.
 pub(super) fn hope_of_scan(s: &Situation, arguments: &[&str]) -> String {
     let Ok(Some(thing)) = thing(s, arguments[1]) else {
         return format!("nothing is known yet of what {THIS} is");

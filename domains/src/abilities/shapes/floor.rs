@@ -13,15 +13,15 @@ use crate::situation::Situation;
 use crate::states::state;
 use crate::symbol::symbol;
 
-/// The symbol of what stands nearest before the body when it first scans.
+/// Symbol of the object nearest before the body at its first scan.
 pub const THIS: &str = "this";
 /// Looseness of a shape without any scans, metres.
 pub const NOTHING_KNOWN_M: f64 = 1.0;
-/// Prior probability that a thing is none of the known ones.
+/// Prior probability that an object is of no known shape.
 const STRANGER: f64 = 0.5;
 /// Probability that the scans of a known shape fit no model, by looseness of the outline (metres):
-/// 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Scans of an open
-/// outline constrain each other too little: it is scanned once more before it is called unknown.
+/// 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Open outlines
+/// constrain scans less and are scanned once more before they are called unknown.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
 /// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
 /// as long as several shapes were left.
@@ -32,9 +32,9 @@ const MEASURED_WITH: f64 = 5.0;
 /// The floor as the laser has found it: objects that the map does not show, and named shapes.
 #[derive(Clone, Default)]
 pub struct Floor {
-    /// Shapes that have a name: those of the domain, then those that were learned.
+    /// Named shapes: those of the domain, then learned ones.
     pub known: Vec<KnownShape>,
-    /// Those that were learned in this run.
+    /// Shapes learned in this run.
     pub learned: Vec<KnownShape>,
     /// Objects that were found.
     pub things: Vec<FloorThing>,
@@ -44,7 +44,7 @@ pub struct Floor {
     pub records: Vec<descry_memory::RecordId>,
     /// The floor that no sweep has passed over.
     pub unseen: UnseenFloor,
-    /// The shape whose place is asked for, by its symbol; none: it is about [`THIS`].
+    /// Symbol of the shape whose place is requested; `None`: the goal is about [`THIS`].
     pub sought: Option<String>,
     /// Names of shapes, by their symbols.
     pub names: Vec<(String, String)>,
@@ -56,35 +56,35 @@ pub struct Floor {
     pub poses: Candidates,
 }
 
-/// A thing on the floor.
+/// Object on the floor.
 #[derive(Clone)]
 pub struct FloorThing {
-    /// Its PDDL symbol.
+    /// PDDL symbol.
     pub symbol: String,
-    /// About where its middle is, in the map.
+    /// Approximate centre in the map.
     pub near: Point2<f64>,
-    /// Scans in which it is bounded on both sides, posed in the map, and from where each was taken.
+    /// Scans that bound the object on both sides, in the map frame, each with its pose symbol.
     pub scans: Vec<(String, PosedScan)>,
-    /// Scans that say nothing of its shape, from where each was taken, and why.
+    /// Unusable scans, each with its pose symbol and the reason.
     pub ignored: Vec<(String, Ignored)>,
-    /// Poses around it.
+    /// Viewpoints around the object.
     pub ring: Vec<String>,
-    /// Joint outline of its scans, once there is one.
+    /// Joint outline of the scans; `None` before alignment.
     pub outline: Option<Arc<Outline>>,
-    /// Recognition result when its scans were last aligned; none since a new one was taken.
+    /// Recognition result of the last alignment; `None` after a newer scan.
     pub taken_for: Option<Arc<Recognition>>,
 }
 
-/// Joint outline from the scans of a thing.
+/// Joint outline of an object's scans.
 pub struct Outline {
     /// The scans brought together, in the map.
     pub alignment: Alignment,
-    /// Expected gain of scans from the poses around it, in their order.
+    /// Expected gain of a scan from each viewpoint around the object.
     pub outlook: Outlook,
 }
 
 impl Floor {
-    /// The thing of a symbol.
+    /// Object with a symbol.
     pub fn thing(&self, name: &str) -> Option<&FloorThing> {
         self.things.iter().find(|t| t.symbol == name)
     }
@@ -94,7 +94,7 @@ impl Floor {
         self.known.iter().any(|k| symbol(&k.name) == shape)
     }
 
-    /// Highest confidence of the things that fit only one name, this one; 0 if none does.
+    /// Highest confidence among objects that fit this name alone; 0 if none does.
     pub fn surest(&self, shape: &str) -> f64 {
         let of_name = self.things.iter().filter(|t| t.is().is_some_and(|is| symbol(is) == shape));
         of_name.map(|t| t.sureness(self.known.len())).fold(0.0, f64::max)
@@ -102,13 +102,14 @@ impl Floor {
 }
 
 impl FloorThing {
-    /// Mean distance that it may reach beyond its measured outline, metres.
+    /// Mean distance that the object may extend beyond its measured outline, metres.
     pub fn looseness_m(&self) -> f64 {
         let known = |outline: &Arc<Outline>| outline.outlook.looseness_m(&[]).min(0.9 * NOTHING_KNOWN_M);
         self.outline.as_ref().map_or(NOTHING_KNOWN_M, known)
     }
 
-    /// The same as one may hope for after scans from more poses around it: from all of them nothing would stay open.
+    /// Looseness expected after scans from further viewpoints, metres; none remains open after all
+    /// of them.
     pub fn hoped_looseness_m(&self, more: &[usize]) -> f64 {
         let Some(outlook) = self.outline.as_ref().map(|o| &o.outlook) else { return NOTHING_KNOWN_M };
         let all: Vec<usize> = (0..self.ring.len()).collect();
@@ -117,7 +118,7 @@ impl FloorThing {
         self.looseness_m() * share
     }
 
-    /// The name of the one known shape that it fits.
+    /// Name of the only known shape that the object fits.
     pub fn is(&self) -> Option<&str> {
         match &self.taken_for.as_ref()?.verdict {
             Verdict::Is(name) => Some(name),
@@ -125,13 +126,13 @@ impl FloorThing {
         }
     }
 
-    /// The names that its scans do not rule out; none: any.
+    /// Names that the scans do not rule out; `None`: any.
     pub fn may_be(&self) -> Option<&[String]> {
         Some(&self.taken_for.as_ref()?.may_be)
     }
 
-    /// True if it may be of a shape, as far as its scans tell: false if it is surely another or none, or if
-    /// the shape is ruled out beside others.
+    /// True if the object may be of a shape, given its scans; false if it surely is another shape
+    /// or none, or if this shape is ruled out.
     pub fn may_have(&self, shape: &str, known: usize, threshold: f64) -> bool {
         let is_sure = self.sureness(known) >= threshold;
         match self.taken_for.as_deref() {
@@ -154,18 +155,19 @@ impl FloorThing {
         }
     }
 
-    /// Confidence that scans from more poses around it may give at best.
+    /// Maximum confidence reachable by scans from further viewpoints.
     pub fn hoped(&self, more: &[usize], known: usize) -> f64 {
         self.hoped_of_name(more, known).max(self.sureness(known))
     }
 
-    /// The same, should it fit one name alone.
+    /// Maximum confidence reachable by scans from further viewpoints, if the object fits one name
+    /// alone.
     pub fn hoped_of_name(&self, more: &[usize], known: usize) -> f64 {
         sure_of_name(self.hoped_looseness_m(more), known)
     }
 }
 
-/// The probability that a thing is what it alone fits among so many known shapes.
+/// Probability that an object is of the only shape that fits, among `known` shapes.
 fn sure_of_name(loose_m: f64, known: usize) -> f64 {
     let is = 1.0 - STRANGER;
     is / (is + by_chance(loose_m, known) * STRANGER)
@@ -181,7 +183,7 @@ fn up_to(bins: &[(f64, f64)], loose_m: f64) -> f64 {
     bins.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share)
 }
 
-/// A thing on the floor of a situation.
+/// Floor object with a symbol.
 pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a FloorThing>, String> {
     match s.floor().thing(name) {
         None if name != THIS => Err(format!("`{name}` is nothing that was found on the floor")),
@@ -189,8 +191,8 @@ pub(super) fn thing<'a>(s: &'a Situation, name: &str) -> Result<Option<&'a Floor
     }
 }
 
-/// Centre of a thing in the map, and its greatest width, metres: from the fitted shape if it has a name, else
-/// from its measured outline.
+/// Centre of an object in the map and its greatest width, metres: from the recognised shape, else
+/// from the outline.
 pub(super) fn place(floor: &Floor, thing: &FloorThing) -> (Point2<f64>, f64) {
     let fitted = thing.taken_for.as_ref().filter(|_| thing.is().is_some()).and_then(|r| r.candidates.first());
     if let Some(candidate) = fitted {
@@ -231,7 +233,7 @@ impl Known {
         self.states.get()
     }
 
-    /// The same, to be changed.
+    /// Mutable access to the laser objects.
     pub(super) fn floor_mut(&mut self) -> &mut Floor {
         self.states.get_mut()
     }

@@ -1,5 +1,6 @@
-//! *shapes*: a laser finds what stands on the floor, scans around it make its shape, and the shape says what it is (Modayil and Kuipers, *Autonomous Shape
-//! Model Learning for Object Localization and Recognition*).
+//! *shapes*: a laser detects objects on the floor, models them from scans all around and recognises
+//! them (Modayil and Kuipers, *Autonomous Shape Model Learning for Object Localization and
+//! Recognition*).
 
 mod calls;
 mod facts;
@@ -114,7 +115,7 @@ pub const ABILITY: Ability = Ability {
 /// The type of names of shapes.
 const SHAPE: &str = "shape";
 
-/// Knowledge at the beginning of a run: the named shapes, and those that are asked about.
+/// Initial state of a run: the named shapes, and the requested ones.
 fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     let remembered = mind.known.past.as_ref().map(|p| p.remembered.shapes.clone()).unwrap_or_default();
@@ -148,7 +149,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
     };
 }
 
-/// The places on the way around a thing.
+/// Waypoints of the route around an object.
 fn way(s: &Situation, arguments: &[&str]) -> Result<Vec<descry_robots::Place>, String> {
     let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
     let to = s.candidate(arguments[1]).map_err(|e| e.to_string())?;
@@ -157,7 +158,7 @@ fn way(s: &Situation, arguments: &[&str]) -> Result<Vec<descry_robots::Place>, S
     Ok(way.into_iter().map(|n| s.candidates[n].place.clone()).collect())
 }
 
-/// The alignment of all scans of a thing.
+/// Alignment task over all scans of an object.
 fn aligning(s: &Situation, name: &str) -> Result<Align, String> {
     let thing = thing(s, name)?.filter(|t| !t.scans.is_empty());
     let thing = thing.ok_or_else(|| format!("no scan shows both ends of {name}"))?;
@@ -182,7 +183,7 @@ fn scanned(
     Ok(String::new())
 }
 
-/// Scans were brought together: what their shape is taken for.
+/// Handles an alignment: updates the recognition result.
 fn aligned(
     mind: &mut Mind,
     _: Eyes<'_>,

@@ -1,4 +1,4 @@
-//! Poses to scan from: around a thing, and over the floor.
+//! Scan poses: around an object, and over the floor.
 
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_robots::{Place, Pose2, Robot};
@@ -13,7 +13,7 @@ use crate::viewpoint::Candidate;
 /// Poses from which the floor is surveyed lie so far from each other, metres.
 const SURVEY_M: f64 = 3.0;
 
-/// Adds poses around a place to those that the body can be sent to; their symbols.
+/// Adds viewpoints around a point to the candidate poses; returns their symbols.
 pub(super) fn around(
     mind: &mut Mind,
     robot: &dyn Robot,
@@ -29,7 +29,7 @@ pub(super) fn around(
     mind.known.candidates[first..].iter().map(|c| c.symbol.clone()).collect()
 }
 
-/// Adds poses over the floor that face either way.
+/// Adds poses over the floor, each in two opposite headings.
 pub(super) fn survey(mind: &mut Mind, robot: &dyn Robot) {
     let Some(map) = robot.map() else { return };
     let from = mind.known.candidates[mind.known.at].place.clone();
@@ -50,8 +50,9 @@ pub(super) fn survey(mind: &mut Mind, robot: &dyn Robot) {
         .extend((1..).zip(open).map(|(n, (place, _))| Candidate { symbol: format!("floor-{n}"), place }));
 }
 
-/// The way around a thing to one of the poses around it: first to that of them nearest to where it begins, then from neighbour to neighbour, the shorter
-/// way round that is open. Numbers of candidates; none if there is no such way.
+/// Route around an object to one of its viewpoints: first to the nearest viewpoint, then from
+/// neighbour to neighbour, the shorter open way round. Candidate indices; `None` if no route is
+/// open.
 pub(super) fn way(s: &Situation, from: usize, to: usize, thing: &FloorThing) -> Option<Vec<usize>> {
     let ring: Vec<usize> = thing.ring.iter().filter_map(|p| s.candidate(p).ok()).collect();
     let n = ring.len();
@@ -90,7 +91,7 @@ pub(super) fn seconds(s: &Situation, from: usize, way: &[usize]) -> f64 {
     way.iter().map(|&next| s.travel_s(std::mem::replace(&mut at, next), next)).sum()
 }
 
-/// A straight drive keeps so far from the middle of what it goes around, metres.
+/// Minimum distance of a straight drive from the object's centre, metres.
 const CLEAR_M: f64 = 0.9;
 
 /// True if the straight line between two poses keeps clear of a place.

@@ -23,14 +23,15 @@ use crate::note::{Note, OnTheFloor};
 use crate::situation::Situation;
 use crate::symbol::symbol;
 
-/// A reading is of a thing if it ended so far before what the map shows, and twice as far as localisation may be off besides, metres.
+/// Minimum distance of a reading in front of the mapped obstacle to belong to an object, metres;
+/// twice the localisation error is added.
 const BEFORE_MAP_M: f64 = 0.1;
 /// A scan tells of a thing's shape from no farther off, metres, and with no fewer readings of it.
 const NEAR_M: f64 = 3.0;
 const LEAST_READINGS: usize = 5;
-/// Readings so near to the believed outline of a thing are of that thing, metres.
+/// Maximum distance of readings from the believed outline of an object to belong to it, metres.
 const SAME_M: f64 = 0.5;
-/// Half the width of a thing of which only few readings are known, metres.
+/// Half width assumed for an object with few readings, metres.
 const USUAL_RADIUS_M: f64 = 0.2;
 /// Beyond an error so long scans contradict each other: twice the laser's precision, metres.
 pub(super) const LONGEST_M: f64 = 0.02;
@@ -42,7 +43,7 @@ pub(super) fn solver(body: &Description) -> SolverOptions {
     SolverOptions { objective, ..SolverOptions::default() }
 }
 
-/// Takes a sweep in: it is in the record when this returns.
+/// Processes a sweep and records it.
 pub(super) fn take(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -88,7 +89,7 @@ pub(super) fn take(
     Ok(note(mind.known.floor(), from))
 }
 
-/// Puts a sweep into the record together with its transforms, and reads it back by its timestamp.
+/// Records a sweep with its transforms, and reads it back by its timestamp.
 fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> Result<Scan, WorldError> {
     let (record, body) = (eyes.record, eyes.robot.description());
     for t in &scanned.transforms {
@@ -108,7 +109,7 @@ fn remember(mind: &mut Mind, eyes: Eyes<'_>, from: &str, scanned: &Scanned) -> R
     Ok(record.scan_at(scanned.stamp_ns, &body.frames.map)?)
 }
 
-/// The map of the body as perception takes it; all around it is occupied.
+/// Occupancy map in the type of perception; everything outside is occupied.
 fn occupancy(grid: &OccupancyGrid) -> Occupancy {
     let width = grid.width + 2;
     let taken = |row: usize, column: usize| {
@@ -130,7 +131,7 @@ fn nearest_first(mut clusters: Vec<Cluster>, laser: &Vector2<f64>) -> Vec<Cluste
     clusters
 }
 
-/// The thing that readings are of: one that was found there before, or a new one.
+/// Object that a cluster of readings belongs to: an earlier detection, or a new one.
 fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
     let off_m = |t: &FloorThing| {
         let (middle, width_m) = place(floor, t);
@@ -154,7 +155,7 @@ fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
     number - 1
 }
 
-/// Makes poses around a thing, if it is asked about and there are none yet.
+/// Adds viewpoints around an object if requested and not yet done; true if added.
 fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
     let thing = &mind.known.floor().things[index];
     let is_asked = mind.known.floor().sought.is_some() || thing.symbol == THIS;
@@ -167,7 +168,7 @@ fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
     true
 }
 
-/// Brings the scans of a thing together, and asks what scans from around it would settle.
+/// Aligns the scans of an object, and computes the expected gain of further scans.
 fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
     let thing = &mind.known.floor().things[index];
     let scans: Vec<_> = thing.scans.iter().map(|(_, posed)| posed.clone()).collect();
@@ -217,7 +218,7 @@ pub(super) fn contradict(alignment: &Alignment) -> String {
     scans + &ends
 }
 
-/// Updates the floor that is still unseen, and the poses to look at it from.
+/// Updates the unobserved floor, and the poses to look at it.
 fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
     let reach_m = eyes.robot.description().laser.as_ref().map_or(0.0, |laser| laser.reach_m);
     let known = &mut mind.known;
@@ -242,7 +243,7 @@ fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
 }
 
 impl Floor {
-    /// The radius of the smallest disc that something of the sought shape covers, a little less for how well it is known.
+    /// Radius of the largest disc inside the sought shape, slightly reduced for its uncertainty.
     fn sought_radius_m(&self) -> Option<f64> {
         let sought = self.sought.as_ref()?;
         let of = self.known.iter().filter(|k| symbol(&k.name) == *sought);

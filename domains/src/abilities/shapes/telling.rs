@@ -11,7 +11,7 @@ use crate::objective::Goal;
 use crate::situation::Situation;
 use crate::symbol::symbol;
 
-/// So much of an outline may be open before it is said, metres.
+/// Open length of an outline above which the answer mentions it, metres.
 const OPEN_M: f64 = 0.02;
 
 /// Answers a goal about shapes; `s` is the situation of the last round.
@@ -181,7 +181,7 @@ impl<'a> Teller<'a> {
         format!("at ({:.2}, {:.2}) m", middle.x, middle.y)
     }
 
-    /// The scans that a shape rests on, and those that failed.
+    /// Numbers of used and failed scans behind a shape, in words.
     fn scans(&self, thing: &FloorThing) -> String {
         let used = thing.outline.as_ref().map_or(0, |o| o.alignment.model.scans().len());
         let mut parts = vec![format!("from {used} scans")];

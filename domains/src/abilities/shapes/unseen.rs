@@ -1,10 +1,10 @@
-//! The floor that no sweep of the laser has passed over: there may be something on it.
+//! Floor that no laser sweep has passed over, where objects may stand.
 
 use descry_perception::laser::Scan;
 use descry_perception::nalgebra::{Point2, Vector2};
 use descry_robots::OccupancyGrid;
 
-/// A sweep is believed up to so far before it ended: its reading is of something, metres.
+/// Distance before a reading's end beyond which the ray no longer proves free floor, metres.
 const BEFORE_M: f64 = 0.05;
 /// The maximum number of possible places whose visibility is checked.
 const ASKED: usize = 200;
@@ -23,7 +23,7 @@ impl UnseenFloor {
         UnseenFloor { open: map.occupied.iter().map(|taken| !taken).collect(), grid: Some(map.clone()) }
     }
 
-    /// A sweep passed over some of it.
+    /// Marks the floor that a sweep passed over.
     pub fn pass(&mut self, scan: &Scan, reach_m: f64) {
         let Some(grid) = &self.grid else { return };
         let from = scan.map_from_laser.translation.vector;
@@ -42,7 +42,7 @@ impl UnseenFloor {
         }
     }
 
-    /// A disc of the floor is known: something that was found stands there.
+    /// Marks a disc of the floor as known, because a detected object stands there.
     pub fn know(&mut self, middle: &Point2<f64>, radius_m: f64) {
         let Some(grid) = &self.grid else { return };
         for (index, open) in self.open.iter_mut().enumerate() {
@@ -72,8 +72,8 @@ impl UnseenFloor {
             .collect()
     }
 
-    /// True if a sweep from a place towards a heading, half a turn wide, would pass over any of these
-    /// middles, as far as the map and discs on the floor tell.
+    /// True if a half-circle sweep from a place and heading would pass over any of the points,
+    /// given map and known objects.
     pub fn would_pass(
         &self,
         from: &Point2<f64>,

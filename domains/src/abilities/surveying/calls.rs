@@ -1,4 +1,4 @@
-//! The calls that *surveying* answers, and what is done where the planner finds no plan.
+//! Calls of *surveying*, and the fallback when the planner finds no plan.
 
 use descry_perception::mapping::Unseen;
 use descry_planner::{Answer, Call, CallError};
@@ -68,7 +68,7 @@ fn gain_m2(s: &Situation, call: &Call) -> Result<f64, CallError> {
     Ok(unseen.gain_m2(look))
 }
 
-/// The reason for a look from there.
+/// Reason for a look from a pose.
 pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     match s.chart().outlook(arguments[0]) {
         Some(look) => format!(
@@ -80,7 +80,7 @@ pub(super) fn hope(s: &Situation, arguments: &[&str]) -> String {
     }
 }
 
-/// The look that shows most of the unknown floor for its time, if any does; else one at a surface.
+/// Fallback: the look with the most unknown floor per second if any, else a look at a surface.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
     let rate = |(symbol, look): &(String, descry_perception::mapping::Outlook)| {
         let to = s.candidate(symbol).ok().filter(|to| s.can_drive_to(*to))?;

@@ -1,5 +1,5 @@
-//! The map that a body without one makes itself: what was seen so far, the walls, surfaces and open floor in it, ways over that floor, and from where
-//! more of it would be seen.
+//! Map under construction by a body without a map: observed cells, walls, surfaces and open floor,
+//! routes on that floor, and exploration viewpoints.
 
 use std::sync::Arc;
 
@@ -27,16 +27,16 @@ use crate::viewpoint::Candidate;
 
 /// Name of the ability.
 pub(super) const NAME: &str = "surveying";
-/// Edge of the cells in which what was seen is kept, metres.
+/// Edge length of the cells of observed space, metres.
 const CELL_M: f64 = 0.1;
 /// Depths beyond this are not used for the map, metres: the noise of a stereo camera grows with their square.
 const FAR_M: f64 = 5.0;
-/// Heights at which something is in the body's way, metres.
+/// Height range of obstacles to the body, metres.
 pub(super) const BODY_M: std::ops::RangeInclusive<f64> = 0.15..=1.6;
 /// Heights of level surfaces on which people put things, metres, and how large these are at least, square metres.
 const SURFACE_M: std::ops::RangeInclusive<f64> = 0.3..=1.4;
 const SURFACE_M2: f64 = 0.15;
-/// Kept between the body and what the map shows beyond its footprint, metres: half a cell, and what the poses may be off.
+/// Clearance between the footprint and mapped obstacles, metres: half a cell, plus the pose error.
 const CLEAR_M: f64 = 0.08;
 /// Poses that a plan weighs against each other.
 const WEIGHED: usize = 7;
@@ -44,8 +44,7 @@ const WEIGHED: usize = 7;
 pub(super) const LOOK_S: f64 = 2.0;
 /// Floor that counts as unknown before the first look, square metres.
 pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
-/// Height difference up to which two level surfaces are one, if one holds the other's middle,
-/// metres.
+/// Maximum height difference of overlapping level surfaces that count as one, metres.
 const SAME_HEIGHT_M: f64 = 0.08;
 
 /// The map that the body makes itself.
@@ -54,34 +53,35 @@ pub struct Chart {
     survey: Option<Survey>,
     /// Poses of the looks of this run and earlier ones, aligned with the map: in the frame of the first look.
     pub(super) stood: Vec<Isometry2<f64>>,
-    /// Poses in which the body believed to stand at these looks, in its own map.
+    /// Poses at which the body believed to be for these looks, in its own map.
     pub(super) believed: Vec<Isometry2<f64>>,
     /// Transform from the chart to the body's own map: the body's heading was some degrees off at the first
     /// look.
     pub(super) map_from_chart: Isometry2<f64>,
     /// Walls, surfaces and open floor, once something was seen.
     pub(super) map: Option<Arc<RoomMap>>,
-    /// Ways on which the body keeps a margin; and those without one, which are taken where no other leads on.
+    /// Routes with clearance, and routes without it for places that are unreachable otherwise.
     router: Option<Arc<Router>>,
     narrow: Option<Arc<Router>>,
     /// Floor that drives have shown to be passable or not.
     pub(super) ground: Ground,
     /// Poses from which more would be seen, by their symbols.
     pub(super) open: Vec<(String, Outlook)>,
-    /// Floor that is unknown and would be seen from where no way leads any more since drives have failed, square metres.
+    /// Unknown floor visible only from places that became unreachable through failed drives, square
+    /// metres.
     cut_off_m2: f64,
-    /// Level surfaces to put things on: names, and what was seen of them.
+    /// Level supporting surfaces: names and observations.
     pub(super) surfaces: Vec<(String, Level)>,
     /// Symbols that were given to poses so far.
     given: usize,
     /// Viewpoints of surfaces.
     pub(super) poses: Candidates,
-    /// Records of what it rests on.
+    /// Records that the map is built from.
     pub(super) records: Vec<RecordId>,
 }
 
 impl Chart {
-    /// The map with which a run begins: what an earlier one has left, if the domain uses it and the body has none of its own.
+    /// Initial map of a run: that of an earlier run, if the domain uses one and the body has none.
     pub fn begin(domain: &Domain, past: Option<&Past>, robot: &dyn Robot) -> Self {
         let is_used = domain.config.uses.iter().any(|name| name == NAME);
         let mut chart = Chart { poses: domain.config.candidates, ..Chart::default() };
@@ -97,7 +97,7 @@ impl Chart {
         chart
     }
 
-    /// The survey for a later run; none if nothing was seen.
+    /// Survey for a later run; `None` if nothing was seen.
     pub(crate) fn kept(&self) -> Option<Surveyed> {
         let survey = self.survey.clone()?;
         let (stood, believed) = (self.stood.clone(), self.believed.clone());
@@ -116,7 +116,8 @@ impl Chart {
         self.survey.as_mut().ok_or_else(|| "nothing was seen".into())
     }
 
-    /// Lays the poses found by what was seen onto those that the body believed in: its errors average out.
+    /// Aligns the optimised poses with the believed ones as a whole, so that the believed poses'
+    /// errors average out.
     fn settle(&mut self) {
         let pairs = || self.believed.iter().zip(&self.stood);
         let count = self.stood.len().min(self.believed.len()).max(1) as f64;
@@ -129,7 +130,7 @@ impl Chart {
         self.map_from_chart = Isometry2::from_parts(shift.into(), turn);
     }
 
-    /// Reads walls, surfaces, open floor and ways from what was seen.
+    /// Extracts walls, surfaces, open floor and routes from the observations.
     pub(super) fn read(&mut self, body: &Description) {
         self.settle();
         let Some(map) = self.survey.as_ref().and_then(|s| s.map(&MapOptions::default()).ok()) else { return };
@@ -143,7 +144,7 @@ impl Chart {
         self.find_ways(body);
     }
 
-    /// Ways over the floor of the map, as far as looks show it and by what drives have taught.
+    /// Updates the routes over the mapped floor, as observed and as learned from drives.
     pub(super) fn find_ways(&mut self, body: &Description) {
         let (Some((floor, footing)), Some(base)) = (self.footing(body), &body.base) else {
             (self.router, self.narrow) = (None, None);
@@ -154,7 +155,7 @@ impl Chart {
         (self.router, self.narrow) = (over(&footing.stand), over(&footing.pass));
     }
 
-    /// Positions that the middle of the body may take by all that is known, in the body's own map.
+    /// Positions that the body's centre may take, in the body's own map.
     pub(super) fn passable(&self) -> Vec<Point2<f64>> {
         let Some(router) = &self.narrow else { return Vec::new() };
         let free = router.map();
@@ -163,7 +164,7 @@ impl Chart {
         squares.map(|square| self.map_from_chart * middle(square)).collect()
     }
 
-    /// Finds the poses from which more would be seen: those that were found before keep their symbols as long as they promise anything.
+    /// Finds exploration poses; poses found before keep their symbols while they promise anything.
     pub(super) fn look_out(
         &mut self,
         here: &Isometry2<f64>,
@@ -194,8 +195,8 @@ impl Chart {
         self.open = open;
     }
 
-    /// Additional floor that could be seen from poses that became unreachable when drives failed,
-    /// square metres.
+    /// Additional floor visible from poses that became unreachable through failed drives, square
+    /// metres.
     fn cut_off_m2(
         &self,
         floor: &Occupancy,
@@ -228,7 +229,7 @@ impl Chart {
         self.footing(body).map(|(floor, _)| floor)
     }
 
-    /// The floor, and where on it the middle of the body may be.
+    /// Occupancy of the floor, and the free positions of the body's centre.
     fn footing(&self, body: &Description) -> Option<(Occupancy, Footing)> {
         let mut floor = self.map.as_ref()?.floor(&self.stood, body.radius_m() + CELL_M, *BODY_M.end())?;
         let footing = self.ground.open(&mut floor, (body.radius_m(), CLEAR_M), &self.map_from_chart);
@@ -249,7 +250,7 @@ impl Chart {
         self.open.iter().find(|(name, _)| name == symbol).map(|(_, look)| look)
     }
 
-    /// Floor that is unknown and expected to be seen from the poses that are left, square metres.
+    /// Unknown floor expected to be visible from the remaining poses, square metres.
     pub(super) fn unseen_m2(&self) -> f64 {
         if self.map.is_none() {
             return NOTHING_SEEN_M2;
@@ -271,7 +272,7 @@ impl Chart {
         })
     }
 
-    /// Ways without a margin, to where the body stands with one.
+    /// Routes without clearance, up to where clearance begins.
     fn narrow_to(&self, to: &Pose2) -> Option<&Router> {
         let fits = self.router.as_ref().is_some_and(|router| router.fits(&to.point()).is_ok());
         self.narrow.as_deref().filter(|_| fits)
@@ -333,7 +334,7 @@ pub(super) fn far_m(camera: &Camera) -> f64 {
     camera.range_m.1.min(FAR_M)
 }
 
-/// Options of exploration; none if the body does not drive or does not see.
+/// Exploration options; `None` if the body cannot drive or see.
 fn explore(body: &Description) -> Option<ExploreOptions> {
     let (base, camera) = (body.base.as_ref()?, body.camera.as_ref()?);
     let seconds = (1.0 / base.speeds.linear_m_s, 1.0 / base.speeds.angular_rad_s, LOOK_S);
@@ -365,7 +366,7 @@ impl Known {
         self.states.get::<Arc<Chart>>()
     }
 
-    /// Changes the map that the body has made itself; ways are those of the changed one.
+    /// Changes the body's own map and recomputes the routes.
     pub(super) fn change_chart<R>(&mut self, change: impl FnOnce(&mut Chart) -> R) -> R {
         self.own_map = Arc::new(NoMap);
         let chart: &mut Arc<Chart> = self.states.get_mut();

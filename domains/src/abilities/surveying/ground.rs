@@ -1,4 +1,4 @@
-//! Floor knowledge from drives: a place where the body has been is passable, and one where it could not go is
+//! Floor knowledge from drives: visited places are passable, and places where a drive failed are
 //! not tried again.
 //!
 //! Both are in the body's own map. It errs there by centimetres, as the map that is read from looks does: at corners that are passed closely no
@@ -16,9 +16,10 @@ use crate::mind::Mind;
 use crate::own_map::OwnMap;
 use crate::situation::Situation;
 
-/// After a failed drive the body is asked for the floor up to this far from where it stands and from the rest of its way, metres.
+/// Radius around the body and the remaining route within which the body is asked for the floor
+/// after a failed drive, metres.
 const ASKED_M: f64 = 0.8;
-/// Squares whose middle lies this near to a line that was driven are those that it passes, in squares.
+/// Maximum distance of a cell's centre from a driven line for the cell to count as passed, cells.
 const PASSED: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// Floor knowledge from drives.
@@ -26,7 +27,7 @@ const PASSED: f64 = std::f64::consts::FRAC_1_SQRT_2;
 pub struct Ground {
     /// Straight lines that were driven.
     pub driven: Vec<[Point2<f64>; 2]>,
-    /// Places where the body does not fit, as it says, though looks show nothing there.
+    /// Places where the body does not fit by its own account, though looks show nothing there.
     pub barred: Vec<Point2<f64>>,
 }
 
@@ -41,7 +42,8 @@ pub struct Footing {
 }
 
 impl Footing {
-    /// Reach of a body: with a margin as far as routes with one lead, and from there on without.
+    /// Reachable positions of a body: with clearance as far as such routes lead, and beyond
+    /// without.
     pub(super) fn reach(&self, floor: &Occupancy, from: &Isometry2<f64>, options: &ExploreOptions) -> Reach {
         let mut reach = Reach::over(floor, from, &self.stand, options);
         let narrow = self.reach_through(&self.pass, floor, from, options);
@@ -60,7 +62,7 @@ impl Footing {
         self.reach_through(&self.shown, floor, from, options)
     }
 
-    /// To where it may stand, over some squares.
+    /// Positions reachable across the given cells.
     fn reach_through(
         &self,
         over: &[bool],
@@ -85,7 +87,8 @@ impl Ground {
         kept.barred.clone_from(&self.barred);
     }
 
-    /// Opens the floor that was driven over, and says where a body may be that is so large and keeps a margin from what is occupied, metres.
+    /// Opens the floor that was driven over, and returns where a body of this size with this
+    /// clearance may be, metres.
     pub fn open(
         &self,
         floor: &mut Occupancy,
@@ -140,7 +143,7 @@ impl Ground {
     }
 }
 
-/// A drive has come to its end: where it led over the map that the body has made itself, that floor is open.
+/// Handles a finished drive: opens the driven floor in the body's own map.
 pub(super) fn has_driven(mind: &mut Mind, s: &Situation) {
     let (from, to) = (&s.candidates[s.at].place, mind.known.candidates[mind.known.at].place.clone());
     if let Some(way) = s.chart().way(from, &to) {
@@ -148,8 +151,8 @@ pub(super) fn has_driven(mind: &mut Mind, s: &Situation) {
     }
 }
 
-/// A drive over the map that the body has made itself has ended early: what of its way was driven is open, and where the body says by now that it does
-/// not fit it does not try again. What is concluded from that; nothing if it has no such map or says nothing new.
+/// Handles a drive that ended early on the body's own map: opens the driven part, and bars places
+/// where the body reports not to fit. Returns the conclusion; empty without such a map or news.
 pub(super) fn drive_failed(
     mind: &mut Mind,
     robot: &dyn Robot,
@@ -179,7 +182,8 @@ pub(super) fn drive_failed(
     })
 }
 
-/// Asks the body where it does not fit, of the places around it and along its way where it seems to; how many there are.
+/// Asks the body where it does not fit, around it and along its route; returns the number of new
+/// places.
 pub fn ask(
     ground: &mut Ground,
     seem: Vec<Point2<f64>>,
@@ -227,7 +231,7 @@ pub fn square(grid: &Occupancy, place: &Point2<f64>) -> Option<usize> {
     inside.then(|| at.y as usize * grid.width + at.x as usize)
 }
 
-/// The squares that a body passes there.
+/// Cells that a body at a place covers.
 fn passed(grid: &Occupancy, place: &Point2<f64>) -> impl Iterator<Item = usize> {
     let (grid, place) = (grid, *place);
     let around = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(f64::from(x), f64::from(y))));

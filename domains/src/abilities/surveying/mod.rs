@@ -1,5 +1,6 @@
-//! *surveying*: a body without a map makes one, look by look (Viejo and Cazorla, *Construcción de mapas 3D y extracción de primitivas geométricas del
-//! entorno*): walls, surfaces and open floor, on which it then plans its ways.
+//! *surveying*: a body without a map builds one, look by look (Viejo and Cazorla, *Construcción de
+//! mapas 3D y extracción de primitivas geométricas del entorno*): walls, surfaces and open floor,
+//! on which routes are planned.
 
 mod calls;
 pub mod chart;
@@ -65,7 +66,7 @@ pub const ABILITY: Ability = Ability {
     )
 };
 
-/// A run begins: with a map from an earlier one, what of it is left to be seen.
+/// Initial state of a run with a map from an earlier run: the part still unknown.
 fn begins(mind: &mut Mind, _: &Domain, _: &Goal) {
     let robot = Arc::clone(&mind.known.robot);
     taken::look_out(mind, &*robot, "");

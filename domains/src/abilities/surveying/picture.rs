@@ -1,4 +1,4 @@
-//! The map as a picture, seen from above: open floor, walls, pillars, surfaces, and where it was looked from.
+//! Top view of the map as a picture: open floor, walls, pillars, surfaces and viewpoints.
 
 use std::io::Cursor;
 

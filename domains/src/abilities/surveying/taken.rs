@@ -22,10 +22,11 @@ use crate::viewpoint::Candidate;
 
 /// The kind under which the map is recorded.
 const MAP: &str = "map";
-/// A ring of poses follows a surface of which more was seen, if its middle has moved by more, metres.
+/// Displacement of an extended surface's centre above which its ring of viewpoints is renewed,
+/// metres.
 const MOVED_M: f64 = 0.15;
 
-/// Takes a look in: it is in the record when this returns, and so is the map as it is then.
+/// Processes a look; look and updated map are in the record on return.
 pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed) -> Result<Note, WorldError> {
     let body = eyes.robot.description();
     let id = recording::view(mind, eyes, &[], sensed)?;
@@ -56,7 +57,7 @@ pub(super) fn take(mind: &mut Mind, eyes: Eyes<'_>, from: &str, sensed: &Sensed)
     Ok(note(mind.known.chart(), &fit, &believed))
 }
 
-/// Makes the surfaces of the map known, with poses around them if anything is looked for.
+/// Registers the map's surfaces, with viewpoints around them if anything is sought.
 fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
     for fresh in mind.known.chart().surfaces() {
         let known = mind.known.surfaces.iter().position(|s| s.symbol == fresh.symbol);
@@ -86,7 +87,7 @@ fn meet_surfaces(mind: &mut Mind, robot: &dyn Robot) {
     }
 }
 
-/// Finds from where more would be seen; those poses take the place of the ones before them.
+/// Replaces the exploration poses by newly found ones.
 pub(super) fn look_out(mind: &mut Mind, robot: &dyn Robot, from: &str) {
     let Place::Pose(here) = mind.known.candidates[mind.known.at].place else { return };
     let here = Isometry2::new(here.point().coords, here.yaw_rad);
@@ -98,7 +99,7 @@ pub(super) fn look_out(mind: &mut Mind, robot: &dyn Robot, from: &str) {
     replace(mind, |symbol| symbol.starts_with("view-"), open);
 }
 
-/// Puts poses in the place of some; those at which the body stands and last looked from stay.
+/// Replaces poses; those of the body's current place and last look stay.
 fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
     let known = &mut mind.known;
     let [at, looked_from] = [known.at, known.looked_from].map(|n| known.candidates[n].clone());
@@ -111,7 +112,7 @@ fn replace(mind: &mut Mind, of: impl Fn(&str) -> bool, by: Vec<Candidate>) {
     mind.attend();
 }
 
-/// Puts the map and a picture of it into the record.
+/// Records the map and its picture.
 fn keep(mind: &mut Mind, eyes: Eyes<'_>, stamp_ns: i64) -> Result<(), WorldError> {
     let chart = mind.known.chart();
     let Some(map) = &chart.map else { return Ok(()) };

@@ -1,5 +1,6 @@
-//! `[expected-completeness ?from ?on ?of]`: by how much a look is expected to raise the certainty of having found all of a kind. Where
-//! the objects that were seen from all sides leave too little of that, no look is expected to.
+//! `[expected-completeness ?from ?on ?of]`: expected rise of the certainty that all objects of a
+//! kind are found. Zero for every look where the objects already seen from all sides limit that
+//! certainty.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,5 +1,6 @@
-//! `[expected-gain ?from ?on ?what]`: by how much a look is expected to raise the confidence in an object, if what it settles
-//! is settled in the object's favour. What an earlier look of the plan settles does not count again.
+//! `[expected-gain ?from ?on ?what]`: expected rise of the confidence in an object by a look, if
+//! the settled doubt turns out in the object's favour. Doubt settled by an earlier look of the plan
+//! does not count again.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,5 +1,5 @@
-//! `[expected-placing ?from ?on ?what]`: by how much a look is expected to raise the certainty that an object stands where on its
-//! surface it is believed to. What an earlier look of the plan shows does not count again.
+//! `[expected-placing ?from ?on ?what]`: expected rise of the certainty of an object's position
+//! along its surface by a look. Edges shown by an earlier look of the plan do not count again.
 
 use descry_planner::{Answer, Call, CallError};
 

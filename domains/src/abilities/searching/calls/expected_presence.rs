@@ -1,5 +1,5 @@
-//! `[expected-presence ?from ?on ?what]`: by how much a look is expected to raise the certainty that an object stands on a surface,
-//! if what it settles of that surface is settled in the object's favour.
+//! `[expected-presence ?from ?on ?what]`: expected rise of the certainty that an object stands on a
+//! surface by a look, if the settled doubt turns out in the object's favour.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,4 +1,4 @@
-//! The calls that *searching* answers: one file each, and the list of them.
+//! Calls of *searching*: one file each, and their list.
 
 mod can_see;
 mod expected_clarity;
@@ -17,7 +17,7 @@ use crate::ability::{Meaning, Reads, argument};
 use crate::belief::doubt::{Doubt, Taken};
 use crate::situation::Situation;
 
-/// The looks at the surface that the call is about; of a call that is about none, all.
+/// Looks at the surface that the call names; all looks for a call without a surface.
 const OBSERVED: Reads = Reads { word: "observed", of: &[None, Some("surface")] };
 const PUSHED: Reads = Reads::all("pushed");
 const LOOKS: &[Reads] = &[OBSERVED, PUSHED];
@@ -89,8 +89,9 @@ pub(super) const ALL: &[Meaning] = &[
     },
 ];
 
-/// The share of a doubt that a call's look settles beyond what the plan does before it. The look is the call's first argument at
-/// its second; without a surface, `is_whole` saying so, at every surface.
+/// Share of a doubt that a call's look settles beyond the earlier steps of the plan. The call's
+/// arguments are viewpoint and surface; without a surface (`names_surface`), looks at all surfaces
+/// count.
 fn settled(situation: &Situation, call: &Call, doubt: &Doubt, names_surface: bool) -> Result<f64, CallError> {
     let from = situation.candidate(argument(call, 0)?)?;
     let surfaces = match names_surface {

@@ -1,7 +1,7 @@
-//! `[search-cost ?on]`: seconds that a look at a surface may turn out to have been in vain for, counted at the first look of a plan
-//! there: (1 - p) / p of what going there for a look takes, where p is the probability that this look finds what is asked for.
-//! With the way and the look itself that is their time by p, and surfaces are looked at in the order of that, as is best when each
-//! is looked at once. Nothing where all surfaces must be looked at.
+//! `[search-cost ?on]`: penalty in seconds for a look in vain, counted at the plan's first look at
+//! a surface: (1 - p) / p times the time of drive and look, where p is the probability that this
+//! look finds the target. With drive and look the sum is time / p, and visiting surfaces in that
+//! order is optimal if each is looked at once. Zero if all surfaces must be looked at.
 
 use descry_planner::{Answer, Call, CallError};
 use serde::{Deserialize, Serialize};
@@ -9,21 +9,20 @@ use serde::{Deserialize, Serialize};
 use crate::ability::argument;
 use crate::situation::Situation;
 
-/// Maximum penalty of a look in vain, seconds: with almost nothing left to find, all looks are
-/// alike.
+/// Maximum penalty, seconds; with almost nothing left to find, all looks are alike.
 const MOST_S: f64 = 10_000.0;
 
 /// Evidence for a first look at a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FirstLook {
-    /// The probability that it finds what is asked for, 0 to 1.
+    /// Probability that the look finds the target, 0 to 1.
     pub finds: f64,
-    /// Duration of going there and looking, seconds.
+    /// Duration of drive and look, seconds.
     pub takes_s: f64,
 }
 
 impl Situation {
-    /// Evidence for a first look at a surface; none where looks in vain are not counted.
+    /// Data of the first look at a surface; `None` if looks in vain have no penalty.
     pub fn first_look(&self, on: usize) -> Option<FirstLook> {
         let is_open = |n: &usize| self.confidence(*n) < self.threshold;
         let mut open: Vec<usize> = (0..self.things.len()).filter(is_open).collect();

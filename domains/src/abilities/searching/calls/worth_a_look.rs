@@ -1,5 +1,5 @@
-//! `[worth-a-look ?from ?on]`: whether a look from a pose may settle anything that is still in doubt. Where none may, there is
-//! no plan, and the search is over.
+//! `[worth-a-look ?from ?on]`: true if a look from a viewpoint may settle some doubt. If no look
+//! may, no plan exists and the search ends.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,5 +1,6 @@
-//! `[worth-a-push ?from ?what]`: whether a push from a pose would move an object out of the way of looks that settle what no
-//! look can settle now. One push is planned at a time: what it uncovers says what is worth the next.
+//! `[worth-a-push ?from ?what]`: true if a push from a viewpoint would move an obstacle and so
+//! enable looks that settle what no look can settle now. Pushes are planned one at a time, as each
+//! reveals whether the next is worthwhile.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -1,4 +1,5 @@
-//! `(clarity ?on)`: how sure it is what each object on a surface is, and that none is hidden.
+//! `(clarity ?on)`: certainty of the identity of every object on a surface, and that none is
+//! hidden.
 
 use crate::range::{Range, Referent};
 use crate::situation::Situation;

@@ -1,4 +1,4 @@
-//! `(completeness ?of)`: how sure it is which objects are of a kind, and that no more are hidden.
+//! `(completeness ?of)`: certainty of which objects belong to a kind, and that no more are hidden.
 
 use crate::range::{Range, Referent};
 use crate::situation::Situation;
@@ -21,7 +21,7 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     }
 }
 
-/// True if a view of a surface was taken on which it could stand.
+/// True if a surface was viewed on which an object of the kind could stand.
 fn is_looked_for(s: &Situation, of: usize) -> bool {
     (0..s.surfaces.len()).any(|on| s.kinds[of].may_be_on(on) && s.is_looked_at(on))
 }

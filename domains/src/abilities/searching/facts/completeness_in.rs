@@ -1,5 +1,6 @@
-//! `(completeness-in ?of ?where)`: how sure it is that all of a kind are found that are in a room. Known of the rooms that
-//! are asked about: of each it is at least as sure as of all of them together. Of any other no more is known than nothing.
+//! `(completeness-in ?of ?where)`: certainty that all objects of a kind in a room are found. For
+//! the rooms that are asked about, at least the certainty of all these rooms together; unknown for
+//! other rooms.
 
 use super::completeness;
 use crate::range::{Range, Referent};
@@ -21,7 +22,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     lines
 }
 
-/// Bounds on the certainty: those of the whole kind if the kind is asked about in all of the room, else
+/// Bounds on the certainty: those of the whole kind if the goal asks about all of the room, else
 /// unknown.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(kind), Referent::Named(room)] = of else { return Range::UNKNOWN };

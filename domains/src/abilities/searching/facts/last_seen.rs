@@ -4,7 +4,7 @@ use descry_memory::remember::Recollection;
 
 use crate::situation::Situation;
 
-/// Each sought object that is remembered, with what is remembered of it and the time now.
+/// Remembered sought objects, each with its last sighting and the current time.
 fn remembered(s: &Situation) -> impl Iterator<Item = (&str, &Recollection, f64)> {
     let past = s.past.as_ref();
     let own = s.things.iter().filter(|t| t.track.is_none());

@@ -1,4 +1,4 @@
-//! Facts of the belief in the words of a domain: one file per fact, and the list of them.
+//! Belief facts in the words of a domain: one file per fact, and their list.
 
 mod clarity;
 mod completeness;

@@ -1,4 +1,5 @@
-//! `(placed ?what)`: how sure it is that a sought object, where one is believed in, stands where on its surface it is believed to.
+//! `(placed ?what)`: certainty of a sought object's position along its surface, given that the
+//! object was found.
 
 use crate::range::{Range, Referent};
 use crate::situation::Situation;
@@ -9,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty: unknown for the place of a thing that was not seen.
+/// Bounds on the certainty; unknown for an object that was not seen.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [Referent::Named(what)] = of else { return Range::UNKNOWN };
     let Ok(what) = s.thing(what) else { return Range::UNKNOWN };

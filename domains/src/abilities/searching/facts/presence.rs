@@ -1,4 +1,4 @@
-//! `(presence ?what ?on)`: how sure it is that a sought object stands on a surface.
+//! `(presence ?what ?on)`: certainty that a sought object stands on a surface.
 
 use crate::range::{Range, Referent};
 use crate::situation::Situation;
@@ -12,7 +12,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.things.len()).flat_map(|what| surfaces.clone().map(move |on| fluent(what, on))).collect()
 }
 
-/// Bounds on the certainty, from all looks so far. It is zero for a thing that counts as *not there*.
+/// Bounds on the certainty from all looks so far; zero for a thing that counts as *not there*.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     let [what, on] = of else { return Range::UNKNOWN };
     let on = match on {

@@ -1,4 +1,4 @@
-//! `gain-per-second`: the look that is expected to settle most of the doubt for the time that it takes, one at a time.
+//! `gain-per-second`: greedy, the look with the highest expected settled doubt per second.
 
 use super::policy::{Look, Policy, best};
 use crate::looking::looks::LOOK_S;

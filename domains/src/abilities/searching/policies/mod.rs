@@ -1,4 +1,4 @@
-//! Ways to choose where to look next: one file each behind one interface, and the list of them.
+//! Policies that choose the next look: one file each behind one trait, and their list.
 //!
 //! `plan`, the way that descry goes by default, is not among them: it is the planner, which weighs gain against cost over
 //! several looks. The others choose one look after another; they are what it is measured against. All act on the same belief
@@ -28,7 +28,7 @@ pub const PLAN: &str = "plan";
 
 /// Who chooses in a run.
 pub struct Chooser {
-    /// Who it is.
+    /// Maker of the choice.
     pub by: By,
     /// True if the first look is taken from where the body stands, without a choice.
     pub first_look_here: bool,
@@ -48,10 +48,10 @@ impl From<By> for Chooser {
     }
 }
 
-/// Makes a policy for a run: the seed of the run, and foresight where there is any.
+/// Makes a policy for a run, from the run's seed and foresight if available.
 type Make = fn(u64, Option<Foresight>) -> Option<Box<dyn Policy>>;
 
-/// Every policy by its name, and what it does.
+/// All policies: name, description, constructor.
 const ALL: [(&str, &str, Make); 8] = [
     ("sweep", "goes all around from the nearest pose, whatever is seen", |_, _| Some(Box::new(sweep::Sweep))),
     ("nearest", "looks from the nearest pose that it has not looked from", |_, _| {
@@ -77,7 +77,7 @@ const ALL: [(&str, &str, Make); 8] = [
     }),
 ];
 
-/// The reason there is no such policy.
+/// Error of an unavailable policy.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum PolicyError {
     /// No policy has that name.
@@ -85,10 +85,10 @@ pub enum PolicyError {
     Unknown {
         /// The requested name.
         name: String,
-        /// The names that there are.
+        /// Names of all policies.
         known: String,
     },
-    /// It needs to know in advance what looks show, as only experiments can.
+    /// The policy needs foresight, which only experiments have.
     #[error(
         "the policy \"{name}\" knows in advance what each look shows and is for experiments in simulation only\n  take another, such as plan"
     )]
@@ -103,7 +103,7 @@ pub fn names() -> Vec<&'static str> {
     std::iter::once(PLAN).chain(ALL.iter().map(|(name, ..)| *name)).collect()
 }
 
-/// Description of a policy, said after its name; none if there is none of that name.
+/// Description of a policy, to follow its name; `None` for an unknown name.
 pub fn about(name: &str) -> Option<&'static str> {
     ALL.iter().find(|(known, ..)| *known == name).map(|(_, about, _)| *about)
 }
@@ -124,8 +124,8 @@ pub fn named(name: &str, seed: u64, foresight: Option<Foresight>) -> Result<Choo
         .ok_or_else(|| PolicyError::NeedsForesight { name: name.into() })
 }
 
-/// True if the policy chooses the next step: something requested is still being searched for, and the hands
-/// are free. All else is left to the planner.
+/// True if the policy chooses the next step: a requested object is still sought and the hands are
+/// free. Other steps are left to the planner.
 pub fn is_asked(s: &Situation) -> bool {
     let own: Vec<usize> = (0..s.things.len()).filter(|&n| s.things[n].track.is_none()).collect();
     let unsure = own.iter().any(|&n| s.confidence(n) < s.threshold)
@@ -134,7 +134,7 @@ pub fn is_asked(s: &Situation) -> bool {
     s.held.is_none() && (unsure || own.is_empty() && s.kinds.is_empty() && s.asked.is_empty())
 }
 
-/// The next look of a policy, but for those that cannot be taken; none if it gives up.
+/// Next look of a policy, except infeasible ones; `None` if the policy gives up.
 pub fn next(
     policy: &mut dyn Policy,
     situation: &Situation,
@@ -146,8 +146,8 @@ pub fn next(
     if looks.is_empty() { None } else { policy.choose(situation, &looks) }
 }
 
-/// The look that is expected to settle most a second of those to which the body cannot drive before it has opened something; none if
-/// there is none that is not barred.
+/// Look with the highest gain per second among those behind closed doors, except barred ones;
+/// `None` if there is none.
 pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Option<Look> {
     let is_behind = |look: &Look| !situation.can_drive_to(look.from) && !is_barred(look);
     let looks: Vec<Look> =
@@ -155,13 +155,14 @@ pub fn behind(situation: &Situation, is_barred: &dyn Fn(&Look) -> bool) -> Optio
     gain_per_second::GainPerSecond.choose(situation, &looks)
 }
 
-/// The look from where the body stands that is expected to settle most; none if it can take none there.
+/// Look with the highest gain from the current pose; `None` if there is none.
 pub fn here(situation: &Situation) -> Option<Look> {
     let looks: Vec<Look> = open(situation).into_iter().filter(|look| look.from == situation.at).collect();
     best(&looks, |look| look.gain)
 }
 
-/// Every look that can be taken, if need be by opening doors on the way, and has not been, in the order of the candidates.
+/// Feasible looks not yet taken, including those behind doors that can be opened, in candidate
+/// order.
 fn open(situation: &Situation) -> Vec<Look> {
     let looks = situation.all_looks().into_iter();
     looks
@@ -175,7 +176,7 @@ fn open(situation: &Situation) -> Vec<Look> {
         .collect()
 }
 
-/// Seconds of driving to a candidate, through doors that would have to be opened first where no other way leads.
+/// Driving time to a candidate, through closed doors where no other route leads, seconds.
 pub fn travel_s(situation: &Situation, to: usize) -> f64 {
     let through_all = || situation.travel_past_s(situation.at, to, &BTreeSet::new());
     match situation.travel_s(situation.at, to) {
@@ -185,7 +186,7 @@ pub fn travel_s(situation: &Situation, to: usize) -> f64 {
     }
 }
 
-/// The share of what the goal leaves in doubt that a look would settle.
+/// Share of the goal's doubt that a look would settle.
 pub fn gain(situation: &Situation, from: usize, on: usize) -> f64 {
     let doubts = situation.doubts();
     let shares = doubts.iter().map(|doubt| doubt.share_settled(situation, (from, on), Taken::default()));

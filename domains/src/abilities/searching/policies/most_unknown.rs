@@ -1,4 +1,4 @@
-//! `most-unknown`: the look that shows most of the space above the surface that no view has shown.
+//! `most-unknown`: the look that shows most of the unobserved space above the surface.
 
 use super::policy::{Look, Policy, best};
 use super::unseen;

@@ -1,12 +1,12 @@
-//! `nearest-surface`: optimistic, nearest first. It goes to the nearest surface where something is in doubt, looks there until no
-//! look there settles anything that is worth it, and then goes to the next.
+//! `nearest-surface`: optimistic, nearest first. Goes to the nearest surface with open doubt, looks
+//! until no look there is worthwhile, then goes to the next.
 
 use super::policy::{Look, Policy, best};
 use crate::situation::Situation;
 
 #[derive(Default)]
 pub(super) struct NearestSurface {
-    /// The surface that it is at.
+    /// Current surface.
     on: Option<usize>,
 }
 

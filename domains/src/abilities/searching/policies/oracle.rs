@@ -1,5 +1,6 @@
-//! `oracle`: knows what each look would truly show of what is sought. It looks from where most of it can be seen; what is not
-//! there or has been seen from there it must still make sure of, by the look that settles most. For experiments only.
+//! `oracle`: knows how much of the target each look truly shows, and looks from where most can be
+//! seen. To confirm absence, or after that look, takes the look that settles most doubt. For
+//! experiments only.
 
 use super::policy::{Foresight, Look, Policy, best};
 use crate::situation::Situation;

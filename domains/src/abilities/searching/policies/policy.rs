@@ -13,18 +13,17 @@ pub struct Look {
     pub on: usize,
     /// Seconds of driving until then.
     pub travel_s: f64,
-    /// The share of what is in doubt that it is expected to settle, 0 to 1.
+    /// Expected share of the doubt that the look settles, 0 to 1.
     pub gain: f64,
 }
 
-/// A way to choose where to look next.
+/// Policy that chooses the next look.
 pub trait Policy: Send {
-    /// The next of the looks (there is at least one), or none to give up. Looks that have been taken, that cannot be reached
-    /// or that do not show the surface are not offered; of the others those that promise nothing only if
-    /// [`Policy::looks_at_all`].
+    /// Next look among `looks` (not empty); `None` to give up. Offered are feasible looks not yet
+    /// taken that show the surface; those without expected gain only if [`Policy::looks_at_all`].
     fn choose(&mut self, situation: &Situation, looks: &[Look]) -> Option<Look>;
 
-    /// True if it also takes looks with no expected gain.
+    /// True if the policy also takes looks without expected gain.
     fn looks_at_all(&self) -> bool {
         false
     }

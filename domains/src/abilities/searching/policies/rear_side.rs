@@ -1,5 +1,6 @@
-//! `rear-side`: the look that shows most of the unseen space right behind what has been seen, where objects go on or hide
-//! (the rear side voxels of Delmerico et al., *A comparison of volumetric information gain metrics*, section III).
+//! `rear-side`: the look that shows most unobserved space directly behind observed surfaces, where
+//! objects continue or hide (rear side voxels of Delmerico et al., *A comparison of volumetric
+//! information gain metrics*, section III).
 
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};

@@ -1,5 +1,5 @@
-//! `sweep`: the fixed tour of paper 004. From the nearest pose of the ring all the way around, whatever is seen, until the
-//! goal is achieved or every pose has been looked from.
+//! `sweep`: the fixed tour of Niemueller et al.: from the nearest pose all the way around the ring,
+//! until the goal is achieved or every pose has been used.
 
 use super::policy::{Look, Policy, best};
 use crate::situation::Situation;

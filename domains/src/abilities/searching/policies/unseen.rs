@@ -9,11 +9,11 @@ use crate::surface::KnownSurface;
 
 /// Distance of the points.
 const GRID_M: f64 = 0.05;
-/// Height up to which space counts: that of the tallest of the published objects.
+/// Height up to which space counts, metres: that of the tallest published object.
 const HEIGHT_M: f64 = 0.28;
 
-/// The number of unseen points of a kind that a look would show, as far as occluders are known. While nothing
-/// is known of the surface, all looks are equal.
+/// Number of unobserved points accepted by `counts` that a look would show, given known occluders;
+/// equal for all looks while the surface is unknown.
 pub(super) fn visible(situation: &Situation, look: &Look, counts: impl Fn(&Point3<f64>) -> bool) -> f64 {
     let Some(map_from_camera) = situation.camera(look.from, look.on) else { return 0.0 };
     let eye = Point3::from(map_from_camera.translation.vector);

@@ -1,8 +1,8 @@
-//! Does a stated probability mean what it says? Brier score and reliability.
+//! Calibration of stated probabilities: Brier score and reliability diagram.
 
 use serde::Serialize;
 
-/// A stated probability and whether it came true.
+/// Stated probability, and true if the claim was right.
 pub type Claim = (f64, bool);
 
 /// One bin of a reliability plot.
@@ -10,9 +10,9 @@ pub type Claim = (f64, bool);
 pub struct Bin {
     /// Least stated probability (inclusive).
     pub low: f64,
-    /// Greatest stated probability (exclusive, but for the last bin).
+    /// Upper edge of the bin (exclusive except in the last bin).
     pub high: f64,
-    /// Claims in it.
+    /// Number of claims in the bin.
     pub count: usize,
     /// Their mean stated probability.
     pub stated: f64,

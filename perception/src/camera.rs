@@ -45,7 +45,8 @@ pub enum CameraError {
 }
 
 impl Intrinsics {
-    /// Pixel (column, row) of a point in the optical frame, metres; `None` behind the camera. It may lie outside the image.
+    /// Pixel (column, row) of a point in the optical frame, metres, possibly outside the image;
+    /// `None` behind the camera.
     #[inline]
     pub fn project(&self, p: &Point3<f64>) -> Option<(f64, f64)> {
         (p.z > 0.0).then(|| (self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy))
@@ -66,7 +67,8 @@ impl Intrinsics {
         inside.then(|| v as u32 as usize * self.width + u as u32 as usize)
     }
 
-    /// An organised cloud in the optical frame from depths along z in metres, row by row; what is not finite or not positive is "no return".
+    /// Organised cloud in the optical frame from depths along z, metres, row by row; non-finite and
+    /// non-positive depths are missing returns.
     ///
     /// # Errors
     /// If the image has another size than the camera, or a focal length is not positive.

@@ -1,4 +1,4 @@
-//! Point clouds: what every step of perception takes and gives.
+//! Point clouds, the data type that all steps of perception share.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -16,20 +16,22 @@ pub struct Grid {
 const FARTHEST_TYPICAL_M: f64 = 100.0;
 /// Upper bound of the coordinates of a map, metres. From: derived, the width of the earth.
 const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
-/// A place whose points lie within this of their middle is in metres if it is far away, metres. From: chosen.
+/// Maximum median distance of points from their centre in a cloud that is in metres though far from
+/// the origin, metres. From: chosen.
 const WIDEST_PLACE_M: f64 = 20.0;
 /// Extent as a share of the distance from the origin below which a cloud counts as far away rather than given
 /// in other units. From: chosen.
 const NARROW: f64 = 0.01;
-/// Median distances, in the cloud's unit, between which a cloud may be in millimetres or in centimetres:
-/// nearer is too near for a depth camera that gives millimetres; farther is too far for one that gives
+/// Median distances, in the cloud's unit, between which a cloud may be in millimetres or in
+/// centimetres: below, it is too near for a depth camera in millimetres; above, too far for one in
 /// centimetres. From: chosen.
 const LEAST_MILLIMETRES: f64 = 300.0;
 const MOST_CENTIMETRES: f64 = 800.0;
-/// Coordinates that single precision tells less apart than this blur objects, metres. From: chosen.
+/// Resolution of single-precision coordinates above which objects are blurred, metres. From:
+/// chosen.
 const COARSEST_M: f64 = 1e-4;
 
-/// Points with what is known of each. All attributes that are present have one entry a point.
+/// Points with optional attributes; each attribute that is present has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cloud {
     /// Positions in metres. NaN is "no return" and stands in organised clouds only.
@@ -89,12 +91,13 @@ impl Cloud {
         self.points.len()
     }
 
-    /// True if there is no point at all.
+    /// True if the cloud has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Checks that attributes and grid fit the points. Readers of this crate give only clouds that pass.
+    /// Checks that attributes and grid match the number of points; clouds from this crate's readers
+    /// always pass.
     pub fn check(&self) -> Result<(), CloudError> {
         let points = self.points.len();
         if points > u32::MAX as usize {
@@ -186,15 +189,17 @@ impl Cloud {
         self.grid = None;
     }
 
-    /// Least and greatest corner of the box around the finite points, metres; `None` if there is none.
+    /// Minimum and maximum corner of the bounding box of the finite points, metres; `None` without
+    /// finite points.
     pub fn bounds(&self) -> Option<(Point3<f32>, Point3<f32>)> {
         let mut finite = self.points.iter().filter(|p| is_finite(p));
         let first = *finite.next()?;
         Some(finite.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
     }
 
-    /// A warning if a typical return lies farther from the sensor (the origin) than any depth camera or room scanner sees: what that looks
-    /// like. Other units are mended with [`Cloud::scaled`], coordinates of a map by subtracting an offset before they are written.
+    /// Warning if a typical return is farther from the sensor (the origin) than depth cameras and
+    /// room scanners measure, with the probable cause. [`Cloud::scaled`] converts other units; map
+    /// coordinates need an offset subtracted before writing.
     pub fn unit_warning(&self) -> Option<String> {
         if self.is_surely_near() {
             return None;
@@ -230,7 +235,8 @@ impl Cloud {
         })
     }
 
-    /// True if more than half of the points lie well within what is typical: told without a root of each.
+    /// True if more than half of the points lie well within typical range; avoids a square root per
+    /// point.
     fn is_surely_near(&self) -> bool {
         /// Fraction of the squared range below which single precision is safe. From: rounding.
         const SURE: f32 = 0.999;
@@ -252,8 +258,8 @@ impl Cloud {
         Some(median(finite().map(|p| (p - middle).norm()).collect()))
     }
 
-    /// The note on coordinates so far from the origin that single precision blurs them; `None` if they are
-    /// near enough.
+    /// Note on coordinates so far from the origin that single precision blurs them; `None` if near
+    /// enough.
     fn far_from_origin(&self, far_m: f64) -> Option<String> {
         let (low, high) = self.bounds()?;
         let greatest = low.coords.amax().max(high.coords.amax());

@@ -1,4 +1,4 @@
-//! Euclidean clusters: what hangs together by steps of a given length.
+//! Euclidean clustering: points are connected by steps up to a given length.
 
 use crate::cloud::is_finite;
 use nalgebra::Point3;
@@ -87,8 +87,8 @@ impl Cells {
         &self.items[self.begin[cell] as usize..self.begin[cell + 1] as usize]
     }
 
-    /// Joins all cells that hold points within a step of each other. For each of the rows of cells within reach that lie before,
-    /// a cursor moves along with the cell, so that no cell is searched for.
+    /// Joins all cells with points within a step of each other. A cursor per preceding row of cells
+    /// advances with the current cell, so that no search is needed.
     fn join(&self, sets: &mut Sets, step_m: f32) {
         let limit = step_m * step_m;
         let rows: Vec<(i32, i32)> = (-REACH..=0)

@@ -1,4 +1,5 @@
-//! Consistency of looks with the map: whether camera and poses are as stated, and which fault explains what they show better.
+//! Consistency of looks with the map: tests camera and poses against their stated values, and finds
+//! the fault that explains the looks better.
 //!
 //! Each look predicts what the map has of a level surface: its height, its tilt, and where it ends. One error model covers camera and
 //! poses; every look adds its own small pose error under the stated spread. A fault is named where it explains the looks far better
@@ -13,8 +14,9 @@ use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector2,
 use sight::Sight;
 use std::fmt;
 
-/// Misfit above which a look contradicts the statement, whatever explains it: more than five standard deviations of a stated quantity.
-/// From: chosen, five times what honest simulated recordings reach.
+/// Misfit above which a look contradicts the stated values regardless of any explanation: more than
+/// five standard deviations of a stated quantity. From: chosen, five times what honest simulated
+/// recordings reach.
 const MISFIT: f64 = 30.0;
 /// A look contributes no more misfit than this: one look with a gross pose error must not name a fault of all. From: chosen.
 const MOST_MISFIT: f64 = 150.0;
@@ -33,9 +35,9 @@ const MENDED: f64 = 4.0;
 /// A level surface that the map states, in a map whose z axis points up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSurface {
-    /// Corners of its convex outline in order around, metres.
+    /// Corners of the convex outline in order, metres.
     pub outline_m: Vec<Point2<f64>>,
-    /// Height of its top, metres.
+    /// Height of the surface, metres.
     pub height_m: f64,
 }
 
@@ -50,11 +52,12 @@ pub enum Fault {
     PrincipalPoint(Vector2<f64>),
     /// Columns run from right to left.
     Mirrored,
-    /// Each look has the pose of a number of frames before it (after it, if negative).
+    /// Poses are shifted in time by a number of frames: each look has the pose of so many frames
+    /// before (after, if negative).
     Late(i64),
     /// The stated poses all lie so far from the true ones: a shift in the map, metres, and a turn about the surface's middle, radians.
     Displaced(Vector2<f64>, f64),
-    /// No single fault of the camera or of the poses explains what the looks show.
+    /// No single fault of camera or poses explains the looks.
     Unexplained,
 }
 
@@ -112,7 +115,7 @@ pub struct Inconsistency {
     pub fault: Fault,
     /// The probability of the fault.
     pub probability: f64,
-    /// Distance by which it misplaces what stands on the surface, metres.
+    /// Displacement that the fault causes for objects on the surface, metres.
     pub spread_m: f64,
 }
 
@@ -123,8 +126,8 @@ impl Inconsistency {
     }
 }
 
-/// Finds the fault that explains why looks at one surface of the map disagree with the map; none if they
-/// agree, or show too little of the surface.
+/// Finds the fault that explains why looks at a mapped surface disagree with the map; `None` if
+/// they agree, or show too little of the surface.
 ///
 /// Each look is a view and its stated pose. `asked` is the number of the surface in `map`. `neighbours` has, for each number of frames by
 /// which poses may be late, the poses that the looks would have.
@@ -222,7 +225,7 @@ impl MapSurface {
 #[derive(Clone, Debug)]
 struct Model {
     fault: Fault,
-    /// Poses of the sights, where they are not the stated ones.
+    /// Poses of the sights, if they differ from the stated ones.
     poses: Option<Vec<Isometry3<f64>>>,
 }
 
@@ -244,7 +247,7 @@ impl Model {
         sights.iter().all(|s| shift.norm() < MENDED * s.sigma_m && turn.abs() < MENDED * s.sigma_rad)
     }
 
-    /// The true point in the optical frame of what was measured at `p`.
+    /// True position in the optical frame of the point measured at `p`.
     fn point(&self, sight: &Sight, p: &Vector3<f64>) -> Vector3<f64> {
         let camera = &sight.camera;
         match self.fault {
@@ -299,8 +302,8 @@ impl Family {
         }
     }
 
-    /// Pattern search (Hooke and Jeeves 1961) for the least misfit, from the statement outwards; given up where no first step takes away
-    /// a good part of it.
+    /// Pattern search (Hooke and Jeeves 1961) for the minimum misfit, starting from the stated
+    /// values; abandoned if no first step removes a good part of the misfit.
     fn search(self, before: f64, misfit: &mut impl FnMut(Fault) -> f64) {
         /// Steps taken at most, in all. From: work.
         const EVALUATIONS: usize = 60;

@@ -1,6 +1,6 @@
 //! Repeatable random draws (SplitMix64: Steele, Lea, Flood 2014), the same on every machine and in every version.
 
-/// A stream of draws that its seed fixes.
+/// Deterministic pseudo-random generator, fixed by its seed.
 #[derive(Clone, Debug)]
 pub struct Draws(u64);
 
@@ -16,12 +16,13 @@ impl Draws {
         b ^ (b >> 31)
     }
 
-    /// A whole number below `end` (Lemire's multiplication; its bias of `end / 2^64` is nothing here).
+    /// Uniform whole number below `end` (Lemire's multiplication; the bias of `end / 2^64` is
+    /// negligible).
     pub(crate) fn below(&mut self, end: usize) -> usize {
         ((u128::from(self.next()) * end as u128) >> 64) as usize
     }
 
-    /// `N` different numbers below `end`; `None` if there are not as many.
+    /// `N` distinct numbers below `end`; `None` if `end` is smaller than `N`.
     pub(crate) fn distinct<const N: usize>(&mut self, end: usize) -> Option<[usize; N]> {
         if end < N {
             return None;

@@ -1,4 +1,4 @@
-//! Clouds and depth images from bytes and back. Nothing here touches a file system.
+//! Clouds and depth images from bytes and to bytes, without a file system.
 
 mod columns;
 pub mod depth;
@@ -31,7 +31,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// A file that cannot be read: where, what was expected, what was found, and how to mend it.
+/// Error of an unreadable file: place, expected and found content, and remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: expected {expected}, found {found}; {mend}")]
 pub struct FileError {
@@ -41,7 +41,7 @@ pub struct FileError {
     pub expected: String,
     /// The content that was found.
     pub found: String,
-    /// The way to correct the error.
+    /// Remedy.
     pub mend: String,
 }
 
@@ -56,18 +56,20 @@ impl FileError {
     }
 }
 
-/// A cloud read from a file, with what the file says besides.
+/// Cloud read from a file, with the file's further information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// The cloud. Without a grid it holds finite points only.
+    /// Cloud; contains finite points only, unless it has a grid.
     pub cloud: Cloud,
-    /// The sensor's pose as the file states it (`VIEWPOINT` of PCD); identity if it states none. The points are not moved by it.
+    /// Sensor pose stated by the file (`VIEWPOINT` of PCD), else identity; points are not
+    /// transformed by it.
     pub viewpoint: Isometry3<f64>,
     /// Notes for a person: points left out, suspicious units, attributes ignored.
     pub notes: Vec<String>,
 }
 
-/// Reads a cloud: PCD, PLY, NPY, LAS, or text (XYZ, CSV, PTS), told apart by the first bytes.
+/// Reads a cloud (PCD, PLY, NPY, LAS, or text: XYZ, CSV, PTS); the format follows from the first
+/// bytes.
 ///
 /// # Errors
 /// If it is none of these, or broken.
@@ -87,16 +89,17 @@ pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
     pcd::read(bytes)
 }
 
-/// Most bytes of padding behind the data: a page of memory, up to which the Point Cloud Library fills its files. From: chosen, 64 KiB.
+/// Maximum padding after the data, bytes: a memory page, to which the Point Cloud Library fills its
+/// files. From: chosen, 64 KiB.
 const MOST_PADDING: usize = 1 << 16;
 
-/// True if what follows the data is nothing: zeros to the end of a page, or the end of a line.
+/// True if the remaining bytes are padding: zeros to the end of a page, or a line end.
 fn is_padding(rest: &[u8]) -> bool {
     rest.len() < MOST_PADDING && rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
 }
 
-/// Takes pixels at the place of the sensor itself as "no return": how many they were. Where the file says that the sensor stood elsewhere
-/// than at the origin, a point there is one like any other.
+/// Marks pixels at the sensor's own position as missing returns and counts them; skipped if the
+/// file states a sensor position other than the origin.
 fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
     if viewpoint.translation.vector != Vector3::zeros() {
         return 0;
@@ -109,7 +112,8 @@ fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
     voided
 }
 
-/// Makes raw points sane: infinite becomes "no return", what has no return leaves clouds without a grid; says what it did.
+/// Normalises raw points: infinite ones become missing returns, and clouds without a grid drop
+/// missing returns; adds notes.
 fn finish(
     mut cloud: Cloud,
     viewpoint: Isometry3<f64>,

@@ -15,12 +15,13 @@ pub struct Hull {
     pub u: Vector3<f64>,
     /// Second axis; `u`, `v`, normal are right-handed.
     pub v: Vector3<f64>,
-    /// Corners in those coordinates, anticlockwise seen from where the normal points, metres. Two for points on a line, one for one place.
+    /// Corners in plane coordinates, anticlockwise seen against the normal, metres; two for
+    /// collinear points, one for coincident points.
     pub corners: Vec<Point2<f64>>,
 }
 
 impl Hull {
-    /// The hull of the finite points, projected along the normal; `None` if there is none.
+    /// Convex hull of the finite points projected along the normal; `None` without finite points.
     pub fn around<'a>(plane: Plane, points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Hull> {
         let (u, v) = tangents(&plane.normal);
         let origin = Point3::from(plane.normal * plane.offset_m);
@@ -39,7 +40,7 @@ impl Hull {
         Point2::new(d.dot(&self.u), d.dot(&self.v))
     }
 
-    /// A point of the plane from its coordinates.
+    /// Point in space from plane coordinates.
     pub fn lift(&self, q: &Point2<f64>) -> Point3<f64> {
         self.origin + self.u * q.x + self.v * q.y
     }
@@ -79,7 +80,7 @@ impl Hull {
         self.edges().map(|(a, b)| (b - a).norm()).sum()
     }
 
-    /// Centre of mass of the region, in the plane's coordinates; of the corners, where they enclose nothing.
+    /// Centroid of the hull in plane coordinates; mean of the corners if the area is zero.
     pub fn centre(&self) -> Point2<f64> {
         let first = self.corners.first().map_or(Vector2::zeros(), |c| c.coords);
         let (mut sum, mut twice_area) = (Vector2::zeros(), 0.0);
@@ -101,7 +102,7 @@ impl Hull {
     }
 }
 
-/// Corners of the convex hull, anticlockwise, without points on its edges (Andrew 1979).
+/// Corners of the convex hull, anticlockwise, without collinear points (Andrew 1979).
 pub fn convex(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
     points.retain(|p| p.x.is_finite() && p.y.is_finite());
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));

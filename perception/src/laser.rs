@@ -1,5 +1,5 @@
-//! Shape models from a planar laser: scans of one thing, aligned by the angles that bound it (Modayil and Kuipers, *Autonomous Shape Model
-//! Learning for Object Localization and Recognition*).
+//! Shape models from a planar laser: scans of one object, aligned by their bounding angles (Modayil
+//! and Kuipers, *Autonomous Shape Model Learning for Object Localization and Recognition*).
 //!
 //! The pipeline, a file a step: a [`Scan`]; what of it is no background ([`observe`]); what it says of the thing ([`ObjectScan`]); how far poses violate
 //! the angular constraints between scans ([`Violation`]: Eq. 1 to 3); poses that do so least ([`align`], or [`align_consistent`] where some scans may be

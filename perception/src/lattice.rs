@@ -14,7 +14,8 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice over a box. The voxels are at least `voxel_m` wide, wider if 64 bits could not number them.
+    /// Lattice over a box, with voxels at least `voxel_m` wide, and wider if their numbers would
+    /// exceed 64 bits.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, mut voxel_m: f64) -> Lattice {
         loop {
             let per_m = 1.0 / voxel_m;
@@ -37,14 +38,14 @@ impl Lattice {
         i << self.shift[0] | j << self.shift[1] | k
     }
 
-    /// Key offsets of the nine columns of voxels around a voxel: added to its key, each gives the first of
-    /// three voxels in a row.
+    /// Key offsets of the nine voxel columns around a voxel; added to a key, each gives the first
+    /// of three consecutive voxels.
     fn columns(&self) -> [i64; 9] {
         let (x, y) = (1_i64 << self.shift[0], 1_i64 << self.shift[1]);
         std::array::from_fn(|c| (c as i64 / 3 - 1) * x + (c as i64 % 3 - 1) * y - 1)
     }
 
-    /// Sorts keys with their payload; equal keys stay in order. What `spare` holds is overwritten.
+    /// Stable sort of keys with payload; overwrites `spare`.
     pub fn sort(&self, entries: &mut Vec<(u64, u32)>, spare: &mut Vec<(u64, u32)>) {
         const DIGIT: u32 = 11;
         const SMALL: usize = 2048;
@@ -91,7 +92,8 @@ impl<'a> Around<'a> {
         Around { keys, columns, starts }
     }
 
-    /// Calls `found` with the numbers of the occupied voxels among the 27 around a key, itself among them. Keys must not fall from call to call.
+    /// Calls `found` with the indices of the occupied voxels among the 27 around a key, including
+    /// its own. Keys must not decrease from call to call.
     #[inline(always)]
     pub fn visit(&mut self, key: u64, mut found: impl FnMut(usize)) {
         for (start, column) in self.starts.iter_mut().zip(&self.columns) {

@@ -1,4 +1,5 @@
-//! Objects learned without being told (Fäulhammer et al., *Autonomous Learning of Object Models on a Mobile Robot*).
+//! Unsupervised learning of object models (Fäulhammer et al., *Autonomous Learning of Object Models
+//! on a Mobile Robot*).
 //!
 //! The pipeline, a file a step: what differs from the static structure of a place ([`MetaRoom`], Eq. 1, 2); where to stand around it
 //! ([`stands`], [`trajectories`]); the looks that are far enough apart ([`keyframes`]) brought together ([`register`]); in each look the object is

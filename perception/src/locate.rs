@@ -20,22 +20,24 @@ const FEWEST: usize = 2;
 /// Maximum distance of a sample from its edge, iteration by iteration: where the view cuts the surface off or
 /// an object hides its end, samples lie farther in than the edge.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
-/// Standard deviation of one sample; neighbours err together, which is why it is no millimetre.
+/// Standard deviation of a sample; centimetres, because neighbouring samples share their errors.
 const SAMPLE_SIGMA_M: f64 = 0.03;
 /// Fewest samples of an end on either side; with fewer, the surface is aligned by the extent that was seen.
 const FEW: usize = 5;
-/// Standard deviation of how far it was seen to reach, where that is from side to side, and most that it may fall short of it, metres.
+/// Standard deviation of the observed extent between opposite sides, and maximum shortfall of that
+/// extent, metres.
 const REACH_SIGMA_M: f64 = 0.01;
 const SHORT_M: f64 = 0.10;
 
-/// The alignment of a surface with its outline.
+/// Alignment of a surface with its outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
     /// The transform from the cloud's frame to the map.
     pub map_from_world: Isometry3<f64>,
     /// Samples of seen edges that found an edge of the outline.
     pub matched: usize,
-    /// Root mean square distance of those from the outline afterwards, metres; 0 without any.
+    /// Root mean square distance of the samples from the aligned outline, metres; 0 without
+    /// samples.
     pub residual_m: f64,
     /// The certainty of that transform; none without an outline.
     pub certainty: Option<Certainty>,
@@ -45,13 +47,14 @@ pub struct Located {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty {
     frame: Frame,
-    /// Covariance of a shift along the two axes of the frame, square metres, and of a turn about its origin,
-    /// square radians.
+    /// Covariance of shift along the frame's two axes (square metres) and rotation about its origin
+    /// (square radians).
     covariance: Matrix3<f64>,
 }
 
 impl Certainty {
-    /// The direction along the surface in which the place of a point is known worst, and its standard deviation that way, metres.
+    /// Least certain direction of a point along the surface, and the standard deviation in that
+    /// direction, metres.
     pub fn worst(&self, at: &Point3<f64>) -> (Unit<Vector3<f64>>, f64) {
         let p = self.frame.flat(at);
         let moved = Matrix2x3::new(1.0, 0.0, -p.y, 0.0, 1.0, p.x);
@@ -63,8 +66,9 @@ impl Certainty {
     }
 }
 
-/// Lays the endings of a surface that were seen on the outline that the map has of it (in order around, metres), and between two sides
-/// of which none was seen, what was seen of the surface, its `hull`, if that is hardly shorter: a board between uprights ends nowhere.
+/// Aligns the observed edges of a surface with the map's outline (in order, metres). Between
+/// opposite sides without an observed edge, the extent of `hull` is used if hardly shorter: a board
+/// between uprights shows no edge.
 ///
 /// `sigma_m` and `sigma_rad` say how well the place in the map of what was seen is known before: where no ending tells otherwise,
 /// it stays. Moves along the surface and turns about `up`; heights are left as they are.
@@ -122,8 +126,8 @@ impl End {
         End { on: frame.flat(&ending.on), past: frame.flat(&ending.past), side, eye: frame.flat(&ending.eye) }
     }
 
-    /// The distance of the end outside an edge, and half of its uncertainty, metres; none if the surface does
-    /// not end on that edge's side.
+    /// Distance of an ending outside an edge, and half its uncertainty, metres; `None` if the
+    /// ending belongs to another side.
     fn beyond(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
         let out = |p: &Point2<f64>| edge.outward.dot(&(moved * p - edge.from));
         let (on, past) = (out(&self.on), out(&self.past));
@@ -135,9 +139,9 @@ impl End {
     }
 }
 
-/// A sample with the edge of the outline that it lies on.
+/// Sample matched with an edge of the outline.
 pub struct Match {
-    /// The sample where the present estimate has it.
+    /// Sample at the current pose estimate.
     at: Point2<f64>,
     normal: Vector2<f64>,
     /// Signed, along the normal.
@@ -145,7 +149,7 @@ pub struct Match {
     variance_m2: f64,
 }
 
-/// The plane of the outline with its middle as origin.
+/// Plane of the outline, with the outline's centre as origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Frame {
     origin: Point3<f64>,
@@ -189,8 +193,8 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
     (0..outline.len()).filter_map(edge).collect()
 }
 
-/// The ends of the surface along the edges, a sample every [`BIN_M`]: the mean of the endings there that lie
-/// nearest to that edge.
+/// Samples of the surface's ends, one every [`BIN_M`] along each edge: mean of the endings nearest
+/// to that edge.
 fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
     let mut bins: Vec<Vec<Bin>> =
         edges.iter().map(|edge| vec![Bin::default(); (edge.length_m / BIN_M) as usize]).collect();
@@ -215,8 +219,8 @@ fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) ->
     each.collect()
 }
 
-/// Matches of spans between two opposite sides of the outline, neither of which shows an end: a span that
-/// reaches nearly from one side to the other is put in the middle.
+/// Matches between opposite sides of the outline without observed ends: an extent that nearly fills
+/// the distance is centred.
 fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2<f64>) -> Vec<Match> {
     let is_open = |edge: &&Edge| ends.iter().filter(|m| m.normal == edge.outward).count() < FEW;
     let open: Vec<&Edge> = edges.iter().filter(is_open).collect();
@@ -240,7 +244,7 @@ fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2
 /// The cosine between the normals of two sides that lie opposite.
 const OPPOSITE: f64 = -0.98;
 
-/// Endings on a piece of an edge: how many, the sums of how far out they are and of half their widths.
+/// Endings along a piece of an edge: count, sum of outward distances, and sum of half widths.
 #[derive(Clone, Default)]
 struct Bin {
     count: usize,
@@ -257,7 +261,7 @@ impl Bin {
     }
 }
 
-/// One Gauss-Newton step towards the edges, held by what was known before, and the covariance of what it leads to.
+/// Gauss-Newton step towards the edges with the prior; returns the covariance as well.
 pub fn step(
     matches: &[Match],
     moved: &Isometry2<f64>,

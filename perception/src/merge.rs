@@ -36,10 +36,10 @@ use serde::{Deserialize, Serialize};
 pub struct MergeOptions {
     /// The up direction in the world, if known.
     pub up: Option<Unit<Vector3<f64>>>,
-    /// Least and greatest height along `up` of what is merged, metres; outside it points are dropped.
+    /// Height range along `up` of the merged points, metres; points outside are dropped.
     pub height_band_m: Option<(f64, f64)>,
-    /// The region that is merged, seen along `up`, if not everything; views are aligned by all that they
-    /// show.
+    /// Region, seen along `up`, to which the merged cloud is limited; views are aligned by all
+    /// their points.
     pub region: Option<Region>,
     /// Returns farther from their camera than this are dropped, metres. From: chosen.
     pub range_m: f64,
@@ -47,7 +47,8 @@ pub struct MergeOptions {
     pub align_voxel_m: f64,
     /// Side of the voxels in which points are fused, metres: the resolution of the merged cloud. From: chosen.
     pub fuse_voxel_m: f64,
-    /// Most points of the merged cloud; beyond it the fusing voxels grow. From: chosen.
+    /// Maximum number of points of the merged cloud; above it, the fusing voxels grow. From:
+    /// chosen.
     pub most_points: usize,
 }
 
@@ -70,19 +71,19 @@ impl Default for MergeOptions {
 pub struct ViewFit {
     /// The corrected pose.
     pub world_from_camera: Isometry3<f64>,
-    /// The shift of the camera from its localised pose, metres.
+    /// Shift of the camera from its localised pose, metres.
     pub moved_m: f64,
-    /// The turn of the camera from its localised pose, radians.
+    /// Rotation of the camera from its localised pose, radians.
     pub moved_rad: f64,
     /// Downsampled points with a partner in another view.
     pub matched: usize,
-    /// Root mean square distance of those from the partners' planes, metres.
+    /// Root mean square point-to-plane distance of the correspondences, metres.
     pub residual_m: f64,
     /// True if the correction settled.
     pub converged: bool,
     /// False if the view was left out of the merged cloud.
     pub used: bool,
-    /// True if the view was left out since it and the others cannot both be as stated.
+    /// True if the view was left out because it contradicts the others.
     #[serde(default)]
     pub is_at_odds: bool,
     /// The reason the view converged, or was left out, in words.
@@ -94,18 +95,18 @@ pub struct ViewFit {
 pub struct Step {
     /// Name.
     pub name: String,
-    /// Points after it.
+    /// Number of points after the step.
     pub points: usize,
     /// The result of the step, in words.
     pub result: String,
 }
 
-/// The merged cloud and how it came about.
+/// Merged cloud with diagnostics.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// All used views in one cloud, world frame, without grid; normals face a camera that saw them.
+    /// All used views in one cloud, world frame, without grid; normals face an observing camera.
     pub cloud: Cloud,
-    /// A point's number of views that measured it.
+    /// Number of views that measured each point.
     pub views_per_point: Vec<u16>,
     /// The visibility of the used views, with corrected poses.
     pub visibility: Visibility,
@@ -136,7 +137,7 @@ pub enum MergeError {
     /// The list of views is empty.
     #[error("no view to merge: give at least one")]
     NoViews,
-    /// Options that mean nothing.
+    /// Invalid options.
     #[error("merge option `{field}` is {value}: expected {expected}")]
     Option {
         /// The option.
@@ -161,16 +162,18 @@ pub enum MergeError {
         views: usize,
         /// The range limit, metres.
         range_m: f64,
-        /// Words about the height band, or nothing.
+        /// Description of the height band, or empty.
         band: String,
     },
 }
 
 /// First alignment: everything, from far to near (the table weighs most; paper step 3). From: chosen.
 const FIRST: Round = Round { from_m: 0.12, to_m: 0.04, passes: 6, asked: 800, rest_weight: 1.0 };
-/// The same where a view was left out: localisation may have been worse than it said, or what is seen far off. From: chosen.
+/// First alignment with a wider search, if a view would otherwise be left out: localisation may be
+/// worse than stated. From: chosen.
 const WIDE: Round = Round { from_m: 0.3, passes: 12, asked: 900, ..FIRST };
-/// Second alignment: planes and what is far weigh little, the objects decide (paper step 4). From: chosen.
+/// Second alignment: planes and distant points weigh little, the objects decide (paper step 4).
+/// From: chosen.
 const SECOND: Round = Round { from_m: 0.05, to_m: 0.012, passes: 9, asked: 1200, rest_weight: 0.2 };
 /// Alignment after a view was left out, in which the rest settles again. From: chosen.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
@@ -191,7 +194,7 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     })
 }
 
-/// The merged cloud of what was gathered, with what is said of it.
+/// Merged cloud of the gathered voxels, with its diagnostics.
 fn merged(gathered: &[Gathered], seen: Visibility, fits: Vec<ViewFit>, mut steps: Vec<Step>) -> Merged {
     let fused = settle::fused(gathered);
     steps.push(Step {
@@ -239,7 +242,7 @@ pub fn align_views(views: &[View], options: &MergeOptions) -> Result<Vec<ViewFit
     })
 }
 
-/// Steps 3 and 4; from farther away if a view would be left out else.
+/// Steps 3 and 4; with a wider search if a view would otherwise be left out.
 fn place(
     prepared: &[Prepared],
     maps: &[Option<DepthMap>],
@@ -367,7 +370,7 @@ fn aligned(name: &str, found: &[Found]) -> Step {
     }
 }
 
-/// Localisation errs by as much as it states.
+/// Localisation errors as stated: looseness 1 for each view.
 fn as_stated(prepared: &[Prepared]) -> Vec<f64> {
     vec![1.0; prepared.len()]
 }
@@ -419,8 +422,8 @@ fn align_objects(
     found
 }
 
-/// The pose of the first alignment without its shift along the surface and its turn about the vertical: those were guesses,
-/// drawn by whatever surfaces happened to be near; tilt and height are certain.
+/// Pose of the first alignment without its shift along the surface and its rotation about the
+/// vertical, which are unreliable; tilt and height are certain.
 fn only_levelled(view: &Prepared, pose: &Isometry3<f64>, up: &Unit<Vector3<f64>>) -> Isometry3<f64> {
     let n = view.points.len().max(1) as f64;
     let middle = view.points.iter().fold(Vector3::zeros(), |s, p| s + p.at().coords) / n;
@@ -447,7 +450,8 @@ struct Objects<'a> {
 }
 
 impl Objects<'_> {
-    /// Puts the objects of one view after another onto those already placed, nearest camera first.
+    /// Places the objects of one view after another onto those already placed, nearest camera
+    /// first.
     fn place_all(&self, used: &[bool], levelled: &[Isometry3<f64>], poses: &mut [Isometry3<f64>]) {
         let mut left: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
         let count = |i: usize| self.parts[i].iter().filter(|p| **p == Part::Standing).count();
@@ -475,8 +479,8 @@ impl Objects<'_> {
         views.iter().flat_map(|&i| objects(&self.prepared[i], &self.parts[i], &poses[i])).collect()
     }
 
-    /// Puts the objects of a view, so loose, onto placed ones: by search from its levelled pose, unless the pose it has fits them better already
-    /// or less than the least share of it would fall onto them.
+    /// Places a view's objects onto placed ones by search from its levelled pose; skipped if the
+    /// current pose already fits better, or less than the minimum share would match.
     fn place_on(
         &self,
         (view, loose, least_share): (usize, f64, f64),
@@ -484,8 +488,8 @@ impl Objects<'_> {
         levelled: &Isometry3<f64>,
         pose: &mut Isometry3<f64>,
     ) {
-        /// Margin in the share of fitting points by which the present pose is preferred to one that was
-        /// searched for. From: chosen.
+        /// Margin of the matching share by which the current pose is preferred over a searched one.
+        /// From: chosen.
         const STAYS: f64 = 0.05;
         let (up, view, parts) = (&self.up, &self.prepared[view], &self.parts[view]);
         let own = objects(view, parts, levelled);
@@ -498,16 +502,17 @@ impl Objects<'_> {
     }
 }
 
-/// Points and normals of what stands on the surface in a view, in the world.
+/// Points and normals of the objects on the surface in a view, world frame.
 fn objects(view: &Prepared, parts: &[Part], pose: &Isometry3<f64>) -> Vec<Oriented> {
     let standing = (0..view.points.len()).filter(|&k| parts[k] == Part::Standing);
     standing.map(|k| (pose * view.points[k].at(), pose.rotation * view.points[k].normal())).collect()
 }
 
-/// The search window of two views, by how far off they may be from each other at the distance of the objects:
-/// three spreads, at least the 10 cm and 6° of a poor localisation.
+/// Search window of two views from their pose uncertainty at the objects' distance: three standard
+/// deviations, at least the 10 cm and 6° of a poor localisation.
 fn window(view: &Prepared, loose: f64, objects: &[Oriented], pose: &Isometry3<f64>) -> search::Window {
-    /// Least and greatest turn, radians, and shift, metres; the greatest shift with what a turn adds. From: chosen, 6° to 8°.
+    /// Minimum and maximum rotation, radians, and shift, metres, of the search window; the maximum
+    /// shift includes the effect of rotation. From: chosen, 6° to 8°.
     const TURNS_RAD: (f64, f64) = (0.105, 0.14);
     const SHIFTS_M: (f64, f64) = (0.10, 0.14);
     const WIDEST_M: f64 = 0.3;

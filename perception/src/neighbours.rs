@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 pub(crate) use nearby::{Nearby, least};
 
-/// Points a leaf. All leaves but the last are full; that one is padded with infinity, which is near nothing.
+/// Points per leaf; the last leaf is padded with infinity, which is near nothing.
 pub(crate) const LEAF: usize = 32;
 
 /// A neighbour of a query.
@@ -24,7 +24,7 @@ pub struct Neighbour {
     pub distance_sq: f32,
 }
 
-/// A box with its sides along the axes.
+/// Axis-aligned box.
 #[derive(Clone, Copy, Debug)]
 struct Bounds {
     low: [f32; 3],
@@ -66,7 +66,7 @@ impl Bounds {
     }
 }
 
-/// [`f32::min`] and [`f32::max`] of what is a number: a single instruction each.
+/// [`f32::min`] and [`f32::max`] for numbers that are not NaN: a single instruction each.
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -93,11 +93,11 @@ pub struct Neighbours {
     index: Vec<u32>,
     nodes: Vec<Bounds>,
     len: usize,
-    /// Points that the tree was built from, those without a return included.
+    /// Number of points that the tree was built from, including missing returns.
     given: usize,
 }
 
-/// A node and the leaves that it covers.
+/// Node with its range of leaves.
 #[derive(Clone, Copy)]
 struct Span {
     node: usize,
@@ -155,17 +155,18 @@ impl Neighbours {
         self.len
     }
 
-    /// True if there was no finite point.
+    /// True if there are no finite points.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Number of points that the tree was built from, those without a return included.
+    /// Number of points that the tree was built from, including missing returns.
     pub fn given(&self) -> usize {
         self.given
     }
 
-    /// The nearest point that is no farther than `within_m`; of equally near ones the first in the tree. `None` also for a query that is not finite.
+    /// Nearest point within `within_m`, the first in the tree among ties; `None` also for a
+    /// non-finite query.
     pub fn nearest(&self, query: &Point3<f32>, within_m: f32) -> Option<Neighbour> {
         let mut best = Neighbour { index: u32::MAX, distance_sq: next_up(within_m * within_m) };
         if !self.is_empty() && is_finite(query) {
@@ -174,7 +175,7 @@ impl Neighbours {
         (best.index != u32::MAX).then_some(best)
     }
 
-    /// The `k` nearest points, nearest first; fewer if there are fewer.
+    /// `k` nearest points, nearest first; all if there are fewer.
     pub fn k_nearest(&self, query: &Point3<f32>, k: usize) -> Vec<Neighbour> {
         let mut found = Vec::with_capacity(k.min(self.len) + 1);
         if k > 0 && !self.is_empty() && is_finite(query) {

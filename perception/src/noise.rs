@@ -31,7 +31,7 @@ pub struct Sensor {
     pub lateral_px: f64,
     /// Steepest angle between ray and normal that still returns, degrees.
     pub steepest_deg: f64,
-    /// Share of returns that have to do with nothing on their ray.
+    /// Share of stray returns, unrelated to the surface on their ray.
     pub stray: f64,
     /// Number of independent measurements that a block of 8 by 8 pixels counts for, as neighbouring
     /// errors are correlated.
@@ -58,8 +58,8 @@ impl Sensor {
         self.axial_m + self.growth_per_m * (beyond_m * beyond_m)
     }
 
-    /// The same from a surface whose normal makes `angle_rad` with the ray (eq. 2 and the steep-angle term); `None` beyond the steepest
-    /// angle, where there is no return.
+    /// Axial standard deviation at a surface whose normal makes `angle_rad` with the ray (eq. 2 and
+    /// the steep-angle term); `None` beyond the steepest angle, where there is no return.
     pub fn axial_sigma_m(&self, z_m: f64, angle_rad: f64) -> Option<f64> {
         let degrees = angle_rad.abs().to_degrees();
         (degrees <= self.steepest_deg && z_m > 0.0).then(|| {
@@ -76,7 +76,7 @@ impl Sensor {
     }
 }
 
-/// [`Sensor::axial_sigma_m`] of the [`KINECT`], for those who do not know the camera.
+/// [`Sensor::axial_sigma_m`] of the [`KINECT`], for callers without a camera model.
 pub fn axial_sigma_m(z_m: f64, angle_rad: f64) -> Option<f64> {
     KINECT.axial_sigma_m(z_m, angle_rad)
 }

@@ -12,7 +12,8 @@ pub use organised::{OrganisedOptions, organised};
 /// The surface at each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normals {
-    /// Unit normals that look towards the viewpoint; NaN where the neighbourhood is no surface (a line, one place, no return).
+    /// Unit normals towards the viewpoint; NaN where the neighbourhood is not a surface (collinear,
+    /// coincident, no return).
     pub normals: Vec<Vector3<f32>>,
     /// Surface variation (Pauly, Gross, Kobbelt 2002, eq. 3): least eigenvalue over the sum, 0 flat to 1/3 round; NaN as above.
     pub variation: Vec<f32>,

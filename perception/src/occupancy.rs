@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Space {
-    /// Nothing is known of the cell.
+    /// Unknown cell.
     #[default]
     Unknown,
     /// Reliably empty.
@@ -16,7 +16,7 @@ pub enum Space {
     Occupied,
 }
 
-/// An occupancy grid: the environment without the things that come and go.
+/// Occupancy grid of the static environment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
     /// The corner of the first cell that has the least coordinates, in the map.
@@ -44,7 +44,8 @@ impl Occupancy {
         Space::Unknown
     }
 
-    /// True unless the place is free and farther than `margin_m` from any occupied cell: a reading there may be of the environment.
+    /// False if the place is free and farther than `margin_m` from occupied cells; otherwise a
+    /// reading there may be of the environment.
     pub fn is_background(&self, place: &Point2<f64>, margin_m: f64) -> bool {
         if self.at(place) != Space::Free {
             return true;

@@ -15,8 +15,9 @@ pub struct Kept {
     pub limit_m: f64,
 }
 
-/// Keeps the points whose mean distance to their `k` nearest (the point itself counts) is below the cloud's mean plus `sigmas` standard deviations
-/// (Rusu et al. 2008, section 4.1). With fewer than `k` points all there are count.
+/// Keeps the points whose mean distance to their `k` nearest (themselves included) is below the
+/// cloud's mean plus `sigmas` standard deviations (Rusu et al. 2008, section 4.1). With fewer than
+/// `k` points, all of them count.
 pub fn statistical(tree: &Neighbours, k: usize, sigmas: f64) -> Kept {
     let _span = tracing::debug_span!("statistical outliers", points = tree.len(), k).entered();
     let means = tree.map_all(k, f32::NAN, |_, near| {

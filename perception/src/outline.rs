@@ -11,7 +11,7 @@ pub struct Rectangle {
     pub y: f64,
     /// Longer and shorter side, metres.
     pub sides_m: [f64; 2],
-    /// Sine and cosine of the angle by which it is turned, and its sides along the axes that are turned so, metres.
+    /// Sine and cosine of the rectangle's rotation, and its sides along the rotated axes, metres.
     pub turn: (f64, f64),
     pub along_m: [f64; 2],
     /// Root mean square distance of the side points from the nearest edge, metres.
@@ -28,7 +28,7 @@ impl Rectangle {
 /// refined.
 const TURNS: usize = 30;
 const APART: usize = 3;
-/// Points that are looked at, at the most, and those by which the turn is sought.
+/// Maximum number of points used for the fit, and for the rotation search.
 const MOST: usize = 800;
 const SCOUTS: usize = 300;
 /// Points that are looked at together.
@@ -72,7 +72,7 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     best.is_some_and(|(squares, _)| squares <= bound_of(&turner))
 }
 
-/// The rectangle of least area around nearly all points; it has no residual.
+/// Bounding rectangle of least area around nearly all points; without a residual.
 pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.is_empty() {
         return None;
@@ -86,8 +86,8 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     Some(turner.turned(turn).rectangle(turner.origin, 0.0))
 }
 
-/// The turn that costs least, and what it costs: the best of a few by some of the points, or one beside it. `cost` is told the least so far,
-/// and may give none for more.
+/// Rotation of least cost, with the cost: the best of a few candidates on some points, or one
+/// beside it. `cost` gets the minimum so far and may return `None` above it.
 fn best_turn(
     scouts: &mut Turner,
     all: &mut Turner,
@@ -110,9 +110,8 @@ fn best_turn(
 
 /// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
 struct Turner {
-    /// The number of points, and the first point, metres. All that follows is relative to that point, where
-    /// single precision is finer than the measurement, and padded to whole blocks with points that lie
-    /// outside of no side.
+    /// Number of points. Coordinates are relative to the first point, so that single precision
+    /// suffices, and padded to whole blocks with points inside every side.
     len: usize,
     origin: [f64; 2],
     xs: Vec<f32>,
@@ -160,8 +159,8 @@ impl Turner {
         Turned { sin, cos, u: u.map(f64::from), v: v.map(f64::from) }
     }
 
-    /// Moves each edge to the mean of the points nearest to it; the bounding rectangle is too large
-    /// by the noise.
+    /// Moves each edge to the mean of its nearest points; the bounding rectangle is too large by
+    /// the noise.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
         /// Least share of the points that moves an edge.
@@ -180,7 +179,7 @@ impl Turner {
         turned
     }
 
-    /// Sum of the squared distances of the points from the nearest edge; `None` if it is more than the bound.
+    /// Sum of the squared distances of the points from their nearest edges; `None` above the bound.
     fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
         let ([u0, u1], [v0, v1]) = (turned.u.map(|u| u as f32), turned.v.map(|v| v as f32));
         let lesser = |a: f32, b: f32| if a < b { a } else { b };
@@ -204,7 +203,8 @@ impl Turner {
     }
 }
 
-/// Adds the points of a block to the sums of the edges that are nearest to them: where they lie across it, and how many they are.
+/// Adds the points of a block to the sums of their nearest edges: coordinate across the edge, and
+/// count.
 #[inline(always)]
 fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32; 4]) -> [(f64, f64); 4] {
     let mut own = [([0.0; BLOCK], [0.0; BLOCK]); 4];
@@ -227,9 +227,9 @@ fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32;
     std::array::from_fn(|n| (sums[n].0 + sum(&own[n].0), sums[n].1 + sum(&own[n].1)))
 }
 
-/// A side of the rectangle, and the points that it leaves outside.
+/// Side of the rectangle, with the points outside it.
 struct Side {
-    /// The points outside the side and the one on it: they were the farthest at the last turn.
+    /// Points outside and on the side, outermost at the last rotation.
     outermost: Vec<usize>,
     /// The outermost values, [`ranked`].
     found: Vec<u64>,
@@ -267,7 +267,7 @@ impl Side {
     }
 }
 
-/// A place and the number of what lies there, in the order of the places.
+/// Sort key of a position and an index, ordered by position.
 fn ranked(place: f32, number: u32) -> u64 {
     let bits = place.to_bits();
     // Of negative numbers the bits fall as they rise.
@@ -275,7 +275,8 @@ fn ranked(place: f32, number: u32) -> u64 {
     u64::from(order) << 32 | u64::from(number)
 }
 
-/// Turns the points of a block, and tells how far out they lie across each side; those that are no number count for nothing.
+/// Rotates the points of a block, and returns their coordinates across each side; NaN does not
+/// count.
 #[inline(always)]
 fn turn_block(
     [xs, ys]: [&[f32; BLOCK]; 2],

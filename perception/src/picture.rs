@@ -41,7 +41,7 @@ impl Default for PictureOptions {
 /// A picture that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureError {
-    /// The eye is at the target, or looks along `up`, or the size is nothing.
+    /// The eye is at the target, or looks along `up`, or the size is zero.
     #[error(
         "eye {eye:?} and target {target:?} give no view of {width} x {height} pixels: move the eye, or give a size"
     )]
@@ -68,7 +68,7 @@ pub enum PictureError {
     Encode(String),
 }
 
-/// Colours that people tell apart (after Okabe and Ito), label 0 is grey.
+/// Colour-blind-safe palette (after Okabe and Ito); label 0 is grey.
 const COLOURS: [[f32; 3]; 9] = [
     [150.0, 150.0, 150.0],
     [230.0, 120.0, 0.0],

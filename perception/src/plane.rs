@@ -28,12 +28,12 @@ impl Plane {
         self.normal.dot(&p.coords) - self.offset_m
     }
 
-    /// The same plane seen from its other side.
+    /// Plane with its normal flipped.
     pub fn flipped(&self) -> Plane {
         Plane { normal: -self.normal, offset_m: -self.offset_m }
     }
 
-    /// The plane with its normal on the side of `p`.
+    /// Plane with its normal towards `p`.
     pub fn facing(&self, p: &Point3<f64>) -> Plane {
         if self.height_m(p) < 0.0 { self.flipped() } else { *self }
     }
@@ -42,15 +42,17 @@ impl Plane {
 /// The plane to look for, and the effort of the search.
 #[derive(Clone, Debug)]
 pub struct PlaneOptions {
-    /// Points no farther from the plane belong to it, metres.
+    /// Maximum distance of an inlier from the plane, metres.
     pub tolerance_m: f32,
     /// Rounds of random sampling.
     pub rounds: usize,
     /// Fixes the sampling.
     pub seed: u64,
-    /// Only planes whose normal lies within this angle (radians) of a direction; the normal found then points along it.
+    /// Direction and maximum angle (radians) of the normal; the result's normal points along the
+    /// direction.
     pub tilt: Option<(Unit<Vector3<f64>>, f64)>,
-    /// With `tilt`: only planes whose offset along their normal lies in this range, metres. The height of a table, if the direction is up and the frame's origin on the floor.
+    /// With `tilt`: range of the plane's offset along its normal, metres, such as the height of a
+    /// table for an up direction and a frame on the floor.
     pub offset_m: Option<RangeInclusive<f64>>,
 }
 
@@ -60,10 +62,11 @@ impl Default for PlaneOptions {
     }
 }
 
-/// A plane, and how well it is borne out.
+/// Plane with its support.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaneFit {
-    /// The plane. Its normal points along the asked direction, or else to the side of the origin (the sensor).
+    /// Plane with its normal along the requested direction, or else towards the origin (the
+    /// sensor).
     pub plane: Plane,
     /// Indices of the points within the tolerance, ascending.
     pub inliers: Vec<u32>,
@@ -71,11 +74,11 @@ pub struct PlaneFit {
     pub of: usize,
     /// Root mean square distance of the inliers, metres.
     pub rms_m: f64,
-    /// Sampling rounds that gave a plane that was asked for.
+    /// Number of sampling iterations that gave a plane as requested.
     pub rounds_used: usize,
 }
 
-/// The reason there is no plane.
+/// Reason why no plane was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneError {
     /// Fewer than three points are finite.

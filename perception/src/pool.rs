@@ -1,5 +1,5 @@
-//! Work shared among threads. What is done is behind a reference to a closure, so that the machinery that shares it is compiled once
-//! and not for every place that uses it. Results stand in the order of what they are of, whatever the number of threads.
+//! Thread pool. Work is passed as a reference to a closure, so that the scheduling code is compiled
+//! once rather than per use. Results are in index order, whatever the number of threads.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -41,8 +41,8 @@ fn length(count: usize, least: usize) -> usize {
     count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
 }
 
-/// Collects the results, if any, of each number below `count`; a share has `least` of them or more. `state`
-/// is a share's own.
+/// Collects the results (if any) for each index below `count`; a chunk has at least `least`
+/// indices. `state` belongs to one chunk.
 pub(crate) fn filter_with<S, R: Send>(
     count: usize,
     least: usize,
@@ -81,7 +81,7 @@ pub(crate) fn map<T: Sync, R: Send>(all: &[T], least: usize, result: impl Fn(&T)
     each(all.len(), least, |n| result(&all[n]))
 }
 
-/// Does something with each of a slice and its number. `state` is a share's own.
+/// Calls a function for each element with its index; `state` belongs to one chunk.
 pub(crate) fn for_each<T: Send, S>(
     all: &mut [T],
     least: usize,
@@ -117,7 +117,8 @@ pub(crate) fn find_first<R: Send>(
     found.into_iter().next()
 }
 
-/// Does a piece of work in a thread of the pool: what it shares out again need not wake the pool and wait for it each time.
+/// Runs work inside a thread of the pool, so that nested parallel steps need not wake the pool each
+/// time.
 pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R {
     rayon::scope(|_| span.in_scope(work))
 }

@@ -31,9 +31,9 @@ pub use model::{Handle, ModelError, ObjectModel, Range, Shape, Top, check_models
 pub use percept::{Evidence, Percept, Sighting, Stance};
 pub use published::Published;
 
-/// A way to tell which known object each segment is.
+/// Recogniser: assigns known objects to segments.
 pub trait Recogniser: Send + Sync {
-    /// The name by which it is chosen on the command line and in files.
+    /// Name for selection on the command line and in files.
     fn name(&self) -> &'static str;
 
     /// Percepts of all segments, in segment order; an object on or in another follows that one. The

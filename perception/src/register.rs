@@ -15,11 +15,11 @@ pub(crate) use equations::rigid;
 pub(crate) use pairs::Partner;
 pub use pairs::{Pair, pairs};
 
-/// A cloud made ready for registration: its finite points, their tree and, if asked for, their normals.
+/// Cloud prepared for registration: finite points, search tree and, if requested, normals.
 pub struct Prepared {
     pub(crate) points: Vec<Point3<f32>>,
     pub(crate) normals: Option<Vec<Vector3<f32>>>,
-    /// Normals by slot of the tree; empty if there are none.
+    /// Normals by tree slot; empty if not requested.
     by_slot: Vec<[f64; 3]>,
     pub(crate) tree: Neighbours,
 }
@@ -53,7 +53,7 @@ impl Prepared {
         &self.points
     }
 
-    /// Their normals, if they were asked for; NaN where there is no surface.
+    /// Normals, if requested; NaN where there is no surface.
     pub fn normals(&self) -> Option<&[Vector3<f32>]> {
         self.normals.as_deref()
     }
@@ -90,7 +90,8 @@ pub struct RegisterOptions {
     pub settle_m: f64,
     /// … and turns by less, radians.
     pub settle_rad: f64,
-    /// If given, residuals beyond this length (metres) lose weight as `1 / (1 + (r/s)²)` (Cauchy), so that what has no true partner pulls little.
+    /// Residual length (metres) beyond which the weight falls as `1 / (1 + (r/s)²)` (Cauchy), so
+    /// that points without a true partner have little influence; `None`: unit weights.
     pub robust_m: Option<f64>,
     /// Fewest partners to go on with.
     pub least: usize,
@@ -118,7 +119,7 @@ pub enum Ending {
     Settled,
     /// All rounds were used while the source still moved.
     OutOfRounds,
-    /// Fewer partners were found than asked for: the clouds do not overlap where they were put.
+    /// Too few correspondences: the clouds do not overlap at the initial pose.
     TooFewPartners,
 }
 
@@ -132,7 +133,7 @@ impl std::fmt::Display for Ending {
     }
 }
 
-/// The pose of the source, and its trustworthiness.
+/// Pose of the source, with quality measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// The pose found.
@@ -141,26 +142,29 @@ pub struct Fit {
     pub matched: usize,
     /// Points of the source.
     pub of: usize,
-    /// Root mean square of what the method makes small, over the matched, metres: between partners, or from the tangent planes.
+    /// Root mean square of the minimised residuals over the correspondences, metres: point to
+    /// point, or point to tangent plane.
     pub residual_m: f64,
     /// Rounds used.
     pub rounds: usize,
     /// The reason registration ended.
     pub ending: Ending,
-    /// The distance of the middle of the matched points from its start, metres.
+    /// Displacement of the correspondences' centroid from the initial pose, metres.
     pub moved_m: f64,
-    /// The angle of the source from its start, radians.
+    /// Rotation from the initial pose, radians.
     pub moved_rad: f64,
-    /// Directions of motion (of six) that the partners leave free: 3 for two planes, 1 for two cylinders without ends … Nothing was moved along them.
+    /// Number of unconstrained directions of motion (of six): 3 for two planes, 1 for two infinite
+    /// cylinders; the source is not moved along them.
     pub free: usize,
-    /// Normal matrix of the last round about `centre`, by small rotation then shift in the target's frame: what each direction of motion is worth, for weighting this fit among others.
+    /// Normal matrix of the last iteration about `centre`, small rotation then shift in the
+    /// target's frame, for weighting this fit among others.
     pub information: Matrix6<f64>,
     /// The point of the target's frame that the matrix refers to.
     pub centre: Point3<f64>,
 }
 
 impl Fit {
-    /// True if it settled and every direction of motion was held.
+    /// True if the iteration converged and every direction of motion is constrained.
     pub fn converged(&self) -> bool {
         self.ending == Ending::Settled && self.free == 0
     }

@@ -19,7 +19,8 @@ const PROPOSALS: usize = 120;
 const JUDGES: usize = 160;
 /// Points that all steps of a fit but the last go by, at the most. From: chosen.
 const SCOUTS: usize = 800;
-/// Fewest points of a side that a fit begins with, and fewest near the side that it goes on with. From: chosen.
+/// Minimum number of side points to start a fit, and of points near the side to continue. From:
+/// chosen.
 const FEWEST: (usize, usize) = (20, 12);
 /// Gates of the first steps of a fit, in tolerances. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];
@@ -27,7 +28,8 @@ const FIRST_GATES: [f64; 2] = [3.0, 2.0];
 pub const SECTORS: usize = 36;
 /// The side is not looked for in these shares of the height, at the foot and below the top. From: chosen.
 pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
-/// Spreads of radius, metres, and slope of things that stand on tables, and the steepest slope that a fit takes. From: chosen.
+/// Prior standard deviations of radius, metres, and slope of objects on tables, and the maximum
+/// slope. From: chosen.
 pub(crate) const RADIUS_SPREAD_M: f64 = 0.05;
 pub(crate) const SLOPE_SPREAD: f64 = 0.1;
 pub const STEEPEST: f64 = 0.6;
@@ -59,9 +61,10 @@ pub struct Round {
     pub slope_sigma: f64,
     /// Root mean square distance of the inliers, metres.
     pub residual_m: f64,
-    /// Root mean square distance of all side points that are not inside it, metres, each at most `OUTSIDE_M`.
+    /// Root mean square distance of all side points that are not inside the body, metres, each at
+    /// most `OUTSIDE_M`.
     pub spread_m: f64,
-    /// Share of the points between base and top that lie on it.
+    /// Share of the points between base and top on the body.
     pub inliers: f64,
 }
 
@@ -79,14 +82,15 @@ pub(crate) struct Edge {
 
 /// Spread of where a silhouette ends, metres: about a pixel and a half at arm's length. From: chosen.
 const EDGE_SIGMA_M: f64 = 0.0025;
-/// Depths of one body share systematic errors (a structured-light camera flattens what is round): however many points, they weigh no
-/// more than so many; where views are laid on each other, those of each view. From: chosen.
+/// Maximum effective number of points of one body, per view where views are registered on it:
+/// depths of one body share systematic errors (a structured-light camera flattens round surfaces).
+/// From: chosen.
 pub(crate) const MOST_INDEPENDENT: f64 = 25.0;
 
 /// Factor on the tolerance within which a point counts as part of the side, once the fit is near.
 /// From: chosen.
 const LAST_GATE: f64 = 1.5;
-/// A point farther out than this tells no more by being still farther, metres. From: chosen.
+/// Maximum outside distance that counts, metres; larger distances are clamped. From: chosen.
 const OUTSIDE_M: f64 = 0.02;
 
 impl Round {
@@ -101,7 +105,7 @@ impl Round {
     }
 }
 
-/// In which of the [`SECTORS`] directions around an axis a place lies that is `x` and `y` from it.
+/// Sector index, of [`SECTORS`], of the direction (`x`, `y`) from an axis.
 #[inline]
 pub fn sector(x: f64, y: f64) -> usize {
     /// Tangents of the ends of a quarter's sectors, without the last. From: derived, every ten degrees.
@@ -126,7 +130,7 @@ pub fn sector(x: f64, y: f64) -> usize {
     quarter * (SECTORS / 4) + if along > 0.0 { beyond } else { 0 }
 }
 
-/// Length of a vector of metres: no overflow to guard against, so no need for `hypot`, which is a slow call.
+/// Euclidean length, without the overflow protection of the slower `hypot`.
 #[inline(always)]
 pub fn distance(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
@@ -165,7 +169,7 @@ pub fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: 
     (round.radius_m > RADII_M.0).then_some(round)
 }
 
-/// The fit again with what silhouettes say, which depth alone measures badly: how wide the body is.
+/// Refits the body with silhouette constraints on its width, which depth alone measures badly.
 pub(crate) fn refit(
     round: &Round,
     points: &[Point3<f64>],
@@ -186,8 +190,9 @@ pub(crate) fn refit(
 }
 
 impl Round {
-    /// The same body where its side as seen from one direction lies in the middle of the points, along that direction (horizontal, unit,
-    /// towards the camera). Errors of depth lie along the view: a circle through such points is drawn into them, and too near.
+    /// Body shifted along one viewing direction (horizontal, unit, towards the camera) until its
+    /// side is centred in the points. Depth errors lie along the view, so a circle through such
+    /// points is too near and too small.
     pub fn behind(
         &self,
         points: &[Point3<f64>],
@@ -231,7 +236,7 @@ fn tolerance(sigma_m: f64) -> f64 {
     (2.0 * sigma_m).clamp(EDGE_M, PLACE_M)
 }
 
-/// Heights between base and top at which what is seen can be the side.
+/// Height band between base and top in which points can be on the side.
 pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     let height = top_m - base_m;
     base_m + ENDS.0 * height..top_m - ENDS.1 * height

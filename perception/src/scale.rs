@@ -1,11 +1,10 @@
 //! Lengths that many judgements share: how exactly a place, an edge and a shape are known once views are merged.
 
-/// Accuracy of position in merged views: points closer than this are one place, metres.
-/// From: chosen, what is left of poses that err by centimetres; most uses bear half of it and twice as
-/// much.
+/// Position accuracy in merged views: closer points count as one place, metres. From: chosen, what
+/// is left of poses that err by centimetres; most uses bear half of it and twice as much.
 pub(crate) const PLACE_M: f64 = 0.008;
-/// Distance from which two positions are two places, whichever way both are off, metres. From: derived, two
-/// of them.
+/// Distance from which two positions are distinct, whatever their errors, metres. From: derived,
+/// two of them.
 pub const APART_M: f64 = 2.0 * PLACE_M;
 /// Accuracy of an edge or an end, metres. From: derived, half of a place.
 pub const EDGE_M: f64 = 0.5 * PLACE_M;
@@ -14,6 +13,7 @@ pub const EDGE_M: f64 = 0.5 * PLACE_M;
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
 /// Number of spreads of a measurement beyond which a deviation is more than noise. From: chosen.
 pub(crate) const SPREADS: f64 = 3.0;
-/// Least and greatest reach of a handle out of the body, and its greatest width across, metres. From: chosen.
+/// Minimum and maximum reach of a handle from the body, and its maximum width, metres. From:
+/// chosen.
 pub(crate) const HANDLE_M: (f64, f64) = (0.014, 0.06);
 pub(crate) const HANDLE_WIDTH_M: f64 = 0.035;

@@ -34,7 +34,8 @@ use std::ops::Range;
 pub struct SceneOptions {
     /// The options of the search for the surface.
     pub surface: SurfaceOptions,
-    /// Least height above the surface of a point that belongs to an object, metres. The surface's own roughness may raise it. From: chosen.
+    /// Minimum height above the surface of an object's point, metres; rough surfaces raise it.
+    /// From: chosen.
     pub clearance_m: f64,
     /// Greatest height above the surface of a point that belongs to an object, metres.
     pub tallest_m: f64,
@@ -42,7 +43,7 @@ pub struct SceneOptions {
     pub voxel_m: f64,
     /// Fewest points of an object. From: chosen.
     pub fewest_points: usize,
-    /// Least height of an object's top above what it stands on, metres. From: chosen.
+    /// Minimum height of an object's top above its support, metres. From: chosen.
     pub least_height_m: f64,
     /// True if touching objects are separated at concave creases.
     pub part_touching: bool,
@@ -70,9 +71,11 @@ pub struct Segment {
     /// Points in the surface's frame (z is the height above the surface), metres, in the order of `indices`.
     #[serde(skip)]
     pub points: Vec<Point3<f64>>,
-    /// Height of what it stands on above the surface, metres: 0 on the surface itself, more on another object.
+    /// Height of the object's support above the surface, metres: 0 on the surface itself, more on
+    /// another object.
     pub base_m: f64,
-    /// Spread of that height, metres: of what stands in another thing, whose foot is not seen.
+    /// Standard deviation of that height, metres; large for an object inside another, whose foot is
+    /// invisible.
     #[serde(default)]
     pub base_sigma_m: f64,
 }
@@ -101,7 +104,7 @@ impl Segment {
     }
 }
 
-/// A surface with the objects on it.
+/// Surface with the objects on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
     /// The surface that the objects stand on.
@@ -110,7 +113,7 @@ pub struct Scene {
     pub segments: Vec<Segment>,
 }
 
-/// Finds the surface in a cloud (world frame) and parts what stands on it.
+/// Finds the surface in a cloud (world frame) and segments the objects on it.
 ///
 /// # Errors
 /// If no surface is found.
@@ -119,7 +122,7 @@ pub fn segment(cloud: &Cloud, seen: &Visibility, options: &SceneOptions) -> Resu
     Ok(segment_on(cloud, seen, surface, options))
 }
 
-/// Parts what stands on a known surface.
+/// Segments the objects on a known surface.
 pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &SceneOptions) -> Scene {
     pool::within(tracing::debug_span!("segment", points = cloud.len()), || {
         let (indices, points) = above(cloud, &surface, options);
@@ -142,16 +145,17 @@ pub fn segment_on(cloud: &Cloud, seen: &Visibility, surface: Surface, options: &
     })
 }
 
-/// Shares of a segment's points that lie below its lower edge and below its top: beyond are the few that may be noise. From: chosen.
+/// Quantiles of a segment's point heights that define its lower edge and its top, excluding noise.
+/// From: chosen.
 pub const POINT_ENDS: (f64, f64) = (0.01, 0.99);
-/// The same of the voxels of a part, and of what sticks out of a body. From: chosen.
+/// Quantiles for the voxels of a part, and for protrusions of a body. From: chosen.
 pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
-/// Fewest voxels that tell an upright side. From: chosen.
+/// Minimum number of voxels of an upright side. From: chosen.
 const SIDE_VOXELS: usize = 25;
-/// Share of places, as a fraction, that may lie outside an outline that holds most of them. From: chosen.
+/// Maximum share, as a fraction, of places outside an enclosing outline. From: chosen.
 pub const OUTSIDE: (usize, usize) = (3, 10);
 
-/// The points of each part, in order of its first point.
+/// Points of each part, in order of its first point.
 fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxel: &[u32]) -> Vec<Segment> {
     let mut counts = vec![0; voxels.len()];
     for (&part, &count) in part_of_voxel.iter().zip(&voxels.counts) {
@@ -194,7 +198,7 @@ fn gather(indices: &[u32], points: &[Point3<f64>], voxels: &Voxels, part_of_voxe
 /// Indices and positions (surface frame) of points.
 type Placed = (Vec<u32>, Vec<Point3<f64>>);
 
-/// The points that stand above the surface, inside its outline.
+/// Points above the surface and inside its outline.
 fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
     let half = cloud.len() / 2;
     let rows = Rows::of(surface);
@@ -206,11 +210,11 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
     (indices, points)
 }
 
-/// The same of some points that follow each other; the first has a number.
+/// Points above the surface among consecutive ones, numbered from `from`.
 fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, options: &SceneOptions) -> Placed {
     /// Number of spreads of the surface within which a point belongs to the surface itself. From: chosen.
     const ROUGH: f64 = 2.5;
-    /// Points whose heights are told together. From: work.
+    /// Number of points whose heights are computed together. From: work.
     const BLOCK: usize = 16;
     let clearance_m = options.clearance_m.max(ROUGH * surface.residual_m);
     let up = surface.up.cast::<f32>();
@@ -239,13 +243,13 @@ fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, optio
     (indices, points)
 }
 
-/// Height of a segment's top above the surface, metres: its highest points but for a few that may be noise.
+/// Height of a segment's top above the surface, metres: high quantile that excludes noise.
 pub fn top_m(segment: &Segment) -> f64 {
     let heights: Vec<f64> = segment.points.iter().map(|p| p.z).collect();
     end(&heights, POINT_ENDS.1)
 }
 
-/// The voxels of each part, ascending, by its name, which is that of a voxel.
+/// Voxels of each part, ascending, by the part's name (one of its voxels).
 fn members(part_of_voxel: &[u32]) -> Vec<(u32, Vec<usize>)> {
     let mut counts = vec![0; part_of_voxel.len()];
     part_of_voxel.iter().for_each(|part| counts[*part as usize] += 1);
@@ -271,7 +275,7 @@ pub fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     [x / n, y / n]
 }
 
-/// Drops from ascending numbers what is among others that ascend.
+/// Removes from a sorted list the elements of another sorted list.
 fn take_away(from: &mut Vec<usize>, others: &[usize]) {
     let mut others = others.iter().peekable();
     from.retain(|own| {

@@ -1,8 +1,8 @@
-//! Spread of points: running second moments and the direction in which they spread least.
+//! Second moments of points, and their direction of least spread.
 
 use nalgebra::{Point3, Vector3};
 
-/// Sums from which mean and covariance follow, taken about a reference point so that nothing cancels.
+/// Sums for mean and covariance relative to a reference point, which avoids cancellation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
     about: [f64; 3],
@@ -61,13 +61,14 @@ pub struct Least {
     pub share: f64,
 }
 
-/// Spread across a line below this part of the spread along it is rounding of coordinates, not a surface.
+/// Minimum ratio of spreads across and along a line; below, the spread across is rounding of
+/// coordinates.
 const COLLINEAR: f64 = 1e-9;
 
-/// Newton's steps towards the least eigenvalue; from a few on they change nothing, but where two of them are nearly the same.
+/// Maximum number of Newton steps towards the least eigenvalue; a few suffice, unless two
+/// eigenvalues nearly coincide.
 const MOST_STEPS: usize = 40;
-/// Least step of the iteration: the error that remains after a step is about its square, which is negligible
-/// here.
+/// Minimum step of the iteration; the remaining error is about its square and negligible.
 const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
@@ -77,7 +78,7 @@ pub fn least(c: &[f64; 6]) -> Option<Least> {
     least
 }
 
-/// The same of several covariances side by side.
+/// Least eigenvalues of several covariances side by side.
 ///
 /// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
 #[inline(always)]

@@ -1,4 +1,5 @@
-//! The level surfaces in view, the floor told from what things stand on: plane and convex hull of each (paper 004, section V).
+//! Level surfaces in view, floor and supports: plane and convex hull of each (paper 004, section
+//! V).
 
 mod extent;
 mod face;
@@ -34,7 +35,8 @@ use upright::Doubt;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SurfaceOptions {
-    /// Up in the world, if known. Otherwise it is told from the planes in view, what stands on them and how the cameras are held.
+    /// Up direction in the world, if known; otherwise estimated from the planes, the objects on
+    /// them and the cameras' attitude.
     pub up: Option<Unit<Vector3<f64>>>,
     /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
@@ -65,15 +67,17 @@ impl Default for SurfaceOptions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
-    /// Corners of its outline in the world, convex, in either direction, metres.
+    /// Corners of the convex outline in the world, in either direction, metres.
     pub corners: Vec<Point3<f64>>,
     /// The maximum distance of the surface outside the region, metres.
     pub margin_m: f64,
 }
 
-/// Farthest coordinate of a return, metres. From: chosen, beyond what cameras and lasers of robots measure.
+/// Maximum coordinate of a return, metres. From: chosen, beyond what cameras and lasers of robots
+/// measure.
 const FARTHEST_M: f32 = 1000.0;
-/// Area of the largest surface, square metres. From: derived, that of all that is in reach.
+/// Area of the largest possible surface, square metres. From: derived, that of all that is in
+/// reach.
 const MOST_AREA_M2: f64 = 4.0 * (FARTHEST_M as f64) * (FARTHEST_M as f64);
 
 /// The reason no surface was found.
@@ -94,7 +98,7 @@ pub enum SurfaceError {
     TooFar {
         /// Finite points in the cloud.
         found: usize,
-        /// Those of them that are out of reach.
+        /// Number of returns out of range.
         far: usize,
     },
     /// No plane is as asked for.
@@ -105,7 +109,7 @@ pub enum SurfaceError {
         /// The wanted surface, in words.
         wanted: String,
     },
-    /// More than one way may be up, or nothing level is in view.
+    /// The up direction is ambiguous, or nothing level is in view.
     #[error(
         "which way is up cannot be told from what is in view: say which way is up, or look at the table with what stands on it"
     )]
@@ -128,7 +132,7 @@ pub enum SurfaceError {
         /// The sign that leaves the role undecided.
         because: Sign,
     },
-    /// None of the surfaces as wanted is one to stand things on.
+    /// None of the requested surfaces is a support.
     #[error("what is level here is nothing to stand things on ({because}): look at the table")]
     OnlyOther {
         /// The sign of that role.
@@ -143,28 +147,28 @@ fn no_plane(wanted: &str, tried: usize) -> String {
     }
 }
 
-/// A horizontal-enough face with its outline.
+/// Level plane with its outline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Surface {
     /// Unit normal in the world, away from the side that carries the objects' weight: up.
     pub up: Unit<Vector3<f64>>,
-    /// `up · p` of its points, metres.
+    /// `up · p` of the plane's points, metres.
     pub offset_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
     /// Area of the outline, square metres.
     pub area_m2: f64,
-    /// Points of the cloud that lie on it.
+    /// Number of cloud points on the surface.
     pub points: usize,
     /// Root mean square distance from the plane of all points near it, metres.
     pub residual_m: f64,
-    /// Share of the finite points that lie on it.
+    /// Share of the finite points on the surface.
     pub share: f64,
     /// World to the surface's frame: z up with 0 on the surface, origin at the middle of the hull.
     pub surface_from_world: Isometry3<f64>,
     /// The role of the surface.
     pub role: Role,
-    /// The sign of its role.
+    /// Evidence for the role.
     pub because: Sign,
     /// Height above the floor, metres, where the floor is in view.
     pub above_floor_m: Option<f64>,
@@ -172,7 +176,7 @@ pub struct Surface {
     /// was given, or no camera is known.
     #[serde(default = "said")]
     pub up_chance: f64,
-    /// Outlines of the other surfaces to stand things on that lie above this one, metres in the world.
+    /// Outlines of the other supports above this surface, metres in the world.
     pub over: Vec<Level>,
 }
 
@@ -197,7 +201,8 @@ impl Level {
 }
 
 impl Surface {
-    /// In words, after what it was taken for: why it may be nothing to stand things on; none if that is as good as sure.
+    /// Reason why the surface may not be a support, in words after its role; `None` if practically
+    /// certain.
     pub fn doubt(&self) -> Option<String> {
         let (because, chance) = (&self.because, self.up_chance);
         match self.role {
@@ -214,10 +219,11 @@ impl Surface {
         self.up.dot(&p.coords) - self.offset_m
     }
 
-    /// Tells what lies on a board above, or is the board itself, of a height above the surface: it does not stand on this one.
+    /// Predicate for points, given height above the surface, that belong to a board above or its
+    /// load, and so do not stand on this surface.
     pub(crate) fn overhung(&self) -> impl Fn(f64, &Point3<f64>) -> bool + use<> {
-        /// Thickness of a board with the things that hide its edge, and distance that things on the board
-        /// reach beyond its hull, metres. From: chosen.
+        /// Thickness of a board with the objects that hide its edge, and overhang of objects beyond
+        /// its hull, metres. From: chosen.
         const BOARD_M: f64 = 0.05;
         const MARGIN_M: f64 = 0.03;
         let boards: Vec<(f64, Outline)> =
@@ -234,7 +240,7 @@ impl Surface {
         places.iter().map(|p| (self.surface_from_world * p).xy().coords.into()).collect()
     }
 
-    /// True if it goes through another, or below it: no two surfaces do.
+    /// True if the surface cuts through the other or lies below it; two supports never do.
     fn cuts(&self, other: &Surface) -> bool {
         let heights = self.hull.iter().map(|p| other.height_m(p));
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
@@ -264,19 +270,20 @@ impl Surface {
     }
 }
 
-/// Heights above a surface at which things stand on it, metres. From: chosen.
+/// Height range of objects above their surface, metres. From: chosen.
 const THINGS_M: (f64, f64) = (0.025, 0.35);
 /// Surfaces that share so much of the lesser one, seen from above, are in two places. From: chosen.
 const COMMON: f64 = 0.2;
 
-/// Fewest returns of things, at least `WITHIN_M` within the outline, metres, that are no accident.
-/// From: chosen, a board that a cupboard stands against is laid 2 cm aside with 4 mm less.
+/// Minimum number of object returns at least `WITHIN_M` inside the outline, metres; fewer are
+/// accidental. From: chosen, a board that a cupboard stands against is laid 2 cm aside with 4 mm
+/// less.
 const THINGS: usize = 20;
 const WITHIN_M: f64 = 0.02;
 /// Fraction that counts as most: the first number of the second, seven of ten. From: chosen.
 const MOST: (usize, usize) = (7, 10);
 
-/// Finds the surface to stand things on: the best of [`find_surfaces`] that is as wanted.
+/// Finds the supporting surface: the best of [`find_surfaces`] that satisfies the options.
 ///
 /// # Errors
 /// If there is none, with the reason: too few points, nothing level as wanted, only the floor, or nothing that tells a table from the floor.
@@ -288,7 +295,7 @@ pub fn find_surface(
     best(find_surfaces(cloud, seen, options)?, options)
 }
 
-/// The surface to stand things on among those that [`find_surfaces`] found, in its order.
+/// First supporting surface of the list from [`find_surfaces`].
 ///
 /// # Errors
 /// If there is none, with the reason.
@@ -304,8 +311,8 @@ pub fn best(surfaces: Vec<Surface>, options: &SurfaceOptions) -> Result<Surface,
     }
 }
 
-/// Finds the level surfaces that face the cameras and tells what each is: first those as wanted, of these those to stand things on, of
-/// these the one with most returns and things on it.
+/// Finds the level surfaces that face the cameras, with their roles; sorted by: satisfying the
+/// options, being a support, and number of returns with objects.
 ///
 /// `seen` gives the places of the cameras, what they saw past an edge and, without a hint, which way is up. Where a region is given,
 /// the outline of a surface in it ends there. Deterministic for a seed.
@@ -380,7 +387,7 @@ pub fn find_surfaces(
     })
 }
 
-/// The surfaces by how much speaks for them, without those that are made of what is left over of a better one and of things on it.
+/// Surfaces by decreasing evidence, without remnants of a better surface and of objects on it.
 fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
     let claims = pool::map(&surfaces, 1, |surface| claim(surface, samples));
     let mut claims: Vec<(f64, Surface)> = claims.into_iter().zip(surfaces).collect();
@@ -395,7 +402,7 @@ fn distinct(surfaces: Vec<Surface>, samples: &[Sample]) -> Vec<Surface> {
 }
 
 impl SurfaceOptions {
-    /// True if a surface lies at the height and in the region that are asked for, whatever it is.
+    /// True if a surface satisfies the requested height and region, whatever its role.
     pub fn wants(&self, surface: &Surface) -> bool {
         let up = self.up.unwrap_or(surface.up);
         // A tilted plane has its height where the surface is, not where the world begins.
@@ -406,7 +413,7 @@ impl SurfaceOptions {
             && self.region.as_ref().is_none_or(|r| r.holds(surface))
     }
 
-    /// The surface without what lies outside the region; itself if it is not in it.
+    /// Surface clipped to the region; unchanged if outside.
     fn within_region(&self, surface: Surface) -> Surface {
         match &self.region {
             Some(region) if self.wants(&surface) => region.cut(surface),
@@ -428,7 +435,8 @@ impl Region {
         hull::clip(surface.flat(&surface.hull), &convex_hull(surface.flat(&self.corners)), self.margin_m)
     }
 
-    /// Unit vectors across `up` into the region, and how far along them its edges lie, metres; none of what has no area.
+    /// Unit vectors across `up` into the region, with the edges' offsets along them, metres; empty
+    /// for a region without area.
     pub(crate) fn edges(&self, up: &Vector3<f64>) -> Vec<(Vector3<f64>, f64)> {
         let n = self.corners.len();
         let middle = self.corners.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords) / n.max(1) as f64;
@@ -449,7 +457,7 @@ impl Region {
     }
 }
 
-/// The claim of a surface among others like it: something on the surface doubles the claim of its returns.
+/// Rank of a surface among similar ones: its returns, doubled if objects stand on it.
 fn claim(surface: &Surface, samples: &[Sample]) -> f64 {
     let hull = surface.outline();
     let is_on = |s: &&Sample| {
@@ -475,7 +483,7 @@ pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
     if distance_m > 0.0 { KINECT.frontal_sigma_m(distance_m) } else { KINECT.axial_m }
 }
 
-/// Spread of one measurement of a point from the nearest of the places that it was seen from, metres.
+/// Standard deviation of a measurement of a point from the nearest viewpoint, metres.
 pub(crate) fn nearest_sigma_m(p: &Point3<f64>, viewpoints: &[Point3<f64>]) -> f64 {
     range_sigma_m(viewpoints.iter().map(|v| (p - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0))
 }
@@ -511,7 +519,7 @@ fn is_in_reach(p: &Point3<f32>) -> bool {
 
 /// Up as people and robots hold cameras: against the images' downward axis.
 fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
-    /// Ways up that add up to less cancel out. From: rounding.
+    /// Minimum length of the mean up direction; shorter ones cancel out. From: rounding.
     const CANCELLED: f64 = 1e-6;
     if !seen.held {
         return None;
@@ -528,7 +536,7 @@ pub(crate) fn floor(value: f64) -> i32 {
     whole.saturating_sub(i32::from(value < f64::from(whole)))
 }
 
-/// The plane with its normal up: along the hint, else towards the cameras.
+/// Plane with its normal up: along the hint, else towards the cameras.
 fn face_up(plane: &Plane, up: Option<&Vector3<f64>>, viewpoints: &[Point3<f64>]) -> Plane {
     let rise = match up {
         Some(up) => plane.normal.dot(up),

@@ -1,4 +1,4 @@
-//! One look at the world: a cloud, where it was taken from, and how well that is known.
+//! View: cloud, camera pose and its uncertainty.
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
@@ -12,7 +12,7 @@ pub struct View {
     pub stamp_ns: i64,
     /// The cloud in the camera's optical frame (x right, y down, z forward), metres.
     pub cloud: Cloud,
-    /// The camera, if known: lets later steps tell free space from space that was not seen.
+    /// Camera, if known; enables the distinction of free and unobserved space.
     pub intrinsics: Option<Intrinsics>,
     /// The pose of the camera as stated by localisation.
     pub world_from_camera: Isometry3<f64>,
@@ -23,7 +23,7 @@ pub struct View {
 }
 
 impl View {
-    /// A cloud by itself: the world is the frame of its camera.
+    /// View of a bare cloud, with the world as the camera's frame.
     pub fn alone(cloud: Cloud) -> View {
         View {
             stamp_ns: 0,

@@ -13,24 +13,24 @@ use std::sync::Arc;
 /// The state of a place in one camera's view, or in the best of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// No camera had the place in view, or the pixel gave no return.
+    /// Outside all views, or a pixel without return.
     Never,
-    /// Behind what a camera saw.
+    /// Behind a measured surface.
     Hidden,
     /// A surface was measured here.
     Surface,
-    /// A camera looked through it.
+    /// Seen through by a camera.
     Free,
 }
 
-/// The depth image of one look with the (corrected) pose of its camera.
+/// Depth image of one view with the (corrected) camera pose.
 #[derive(Clone, Debug)]
 pub struct DepthMap {
     /// The camera; the image has its size.
     pub intrinsics: Intrinsics,
     /// World to optical frame.
     pub camera_from_world: Isometry3<f64>,
-    /// Depth along z in metres, row by row; NaN where there was no return.
+    /// Depth along z, metres, row by row; NaN for missing returns.
     pub depths_m: Arc<[f32]>,
 }
 
@@ -39,12 +39,12 @@ pub struct DepthMap {
 pub struct Visibility {
     /// One map a look.
     pub maps: Vec<DepthMap>,
-    /// True if the maps are images as cameras took them, so that their rows tell how these were held.
+    /// True if the maps are original camera images, so that their rows show the cameras' attitude.
     pub held: bool,
 }
 
 impl DepthMap {
-    /// The depth map of a view, `None` if its cloud is neither organised nor has a camera.
+    /// Depth map of a view; `None` if its cloud is not organised and has no camera.
     ///
     /// An organised cloud without intrinsics gets them by least squares from its own pixels.
     pub fn from_view(view: &View, world_from_camera: &Isometry3<f64>) -> Option<DepthMap> {
@@ -94,7 +94,7 @@ impl DepthMap {
         self.look_from(&(self.camera_from_world * p), tolerance_m)
     }
 
-    /// The same as [`DepthMap::look`], for a point in the camera's optical frame.
+    /// [`DepthMap::look`] for a point in the camera's optical frame.
     pub(crate) fn look_from(&self, q: &Point3<f64>, tolerance_m: f64) -> Seen {
         let Some((u, v)) = self.intrinsics.project(q) else { return Seen::Never };
         let Some(middle) = self.intrinsics.pixel(u, v) else { return Seen::Never };
@@ -112,7 +112,7 @@ impl DepthMap {
         }
     }
 
-    /// The least depth in the 3×3 pixels around one, infinite where there is no return.
+    /// Minimum depth in the 3×3 pixels around one; infinite without returns.
     pub(crate) fn nearest_around(&self, pixel: usize) -> f32 {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let (column, row) = (pixel % width, pixel / width);
@@ -148,11 +148,11 @@ impl Gaze<'_> {
         }
     }
 
-    /// Marks those of some points (world) that the camera looked through: of which [`DepthMap::look`] says free, and whose very pixel has a
-    /// return. Quicker than that where most are not.
+    /// Marks the points (world) that the camera looked through: [`DepthMap::look`] gives free, and
+    /// the very pixel has a return. Faster if most points are not.
     pub fn pass(&self, points: &[Point3<f32>], tolerance_m: f64, through: &mut [bool]) {
         const LANES: usize = 16;
-        /// The column of what is not in the image. From: mark.
+        /// Column mark of a point outside the image. From: mark.
         const NONE: f32 = -1.0;
         let Intrinsics { width, height, .. } = self.map.intrinsics;
         let (right, bottom) = (width as f32, height as f32);
@@ -182,14 +182,14 @@ impl Gaze<'_> {
 }
 
 impl Visibility {
-    /// The visibility of the views from the poses they state; views without a camera or grid are left out.
+    /// Visibility of views at their stated poses; views without camera or grid are left out.
     pub fn from_views(views: &[View]) -> Visibility {
         let map = |v: &View| DepthMap::from_view(v, &v.world_from_camera);
         Visibility { maps: views.iter().filter_map(map).collect(), held: true }
     }
 
-    /// The visibility of a bare cloud (world frame) that was seen from `viewpoints`: the cloud is projected
-    /// onto a virtual camera at each. How a camera was held there is not known.
+    /// Visibility of a bare cloud (world frame) seen from `viewpoints`, by projection onto a
+    /// virtual camera at each; the cameras' attitude is unknown.
     pub fn from_viewpoints(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Visibility {
         Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect(), held: false }
     }
@@ -217,11 +217,12 @@ impl Visibility {
     }
 }
 
-/// A camera at `viewpoint` that looks where half of the cloud lies to each side, and as wide as nearly all of it: a few stray returns turn
-/// and widen it by nothing that shows. Its axes are those of the cloud as seen from there, the same in every frame.
+/// Virtual camera at `viewpoint`, centred on the median of the cloud and wide enough for nearly all
+/// of it, so that stray returns have no effect; its axes depend on the cloud alone, not on the
+/// frame.
 fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
     const SIDE: usize = 320;
-    /// Share of the points that it has in view, and widest half angle, as a slope.
+    /// Share of the points in view, and maximum half angle, as a slope.
     const IN_VIEW: f64 = 0.998;
     const WIDEST: f64 = 2.0;
     let finite = || cloud.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>() - viewpoint);
@@ -256,7 +257,8 @@ fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
     Some(DepthMap::project(cloud, &world_from_camera.inverse(), intrinsics, &world_from_camera))
 }
 
-/// The pinhole camera that explains an organised cloud in its optical frame: least squares of `u·z = f·x + c·z` over its pixels.
+/// Pinhole camera of an organised cloud in its optical frame: least squares of `u·z = f·x + c·z`
+/// over the pixels.
 ///
 /// `None` if there is no grid or the pixels do not tell.
 pub fn estimate_intrinsics(cloud: &Cloud) -> Option<Intrinsics> {

@@ -1,4 +1,4 @@
-//! Thinning by voxels: one point a cube, at the centroid of what lies in it.
+//! Voxel downsampling: one point per cube, at the centroid of its points.
 
 use crate::cloud::{Cloud, is_finite};
 use nalgebra::{Point3, Vector3};
@@ -39,7 +39,7 @@ pub(crate) fn floor(value: f64) -> i64 {
     toward_zero.saturating_sub(i64::from(toward_zero as f64 > value))
 }
 
-/// One point a voxel of edge `edge_m`, at the centroid of its points, in the order in which the voxels first occur.
+/// Downsamples to one point per voxel of edge `edge_m`, the centroid, in order of first occurrence.
 ///
 /// The grid is fixed to the origin of the frame, so that the same surface gives the same voxels in every cloud. Colours and normals are
 /// averaged, a label is that of the voxel's first point. Points without a return are left out.
@@ -86,7 +86,7 @@ pub const NONE: u32 = u32::MAX;
 /// The voxel of each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assigned {
-    /// Per point the number of its voxel, counted in order of first occurrence; [`NONE`] for points without a return.
+    /// Voxel number of each point, counted by first occurrence; [`NONE`] for missing returns.
     pub voxel: Vec<u32>,
     /// The number of voxels.
     pub voxels: usize,
@@ -145,7 +145,7 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
     Ok(Assigned { voxel, voxels: table.len as usize })
 }
 
-/// Key of the voxel at three whole coordinates; `None` if they lie beyond what an axis can count.
+/// Key of the voxel at integer coordinates; `None` beyond the range of an axis.
 #[inline(always)]
 pub(crate) fn key([x, y, z]: [i64; 3]) -> Option<u64> {
     let axis = |c: i64| c.saturating_add(HALF_RANGE) as u64;

@@ -1,4 +1,4 @@
-//! Misfit of a look under a model of camera and poses, at the pose error that explains it best.
+//! Misfit of a look under a camera and pose model, at the most likely pose error.
 
 use super::sight::{Ray, Sight};
 use super::{MapSurface, Model};
@@ -13,7 +13,8 @@ const HEIGHT_SIGMA_M: f64 = 0.01;
 /// From: chosen.
 const EDGES: f64 = 40.0;
 const HEIGHTS: f64 = 6.0;
-/// Distances from an edge beyond which more distance tells no more, metres. From: chosen.
+/// Maximum distance from an edge that counts in the misfit, metres; larger distances are clamped.
+/// From: chosen.
 const GROSS_M: f64 = 0.10;
 /// Distance beside the outline from which level points may belong to another surface, metres. From: chosen.
 const OTHER_M: f64 = 0.4;
@@ -37,7 +38,8 @@ impl Sides {
         Sides((0..corners.len()).filter_map(side).collect())
     }
 
-    /// Distance outwards from the side that a point lies farthest out of, and outwards there.
+    /// Distance of a point outside the side that it exceeds most, and the outward direction of that
+    /// side.
     fn outside(&self, p: &Point2<f64>) -> Option<(f64, Vector2<f64>)> {
         let each = self.0.iter().map(|(a, outward)| (outward.dot(&(p - a)), *outward));
         each.max_by(|a, b| a.0.total_cmp(&b.0))
@@ -64,7 +66,7 @@ impl<'a> Fit<'a> {
         Fit { sights, surface, centre: surface.centre(), sides: Sides::of(surface), level }
     }
 
-    /// Sum of squared errors, in their spreads, of a look at its likeliest pose error.
+    /// Sum of squared errors of a look in standard deviations, at its most likely pose error.
     pub(super) fn misfit(&self, n: usize, model: &Model) -> f64 {
         self.settle(n, model).0
     }
@@ -116,7 +118,8 @@ impl<'a> Fit<'a> {
         (least, Isometry3::from_parts(shift, turn * stated.rotation))
     }
 
-    /// Misfit of the rays at a pose error (shift, then turn about the camera), and its normal equations.
+    /// Misfit of the rays at a pose error (shift, then rotation about the camera), and the normal
+    /// equations.
     fn linearise(
         &self,
         rays: &[(Vector3<f64>, bool)],

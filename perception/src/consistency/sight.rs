@@ -1,4 +1,4 @@
-//! The view of a level surface from one look: rays that met the surface, and rays that went past it.
+//! Rays of one look at a level surface: those that hit the surface, and those that pass its edge.
 
 use super::MapSurface;
 use crate::camera::Intrinsics;
@@ -19,16 +19,16 @@ const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
 /// Depth below the plane from which a return was seen past the surface, metres. From: chosen, thicker than a
 /// board is rough.
 const PAST_M: f64 = 0.04;
-/// Fewest points that tell a plane. From: chosen.
+/// Minimum number of points for fitting a plane. From: chosen.
 const FEWEST: usize = 40;
 /// Fewest rays that say anything of the surface. From: chosen.
 const FEWEST_RAYS: usize = 80;
 
-/// A ray of a look, and where it goes through the plane of the surface, in the optical frame.
+/// Ray of a look, with its intersection with the surface plane in the optical frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ray {
     pub at: Vector3<f64>,
-    /// True if it met the surface there; it went past it otherwise.
+    /// True if the ray hit the surface; false if it passed.
     pub met: bool,
 }
 
@@ -43,8 +43,7 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    /// The sight of the surface in a view. None if the view has no pixels, or too few of them tell of the
-    /// surface.
+    /// Rays of a view at the surface; `None` if the view has no pixels, or too few on the surface.
     pub(super) fn of(view: &View, world_from_camera: &Isometry3<f64>, surface: &MapSurface) -> Option<Sight> {
         let (camera, grid) = view.intrinsics.zip(view.cloud.grid)?;
         let side = ((grid.width * grid.height) as f64 / ASKED as f64).sqrt().max(1.0) as usize;
@@ -86,7 +85,8 @@ impl Sight {
     }
 }
 
-/// The plane of the surface as one look shows it, in the optical frame; as the map has it, where the look shows none.
+/// Surface plane as measured by one look, in the optical frame; the mapped plane if the look shows
+/// too little.
 fn plane(points: &[Point3<f64>], world_from_camera: &Isometry3<f64>, surface: &MapSurface) -> Plane {
     let up = world_from_camera.inverse_transform_vector(&Vector3::z());
     let stated_m = surface.height_m - world_from_camera.translation.z;

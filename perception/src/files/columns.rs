@@ -1,11 +1,13 @@
-//! Clouds from a table of numbers: names of columns, or what their numbers look like.
+//! Clouds from a table of numbers, by column names or by the columns' values.
 
 use crate::cloud::{Cloud, Grid};
 use nalgebra::{Point3, Vector3};
 
-/// Extent as a share of the distance from the origin below which coordinates are those of a map. From: chosen.
+/// Extent relative to the distance from the origin, below which coordinates are map coordinates.
+/// From: chosen.
 const NARROW: f64 = 0.01;
-/// Distance from the origin beyond which coordinates of a map are moved to it, metres: single precision blurs them. From: chosen.
+/// Distance from the origin beyond which map coordinates are moved to the origin, metres, because
+/// single precision blurs them. From: chosen.
 const FAR_M: f64 = 1000.0;
 /// Tolerance on the length of a normal. From: chosen.
 const NORMAL: f64 = 0.05;
@@ -34,8 +36,8 @@ impl Columns {
         })
     }
 
-    /// Meaning of unnamed columns by their number: x, y, z, then colours or normals as all rows
-    /// allow; `intensity` between if there are seven.
+    /// Meaning of unnamed columns by their number: x, y, z, then colours or normals, as the values
+    /// of all rows allow; seven columns have `intensity` in between.
     pub(super) fn unnamed(values: &[f64], width: usize) -> Columns {
         let mut columns = Columns { position: [0, 1, 2], colour: None, normal: None, label: None };
         let rest = match width {
@@ -83,8 +85,9 @@ impl Columns {
     }
 }
 
-/// Moves positions of a map to the origin by whole metres, before single precision blurs them: by how much, and a note. Positions in another
-/// unit are far from the origin too, and as wide as they are far.
+/// Moves map coordinates to the origin by whole metres before rounding to single precision; returns
+/// the offset and a note. Positions in another unit are also far from the origin, but as wide as
+/// they are far.
 pub(super) fn to_origin(positions: &mut [[f64; 3]]) -> Option<([f64; 3], String)> {
     let finite = |p: &&[f64; 3]| p.iter().all(|c| c.is_finite());
     let first = *positions.iter().find(finite)?;

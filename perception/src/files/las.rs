@@ -31,7 +31,7 @@ fn at<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
     bytes.get(offset..offset.checked_add(N)?)?.try_into().ok()
 }
 
-/// Points of a file, as its header declares them.
+/// Point records of a file, as declared by its header.
 struct Points<'a> {
     bytes: &'a [u8],
     length: usize,

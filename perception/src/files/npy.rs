@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Type of the numbers: bytes of each, and how they are read.
+/// Number type: width in bytes, and decoder.
 struct Kind {
     size: usize,
     big: bool,
@@ -39,7 +39,7 @@ impl Kind {
     }
 }
 
-/// Text and end of the header, which has its length in front.
+/// Header text and end offset, from the length prefix.
 fn header(bytes: &[u8]) -> Option<(&str, usize)> {
     let version = *bytes.get(MAGIC.len())?;
     let (start, length) = match version {

@@ -137,7 +137,7 @@ impl<'a> Table<'a> {
         self.column(header, field, move |raw| kind.number(raw))
     }
 
-    /// The four bytes of a field that has them, point by point.
+    /// Four bytes of a four-byte field, for each point.
     fn words(&self, header: &Header, field: usize) -> impl Iterator<Item = [u8; 4]> {
         let (begin, step) = self.layout[field];
         let of_points = self.bytes.get(begin..).unwrap_or_default().chunks(step).take(header.points);
@@ -241,7 +241,8 @@ fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> R
     }
 }
 
-/// A cloud as a PCD 0.7 file: `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` and `label` (U 4) as far as it has them.
+/// Encodes a cloud as PCD 0.7: `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` and
+/// `label` (U 4) if present.
 pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
     let columns = columns(cloud);
     let points = cloud.len();

@@ -1,4 +1,5 @@
-//! PLY: `ascii`, `binary_little_endian`, `binary_big_endian`; any elements and properties, of which the vertices are used.
+//! PLY (`ascii`, `binary_little_endian`, `binary_big_endian`) with arbitrary elements and
+//! properties; only vertices are used.
 
 use super::columns::to_origin;
 use super::{FileError, Loaded, Place, finish, is_padding};
@@ -75,7 +76,7 @@ impl Scalar {
 struct Property {
     name: String,
     scalar: Scalar,
-    /// Type of the count, if it is a list.
+    /// Type of the list length; `None` for a scalar property.
     list: Option<Scalar>,
 }
 
@@ -132,7 +133,7 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     finish(cloud, viewpoint, notes, Place::Line(element.line))
 }
 
-/// The element `camera` of the Point Cloud Library: pose of the sensor, and the size of its image.
+/// Element `camera` of the Point Cloud Library: sensor pose and image size.
 struct Camera {
     viewpoint: Isometry3<f64>,
     grid: Option<Grid>,
@@ -179,7 +180,7 @@ impl<'a> Cursor<'a> {
         Some((self.line, std::str::from_utf8(&rest[..end]).unwrap_or("\u{fffd}")))
     }
 
-    /// Refuses rows behind the last element: the header says less than is there.
+    /// Rejects data after the last element, because the header declares too little.
     fn ends_with(&self, stored: Stored, last: &Element) -> Result<(), FileError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         let more = match stored {
@@ -389,7 +390,7 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
-/// The cloud of the vertices, and what was taken off each of them.
+/// Cloud of the vertices, and the offset subtracted from each.
 fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<(Cloud, [f64; 3]), FileError> {
     let flat: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_none()).collect();
     let find = |name: &str| flat.iter().position(|p| p.name == name);

@@ -1,4 +1,5 @@
-//! Clouds as lines of numbers: XYZ, CSV with or without names, and PTS with the number of its points first.
+//! Clouds as lines of numbers: XYZ, CSV with or without a header line, and PTS with a leading point
+//! count.
 
 use super::columns::Columns;
 use super::{FileError, Loaded, Place, finish};
@@ -13,7 +14,7 @@ fn words(line: &str) -> impl Iterator<Item = &str> {
     split.map(|word| word.trim_matches('"')).filter(|word| !word.is_empty())
 }
 
-/// Names of columns in a line, lower case: `x y z` among them, whatever marks a comment before them.
+/// Lower-case column names in a line that contains `x y z`, after any comment marker.
 fn names(line: &str) -> Option<(Vec<String>, Columns)> {
     let names: Vec<String> =
         words(line.trim().trim_start_matches(['#', '/'])).map(str::to_ascii_lowercase).collect();

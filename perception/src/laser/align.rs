@@ -7,7 +7,7 @@ use nalgebra::Isometry2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
-/// A shape model made of scans, and how well they go together.
+/// Shape model from scans, with the quality of the alignment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
     /// The scans at their poses after alignment.
@@ -16,10 +16,10 @@ pub struct Alignment {
     pub before: Violation,
     /// Violation after.
     pub after: Violation,
-    /// Minimised objective, after: the violation, and the tie-breaker among poses that violate
-    /// nothing; square metres.
+    /// Minimised objective after alignment, square metres: boundary violation, plus the tie-breaker
+    /// among poses without violation.
     pub objective_m2: f64,
-    /// True if the solver settled; false if it was cut short.
+    /// True if the solver converged; false at the iteration limit.
     pub converged: bool,
     /// Iterations of the solver.
     pub iterations: usize,
@@ -29,7 +29,8 @@ pub struct Alignment {
     pub moved: Vec<(f64, f64)>,
     /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
     pub left_out: Vec<usize>,
-    /// Ends that contradict the others, by the index of the scan: in the model that scan is open on that side. Only [`align_consistent`] opens any.
+    /// Ends that contradict other scans, with the index of the scan; in the model, the scan is open
+    /// on that side. Set by [`align_consistent`] only.
     pub opened: Vec<(usize, Side)>,
 }
 
@@ -39,7 +40,7 @@ impl Alignment {
         self.after.exterior_m.max(self.after.interior_m)
     }
 
-    /// True if a scan ended too far from its stated pose; never, if the accuracy of stated poses is
+    /// True if a scan ended too far from its stated pose; false if the accuracy of stated poses is
     /// unknown.
     fn strays(&self, options: &SolverOptions) -> bool {
         let Objective::Centred { pose_sigma_m, pose_sigma_rad } = options.objective else { return false };
@@ -47,7 +48,8 @@ impl Alignment {
     }
 }
 
-/// Minimises the boundary violation over the poses of all scans, from the poses given. One scan alone stays as it is.
+/// Minimises the boundary violation over the poses of all scans, from the given poses; a single
+/// scan keeps its pose.
 ///
 /// # Errors
 /// If there is no scan, or one is unsound.
@@ -84,15 +86,18 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
     })
 }
 
-/// Fewest scans that can tell which of them is wrong: two contradict each other, a third decides.
+/// Minimum number of scans that can identify a wrong one: two contradict each other, a third
+/// decides.
 const FEWEST: usize = 3;
-/// A scan that was moved by more spreads of its stated pose is not where it was taken.
+/// Maximum displacement of a scan from its stated pose, in standard deviations; beyond it, the
+/// stated pose was wrong.
 const FAR: f64 = 4.0;
-/// Angle by which an end is opened, radians: the bound then lies far beside the thing and
+/// Angle by which an end is opened, radians: the bound then lies far beside the object and
 /// constrains nothing.
 const OPEN_RAD: f64 = 0.5;
 
-/// Aligns scans of which some may be wrong: where an end of the thing was taken for background, the bound lies on the thing and contradicts other scans.
+/// Aligns scans of which some may have false ends: if an end of the object was taken for
+/// background, the bound lies on the object and contradicts other scans.
 ///
 /// While an error is longer than `longest_m`, scans are aligned with such errors as outliers ([`SolverOptions::outlier_m`]); ends that two or more of the
 /// others contradict are opened, and scans that contradict two or more ends are left out. If fewer than three scans, or no more than half of all scans or
@@ -136,7 +141,7 @@ pub fn align_consistent(
     Ok(best)
 }
 
-/// Moves the bound of a scan far away from the thing on one side.
+/// Moves the bound of a scan far away from the object on one side.
 fn open(posed: &mut PosedScan, side: Side) {
     let scan = &mut posed.scan;
     let most = |other: f64| (other.abs() - 1e-3).min(OPEN_RAD);
@@ -165,8 +170,8 @@ impl Contradictions {
     }
 }
 
-/// Majority of scans over one: an end that two other scans contradict is false, a scan that contradicts two
-/// ends which nobody else does has false points, or lacks some.
+/// Majority vote on contradictions: an end contradicted by two other scans is false; a scan that
+/// alone contradicts two ends has false points or lacks some.
 fn contradictions(
     scans: &[PosedScan],
     longest_m: f64,

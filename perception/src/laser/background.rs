@@ -1,4 +1,5 @@
-//! The readings of a thing in a scan: what is no background, in clusters, and the angles that bound it.
+//! Background subtraction in a laser scan: clusters of foreground readings, and the angles that
+//! bound each object.
 
 use super::scan::{Scan, ScanError};
 use super::shape::{ObjectScan, PosedScan};
@@ -7,15 +8,15 @@ use nalgebra::{Point2, Point3, Vector2};
 use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
-/// Options for separating readings of a thing from the background.
+/// Options for background subtraction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserveOptions {
     /// Maximum gap between readings of one object, metres: wider than the gap between a chair's
     /// legs.
     pub step_m: f32,
-    /// Fewest readings of a thing.
+    /// Minimum number of readings of an object.
     pub least: usize,
-    /// The middle of its readings lies no farther from where the thing is looked for, metres.
+    /// Maximum distance of the readings' centre from the expected position, metres.
     pub within_m: f64,
     /// A reading bounds the object if it ends this much farther out than the object's own last
     /// reading, metres; if it ends nearer by as much, the object was cut off.
@@ -33,15 +34,15 @@ impl Default for ObserveOptions {
 pub enum Ignored {
     /// No cluster of readings lies near the expected place.
     NotSeen,
-    /// The thing reaches to the left end of the field of view: LeftBound does not exist.
+    /// The object reaches the left end of the field of view, so that LeftBound does not exist.
     NoLeftBound,
-    /// The thing reaches to the right end of the field of view: RightBound does not exist.
+    /// The object reaches the right end of the field of view, so that RightBound does not exist.
     NoRightBound,
-    /// Something nearer covers its left end.
+    /// A nearer object occludes the left end.
     LeftCovered,
-    /// Something nearer covers its right end.
+    /// A nearer object occludes the right end.
     RightCovered,
-    /// The thing and its bounds fill half a turn or more.
+    /// Object and bounds span half a turn or more.
     TooNear,
 }
 
@@ -58,12 +59,12 @@ impl std::fmt::Display for Ignored {
     }
 }
 
-/// Observation of a thing by several scans.
+/// Observation of an object by several scans.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
-    /// Scans in which it is bounded on both sides, posed in the map.
+    /// Scans that bound the object on both sides, posed in the map.
     pub scans: Vec<PosedScan>,
-    /// The others, by their index, and why they are left out.
+    /// Indices of the ignored scans, with the reasons.
     pub ignored: Vec<(usize, Ignored)>,
 }
 
@@ -83,7 +84,8 @@ pub enum ObserveError {
     Cluster(#[from] ClusterError),
 }
 
-/// Takes the thing near a place of the map out of each scan: readings that are no background, the cluster of them nearest to `near`, and its bounds.
+/// Extracts the object near a map position from each scan: foreground readings, the cluster nearest
+/// to `near`, and its bounding angles.
 ///
 /// `is_background` is asked with places of the map; see [`crate::occupancy::Occupancy::is_background`].
 ///
@@ -110,16 +112,16 @@ pub fn observe(
     Ok(observation)
 }
 
-/// Readings of one thing in a scan.
+/// Cluster of readings of one object in a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
     /// Their indices, ascending.
     pub readings: Vec<usize>,
-    /// The middle of where they ended, in the map.
+    /// Mean end point of the readings, in the map.
     pub middle: Point2<f64>,
 }
 
-/// Everything in a scan that is no background, a cluster a thing; in the order of their first readings.
+/// All foreground clusters of a scan, in the order of their first readings.
 ///
 /// # Errors
 /// If the scan is unsound, or `step_m` is no length.
@@ -173,7 +175,7 @@ fn readings_near(
     Ok(nearest.map(|(_, cluster)| cluster.readings))
 }
 
-/// The thing of these readings with its angles.
+/// Object of these readings with its bounding angles.
 fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<ObjectScan, Ignored> {
     let points: Vec<Point2<f64>> = readings.iter().filter_map(|&i| scan.endpoint(i)).collect();
     let middle: Vector2<f64> = points.iter().map(|p| p.coords).sum();
@@ -212,8 +214,8 @@ fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<
     })
 }
 
-/// Compares a neighbouring reading with the thing's own: beyond (greater), before (less), or level;
-/// `None` without a reading.
+/// Compares a neighbouring reading with the object's own: beyond (greater), in front (less), or
+/// level; `None` without a reading.
 fn past(own_m: f64, reading_m: f64, clear_m: f64) -> Option<Ordering> {
     if reading_m.is_nan() || reading_m <= 0.0 {
         return None;

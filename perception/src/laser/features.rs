@@ -5,7 +5,7 @@ use nalgebra::{Matrix2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Features of a shape's convex hull that no pose changes, and its centre.
+/// Pose-invariant features of a shape's convex hull, and its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Features {
     /// Square metres.
@@ -22,7 +22,8 @@ impl Features {
     }
 }
 
-/// Standard deviations of area (square metres) and perimeter (metres) between models of one thing that seven scans leave: the middle of the paper's Fig. 7.
+/// Standard deviations of area (square metres) and perimeter (metres) between models of one object
+/// from seven scans: the middle of the paper's Fig. 7.
 pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
 
 /// Feature distribution of a class of shapes.
@@ -30,11 +31,11 @@ pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
 pub struct FeatureClass {
     /// Name.
     pub name: String,
-    /// Instances it was learnt from.
+    /// Number of training instances.
     pub instances: usize,
     /// Mean area (square metres) and perimeter (metres).
     pub mean: Vector2<f64>,
-    /// Their covariance: that of the instances, drawn towards that of all classes where instances are few.
+    /// Covariance of the instances, shrunk towards that of all classes when instances are few.
     pub covariance: Matrix2<f64>,
 }
 
@@ -52,9 +53,9 @@ impl FeatureClass {
 pub struct Nearest<'a> {
     /// The class.
     pub class: &'a FeatureClass,
-    /// Spreads from its mean.
+    /// Mahalanobis distance from the class mean.
     pub distance: f64,
-    /// Distance to the second-nearest class, in the same units; infinite if there is none.
+    /// Distance to the second-nearest class in the same units; infinite if there is none.
     pub second: f64,
 }
 
@@ -85,7 +86,8 @@ pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -
         .collect()
 }
 
-/// The class nearest to features, in its spreads; `None` without classes. Whether it is near enough is for the caller to say.
+/// Class with the smallest Mahalanobis distance; `None` without classes. The caller decides on
+/// acceptance.
 pub fn nearest<'a>(classes: &'a [FeatureClass], features: &Features) -> Option<Nearest<'a>> {
     let mut ranked: Vec<(f64, &FeatureClass)> = classes.iter().map(|c| (c.distance(features), c)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -14,8 +14,7 @@ pub struct FitOptions {
     pub solver: SolverOptions,
     /// Angles to start from, evenly around.
     pub starts: usize,
-    /// Number of starts, among those with less violation than their neighbours, that are followed
-    /// to the end.
+    /// Number of starts, local minima of the violation, that are optimised to the end.
     pub followed: usize,
     /// Violation above which the best roughly settled start is given up, metres as
     /// [`Violation::per_pair_m`].
@@ -45,9 +44,9 @@ pub struct ModelFit {
     pub model_from_other: Isometry2<f64>,
     /// f_C: BV of all scans of both together, square metres (Eq. 4).
     pub f_c_m2: f64,
-    /// The part of it between scans of the one and of the other.
+    /// Part of `f_c_m2` between scans of the one model and of the other.
     pub between: Violation,
-    /// True if the solver settled; false if it was cut short.
+    /// True if the solver converged; false at the iteration limit.
     pub converged: bool,
     /// Iterations of the solver, over all starts that were followed.
     pub iterations: usize,
@@ -71,7 +70,7 @@ pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> Mode
     follow(model, other.scans(), &starts, options)
 }
 
-/// Localises a scan by the model of the thing that it shows: pose of the laser in the model's
+/// Localises a scan relative to the model of the object it shows: pose of the laser in the model's
 /// frame.
 ///
 /// Without a start every angle is tried, the scan's nearest reading put on the side of the hull that faces it.
@@ -85,8 +84,8 @@ pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &F
     follow(model, std::slice::from_ref(&posed), &starts, options)
 }
 
-/// Brings scans of one thing, in one frame but from one side perhaps, onto a model of all of it: from every angle, the nearest reading of the scan that
-/// met the thing most often put on the side of the hull that faces it.
+/// Registers scans of one object, possibly from one side, to a complete model: multi-start over
+/// headings, with the scan's nearest reading on the facing side of the hull.
 pub fn fit_scans(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
     let _span = tracing::debug_span!("fit_scans", scans = scans.scans().len()).entered();
     let most = scans.scans().iter().max_by_key(|s| s.scan.points.len());
@@ -101,7 +100,8 @@ fn turns(count: usize) -> impl Iterator<Item = f64> {
     (0..count.max(1)).map(move |i| TAU * i as f64 / count.max(1) as f64)
 }
 
-/// Poses of a laser all around a model, from each of which the scan's nearest reading would lie on the side of the hull that is nearest to it.
+/// Poses of a laser all around a model, with the scan's nearest reading on the facing side of the
+/// hull.
 fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<f64>> {
     let hull = model.hull();
     let centre = hull.centre();
@@ -170,7 +170,7 @@ fn within(scans: &[PosedScan]) -> f64 {
     assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2
 }
 
-/// Local minima of a ring of starts, the least violation first; the first start if there are none.
+/// Local minima of a ring of starts, by increasing violation; the first start if there are none.
 fn promising(violations: &[f64], most: usize) -> impl Iterator<Item = usize> {
     let n = violations.len();
     let (before, after) = (|i: usize| violations[(i + n - 1) % n], |i: usize| violations[(i + 1) % n]);

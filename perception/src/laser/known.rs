@@ -25,7 +25,7 @@ pub struct KnownShape {
     features: Features,
 }
 
-/// A known shape as it stands in a file.
+/// Known shape in file form.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Named {
@@ -45,7 +45,7 @@ impl KnownShape {
         KnownShape { name: name.into(), features: model.features(), model }
     }
 
-    /// Features of its hull.
+    /// Features of the hull.
     pub fn features(&self) -> &Features {
         &self.features
     }
@@ -54,19 +54,21 @@ impl KnownShape {
 /// Options of recognition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecogniseOptions {
-    /// Shapes whose features, or width, are off by more spreads are not aligned: measured at most 5.8 for the same thing, scanned from three to nine
-    /// sides; see `experiments/measure/src/shapes`.
+    /// Maximum distance of features or width, in standard deviations, up to which a shape is
+    /// aligned: measured at most 5.8 for the same object, scanned from three to nine sides; see
+    /// `experiments/measure/src/shapes`.
     pub gate: f64,
     /// Accuracy of the outline from which hull features are used, metres.
     pub tight_m: f64,
-    /// Accuracy of the outline from which scans fix each other's poses, metres; otherwise each scan
-    /// is matched with a shape by itself.
+    /// Outline accuracy from which on the scans fix each other's poses, metres; otherwise each scan
+    /// is matched with a shape separately.
     pub rigid_m: f64,
-    /// A shape fits if the root of the boundary violation a pair of scans stays below, metres: measured so for 97 % of scans of the same thing.
+    /// Maximum root boundary violation per pair of scans at which a shape fits, metres: reached by
+    /// 97 % of scans of the same object.
     pub same_m: f64,
-    /// A shape is ruled out if that root is above this, metres, the precision of the paper's laser: measured
-    /// at most 5.5 mm for the same thing, at least 8.9 mm for another of the paper's. Between the two it may
-    /// be it.
+    /// Minimum root boundary violation that rules a shape out, metres, the precision of the paper's
+    /// laser: measured at most 5.5 mm for the same object, at least 8.9 mm for another of the
+    /// paper's. In between, the shape remains possible.
     pub other_m: f64,
     /// Options for aligning models.
     pub fit: FitOptions,
@@ -97,7 +99,7 @@ impl RecogniseOptions {
 pub struct Candidate {
     /// The index in the list of known shapes.
     pub index: usize,
-    /// Distance of its features or its width from the class, in standard deviations.
+    /// Distance of features or width from the class, in standard deviations.
     pub distance: f64,
     /// Fit of the instance on the model.
     pub fit: ModelFit,
@@ -108,13 +110,14 @@ pub struct Candidate {
 pub enum Verdict {
     /// Exactly one name fits.
     Is(String),
-    /// Several names fit, or none fits and these are not ruled out: more scans, or other features, must tell.
+    /// Several names fit, or none fits and these are not ruled out; more scans or other features
+    /// must decide.
     OneOf(Vec<String>),
     /// Every known shape is ruled out.
     Unknown,
 }
 
-/// Verdict on a shape, with the classes that it was compared with.
+/// Recognition verdict, with the compared classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recognition {
     /// Verdict.
@@ -123,7 +126,7 @@ pub struct Recognition {
     pub candidates: Vec<Candidate>,
     /// The number of known shapes that features or width ruled out.
     pub ruled_out: usize,
-    /// Names that are not ruled out, the best fit first, whether or not they fit as well as the best.
+    /// Names that are not ruled out, best fit first.
     pub may_be: Vec<String>,
 }
 
@@ -158,9 +161,9 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     decide(candidates, known, options)
 }
 
-/// Classifies several scans, perhaps all from one side. `loose_m` is the mean distance by which the
-/// object may extend beyond the measured hull ([`super::Outlook::looseness_m`]): if it is small,
-/// the features of the hull are compared, else only the width in each scan.
+/// Classifies several scans, possibly from one side. `loose_m`: mean distance by which the object
+/// may extend beyond the measured hull ([`super::Outlook::looseness_m`]); if small, hull features
+/// are compared, else only the width in each scan.
 pub fn recognise_scans(
     scans: &ShapeModel,
     loose_m: f64,
@@ -185,7 +188,7 @@ pub fn recognise_scans(
     decide(candidates, known, options)
 }
 
-/// Fit of the scan that fits worst on a model, each scan by itself.
+/// Worst fit among the scans, each fitted to a model separately.
 fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
     let each = scans.scans().iter().map(|posed| {
         let fit = localise(model, &posed.scan, Start::AllAngles, options);
@@ -195,8 +198,8 @@ fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> Mo
     worst.unwrap_or_else(|| fit_scans(model, scans, options))
 }
 
-/// Width by which a shape exceeds the bounds of a scan, or falls short of its readings, from every
-/// side, metres.
+/// Width by which a shape exceeds a scan's bounds, or falls short of its readings, minimised over
+/// viewing directions, metres.
 fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     let corners = model.hull().corners;
     let widths = (0..WIDTHS).map(|i| {
@@ -214,7 +217,7 @@ fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
 }
 
-/// Names of the shapes that fit, and of those that are not ruled out.
+/// Names of the shapes that fit, and of those not ruled out.
 fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
@@ -239,8 +242,8 @@ fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &Recogn
     Recognition { verdict, candidates, ruled_out, may_be }
 }
 
-/// Distance between features of two models in standard deviations of such a difference: the larger
-/// of area's and perimeter's.
+/// Distance between the features of two models, in standard deviations of such a difference: the
+/// larger of area's and perimeter's.
 fn apart(a: &Features, b: &Features) -> f64 {
     let area = (a.area_m2 - b.area_m2) / USUAL_SPREAD.0;
     let perimeter = (a.perimeter_m - b.perimeter_m) / USUAL_SPREAD.1;

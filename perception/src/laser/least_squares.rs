@@ -1,4 +1,5 @@
-//! Least squares on the violated constraints (Levenberg 1944, Marquardt 1963). Which constraints are violated, and by which points, is asked anew each time.
+//! Levenberg-Marquardt on the violated constraints (Levenberg 1944, Marquardt 1963); the active
+//! constraints and their points are recomputed in each iteration.
 
 use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
@@ -6,12 +7,12 @@ use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 /// Rounds of the solver: the softness of the farthest points, metres, and the factor on the length of
 /// outliers; the last is the objective itself.
 const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
-/// Length that a rotation by one radian about the middle of an object counts for, metres: about its
+/// Length equivalent of a rotation by one radian about an object's centre, metres: about its
 /// radius.
 const RADIUS_M: f64 = 0.3;
-/// An objective below this is nothing, square metres.
+/// Objective below which the violation counts as zero, square metres.
 const NOTHING_M2: f64 = 1e-12;
-/// Damping at the start, and where steps are so short that they do not help any more.
+/// Initial damping, and the damping at which steps are too short to help.
 const DAMPING: (f64, f64) = (1e-3, 1e1);
 
 /// Runs the first, softest round alone.
@@ -45,7 +46,7 @@ fn rounds(problem: &Problem, options: &SolverOptions, rounds: &[(f64, f64)]) -> 
     solved
 }
 
-/// Steps until they change nothing; false if they still do.
+/// Iterates until steps change nothing; false at the iteration limit.
 fn descend(
     problem: &Problem,
     options: &SolverOptions,

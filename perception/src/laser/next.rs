@@ -12,13 +12,13 @@ use nalgebra::{Isometry2, Point2, Point3};
 /// Options for counting undetermined places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextOptions {
-    /// Edge of the square around the hull's centre that the thing is believed to lie in, metres.
+    /// Edge of the square around the hull's centre that contains the object, metres.
     pub within_m: f64,
     /// Edge of a cell, metres.
     pub cell_m: f64,
-    /// Angle between readings of the laser, radians: a bound lies so far beside the thing.
+    /// Angular resolution of the laser, radians: spacing of a bound from the object.
     pub step_rad: f64,
-    /// Depths of readings are told no finer, metres.
+    /// Depth resolution of readings, metres.
     pub depth_m: f64,
 }
 
@@ -42,12 +42,12 @@ pub struct NextScan {
     pub leaves_m2: f64,
 }
 
-/// The area that may belong to the thing beyond the hull of its readings, square metres.
+/// Area beyond the hull of the readings that may belong to the object, square metres.
 pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
     undetermined(model, &model.hull(), options).len() as f64 * options.cell_m * options.cell_m
 }
 
-/// Expected gain of scans from several poses, together and each by itself.
+/// Expected gain of scans from several poses, jointly and separately.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
     /// Perimeter of the hull of all hits, metres.
@@ -59,8 +59,8 @@ pub struct Outlook {
 }
 
 impl Outlook {
-    /// Undetermined places of a model, and those that scans from the given poses of the laser, in
-    /// the model's frame, would settle.
+    /// Undetermined cells of a model, and those that scans from the given laser poses (model frame)
+    /// would settle.
     pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Outlook {
         let _span = tracing::debug_span!("outlook", poses = poses.len()).entered();
         let hull = model.hull();
@@ -87,7 +87,7 @@ impl Outlook {
         settled.iter().filter(|is| !**is).count() as f64 * self.cell_m2
     }
 
-    /// Mean distance by which the thing may exceed its measured outline after scans from the given
+    /// Mean distance by which the object may exceed its measured outline after scans from the given
     /// poses, metres.
     pub fn looseness_m(&self, poses: &[usize]) -> f64 {
         self.leaves_m2(poses) / self.perimeter_m
@@ -130,7 +130,7 @@ fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<P
         .collect()
 }
 
-/// True if a reading beside the direction of a place ended beyond it.
+/// True if a reading next to a cell's direction ended beyond the cell.
 fn through(points: &[Point2<f64>], place: &Point2<f64>, options: &NextOptions) -> bool {
     let range_m = place.coords.norm();
     points.iter().any(|p| {
@@ -139,7 +139,7 @@ fn through(points: &[Point2<f64>], place: &Point2<f64>, options: &NextOptions) -
     })
 }
 
-/// True if a scan from here would look past the place, or through it, were the thing as its hull.
+/// True if a scan from here would look past or through the cell, if the object were its hull.
 fn settles(laser: &Point2<f64>, place: &Point2<f64>, hull: &Hull, options: &NextOptions) -> bool {
     let towards = place - laser;
     let middle = hull.centre() - laser;

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Scan {
     /// Ascending, anticlockwise from the laser's x axis, over no more than a full turn.
     pub angles_rad: Vec<f64>,
-    /// Range at each angle, metres. Infinite: nothing within reach. NaN, zero or less: no reading, which
-    /// tells nothing. Written as null where nothing is within reach, and as 0 where there is no reading.
+    /// Range at each angle, metres. Infinite: nothing within reach (serialised as null). NaN, zero
+    /// or negative: no reading, no information (serialised as 0).
     #[serde(with = "ranges")]
     pub ranges_m: Vec<f64>,
     /// Stated pose of the laser.

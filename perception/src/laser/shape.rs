@@ -1,4 +1,4 @@
-//! Shape model: constraints on a thing's outline from one scan and from many.
+//! Shape model: constraints on an object's outline from one scan or many.
 
 use super::features::Features;
 use super::scan::is_pose;
@@ -7,23 +7,24 @@ use crate::plane::Plane;
 use nalgebra::{Isometry2, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// A scan's readings of one thing, and the angles that bound it (section III of the paper). Angles are from the laser's x axis, anticlockwise.
+/// One scan's readings of an object with their bounding angles (section III of the paper). Angles
+/// are from the laser's x axis, anticlockwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectScan {
-    /// End points of readings on the thing, in the laser's frame, metres.
+    /// End points of the object's readings, laser frame, metres.
     pub points: Vec<Point2<f64>>,
-    /// RightBound: the nearest angle to the right of the thing at which the laser looked past it.
+    /// RightBound: nearest angle to the right of the object at which the laser looked past it.
     pub right_bound_rad: f64,
     /// RightObject: rightmost angle at which the scan hit the object.
     pub right_object_rad: f64,
     /// LeftObject: leftmost angle at which the scan hit the object.
     pub left_object_rad: f64,
-    /// LeftBound: the nearest angle to the left of the thing at which the laser looked past it.
+    /// LeftBound: nearest angle to the left of the object at which the laser looked past it.
     pub left_bound_rad: f64,
 }
 
-/// A scan of a thing, and where it was taken.
+/// Scan of an object, with its pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PosedScan {
@@ -33,14 +34,15 @@ pub struct PosedScan {
     pub model_from_laser: Isometry2<f64>,
 }
 
-/// Scans of one thing with poses in one frame: `M = {(S, p_S)}`. Read back only if every scan is sound.
+/// Scans of one object with poses in one frame: `M = {(S, p_S)}`. Deserialised only if every scan
+/// is valid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Written")]
 pub struct ShapeModel {
     scans: Vec<PosedScan>,
 }
 
-/// A model as it stands in a file, not yet looked at.
+/// Model in file form, not yet validated.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -69,7 +71,7 @@ pub enum ShapeError {
         /// Index of the scan.
         index: usize,
     },
-    /// The angles bound nothing.
+    /// The angles are not in order, so that they bound nothing.
     #[error(
         "the angles of scan {index} are {angles_rad:?} rad: expected right bound < right object <= left object < left bound, over less than half a turn"
     )]
@@ -88,7 +90,7 @@ pub enum ShapeError {
 }
 
 impl ShapeModel {
-    /// A model of these scans, as they are posed.
+    /// Model of the given scans at their poses.
     ///
     /// # Errors
     /// If there is none, or one of them is unsound.
@@ -110,12 +112,12 @@ impl ShapeModel {
         &self.scans
     }
 
-    /// End points of readings on the thing, in the model's frame, metres.
+    /// End points of the object's readings, model frame, metres.
     pub fn points(&self) -> impl Iterator<Item = Point2<f64>> {
         self.scans.iter().flat_map(|s| s.scan.points.iter().map(|p| s.model_from_laser * p))
     }
 
-    /// The convex hull of all readings of the thing, in the plane z = 0 of the model's frame.
+    /// Convex hull of all the object's readings, in the plane z = 0 of the model frame.
     pub fn hull(&self) -> Hull {
         hull_of(self.points())
     }
@@ -126,7 +128,7 @@ impl ShapeModel {
         Features { area_m2: hull.area_m2(), perimeter_m: hull.perimeter_m(), centre: hull.centre() }
     }
 
-    /// The same model with its frame moved: `t(N, p)` of Eq. 4.
+    /// Model with its frame transformed: `t(N, p)` of Eq. 4.
     pub fn moved(&self, by: &Isometry2<f64>) -> ShapeModel {
         let moved =
             |s: &PosedScan| PosedScan { scan: s.scan.clone(), model_from_laser: by * s.model_from_laser };

@@ -4,7 +4,7 @@
 pub struct Found {
     /// The best place.
     pub at: Vec<f64>,
-    /// The value there.
+    /// Value of the function at the corner.
     pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
@@ -14,8 +14,9 @@ pub struct Found {
 /// Convergence limit of the simplex, as a fraction of the first steps.
 const FINEST: f64 = 1e-4;
 
-/// Minimises a function near the origin, from a simplex of the given steps. Settled once the corners lie within a ten-thousandth of the first steps, or
-/// their values differ by less than `settle` of them.
+/// Minimises a function near the origin by the Nelder-Mead simplex with the given initial steps.
+/// Converged once the corners lie within a ten-thousandth of these steps, or their values differ by
+/// a share less than `settle`.
 pub fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, settle: f64) -> Found {
     let n = steps.len();
     let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)

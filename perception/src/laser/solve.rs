@@ -18,11 +18,11 @@ pub enum Solver {
 /// Objective.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Objective {
-    /// The boundary violation alone (Eq. 3). Many poses violate nothing, for a reading a degree bounds a thing loosely; which of them is found is left to
-    /// chance, and models come out too large.
+    /// Boundary violation alone (Eq. 3). Many poses have none, because readings one degree apart
+    /// bound an object loosely; the result among these is arbitrary, and models come out too large.
     Violation,
-    /// The boundary violation, and with a tenth of its weight what chooses among the poses that violate nothing: silhouettes lie in the middle between
-    /// the last ray that met the thing and the first that went past, and poses stay near those given.
+    /// Boundary violation, plus with a tenth of its weight a tie-breaker: silhouettes lie midway
+    /// between the last hit and the first miss, and poses stay near the given ones.
     Centred {
         /// Spread of the given positions, metres.
         pose_sigma_m: f64,
@@ -37,7 +37,7 @@ impl Default for Objective {
     }
 }
 
-/// Weight of what chooses among poses that violate nothing.
+/// Weight of the tie-breaker among poses without violation.
 const CENTRED: f64 = 0.1;
 /// Standard deviation of a silhouette edge between two rays one degree apart at 1.5 m, metres:
 /// their spacing over the square root of twelve.
@@ -50,7 +50,7 @@ pub struct SolverOptions {
     pub solver: Solver,
     /// Objective.
     pub objective: Objective,
-    /// Most iterations of least squares in each of its rounds.
+    /// Maximum iterations of least squares per round.
     pub most_iterations: usize,
     /// Most evaluations of the simplex, for each of three numbers a pose.
     pub most_evaluations: usize,
@@ -58,8 +58,8 @@ pub struct SolverOptions {
     pub settle: f64,
     /// First steps of the simplex: metres, and radians.
     pub simplex_steps: (f64, f64),
-    /// Errors that are much longer count as if they were no longer, metres (the weights of Geman and McClure 1987): a few false ends of scans then leave
-    /// the others in place. Infinite: all count by their squares, as in Eq. 3.
+    /// Error length beyond which errors gain no further weight, metres (Geman and McClure 1987), so
+    /// that a few false ends do not shift the other scans. Infinite: plain squares, as in Eq. 3.
     pub outlier_m: f64,
 }
 
@@ -89,21 +89,21 @@ pub struct Solved {
     pub evaluations: usize,
 }
 
-/// Groups of scans, where they are, and which of them may move.
+/// Groups of scans with their poses and movability.
 pub struct Problem<'a> {
     assembly: &'a Assembly,
     start: &'a [Isometry2<f64>],
     movable: Vec<usize>,
     /// Weight of [`Kind::Slack`].
     slack: f64,
-    /// Weights of a group's shift (twice) and turn from its start.
+    /// Prior weights of a group's shift (two components) and rotation from its start.
     prior: [f64; 3],
     /// See [`SolverOptions::outlier_m`].
     outlier_m: f64,
 }
 
 impl<'a> Problem<'a> {
-    /// Scans that are all free to move, from where localisation put them.
+    /// All scans free to move, from their localised poses.
     pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = (0..start.len()).collect();
         let (slack, prior) = match options.objective {
@@ -116,7 +116,7 @@ impl<'a> Problem<'a> {
         Problem { assembly, start, movable, slack, prior, outlier_m: options.outlier_m }
     }
 
-    /// The last group moves onto the others; nothing is known of where it belongs.
+    /// Last group free to move onto the fixed others, without a prior on its pose.
     pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = vec![start.len() - 1];
         Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, options) }
@@ -134,15 +134,15 @@ impl<'a> Problem<'a> {
         &self.movable
     }
 
-    /// Cost of an error, square metres, and the weight of its square with the same slope; outliers
-    /// are `wider` times as long as at the end.
+    /// Cost of an error, square metres, and the weight of its square with the same slope; the
+    /// outlier length is scaled by `wider`.
     pub fn costs(&self, r: &Residual, wider: f64) -> (f64, f64) {
         let weight = if r.kind == Kind::Slack { self.slack } else { 1.0 };
         let share = 1.0 / (1.0 + (r.value_m / (wider * self.outlier_m)).powi(2));
         (weight * share * r.value_m * r.value_m, weight * share * share)
     }
 
-    /// Shift and turn of a group from its start, each with the weight of its square.
+    /// Shift and rotation of a group from its start, each with the weight of its square.
     pub fn strayed(&self, poses: &[Isometry2<f64>], group: usize) -> impl Iterator<Item = (f64, f64)> {
         let pivot = self.assembly.pivot(group);
         let (from, to) = (&self.start[group], &poses[group]);
@@ -150,7 +150,7 @@ impl<'a> Problem<'a> {
         [shift.x, shift.y, from.rotation.angle_to(&to.rotation)].into_iter().zip(self.prior)
     }
 
-    /// The poses after a shift (metres) and a turn (radians) of each movable group about its pivot.
+    /// Poses after a shift (metres) and rotation (radians) of each movable group about its pivot.
     pub fn moved(&self, poses: &[Isometry2<f64>], by: &[f64]) -> Vec<Isometry2<f64>> {
         let mut moved = poses.to_vec();
         for (&group, by) in self.movable.iter().zip(by.chunks_exact(3)) {

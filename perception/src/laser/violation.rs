@@ -1,4 +1,4 @@
-//! The angular constraints between scans, and how far poses violate them (Eq. 1 to 3).
+//! Angular constraints between scans, and their violation by poses (Eq. 1 to 3).
 //!
 //! All errors are distances of points from lines, the worst or the best of a scan's points: only corners of its convex hull can be either.
 
@@ -36,14 +36,16 @@ struct Part {
     /// The start of the part's corners in `Assembly::corners`.
     begin: usize,
     end: usize,
-    /// False if its laser looked past the thing only far beside it on either side: it may have missed an end, and need not reach what others saw.
+    /// False if the laser looked past the object only far beside it on some side; the scan may have
+    /// missed an end, and need not reach the extent seen by others.
     is_whole: bool,
 }
 
-/// A bound so far beside the last reading of the thing tells nothing of where it ends, radians.
+/// Angle between a bound and the object's last reading beyond which the bound says nothing about
+/// the end, radians.
 const FAR_RAD: f64 = 0.2;
 
-/// An end of the thing, as a scan sees it.
+/// End of the object in a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
@@ -53,7 +55,7 @@ pub enum Side {
     Right,
 }
 
-/// Origin of a scan and its lines: unit normals that point away from the thing.
+/// Origin of a scan, and unit normals of its bounding lines, pointing away from the object.
 #[derive(Clone, Copy, Debug)]
 struct Rays {
     laser: Point2<f64>,
@@ -80,8 +82,8 @@ impl Rays {
         }
     }
 
-    /// The object ray that a scan from `other` must reach, the one on its side (Eq. 2), and the bound beside it; none if it looks from between the bounds,
-    /// for then it need not see either end of what this scan saw.
+    /// Object ray on the side of `other` that its scan must reach (Eq. 2), with the bound beside
+    /// it; `None` if `other` is between the bounds and need not see either end.
     fn facing(&self, other: &Point2<f64>) -> Option<(Side, Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
@@ -95,26 +97,26 @@ impl Rays {
     }
 }
 
-/// Scans in groups, each of which moves as one.
+/// Groups of rigidly connected scans.
 #[derive(Clone, Debug)]
 pub struct Assembly {
     parts: Vec<Part>,
     corners: Vec<Point2<f64>>,
     rays: Vec<Rays>,
-    /// About what each group turns, in its own frame: the middle of its corners.
+    /// Pivot of each group in its own frame: mean of its corners.
     pivots: Vec<Point2<f64>>,
     /// Pairs of scans of different groups that are held against each other.
     pairs: usize,
 }
 
-/// An assembly with each group at its pose.
+/// Assembly with its group poses.
 pub struct Placed {
     corners: Vec<Point2<f64>>,
     rays: Vec<Rays>,
 }
 
-/// Kind of error: exterior (Eq. 1), interior (Eq. 2), or signed distance of an end of the thing
-/// from the middle between the last ray that met it and the first that passed it.
+/// Kind of error: exterior (Eq. 1), interior (Eq. 2), or signed distance of an end of the object
+/// from the midpoint between the last hit and the first miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Exterior,
@@ -126,14 +128,14 @@ pub enum Kind {
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     pub kind: Kind,
-    /// Side of the scan whose line it is.
+    /// Side of the scan with the line.
     pub side: Side,
     pub value_m: f64,
     pub normal: Vector2<f64>,
     pub at: Point2<f64>,
-    /// Group of the scan whose line it is.
+    /// Group of the scan with the line.
     pub line: usize,
-    /// Group of the scan whose point it is.
+    /// Group of the scan with the point.
     pub point: usize,
 }
 
@@ -178,12 +180,12 @@ impl Assembly {
         self.rays.push(rays.map(|p| pose * p, |v| pose * v));
     }
 
-    /// About what a group turns, in its own frame.
+    /// Pivot of a group in its own frame.
     pub fn pivot(&self, group: usize) -> Point2<f64> {
         self.pivots[group]
     }
 
-    /// Every scan where the pose of its group puts it.
+    /// All scans placed at their groups' poses.
     pub fn placed(&self, poses: &[Isometry2<f64>]) -> Placed {
         let mut placed = Placed {
             corners: Vec::with_capacity(self.corners.len()),
@@ -237,7 +239,8 @@ impl Assembly {
     }
 }
 
-/// The errors of points against the lines of a scan; nought is not told. The points were seen from `whole`, or by a scan that may have missed an end.
+/// Errors of points against a scan's lines, zeros omitted. `whole`: the points come from a scan
+/// that saw both ends.
 #[inline(always)]
 fn errors(
     rays: &Rays,
@@ -265,7 +268,7 @@ fn errors(
     }
 }
 
-/// The point farthest along a normal, measured from `from`, and how far it is.
+/// Farthest point along a normal from `from`, and its distance.
 ///
 /// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes
 /// without a jump, so that derivatives tell where to go when two points are as far.

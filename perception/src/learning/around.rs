@@ -20,7 +20,8 @@ pub struct AroundOptions {
     pub footprint_m: f64,
     /// Minimum and maximum height of possible obstacles, metres.
     pub band_m: (f64, f64),
-    /// A way that is longer than the straight line times this is a detour: the look around is cut there.
+    /// Detour factor: a route longer than the straight line times this factor interrupts the tour
+    /// around the object.
     pub detour: f64,
 }
 
@@ -81,8 +82,8 @@ pub fn stands(
     Ok((0..options.lines).map(on_line).collect())
 }
 
-/// Sequences of neighbouring poses that are reachable without a detour; each sequence follows the
-/// lines. `way_m` is the length of the route between two places, metres, if there is one.
+/// Sequences of neighbouring poses that are reachable without a detour, in the order of the lines.
+/// `way_m`: length of the route between two places, metres, if there is one.
 pub fn trajectories(
     stands: &[Option<Point2<f64>>],
     detour: f64,
@@ -110,8 +111,8 @@ pub fn trajectories(
     strings
 }
 
-/// The string whose one end is nearest from where the body is, turned round if that is its last; of equally near ones the longest. The others
-/// cost camera tracking before they begin (section IV-A).
+/// Sequence with an end nearest to the body, reversed if that end is its last; among ties the
+/// longest, as the others cost camera tracking before they begin (section IV-A).
 pub fn nearest(
     strings: &[Vec<Point2<f64>>],
     here: &Point2<f64>,

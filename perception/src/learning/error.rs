@@ -26,7 +26,7 @@ pub enum LearningError {
         /// Pixels of the view.
         expected: usize,
     },
-    /// The view that shows what to learn does not fit the others.
+    /// The view with the mask does not fit the others.
     #[error(
         "the first view was left out ({why}): what it shows of the object cannot be carried over to the others"
     )]
@@ -34,7 +34,7 @@ pub enum LearningError {
         /// Reason.
         why: String,
     },
-    /// Nothing of the object is left after cleaning.
+    /// Cleaning left no points of the object.
     #[error(
         "{points} points of the object are left in the first view after its edge, outliers and planes were removed: go nearer"
     )]
@@ -42,7 +42,7 @@ pub enum LearningError {
         /// Number of points.
         points: usize,
     },
-    /// Two models of what should be one object.
+    /// The models do not match as one object.
     #[error(
         "both lie on each other in {:.0} % only, {:.1} mm off, after one was moved by {:.0} mm: they are not one surface",
         1e2 * shared, 1e3 * off_m, 1e3 * moved_m
@@ -50,12 +50,12 @@ pub enum LearningError {
     Disagree {
         /// Share of the smaller one that lies on the other.
         shared: f64,
-        /// Root mean square by which it is off there, metres.
+        /// Root mean square distance in the overlap, metres.
         off_m: f64,
         /// Motion that was needed to fit, metres.
         moved_m: f64,
     },
-    /// Options that mean nothing.
+    /// Invalid options.
     #[error("learning option `{field}` is {value}: expected {expected}")]
     Option {
         /// The option.
@@ -68,7 +68,7 @@ pub enum LearningError {
     /// The views could not be brought together.
     #[error(transparent)]
     Merge(#[from] MergeError),
-    /// A cloud could not be brought onto another.
+    /// Registration of a cloud failed.
     #[error(transparent)]
     Register(#[from] RegisterError),
     /// Too many points.

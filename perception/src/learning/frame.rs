@@ -1,4 +1,4 @@
-//! A keyframe made ready: what lies near the object, in the world, with normals.
+//! Prepared keyframe: the points near the object in the world, with normals.
 
 use super::mask::Mask;
 use crate::cloud::{Cloud, Grid, is_finite};
@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 pub(super) struct Frame {
     pub map: DepthMap,
     pub grid: Grid,
-    /// World frame, row by row; NaN where nothing near the object was measured.
+    /// Points in the world frame, row by row; NaN where no point near the object was measured.
     pub points: Vec<Point3<f32>>,
     /// World frame, towards the camera.
     pub normals: Vec<Vector3<f32>>,
@@ -24,7 +24,8 @@ pub(super) struct Frame {
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
-/// Farthest that neighbours are looked for, pixels: what fills more of the image is too near to be measured.
+/// Maximum half width of a pixel neighbourhood, pixels: a larger one means an object too near to
+/// measure.
 const WIDEST_PX: f64 = 32.0;
 
 impl Frame {
@@ -80,8 +81,8 @@ impl Frame {
         }
     }
 
-    /// Calls `found` with the pixels of a square around one, so wide that it holds all points within `radius_m`, itself among
-    /// them, as far as [`WIDEST_PX`].
+    /// Calls `found` with the pixels of a square that contains all points within `radius_m` of the
+    /// given one, itself included, up to [`WIDEST_PX`].
     pub fn around(&self, pixel: usize, radius_m: f32, mut found: impl FnMut(usize)) {
         let Grid { width, height } = self.grid;
         let (u, v) = (pixel % width, pixel / width);

@@ -17,17 +17,18 @@ const EDGE_M: (f64, f64) = (1.0, 0.002);
 const EDGE_SHARE: f32 = 0.015;
 /// An edge farther away casts no doubt that counts, metres.
 const EDGE_REACH_M: f32 = 0.008;
-/// Measurements within so far of a place along its surface say where it is, metres; farther off along the normal they are of another surface.
+/// Radius along the surface, metres, within which measurements determine a point; beyond that
+/// distance along the normal, they belong to another surface.
 const SMOOTH_M: f32 = 0.004;
 const DEEP_M: f32 = 0.01;
-/// Measurements that are asked where a place is, at most: more tell it no better.
+/// Maximum number of measurements used for determining points; more do not improve the result.
 const ASKED: usize = 60_000;
 /// Error of a model from one encounter, metres.
 const MADE_M: f64 = 0.001;
 /// Least cosine between normals of one surface.
 const SAME_SIDE: f32 = 0.6;
 
-/// The object as one look measured it.
+/// Object as measured by one view.
 #[derive(Default)]
 pub(super) struct Measured {
     cloud: Cloud,
@@ -64,7 +65,8 @@ impl Measured {
         self.variances.extend(std::iter::repeat_n(variance, part.len()));
     }
 
-    /// In each cube the point of least variance; then moved along its normal to where all measurements around say, if `smooth`; without outliers.
+    /// Point of least variance in each cube, then, if `smooth`, moved along its normal to the mean
+    /// of the surrounding measurements; without outliers.
     pub fn fused(&self, cube_m: f32, smooth: bool) -> Result<Cloud, LearningError> {
         let mut chosen = self.least(&self.cloud, &self.variances, cube_m)?;
         if smooth {
@@ -92,8 +94,9 @@ impl Measured {
         Ok(best)
     }
 
-    /// The chosen points, each moved along its normal to the mean of the measurements around it, weighed by their variances. Two looks that are
-    /// off by less than the sensor's noise make one wall so, not two.
+    /// Chosen points, each moved along its normal to the variance-weighted mean of the surrounding
+    /// measurements, so that two views misaligned by less than the sensor noise give one surface
+    /// instead of two.
     fn smoothed(&self, chosen: &[u32]) -> Result<Cloud, LearningError> {
         let mut cloud = self.cloud.select(chosen);
         let Some(normals) = &self.cloud.normals else { return Ok(cloud) };

@@ -1,4 +1,5 @@
-//! From one look to the next: what lies where the object was, grown over smooth surface (section V-B).
+//! Propagation of the object mask from view to view: points at the object's position, grown over
+//! smooth surfaces (section V-B).
 
 use super::LearningError;
 use super::frame::Frame;
@@ -34,7 +35,8 @@ pub(super) fn grown(frame: &Frame, usable: &Mask, mut mask: Mask, radius_m: f32,
     mask
 }
 
-/// Neighbours whose mean distance tells a stray point, and how many standard deviations too many (Rusu et al. 2008).
+/// Outlier filter: number of neighbours for the mean distance, and threshold in standard deviations
+/// (Rusu et al. 2008).
 const STRAY: (usize, f64) = (20, 2.5);
 
 /// The mask without statistical outliers (section V-A, a).

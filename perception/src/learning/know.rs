@@ -40,13 +40,13 @@ pub struct KnowOptions {
     pub keypoint_m: f32,
     /// Minimum confidence of a reported object.
     pub least_confidence: f64,
-    /// Upper bound of the probability, from a few points of the model, below which a candidate is
-    /// not examined closer: far below any that is reported, so nothing but time is saved.
+    /// Upper bound of the probability, from a few model points, below which a candidate is dropped;
+    /// far below any reported probability, so only time is saved.
     pub hopeless: f64,
     /// Judge that turns evidence into a probability.
     pub judge: Judge,
-    /// The up direction in the frames of the models and in the world of the views, if it is the same in all
-    /// of them: things mostly stand as they stood when they were learned.
+    /// Up direction in the frames of the models and of the views, if common to all: objects mostly
+    /// stand as they stood when learned.
     pub up: Option<Unit<Vector3<f64>>>,
 }
 
@@ -66,7 +66,7 @@ impl Default for KnowOptions {
 /// A learned object found in a view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recognised {
-    /// Number of the model in the library, in the order in which they were added.
+    /// Index of the model in the library, in order of addition.
     pub model: usize,
     /// Pose, by the stated pose of the view.
     pub world_from_model: Isometry3<f64>,
@@ -131,7 +131,7 @@ const SETTLED: (f64, f64) = (0.005, 0.07);
 /// and for one that a few points have aligned already.
 const WITHIN_M: [f32; 2] = [0.025, 0.01];
 const SETTLED_WITHIN_M: [f32; 1] = [0.01];
-/// Odds that a thing lies or hangs, to standing as it stood when it was learned. An assumption: nine in ten stand.
+/// Odds of lying or hanging against standing as when learned; an assumption: nine in ten stand.
 const LYING: f64 = 0.1;
 /// Two answers may share at most this part of the smaller one's explained points.
 const SHARED: f64 = 0.2;
@@ -147,7 +147,8 @@ fn directions() -> Vec<Vector3<f32>> {
 }
 
 impl Library {
-    /// Adds a model: a cloud with outward normals about any origin, coloured or not. Its number.
+    /// Adds a model, a cloud with outward normals about any origin, optionally coloured; returns
+    /// its index.
     ///
     /// # Errors
     /// If it has next to no points with normals.
@@ -176,7 +177,7 @@ impl Library {
         self.models.len()
     }
 
-    /// True if nothing was learned.
+    /// True if the library has no models.
     pub fn is_empty(&self) -> bool {
         self.models.is_empty()
     }
@@ -223,12 +224,12 @@ impl Library {
     }
 }
 
-/// A model at a pose, judged by itself.
+/// Model at a pose, judged in isolation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// Candidate.
     pub recognised: Recognised,
-    /// Points of the view's surface that it explains, ascending.
+    /// Indices of the view's surface points that the model explains, ascending.
     explained: Vec<u32>,
 }
 
@@ -273,8 +274,8 @@ impl Known {
         Ok(judged)
     }
 
-    /// Poses that matches vote for, brought onto the scene by a few of the model's points, if they are not hopeless by these. Votes that come to one pose are
-    /// one. `up` is up in the model and in the scene.
+    /// Poses that matches vote for, refined on the scene with a few model points and kept if
+    /// promising; duplicates are merged. `up`: up direction in model and scene.
     fn promising(
         &self,
         described: &[Features; 2],
@@ -312,7 +313,8 @@ impl Known {
         Ok(promising)
     }
 
-    /// The most confidence that one of some poses may come to by a few of the model's points; one if too few of them can be seen.
+    /// Upper bound of the confidence over some poses, from a few model points; 1 if too few are
+    /// visible.
     fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &Seen, judge: &Judge) -> f64 {
         let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
         let mut most = 0.0_f64;
@@ -328,14 +330,16 @@ impl Known {
 }
 
 impl KnowOptions {
-    /// Probability that a model with this evidence is where it is said to be, if it stands there as it stood when it was learned, or not.
+    /// Probability that a model with this evidence is at its pose, given whether it stands as when
+    /// learned.
     fn confidence(&self, evidence: &Evidence, stands: bool) -> f64 {
         let p = self.judge.confidence(evidence);
         if stands { p } else { LYING * p / (1.0 - p + LYING * p) }
     }
 }
 
-/// The pose of a skin after its visible side was brought onto the scene's surface, looked for within these distances (metres) one after the other.
+/// Pose of a skin after ICP of its visible side with the scene, with decreasing search radii,
+/// metres.
 fn refined(
     skin: &Skin,
     start: &Isometry3<f64>,
@@ -374,10 +378,10 @@ fn same(a: &Isometry3<f64>, b: &Isometry3<f64>, (within_m, within_rad): (f64, f6
         && a.rotation.angle_to(&b.rotation) < within_rad
 }
 
-/// The candidates that together explain the scene best without explaining any part of it twice, the surest
-/// first: from the best of each alone, changed one at a time for the better (add one and drop what it
-/// conflicts with). What another model explains as well is shared among both by their odds; less confidence
-/// than `least_confidence` is not told.
+/// Candidates that together explain the scene best without explaining any point twice, most
+/// confident first: greedy from each single best candidate, with single improving exchanges (add
+/// one, drop its conflicts). Competing explanations share confidence by their odds; candidates
+/// below `least_confidence` are dropped.
 pub fn choose(mut found: Vec<Candidate>, least_confidence: f64) -> Vec<Recognised> {
     found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let n = found.len();

@@ -2,7 +2,7 @@
 
 use crate::cloud::Grid;
 
-/// Pixels of which something holds, row by row.
+/// Pixel mask, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     pub grid: Grid,
@@ -43,7 +43,7 @@ impl Mask {
         self.along_rows(reach).transposed().along_rows(reach).transposed()
     }
 
-    /// All pixels around which a square of `reach` pixels to each side is in the mask. Beyond the image counts as in it.
+    /// Erosion by a square of `reach` pixels to each side; pixels outside the image count as set.
     pub fn eroded(&self, reach: usize) -> Mask {
         let out = Mask { grid: self.grid, set: self.set.iter().map(|s| !s).collect() }.dilated(reach);
         Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }

@@ -17,7 +17,7 @@ use crate::voxel;
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde::{Deserialize, Serialize};
 
-/// Options of modelling. Parameters of the paper where it gives any.
+/// Options of modelling, with the paper's values where stated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearnOptions {
@@ -25,9 +25,9 @@ pub struct LearnOptions {
     pub reach_m: f64,
     /// Side of a supervoxel, metres (paper: 5 mm).
     pub supervoxel_m: f32,
-    /// Least share of a supervoxel that is of the object, for it to stay (paper: 25 %).
+    /// Minimum share of a supervoxel in the object for the supervoxel to stay (paper: 25 %).
     pub supervoxel_share: f64,
-    /// Least share of a plane that is of the object, for it to stay (ϑ_obj of Eq. 3).
+    /// Minimum share of a plane in the object for the plane to stay (ϑ_obj of Eq. 3).
     pub plane_object_share: f64,
     /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis of
     /// Eq. 4).
@@ -38,9 +38,10 @@ pub struct LearnOptions {
     pub angle_rad: f64,
     /// Side of the cubes of the model, metres (paper: 2 mm).
     pub cube_m: f32,
-    /// True: each point of the model lies where all measurements around it say, not only the best one (beyond the paper).
+    /// True: each model point is the mean of the measurements around it, instead of the single best
+    /// one (beyond the paper).
     pub smooth: bool,
-    /// A look that sees through more than this share of what is known of the object is left out.
+    /// Maximum seen-through share of the known object in a view; views above it are left out.
     pub through_share: f64,
 }
 
@@ -64,24 +65,25 @@ impl Default for LearnOptions {
 /// Contribution of one look to a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Used {
-    /// Pixels of the object; 0 if it was left out.
+    /// Number of object pixels; 0 if the view was left out.
     pub pixels: usize,
     /// Reason for which the look was left out.
     pub left_out: Option<String>,
 }
 
-/// A rigid object as it was learned.
+/// Learned model of a rigid object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnedModel {
-    /// Points with normals, and colours where the views had them, about the middle of the object, metres.
+    /// Points about the object's centre, with normals, and with colours if the views had them,
+    /// metres.
     pub cloud: Cloud,
-    /// Pose of the model's middle when it was learned; axes as the world's.
+    /// Pose of the model's centre when learned; the axes are the world's.
     pub world_from_model: Isometry3<f64>,
     /// Contribution of each look.
     pub looks: Vec<Used>,
 }
 
-/// Grows a model of what `mask` shows in the first view over the keyframes, in their order.
+/// Learns a model: propagates `mask` from the first view over the keyframes, in order.
 ///
 /// # Errors
 /// If there is no view, one is no depth image, the mask has another size, the first view was left out, nothing is left of the object, or an option means nothing.
@@ -144,15 +146,15 @@ struct Growing<'a> {
     measured: Measured,
 }
 
-/// First look, which noticed the object: its surroundings there are no part of the object, however
-/// smoothly they continue its surface.
+/// First view, in which the object was detected; its surroundings there are no part of the object,
+/// however smoothly they continue the surface.
 struct First {
     map: DepthMap,
-    /// Pixels of the object, and those so near that noise may put it there.
+    /// Pixels of the object, and those that noise may assign to it.
     own: Mask,
 }
 
-/// Pixels beside what was noticed that may be of it as well.
+/// Margin around the detected pixels that may belong to the object, pixels.
 const BESIDE_PX: usize = 8;
 
 impl First {
@@ -228,7 +230,7 @@ impl<'a> Growing<'a> {
         Ok(Used { pixels, left_out: None })
     }
 
-    /// Contradiction between a look and the object as known so far: the look sees through it.
+    /// Reason why a view contradicts the object known so far: the view sees through it.
     fn contradiction(&self, frame: &Frame) -> Option<String> {
         let (mut through, mut seen) = (0, 0);
         for p in &self.object.points {

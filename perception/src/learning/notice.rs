@@ -19,8 +19,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoticeOptions {
-    /// Points farther than this from every point of the other cloud differ, metres (δ of Eq. 1; paper: 1 cm). Where the camera errs by more than a
-    /// third of it, three of its standard deviations count.
+    /// Distance from every point of the other cloud beyond which a point differs, metres (δ of Eq.
+    /// 1; paper: 1 cm). Where the camera's standard deviation exceeds a third of this value, three
+    /// standard deviations count.
     pub delta_m: f64,
     /// Maximum distance from the camera at which something is new, or gone, metres. Farther points are
     /// background.
@@ -29,7 +30,7 @@ pub struct NoticeOptions {
     pub voxel_m: f64,
     /// Maximum distance between neighbouring points of one dynamic cluster, metres.
     pub cluster_step_m: f32,
-    /// Fewest pixels of a dynamic cluster in the view that shows it best.
+    /// Minimum number of pixels of a dynamic cluster in its best view.
     pub least_pixels: usize,
     /// Greatest error of localisation between two visits, metres.
     pub search_m: f32,
@@ -53,13 +54,13 @@ impl Default for NoticeOptions {
 pub struct MetaRoom {
     /// World frame, one point a voxel.
     pub cloud: Cloud,
-    /// Visits that it was made from.
+    /// Number of visits in the model.
     pub visits: usize,
     /// Options of change detection.
     pub options: NoticeOptions,
 }
 
-/// Something that was not there before.
+/// Appeared cluster.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appeared {
     /// The points of the object, world frame, from all views of the visit.
@@ -68,13 +69,13 @@ pub struct Appeared {
     pub view: usize,
     /// The pixels of the object in that view, row by row (O_0).
     pub mask: Vec<bool>,
-    /// True if most of it lies before what was there by far, to either side as well, as far as its cameras may be turned. Otherwise it may be an edge
-    /// of what always stood there.
+    /// True if most of the cluster is well in front of the former structure, also to either side
+    /// within the cameras' rotation error; otherwise it may be an edge of static structure.
     pub apart: bool,
 }
 
 impl Appeared {
-    /// Middle of its bounds, world, metres.
+    /// Centre of the bounds, world, metres.
     pub fn centre(&self) -> Point3<f64> {
         self.cloud.bounds().map_or(Point3::origin(), |(low, high)| nalgebra::center(&low, &high).cast())
     }
@@ -89,24 +90,26 @@ pub struct Visit {
     pub gone: Vec<Cloud>,
     /// Camera poses, after the views of the visit were aligned together with the static structure.
     pub poses: Vec<Isometry3<f64>>,
-    /// Points that the static structure gained: they had been hidden or never seen …
+    /// Number of points added to the static structure: formerly hidden or unseen.
     pub added: usize,
-    /// … and lost: this visit looked through them.
+    /// Number of points removed from the static structure: this visit looked through them.
     pub removed: usize,
 }
 
-/// Half the side of a square that a point of the static structure covers when it is looked at, in voxels.
+/// Half the side of the square that a static point covers when rendered, in voxels.
 const COVER: f64 = 0.75;
-/// Multiple of the tolerance beyond which a point is surely looked through: two measurements of one
-/// surface differ by less, also if the camera errs by twice its known error.
+/// Multiple of the tolerance beyond which a point is certainly seen through: two measurements of
+/// one surface differ by less even at twice the stated noise.
 const FAR: f64 = 2.5;
 /// Factor on the localisation's heading error that covers a rotated camera.
 const TURNED: f64 = 2.0;
-/// Background is kept up to this, metres: to have seen it is to have seen past what stands before it now.
+/// Maximum range of background points kept, metres: having seen them proves that the space before
+/// them was free.
 const BACKGROUND_M: f32 = 8.0;
 
 impl MetaRoom {
-    /// The first visit: all that is seen is static until it changes. The views of a visit must fit each other.
+    /// Model from the first visit: everything is static until it changes. The views must be
+    /// mutually consistent.
     ///
     /// # Errors
     /// If there is no view, one is no depth image, or an option means nothing.
@@ -126,7 +129,8 @@ impl MetaRoom {
         Ok(MetaRoom { cloud, visits: 1, options })
     }
 
-    /// Compares a visit with the static structure both ways (Eq. 2) and refines it.
+    /// Compares a visit with the static structure in both directions (Eq. 2) and updates the
+    /// structure.
     ///
     /// # Errors
     /// As [`MetaRoom::new`].
@@ -143,13 +147,13 @@ impl MetaRoom {
         Ok(Visit { appeared, gone, poses, added, removed })
     }
 
-    /// The poses of the views after all were moved together onto the static structure, where they fit it. What is farther than `range_m` has no say:
-    /// of a wall behind the room, which the camera measures to decimetres, two looks are two clouds that fit each other anywhere, and so many of its
-    /// points outvote those that are known to millimetres.
+    /// Poses of the views after rigid alignment with the static structure. Points beyond `range_m`
+    /// are excluded: a distant wall, measured to decimetres, fits anywhere and outvotes points
+    /// known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
-        /// Pixel stride by which views are thinned for alignment, rather than by voxels: points of one grid
-        /// of voxels are drawn onto those of another, centimetres off the truth where only edges hold a view
-        /// along a plane.
+        /// Pixel stride that thins views for alignment. Voxel grids are unsuitable: their points
+        /// are attracted to those of another grid, which shifts views held by edges alone by
+        /// centimetres.
         const EVERY: usize = 6;
         const ROOM_M: f32 = 0.01;
         const NEIGHBOURS: usize = 12;
@@ -184,7 +188,7 @@ impl MetaRoom {
         Ok(stated.iter().map(|pose| by_world * pose).collect())
     }
 
-    /// The static structure as a camera sees it: least depth a pixel.
+    /// Static structure rendered from a camera: minimum depth per pixel.
     fn seen_by(&self, map: &DepthMap) -> Vec<f32> {
         let camera = map.intrinsics;
         let mut depths_m = vec![f32::INFINITY; camera.width * camera.height];
@@ -206,7 +210,7 @@ impl MetaRoom {
         depths_m
     }
 
-    /// Part of a view that is not of the static structure, and the view's alignment with it.
+    /// Part of a view outside the static structure, and the view's alignment with the structure.
     fn compare(&self, view: &View, map: &DepthMap, tree: &Neighbours) -> Change {
         let known = self.seen_by(map);
         let grid = Grid { width: map.intrinsics.width, height: map.intrinsics.height };
@@ -250,7 +254,7 @@ impl MetaRoom {
         (self.options.delta_m as f32).max(3.0 * frontal_sigma_m(z_m))
     }
 
-    /// Connected parts of what appeared, each with the view that shows it best.
+    /// Connected components of the appeared points, each with its best view.
     fn clusters(
         &self,
         views: &[View],
@@ -289,9 +293,10 @@ impl MetaRoom {
         Ok(clusters.iter().filter_map(of_cluster).collect())
     }
 
-    /// Drops what the visit looked through (D_2 without what is hidden): what went, by clusters, and how many points. A cluster went if most of
-    /// it was looked through by far: of a wall or a floor whose two measurements err, neither does. By far is also to either side, as far as a camera
-    /// may be turned: past the edge of what still stands.
+    /// Removes the points that the visit looked through (D_2 without hidden ones); returns the
+    /// vanished clusters and the number of removed points. A cluster vanished if most of it is seen
+    /// through by a wide margin, also to either side within the camera's rotation error, so that
+    /// doubly measured walls and edges of standing objects do not count.
     fn remove(&mut self, views: &[View], maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
         let through = |p: &Point3<f32>, times: f64, turned: f64| {
             maps.iter().zip(views).any(|(map, view)| {
@@ -317,7 +322,8 @@ impl MetaRoom {
         Ok((clusters.iter().filter(went).map(|c| lost.select(c)).collect(), lost.len()))
     }
 
-    /// Adds what was hidden or never seen before: how many points. What was never seen and hangs together with something new may be of it.
+    /// Adds formerly hidden and unseen points; returns their number. Unseen points connected with
+    /// an appeared cluster may belong to it.
     fn add(
         &mut self,
         views: &[View],
@@ -348,14 +354,14 @@ impl MetaRoom {
 
 /// Differences of a view from the static structure.
 struct Change {
-    /// Pixels before it.
+    /// Pixels in front of the static structure.
     before: Mask,
     /// The pixels far before the static structure, to either side as well, as far as the camera may be
     /// turned.
     apart: Mask,
-    /// Pixels behind it: they may always have been there.
+    /// Pixels behind the static structure, which may always have been there.
     revealed: Vec<u32>,
-    /// Pixels where nothing was known.
+    /// Pixels without prior knowledge.
     unknown: Vec<u32>,
 }
 
@@ -383,7 +389,7 @@ fn near(cloud: &Cloud, range_m: f64) -> Cloud {
     cloud.filter(|p| is_finite(p) && f64::from(p.z) <= range_m)
 }
 
-/// Points alone: what is static is kept without colours and labels.
+/// Points alone; the static structure has no colours and labels.
 fn bare(cloud: &Cloud) -> Cloud {
     Cloud::from_points(cloud.points.clone())
 }

@@ -1,4 +1,4 @@
-//! Planes that are not of the object: what it stands on, walls, other furniture (section V-A, c; Eq. 3 and 4).
+//! Planes outside the object: its support, walls, other furniture (section V-A, c; Eq. 3 and 4).
 
 use super::frame::Frame;
 use super::mask::Mask;
@@ -11,7 +11,7 @@ use nalgebra::Point3;
 /// Rules for planes.
 #[derive(Clone, Debug)]
 pub(super) struct PlaneRules {
-    /// Least share of a plane that is of the object, for it to stay (ϑ_obj).
+    /// Minimum share of a plane in the object for the plane to stay (ϑ_obj).
     pub object_share: f64,
     /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis).
     pub hidden_share: f64,
@@ -19,11 +19,11 @@ pub(super) struct PlaneRules {
 
 /// Most planes looked for in a frame.
 const MOST: usize = 8;
-/// Fewest pixels of a plane, as a share of what lies near, and at all.
+/// Minimum number of pixels of a plane, as a share of the nearby pixels, and absolute.
 const LEAST: (f64, usize) = (0.015, 200);
 /// Pixels that planes are looked for in, at most.
 const SAMPLE: usize = 20_000;
-/// Greatest angle between a pixel's normal and its plane's, and between planes of a group, radians.
+/// Maximum angle between a pixel's normal and its plane's, and between planes of a group, radians.
 const TILT_RAD: f64 = 0.5;
 const GROUP_RAD: f64 = 0.12;
 /// Maximum distance between planes of one group, metres.
@@ -123,14 +123,14 @@ fn find(frame: &Frame, open: &Mask, draws: &mut Draws) -> Option<Found> {
     Some(Found { plane, middle, pixels })
 }
 
-/// Greatest distance of a pixel from its plane: three standard deviations of the camera at the
-/// middle depth, metres.
+/// Maximum distance of a pixel from its plane: three standard deviations of the camera at the
+/// median depth, metres.
 fn tolerance_m(frame: &Frame, pixels: &[usize]) -> f64 {
     let depth_m = frame.depth_m(pixels[pixels.len() / 2]);
     (2.5 * f64::from(frontal_sigma_m(depth_m as f32))).max(0.006)
 }
 
-/// Pixels of a mask that lie on a plane: near it and turned as it is, or very near.
+/// Pixels of a mask on a plane: near with a similar normal, or very near.
 fn pixels_of(frame: &Frame, mask: &Mask, plane: &Plane) -> Vec<usize> {
     let pixels: Vec<usize> = mask.pixels().collect();
     if pixels.is_empty() {

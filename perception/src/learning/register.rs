@@ -1,4 +1,4 @@
-//! Keyframes: which looks are far enough apart, and how they lie to each other (section IV-C).
+//! Keyframes: selection of sufficiently different views, and their registration (section IV-C).
 //!
 //! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned together against each
 //! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why. Then what is
@@ -17,12 +17,12 @@ pub struct Keyframe {
     pub world_from_camera: Isometry3<f64>,
     /// False if the look does not fit the others.
     pub used: bool,
-    /// Reason for which it settled, or was left out.
+    /// Reason for convergence or exclusion.
     pub why: String,
 }
 
-/// Indices of the looks that are worth keeping: the first, and each whose direction from `centre` (world, metres) is more than `step_rad` from that
-/// of every one kept before (paper: 15 degrees).
+/// Indices of the keyframes: the first view, and each whose direction from `centre` (world, metres)
+/// differs by more than `step_rad` from all earlier keyframes (paper: 15 degrees).
 pub fn keyframes(poses: &[Isometry3<f64>], centre: &Point3<f64>, step_rad: f64) -> Vec<usize> {
     let direction = |i: usize| poses[i].translation.vector - centre.coords;
     let mut kept: Vec<usize> = Vec::new();

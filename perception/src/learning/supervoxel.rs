@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 
 /// Supervoxel of each pixel.
 pub(super) struct Supervoxels {
-    /// Index by pixel; [`voxel::NONE`] where there is none.
+    /// Supervoxel index by pixel; [`voxel::NONE`] for none.
     of: Vec<u32>,
     count: usize,
 }
@@ -28,7 +28,8 @@ struct Piece {
 }
 
 impl Supervoxels {
-    /// The pieces of what lies near, about `side_m` wide; the normals of the frame become those of their pieces.
+    /// Supervoxels of the nearby points, about `side_m` wide; also replaces the frame's normals by
+    /// their supervoxels' normals.
     pub fn of(frame: &mut Frame, side_m: f32) -> Result<Supervoxels, LearningError> {
         let points: Vec<Point3<f32>> = frame.near.iter().map(|&i| frame.points[i as usize]).collect();
         let seeds = voxel::assign(&points, side_m)?;
@@ -85,7 +86,7 @@ impl Supervoxels {
         }
     }
 
-    /// Takes out of a mask the pieces of which it holds less than `share`.
+    /// Removes from a mask the supervoxels of which it holds less than `share`.
     pub fn drop_unsupported(&self, mask: &mut Mask, share: f64) {
         let (mut all, mut held) = (vec![0_u32; self.count], vec![0_u32; self.count]);
         for (piece, set) in self.of.iter().zip(&mask.set).filter(|(p, _)| **p != voxel::NONE) {

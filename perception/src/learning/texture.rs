@@ -1,4 +1,5 @@
-//! Keyframes brought together by what is printed on things, where surfaces alone let them slide: a round table turns, a tin has no side.
+//! Photometric alignment of keyframes, where geometry alone lets them slide: a round table can
+//! turn, a tin has no distinctive side.
 //!
 //! The paper refines its keyframes by patches of the image and adjusts all of them together in the end. Here both are one least-squares problem over
 //! all poses, from blurred to sharp images: marks of one image have the lightness that the other shows there (Park, Zhou, Koltun 2017 do so for two
@@ -17,7 +18,7 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQ
 const BLURS: [usize; 3] = [5, 2, 1];
 /// Rounds of moving at each.
 const ROUNDS: usize = 5;
-/// Side of the squares of which one mark and one point of the surface are taken each, pixels.
+/// Side of the squares from which one texture feature and one surface point each are taken, pixels.
 const CELL_PX: usize = 12;
 /// Least change of lightness a pixel at a mark, of 255.
 const CONTRAST: f32 = 3.0;
@@ -26,22 +27,24 @@ const LIGHTNESS: f32 = 8.0;
 /// Minimum tolerance between a feature's predicted depth and the depth measured in the other view,
 /// metres; beyond it the feature is occluded or on another surface.
 const NEAR_M: f32 = 0.015;
-/// Neighbouring pixels that differ by more than this and what the camera errs are of two surfaces, metres.
+/// Minimum depth difference between neighbouring pixels of two surfaces beyond the camera's error,
+/// metres.
 const STEP_M: f32 = 0.01;
 /// Number of correlated measurements (neighbouring pixels) that count as one independent one.
 const SHARED: f32 = 12.0;
-/// Number of looks, those with the nearest directions, that each look is compared with.
+/// Number of views with the most similar directions that each view is compared with.
 const PARTNERS: usize = 6;
-/// Looks that share fewer marks say nothing of each other by them.
+/// Minimum number of shared features for a texture constraint between two views.
 const FEWEST: usize = 40;
-/// A look that would move farther is not moved, metres and radians: its texture repeats.
+/// Maximum correction of a view, metres and radians; beyond it, the texture probably repeats and
+/// the view is not moved.
 const FARTHEST: (f64, f64) = (0.03, 0.03);
 
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
-/// The poses of the looks that are `used` after their texture was brought together; as they were if fewer than two have colours. The first used
-/// look stays where it is.
+/// Poses after photometric alignment of the `used` views; unchanged if fewer than two have colours.
+/// The first used view is fixed.
 pub(super) fn refined(
     views: &[View],
     poses: &[Isometry3<f64>],
@@ -77,7 +80,7 @@ pub(super) fn refined(
     (0..views.len()).map(|i| if sound(i) { moved[i] } else { poses[i] }).collect()
 }
 
-/// A look as its texture is compared.
+/// View prepared for texture comparison.
 struct Look {
     map: DepthMap,
     grid: Grid,
@@ -85,7 +88,7 @@ struct Look {
     normals: Vec<Vector3<f32>>,
     /// Lightness of each pixel, 0 to 255.
     light: Vec<f32>,
-    /// Pixels so far inside a surface that what lies before or behind it is not blurred into them.
+    /// True for pixels far enough inside a surface that blur from a depth edge does not reach them.
     inner: Vec<bool>,
     /// Pixels inside a surface where lightness changes most, and pixels of the surface evenly spread.
     marks: Vec<u32>,
@@ -126,7 +129,8 @@ impl Look {
         Some(Look { map, grid, points, normals, light, inner, marks, spread })
     }
 
-    /// Pixel coordinates of a point of this camera's frame that lies on what it measured, and the pixel's index.
+    /// Pixel coordinates and index of a camera-frame point, if the point lies on the measured
+    /// surface.
     fn place(&self, q: &Point3<f32>) -> Option<(f32, f32, usize)> {
         let (u, v) = self.map.intrinsics.project(&q.cast())?;
         let at = self.map.intrinsics.pixel(u, v)?;
@@ -137,8 +141,8 @@ impl Look {
     }
 }
 
-/// Pixels without a step of depth so near that blurring would reach it. Where a surface ends, another look has something else behind it: such an edge
-/// is no mark of the surface.
+/// True for pixels without a depth edge within the blur radius; the background at such an edge
+/// changes between views.
 fn inner(depths_m: &[f32], grid: Grid) -> Vec<bool> {
     let goes_on = |a: f32, b: f32| (a - b).abs() < STEP_M + 6.0 * frontal_sigma_m(a);
     let ends = |i: usize| {
@@ -181,8 +185,8 @@ fn sampled(image: &[f32], width: usize, u: f32, v: f32) -> (f32, f32, f32) {
     (value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q))
 }
 
-/// Constraints by the marks and surfaces of one look on its pose in another, as motions of the
-/// first in the frame of the second.
+/// Constraints from texture and surface of one view on its pose in another, as motions of the first
+/// in the frame of the second.
 fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isometry3<f64>) -> Sums {
     let (turn, shift) =
         (b_from_a.rotation.to_rotation_matrix().cast::<f32>(), b_from_a.translation.vector.cast::<f32>());
@@ -222,7 +226,7 @@ fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isome
     sums
 }
 
-/// Adds a residual with its slope at a point; Cauchy weights.
+/// Adds a residual with its gradient at a point, with Cauchy weight.
 fn add(sums: &mut Sums, q: &Point3<f32>, slope: &Vector3<f32>, residual: f32, sigma: f32) {
     let along = q.coords.cross(slope);
     let derivative = [along.x, along.y, along.z, slope.x, slope.y, slope.z].map(f64::from);
@@ -230,7 +234,7 @@ fn add(sums: &mut Sums, q: &Point3<f32>, slope: &Vector3<f32>, residual: f32, si
     sums.add_scalar(derivative, f64::from(residual), f64::from(weight));
 }
 
-/// The pairs of each look with those that see things from the most similar side.
+/// Pairs of each view with the views of most similar direction.
 fn pairs(active: &[usize], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for &i in active {

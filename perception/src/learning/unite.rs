@@ -1,5 +1,5 @@
-//! A model that improves with every meeting (the paper's future work): what a later one made of the same object is laid on what is known of it, and
-//! both become one.
+//! Extension of a model by a later encounter (the paper's future work): the new model is registered
+//! to the known one, and both are fused.
 
 use super::LearningError;
 use super::fuse::Measured;
@@ -11,28 +11,31 @@ use nalgebra::Isometry3;
 const NEIGHBOURS: usize = 20;
 /// Match distances, from far to near, metres.
 const WITHIN_M: [f32; 2] = [0.02, 0.006];
-/// Greatest correction of a found pose, metres and radians: beyond that it was found wrongly.
+/// Maximum correction of a recognised pose, metres and radians; beyond it, the recognition was
+/// wrong.
 const MOST_MOVED: (f64, f64) = (0.03, 0.3);
-/// Minimum overlap of the smaller model with the other, and maximum distance between them, metres:
-/// a model is accurate to two millimetres.
+/// Minimum overlap of the smaller model with the other, and maximum distance in the overlap,
+/// metres; models are accurate to two millimetres.
 const LEAST_SHARED: f64 = 0.35;
 const MOST_OFF_M: f64 = 0.003;
 
 /// Two models of one object as one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct United {
-    /// Points with normals, and colours where both had them, in the frame of what was known, metres.
+    /// Points with normals, and with colours if both models had them, in the known model's frame,
+    /// metres.
     pub cloud: Cloud,
     /// Pose of the new model in the known one.
     pub known_from_more: Isometry3<f64>,
     /// Share of the smaller of both that lies on the other.
     pub shared: f64,
-    /// Root mean square by which it is off there, metres.
+    /// Root mean square distance in the overlap, metres.
     pub off_m: f64,
 }
 
-/// Lays what a later meeting made of an object on what is `known` of it from so many `meetings`, from about `known_from_more`, and fuses both in cubes of
-/// side `cube_m` (metres), each meeting with the same weight.
+/// Registers the model of a later encounter, from the initial pose `known_from_more`, to the
+/// `known` one of `meetings` encounters, and fuses both in cubes of `cube_m` metres, each encounter
+/// with equal weight.
 ///
 /// # Errors
 /// [`LearningError::Disagree`] if they are not one surface where both have some; as registration and fusing have them.

@@ -1,5 +1,5 @@
-//! Ends of a surface in a camera's view: between two neighbouring rays, one that met it and one that went
-//! past it.
+//! Ends of a surface in a camera's view, each between neighbouring rays of which one hit the
+//! surface and the other passed.
 //!
 //! Noise of depth moves a point along its ray. Where the ray meets the plane of the surface is free of it.
 
@@ -9,23 +9,25 @@ use nalgebra::{Point3, Vector3};
 
 /// Points so near to the plane are of the surface.
 const ON_M: f64 = 0.012;
-/// Points below this are of the side of a board, or of nothing: mixed from what is before and behind an edge.
+/// Depth below the plane from which points belong to a board's side, or are mixed pixels of a depth
+/// edge, metres.
 const BELOW_M: f64 = 0.004;
-/// Points below this are something else, seen past the surface.
+/// Depth below the plane from which points belong to something behind the surface, metres.
 const PAST_M: f64 = 0.02;
 /// Maximum distance beyond the hull of the seen surface at which the surface may go on.
 const HULL_MARGIN_M: f64 = 0.04;
-/// Number of pixels to either side of an end, of which [`CERTAIN`] must agree: single pixels are noise.
+/// Number of pixels to either side of an end, of which [`CERTAIN`] must agree, as single pixels are
+/// noise.
 const AROUND: usize = 4;
 const CERTAIN: usize = 3;
-/// A surface reaches so far back from its end, metres: where something upright goes through its plane, less is near that.
+/// Minimum extent of a surface behind its end, metres; less is an intersection with something
+/// upright.
 const DEEP_M: f64 = 0.04;
 /// Minimum number of pixels of an image line that see an edge.
 const SIDE: usize = 2;
-/// Number of pixels lost at an edge: a surface ends within this many pixels of the last one that
-/// shows it. Any further loss is the shadow of the projector.
+/// Maximum number of lost pixels at an end; a longer loss is the shadow of the projector.
 const LOST: usize = 3;
-/// Distance without a return behind the surface's last point from which nothing is there, metres.
+/// Length of a gap without returns behind the surface's last point that proves empty space, metres.
 const NOTHING_M: f64 = 0.09;
 
 /// The end of a surface on a line of pixels.
@@ -35,13 +37,13 @@ pub struct Ending {
     pub on: Point3<f64>,
     /// The point where the first ray past the surface crosses the surface's plane.
     pub past: Point3<f64>,
-    /// The middle of what was seen of the side of a board between them.
+    /// Mean of the observed points on a board's side at the end; `None` without.
     pub side: Option<Point3<f64>>,
     /// The camera.
     pub eye: Point3<f64>,
 }
 
-/// All that the cameras saw of where a surface ends. What hides it, and what the image cuts off, is no end.
+/// All ends of a surface seen by the cameras, without occlusions and image borders.
 pub fn endings(visibility: &Visibility, surface: &Surface) -> Vec<Ending> {
     let outline = surface.outline();
     let is_near = |ending: &Ending| outline.covers(&ending.on, HULL_MARGIN_M);
@@ -59,7 +61,7 @@ enum Shown {
     Low,
     /// A return from behind the surface's plane.
     Past,
-    /// Anything else.
+    /// Other point.
     Other,
 }
 
@@ -174,7 +176,7 @@ impl<'a> Rays<'a> {
         near.is_some_and(|near| AROUND * on(near) >= CERTAIN * near)
     }
 
-    /// True if the pixels of a line up to its end show nothing, over a long enough gap.
+    /// True if the pixels after an end have no return, over a long enough gap.
     fn is_nothing(&self, gap: &[usize]) -> bool {
         let ends =
             || Some((self.through(*gap.first()?)?, gap.iter().rev().find_map(|&pixel| self.through(pixel))?));
@@ -183,7 +185,7 @@ impl<'a> Rays<'a> {
             && ends().is_some_and(|(from, to)| (to - from).norm() > NOTHING_M)
     }
 
-    /// The middle of what some pixels show, world.
+    /// Mean point of some pixels, world.
     fn side(&self, pixels: impl Iterator<Item = usize>) -> Option<Point3<f64>> {
         let at = |pixel: usize| self.ray(pixel) * f64::from(self.map.depths_m[pixel]);
         let (sum, count) = pixels.fold((Vector3::zeros(), 0), |(sum, n), pixel| (sum + at(pixel), n + 1));

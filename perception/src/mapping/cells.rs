@@ -9,7 +9,8 @@ use nalgebra::{Isometry2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Sums over the points of cubes, and over the ways back to the camera. Points come in station by station and need not be kept.
+/// Accumulated sums over the points of cubes and over the directions to the camera; points are
+/// added station by station and not kept.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Cells {
@@ -30,7 +31,7 @@ struct Sums {
     towards: [f32; 3],
 }
 
-/// Cells as they stand in a file.
+/// Cells in file form.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
@@ -47,7 +48,7 @@ pub enum CellsError {
         /// Given edge.
         edge_m: f64,
     },
-    /// A stored cell holds what no cell can.
+    /// A stored cell is invalid.
     #[error(
         "cell {index} of the stored ones is damaged (its count is {count}, or a sum is no number, or it occurs twice): store the map anew"
     )]
@@ -89,12 +90,12 @@ impl TryFrom<Stored> for Cells {
     }
 }
 
-/// A small piece of surface: the points of a cube, and the normal there.
+/// Surface element: mean point of a cube, and normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
     /// Centroid, in the map, metres.
     pub at: Point3<f64>,
-    /// Unit normal, towards where it was seen from.
+    /// Unit normal, towards the observer.
     pub normal: Vector3<f64>,
     /// Points in the cube.
     pub points: u32,
@@ -107,13 +108,13 @@ pub(super) struct Region {
     pub at: Point3<f64>,
     /// Mean of the unit vectors towards the camera.
     pub towards: Vector3<f64>,
-    /// Unit normal, towards where it was seen from.
+    /// Unit normal, towards the observer.
     pub normal: Option<Vector3<f64>>,
     pub points: u32,
 }
 
 impl Region {
-    /// The piece of surface that it is, if there is evidence of one.
+    /// Surface element, if the evidence suffices.
     pub fn facet(&self) -> Option<Facet> {
         self.normal.map(|normal| Facet { at: self.at, normal, points: self.points })
     }
@@ -130,7 +131,8 @@ pub struct NormalOptions {
     pub reach: i64,
     /// Fewest regions that are evidence enough.
     pub least_regions: usize,
-    /// Least length of the mean of the products (Eq. 4) against the mean of their lengths: less, and they do not agree on a direction.
+    /// Minimum ratio of the length of the mean cross product (Eq. 4) to the mean length; below it,
+    /// the products do not agree on a direction.
     pub agreement: f64,
 }
 
@@ -162,7 +164,7 @@ impl Cells {
         self.sums.len()
     }
 
-    /// True if nothing was added.
+    /// True if no points were added.
     pub fn is_empty(&self) -> bool {
         self.sums.is_empty()
     }
@@ -172,7 +174,8 @@ impl Cells {
         self.sums.iter().map(|s| u64::from(s.count)).sum()
     }
 
-    /// Adds what was seen from a station: points in its level frame, seen from `height_m` above its origin, no deeper than `far_m`.
+    /// Adds the points of a station (level frame), seen from `height_m` above its origin, up to
+    /// depth `far_m`.
     ///
     /// Points that are not finite, or farther out than a million cells, are passed over.
     pub fn add(
@@ -209,7 +212,7 @@ impl Cells {
         }
     }
 
-    /// The surface in each cell, where there is evidence of one, in the order of the cells.
+    /// Surface elements of all cells with sufficient evidence, in cell order.
     pub fn facets(&self, options: &NormalOptions) -> Vec<Facet> {
         self.regions(options).iter().filter_map(Region::facet).collect()
     }
@@ -240,7 +243,7 @@ impl Cells {
         found.into_iter().map(|(_, region)| region).collect()
     }
 
-    /// The plan of what was seen at some heights: cells that lie over each other are one spot.
+    /// Plan of the points in a height band; vertically stacked cells form one spot.
     pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, least_points: u32, thin_m: f64) -> Vec<Spot> {
         let kept = self.sums.iter().filter(|s| s.count >= least_points);
         let at = kept.map(|s| (self.centroid(s), f64::from(s.count)));

@@ -1,4 +1,4 @@
-//! Loop closure and pose graph: the global correction that the paper leaves open (its Fig. 9).
+//! Loop closure and pose graph, the global correction that the paper leaves open (Fig. 9).
 
 use super::error::{MappingError, check, check_pose};
 use super::field::Field;
@@ -11,9 +11,9 @@ use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
 /// Options for finding places that were passed before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosureOptions {
-    /// Stations on a shorter way are neighbours anyhow, metres.
+    /// Minimum route length between two stations for a loop closure, metres.
     pub apart_m: f64,
-    /// Poses may have drifted by this share of the way between two stations, and …
+    /// Assumed drift of poses, as a share of the route between two stations.
     pub drift: f64,
     /// … by no more than this, metres.
     pub most_m: f64,
@@ -21,7 +21,7 @@ pub struct ClosureOptions {
     pub turn_rad: f64,
     /// Maximum drift of the heading, radians.
     pub heading_drift_rad: f64,
-    /// Least share of what both fields of view see that must lie on each other.
+    /// Minimum share of the jointly visible spots that must match.
     pub explained: f64,
     /// Length of the stretches of the drive that are compared, metres.
     pub stretch_m: f64,
@@ -57,7 +57,7 @@ impl ClosureOptions {
     }
 }
 
-/// A station that shows what one long before it showed.
+/// Loop closure: a station that shows the same place as a much earlier one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closure {
     /// The earlier station.
@@ -70,14 +70,14 @@ pub struct Closure {
 
 /// Spread of the field in which a start is looked for, metres; steps of the search, metres and radians.
 const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
-/// Spots by which starts are judged, about.
+/// Approximate number of spots by which starts are scored.
 const SOME: usize = 400;
-/// Half the spread of a start that the search found: what it may be off by, metres and radians.
+/// Half the resolution of the search, metres and radians: possible error of a start.
 const START: (f64, f64) = (0.15, 0.05);
 /// Another place that fits nearly as well (mean logarithm of density) and lies farther than this (metres) makes the first doubtful.
 const RIVAL: (f64, f64) = (0.1, 0.5);
 
-/// Looks for stations that show what an earlier one showed, from where a chain of fits put them: a pose a station.
+/// Finds loop closures of a drive, from poses chained from pairwise fits, one per station.
 ///
 /// # Errors
 /// If an option or a pose cannot be used.
@@ -148,7 +148,7 @@ impl Stretch {
         Stretch::of(near.map(|i| (&plans[i], poses[at].inv_mul(&poses[i]))), rectify)
     }
 
-    /// Plans and where they were seen from.
+    /// Merged plan of several stations, with their viewpoints.
     fn of<'a>(
         plans: impl Iterator<Item = (&'a Vec<Spot>, Isometry2<f64>)> + Clone,
         rectify: &RectifyOptions,
@@ -165,15 +165,15 @@ impl Stretch {
         self.here_from_level.iter().any(|pose| self.field.sees(&pose.inverse_transform_point(place)))
     }
 
-    /// The spots that the other could see too, once they are put by a pose.
+    /// Spots that the other stretch could see too at the given relative pose.
     fn shared(&self, other_from_here: &Isometry2<f64>, other: &Stretch) -> Vec<Spot> {
         self.spots.iter().filter(|s| other.sees(&(other_from_here * s.at))).copied().collect()
     }
 }
 
-/// Locates one drive in another from a rough pose: within `options.most_m` and
-/// `options.heading_drift_rad` of it. Stations come with their poses in the frame of their drive.
-/// `None` if too little fits, or several places do.
+/// Localises one drive in another from a rough pose, within `options.most_m` and
+/// `options.heading_drift_rad`; stations have poses in their drive's frame. `None` if too little
+/// matches, or the result is ambiguous.
 ///
 /// # Errors
 /// If an option or a pose cannot be used.
@@ -195,7 +195,7 @@ pub fn relocate(
     Ok(searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options))
 }
 
-/// Poses of a drive after its pairs and closures have been brought together.
+/// Optimised poses of a drive from pairwise fits and loop closures.
 ///
 /// # Errors
 /// If there are not as many pairs as steps between the stations that closures name, or a fit is not finite.
@@ -212,7 +212,7 @@ pub fn correct_drive(pairs: &[PairFit], closures: &[Closure]) -> Result<Settled,
     PoseGraph { poses: chained(pairs), edges: steps.chain(again).collect() }.settle()
 }
 
-/// Way driven up to each pose, metres.
+/// Path length up to each pose, metres.
 fn ways_m(poses: &[Isometry2<f64>]) -> Vec<f64> {
     let mut way = 0.0;
     let mut last = poses.first().map_or(Vector2::zeros(), |p| p.translation.vector);
@@ -228,7 +228,7 @@ fn reach_m(way_m: f64, options: &ClosureOptions) -> f64 {
     (0.3 + options.drift * way_m).min(options.most_m)
 }
 
-/// The nearest earlier station that may show what this one shows.
+/// Nearest earlier station that may show the same place.
 fn candidate(poses: &[Isometry2<f64>], ways: &[f64], to: usize, options: &ClosureOptions) -> Option<usize> {
     let apart = |from: usize| (poses[from].translation.vector - poses[to].translation.vector).norm();
     let near = (0..to)
@@ -238,8 +238,9 @@ fn candidate(poses: &[Isometry2<f64>], ways: &[f64], to: usize, options: &Closur
     near.min_by(|&a, &b| apart(a).total_cmp(&apart(b)))
 }
 
-/// The fit from the best of all starts within reach; `None` if it explains too little. Where starts along a line do as well, a bare corridor, the fit
-/// says nothing along that line; where starts all around do, there is none.
+/// Fit from the best start within reach; `None` if it explains too little. If starts along a line
+/// score equally (a bare corridor), the fit is uninformative along that line; if starts all around
+/// do, it is rejected.
 fn searched(
     before: &Stretch,
     after: &Stretch,
@@ -277,7 +278,7 @@ fn searched(
     Some(found)
 }
 
-/// Scores of all starts within reach: agreement of two stretches in what both could see.
+/// Scores of all starts within reach: agreement of two stretches where both could see.
 fn scores(
     before: &Stretch,
     after: &Stretch,

@@ -1,4 +1,5 @@
-//! Cylinders, which the paper announces: pillars, out of what planes leave over, and round walls, where one cylinder stands for several planes.
+//! Cylinders, announced in the paper: pillars from spots outside the planes, and round walls, where
+//! one cylinder replaces several planes.
 
 mod post;
 
@@ -19,15 +20,15 @@ pub struct UprightCylinder {
     pub middle: Point2<f64>,
     /// Radius, metres.
     pub radius_m: f64,
-    /// True if it was seen from inside: a round wall.
+    /// True if seen from inside: a round wall.
     pub from_inside: bool,
-    /// Heights between which it was seen, metres.
+    /// Observed height range, metres.
     pub heights_m: (f64, f64),
     /// The parts of the circle that were seen: from and to, anticlockwise from the x axis, radians.
     pub arcs_rad: Vec<(f64, f64)>,
     /// Root mean square residual of the fit, metres.
     pub rms_m: f64,
-    /// Share of what was seen there that lies on it.
+    /// Share of the observed points there that lie on the cylinder.
     pub share: f64,
 }
 
@@ -37,12 +38,12 @@ impl UprightCylinder {
         self.arcs_rad.iter().map(|(from, to)| to - from).sum()
     }
 
-    /// The place on it in a direction.
+    /// Point of the cylinder in a direction.
     pub fn at(&self, angle_rad: f64) -> Point2<f64> {
         self.middle + Vector2::new(angle_rad.cos(), angle_rad.sin()) * self.radius_m
     }
 
-    /// Chords of what was seen of it, one a part of the circle.
+    /// Chords of the observed arcs, one per sector.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
         let chords = |(from, to): &(f64, f64)| {
             let (from, count) = (*from, ((to - from) / PART_RAD).round().max(1.0) as usize);
@@ -60,13 +61,13 @@ pub struct CylinderOptions {
     pub pillar_m: RangeInclusive<f64>,
     /// Radii of round walls, metres.
     pub round_wall_m: RangeInclusive<f64>,
-    /// Greatest distance of a point from the surface it belongs to, metres.
+    /// Maximum distance of a point from its surface, metres.
     pub tolerance_m: f64,
     /// Least arc of a pillar that is seen in one piece, radians: less may be a bend …
     pub least_arc_rad: f64,
     /// … and of a round wall: less may be the walls of a cluttered room.
     pub least_round_rad: f64,
-    /// Least share of the points seen there that lie on the cylinder.
+    /// Minimum share of the points seen there that lie on the cylinder.
     pub least_share: f64,
 }
 
@@ -83,7 +84,7 @@ impl Default for CylinderOptions {
     }
 }
 
-/// Parts by which it is told what of a circle was seen.
+/// Number of sectors for the observed part of a circle.
 const PARTS: usize = 24;
 const PART_RAD: f64 = TAU / PARTS as f64;
 /// Minimum number of occupied heights in an upright column of cells.
@@ -100,13 +101,13 @@ const PLANES: usize = 3;
 const TRIES: usize = 3000;
 const STEPS: usize = 8;
 
-/// A square of the plan with something upright on it.
+/// Cell of the plan with something upright.
 #[derive(Clone, Copy, Debug)]
 struct Column {
     at: Point2<f64>,
-    /// Mean way towards the camera.
+    /// Mean direction to the camera.
     towards: Vector2<f64>,
-    /// Heights at which it holds something.
+    /// Occupied height levels, one bit each.
     levels: u32,
     heights_m: (f64, f64),
 }
@@ -118,7 +119,8 @@ struct Circle {
     on: Vec<usize>,
 }
 
-/// Finds cylinders, and takes the patches that are parts of them away. `patches` are planes through `regions` that have a normal, numbered in that order.
+/// Finds cylinders, and removes the patches that are part of them. `patches`: planes through
+/// `regions` with a normal, numbered in that order.
 pub(super) fn cylinders(
     regions: &[Region],
     patches: &mut Vec<Patch>,
@@ -147,7 +149,7 @@ pub(super) fn cylinders(
     found
 }
 
-/// True if something lies on a patch or just before or behind it.
+/// True if the region lies on a patch, or just in front of or behind it.
 fn is_of(patch: &Patch, region: &Region, within_m: f64) -> bool {
     let off = region.at - patch.middle;
     let along = off.dot(&patch.along);
@@ -155,7 +157,7 @@ fn is_of(patch: &Patch, region: &Region, within_m: f64) -> bool {
     patch.plane.height_m(&region.at).abs() <= within_m && along >= from - within_m && along <= to + within_m
 }
 
-/// True if a patch lies on a cylinder: its ends and its middle do.
+/// True if a patch lies on a cylinder, with its ends and centre.
 fn is_part(patch: &Patch, cylinder: &UprightCylinder, options: &CylinderOptions) -> bool {
     let (from, to) = patch.limits_m[0];
     let sagitta_m = 0.125 * (to - from).powi(2) / cylinder.radius_m;
@@ -216,7 +218,7 @@ fn groups(columns: &[Column], edge_m: f64) -> Vec<Vec<usize>> {
     found
 }
 
-/// Finds cylinders among columns, those on which most stands first.
+/// Finds cylinders among columns, in order of support.
 fn search(
     columns: &[Column],
     mut group: Vec<usize>,
@@ -237,7 +239,7 @@ fn search(
     }
 }
 
-/// The circle on which most of a group stands, if it is as it was asked for.
+/// Best-supported circle of a group, if it satisfies the options.
 fn best(columns: &[Column], group: &[usize], from_inside: bool, options: &CylinderOptions) -> Option<Circle> {
     let radii = if from_inside { &options.round_wall_m } else { &options.pillar_m };
     let mut draws = Draws::new(group.len() as u64);
@@ -308,7 +310,8 @@ fn least_squares(
     Some((middle + step.xy(), radius_m + step.z))
 }
 
-/// A circle as a cylinder; `None` if too little of it was seen, if too much else was seen there, or if a square post is as likely. `rest`: what does not stand on it.
+/// Circle as a cylinder; `None` if too little of it was seen, too much else was seen there, or a
+/// square post is as likely. `rest`: points off the circle.
 fn told(
     columns: &[Column],
     circle: &Circle,
@@ -375,7 +378,7 @@ fn mean_m2<'a>(misses: impl Iterator<Item = (&'a Column, f64)>, tolerance_m: f64
     sum / f64::max(weight, 1.0)
 }
 
-/// Runs of parts that were seen; a single part that was not does not end one.
+/// Runs of observed sectors; single gaps are bridged.
 fn arcs(seen: &[bool; PARTS]) -> Vec<(f64, f64)> {
     let is_seen = |k: usize| seen[k % PARTS] || (seen[(k + 1) % PARTS] && seen[(k + PARTS - 1) % PARTS]);
     let Some(gap) = (0..PARTS).find(|k| !is_seen(*k)) else { return vec![(0.0, TAU)] };

@@ -3,9 +3,10 @@
 use super::station::Spot;
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// Greatest distance of an inlier from its spot, in standard deviations.
+/// Maximum distance of an inlier from its spot, in standard deviations.
 pub(super) const REACH: f64 = 3.0;
-/// Density of outliers against that of a spot of usual weight: that of a Gaussian at `REACH` spreads.
+/// Density of outliers relative to that of a spot of usual weight: a Gaussian at `REACH` standard
+/// deviations.
 pub(super) const OUTLIERS: f64 = 0.011;
 
 /// Logarithms of densities at the corners of squares.
@@ -15,7 +16,7 @@ pub(super) struct Field {
     width: usize,
     height: usize,
     logs: Vec<f32>,
-    /// Cells that were asked for; empty if that was not recorded.
+    /// Observed cells; empty if not recorded.
     seen: Vec<bool>,
     /// Value where no spot is near.
     nothing: f64,
@@ -50,7 +51,7 @@ impl Field {
         Some(Field { low, per_m, width, height, logs: sums, seen: Vec::new(), nothing: OUTLIERS.ln() })
     }
 
-    /// The logarithm of the density at a place, between the corners around it.
+    /// Bilinear log density at a place.
     fn at(&self, place: &Point2<f64>) -> f64 {
         let (x, y) = ((place.x - self.low.x) * self.per_m, (place.y - self.low.y) * self.per_m);
         if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
@@ -64,7 +65,7 @@ impl Field {
         (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v
     }
 
-    /// Mean logarithm over spots put by a pose: how well they lie on the field's own.
+    /// Mean log density over transformed spots: match with the field.
     pub fn mean(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
         let (sum, weight) = spots.iter().fold((0.0, 0.0), |(sum, weight), s| {
             (sum + s.weight * self.at(&(pose * s.at)), weight + s.weight)
@@ -72,7 +73,7 @@ impl Field {
         sum / weight.max(f64::MIN_POSITIVE)
     }
 
-    /// Notes which places of the field were looked at: elsewhere nothing is known.
+    /// Marks the observed part of the field; elsewhere nothing is known.
     pub fn look(&mut self, is_seen: impl Fn(&Point2<f64>) -> bool) {
         self.seen = (0..self.logs.len())
             .map(|i| {
@@ -82,7 +83,7 @@ impl Field {
             .collect();
     }
 
-    /// The mean over the spots that lie where it was looked; `None` if they are fewer than half.
+    /// Mean log density over spots in the observed part; `None` if fewer than half are.
     pub fn mean_of_seen(&self, spots: &[Spot], pose: &Isometry2<f64>) -> Option<f64> {
         let (mut sum, mut weight, mut all) = (0.0, 0.0, 0.0);
         for spot in spots {

@@ -1,5 +1,5 @@
-//! Frontier exploration: frontiers between open and unknown floor (Yamauchi 1997), and for poses
-//! around, the expected view and the cost of the way.
+//! Frontier exploration (Yamauchi 1997): frontiers between open and unknown floor, and for
+//! candidate poses the expected view and the route cost.
 
 use super::station::FieldOfView;
 use crate::occupancy::{Occupancy, Space};
@@ -14,16 +14,17 @@ use std::f64::consts::{PI, TAU};
 pub struct ExploreOptions {
     /// Field of view of the camera in the plan.
     pub field: FieldOfView,
-    /// The body keeps so far from what is occupied, metres.
+    /// Clearance of the body's centre from occupied cells, metres.
     pub radius_m: f64,
     /// Frontiers with fewer squares are left alone.
     pub least_squares: usize,
-    /// Seconds a metre of the way takes, and a radian of the turn at its end, and a look.
+    /// Time per metre of route, per radian of the final turn, and per look, seconds.
     pub seconds: (f64, f64, f64),
-    /// Probability that an unknown square is occupied: squares behind many of them are seldom seen.
+    /// Probability that an unknown cell is occupied, which limits the expected view behind many of
+    /// them.
     pub occupied: f64,
-    /// Probability that the next look shows a square that an earlier one should have shown but did
-    /// not: bare walls never are.
+    /// Probability that the next look shows a cell that an earlier look should have shown but did
+    /// not, such as a bare wall.
     pub again: f64,
 }
 
@@ -43,7 +44,7 @@ impl Default for ExploreOptions {
 /// Open squares in a row that border on unknown ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frontier {
-    /// Middles of its squares, metres.
+    /// Cell centres, metres.
     pub squares: Vec<Point2<f64>>,
     /// The square nearest to their middle.
     pub middle: Point2<f64>,
@@ -56,9 +57,9 @@ pub struct NextPose {
     pub pose: Isometry2<f64>,
     /// Floor that is unknown now and expected to be seen, square metres.
     pub gain_m2: f64,
-    /// Length of the way there, metres.
+    /// Length of the route, metres.
     pub way_m: f64,
-    /// Cost of the way and the look, seconds.
+    /// Cost of route and look, seconds.
     pub cost_s: f64,
 }
 
@@ -81,7 +82,7 @@ const PLACES_M: f64 = 0.6;
 const AROUND_M: f64 = 2.0;
 /// Minimum gain of a pose that is worth a look, square metres.
 pub(super) const LEAST_M2: f64 = 0.2;
-/// Ways to neighbouring squares, and their lengths in squares.
+/// Steps to neighbouring cells, with lengths in cells.
 const STEPS: [(i64, i64, f64); 8] = {
     const D: f64 = std::f64::consts::SQRT_2;
     [(1, 0, 1.0), (-1, 0, 1.0), (0, 1, 1.0), (0, -1, 1.0), (1, 1, D), (1, -1, D), (-1, 1, D), (-1, -1, D)]
@@ -103,7 +104,7 @@ impl<'a> Floor<'a> {
         Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
     }
 
-    /// Number of a square of the grid or of the margin around it.
+    /// Index of a cell of the grid or its margin.
     pub(super) fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
         let (column, row) = (column + self.margin, row + self.margin);
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
@@ -134,7 +135,7 @@ impl<'a> Floor<'a> {
         (0..self.height).flat_map(move |row| (0..width).map(move |column| (column, row)))
     }
 
-    /// Squares on which the middle of the body may be: open, and nothing occupied near.
+    /// True, by cell, if the body's centre may be there: open, and clear of occupied cells.
     fn standable(&self, radius_m: f64) -> Vec<bool> {
         let mut free: Vec<bool> = self.squares().map(|s| self.space(s) == Space::Free).collect();
         let reach = (radius_m / self.grid.cell_m).ceil() as i64;
@@ -187,7 +188,7 @@ impl<'a> Floor<'a> {
         ways
     }
 
-    /// Calls `found` with the range and the index of each unknown square along a ray, and how likely nothing is before it.
+    /// Calls `found` with range, index and unoccluded probability of each unknown cell along a ray.
     pub(super) fn ray(
         &self,
         from: &Vector2<f64>,
@@ -214,7 +215,7 @@ impl<'a> Floor<'a> {
         }
     }
 
-    /// The probability that another look shows each square, given the looks that should have shown it.
+    /// Probability that another look shows each cell, given the looks that should have shown it.
     pub(super) fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
         let mut missed = vec![1.0; (width * height) as usize];
@@ -257,22 +258,23 @@ pub(super) fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> boo
     off >= field.right_rad && off <= field.left_rad
 }
 
-/// Squares of a grid on which the middle of a body may be: open, and nothing occupied nearer than `radius_m`; in the order of its cells.
+/// True, by cell, if the body's centre may be there: open, with no occupied cell within `radius_m`.
 pub fn standable(grid: &Occupancy, radius_m: f64) -> Vec<bool> {
     Floor::of(grid, 0.0).standable(radius_m)
 }
 
-/// Floor that a body can reach from its pose.
+/// Floor reachable from a pose of the body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reach {
     /// Pose of the body.
     pub from: Isometry2<f64>,
-    /// Length of the shortest way to each square of the grid, metres; infinite where there is none.
+    /// Shortest route length to each cell, metres; infinite if unreachable.
     pub ways_m: Vec<f64>,
 }
 
 impl Reach {
-    /// Over the squares on which the middle of the body may be: those of [`standable`], and what else is known of them.
+    /// Reachability over the cells where the body's centre may be: those of [`standable`], adjusted
+    /// by other knowledge.
     pub fn over(grid: &Occupancy, from: &Isometry2<f64>, stand: &[bool], options: &ExploreOptions) -> Reach {
         let start = Point2::from(from.translation.vector);
         let ways_m = Floor::of(grid, options.field.far_m).ways_m(&start, stand, options.radius_m);
@@ -314,7 +316,7 @@ pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
     found
 }
 
-/// Poses from which more would be seen, those that are expected to show most for their cost first. None: all that can be reached is known.
+/// Exploration poses by expected gain per cost, best first; empty if everything reachable is known.
 ///
 /// `looked`: the poses looked from so far; the body stands at the last. What they should have shown and did not is expected less.
 pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<NextPose> {
@@ -322,7 +324,7 @@ pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &Explore
     next_within(grid, &Reach::over(grid, from, &standable(grid, options.radius_m), options), looked, options)
 }
 
-/// The same where it is known what the body can get to.
+/// Exploration poses for known reachability.
 pub(super) fn next_within(
     grid: &Occupancy,
     reach: &Reach,
@@ -358,8 +360,7 @@ pub(super) fn next_within(
     found
 }
 
-/// True if a look was taken from the same place with the same heading: another would show nothing
-/// new.
+/// True if a look was taken from the same position and heading, so that another would add nothing.
 pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) -> bool {
     let (apart_m, turned_rad) = (0.5 * PLACES_M, 0.5 * TAU / HEADINGS as f64);
     looked.iter().any(|look| {

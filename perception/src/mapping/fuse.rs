@@ -22,7 +22,7 @@ impl Default for FuseOptions {
     }
 }
 
-/// Rounds over all patches; each joins what touches.
+/// Number of passes over all patches; each joins touching ones.
 const ROUNDS: usize = 8;
 
 /// Joins patches until none is left that belongs to another. The largest first.
@@ -52,7 +52,7 @@ pub(super) fn fuse(
     patches
 }
 
-/// True if two patches are near each other, in one plane and turned the same way.
+/// True if two patches are near, coplanar and equally oriented.
 fn belong(a: &Patch, b: &Patch, options: &FuseOptions) -> bool {
     if a.plane.normal.dot(&b.plane.normal) < options.turned_rad.cos() {
         return false;

@@ -1,10 +1,10 @@
-//! All poses of a drive together: what each pair of stations says of the way between them, in one least-squares problem (Lu and Milios 1997), by
-//! Gauss's and Newton's method on a matrix whose rows are kept from their first entry on.
+//! Pose graph of a drive: relative poses between stations in one least-squares problem (Lu and
+//! Milios 1997), solved by Gauss-Newton with an envelope (skyline) matrix.
 
 use nalgebra::{Isometry2, Matrix2x3, Matrix3, UnitComplex, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Relative pose of two stations, with its weight.
+/// Relative pose of two stations, with its information.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Edge {
     /// Number of a station.
@@ -20,10 +20,10 @@ pub struct Edge {
     pub doubtful: bool,
 }
 
-/// Stations and what is known between them.
+/// Stations and the edges between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseGraph {
-    /// Poses to start from; the first stays where it is.
+    /// Initial poses; the first is fixed.
     pub poses: Vec<Isometry2<f64>>,
     /// Edges.
     pub edges: Vec<Edge>,
@@ -47,7 +47,7 @@ pub struct Settled {
 /// A graph that cannot be solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GraphError {
-    /// An edge names a station that is not there, or itself.
+    /// An edge names a missing station, or connects a station with itself.
     #[error(
         "edge {edge} goes from station {from} to {to}, of {stations}: name two different stations, counted from 0"
     )]
@@ -80,12 +80,12 @@ pub enum GraphError {
 const MOST_ROUNDS: usize = 60;
 /// A step that moves no pose farther than this, metres and radians, is the last.
 const SETTLED: f64 = 1e-4;
-/// Residual, in standard deviations, beyond which doubtful edges lose weight; it shrinks over the
-/// iterations, because drift on a long route is large at first.
+/// Residual, in standard deviations, beyond which doubtful edges lose weight; decreases over the
+/// iterations, as drift on a long route is large at first.
 const DOUBT: (f64, f64, f64) = (1e4, 0.5, 3.0);
 
 impl PoseGraph {
-    /// Moves the poses until the edges agree as well as they can.
+    /// Optimises the poses.
     ///
     /// # Errors
     /// If an edge names no station, a number is not finite, or a station is held by nothing.
@@ -178,7 +178,7 @@ impl PoseGraph {
 }
 
 impl Edge {
-    /// Shift and turn by which the poses are off from what the edge says.
+    /// Shift and rotation error of the edge.
     fn error(&self, poses: &[Isometry2<f64>]) -> Vector3<f64> {
         let (from, to) = (&poses[self.from], &poses[self.to]);
         let seen = from.inv_mul(to);
@@ -205,7 +205,8 @@ impl Edge {
     }
 }
 
-/// A symmetric matrix, each row from its first entry to the diagonal: what Cholesky's method fills lies there too.
+/// Symmetric matrix in envelope storage: each row from its first entry to the diagonal, which also
+/// holds the Cholesky factor.
 struct Envelope {
     first: Vec<usize>,
     rows: Vec<Vec<f64>>,
@@ -235,13 +236,13 @@ impl Envelope {
         }
     }
 
-    /// Makes an unknown next to nothing.
+    /// Fixes an unknown near zero.
     fn hold(&mut self, row: usize) {
         let at = row - self.first[row];
         self.rows[row][at] += 1e12;
     }
 
-    /// Replaces the right side by the solution; the row that nothing holds, if there is one.
+    /// Solves in place; `Err` with the row that is unconstrained.
     fn solve(&mut self, right: &mut [f64]) -> Result<(), usize> {
         for row in 0..self.rows.len() {
             let (above, rest) = self.rows.split_at_mut(row);

@@ -1,4 +1,4 @@
-//! Occupancy grid seen from above: lines of sight through squares, and ends in them.
+//! Occupancy grid from above, from lines of sight through cells and end points in them.
 
 use super::station::Station;
 use crate::cloud::is_finite;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
-/// Counts of stations that looked through squares of the floor, and that saw something in them.
+/// Number of stations that looked through each cell, and that saw an end point in it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Vec<(i32, i32, u32, u32)>", into = "Vec<(i32, i32, u32, u32)>")]
 pub(super) struct Sightlines {
@@ -33,24 +33,24 @@ impl From<Sightlines> for Vec<(i32, i32, u32, u32)> {
     }
 }
 
-/// Bearings into which what a station saw is sorted.
+/// Number of bearings into which a station's points are sorted.
 const BEARINGS: usize = 720;
 /// Lines of sight are followed no farther, metres.
 const FARTHEST_M: f64 = 100.0;
 /// Most squares of a grid.
 const MOST_SQUARES: usize = 1 << 28;
-/// Share of the points of a bearing that may lie nearer than what ends it: mismatches.
+/// Maximum share of a bearing's points nearer than its end point; nearer ones are mismatches.
 const STRAY: f64 = 0.1;
 /// Points of a station in a square that are something.
 const SOMETHING: u32 = 3;
 /// Points lower than this are of the floor, metres.
 const FLOOR_M: f64 = 0.1;
-/// Fewest stations, and least share of those that looked at a square, that saw something there for the square
-/// to be occupied.
+/// Minimum number of stations, and minimum share of the stations that observed a cell, with an end
+/// point in it for the cell to be occupied.
 const OCCUPIED: (u32, f64) = (2, 0.35);
 
 impl Sightlines {
-    /// Adds what a station saw of the heights that are in a body's way.
+    /// Adds a station's points in the height band of the body.
     pub(super) fn add(
         &mut self,
         station: &Station,
@@ -100,7 +100,7 @@ impl Sightlines {
             .for_each(|key| self.squares.entry(*key).or_default().0 += 1);
     }
 
-    /// The grid of squares with a border of unknown ones; `None` if nothing was seen.
+    /// Grid with a border of unknown cells; `None` if nothing was seen.
     pub(super) fn occupancy(&self, edge_m: f64) -> Option<Occupancy> {
         let (first, _) = self.squares.iter().next()?;
         let (low, high) = self

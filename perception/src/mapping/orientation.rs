@@ -20,18 +20,18 @@ impl Default for OrientationOptions {
     }
 }
 
-/// Orientations, and what has which.
+/// Orientations, and the assignment of directions to them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orientations {
     /// Direction of the normal, modulo half a turn, radians from 0 to π.
     pub centres_rad: Vec<f64>,
-    /// The number of the orientation of each given direction, if it has one.
+    /// Orientation index of each given direction, if any.
     pub of: Vec<Option<u32>>,
 }
 
 /// Bins of the histogram over half a turn.
 const BINS: usize = 90;
-/// Spread by which the histogram is smoothed, bins.
+/// Standard deviation of histogram smoothing, bins.
 const SMOOTH: f64 = 2.0;
 /// Minimum ratio of a peak to the histogram's median; a round room has no such peak.
 const STANDS_OUT: f64 = 1.7;

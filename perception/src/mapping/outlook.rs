@@ -9,14 +9,14 @@ use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// A pose, and what a look from there is expected to show.
+/// Pose with the expected view of a look from there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
     /// Pose in the map.
     pub pose: Isometry2<f64>,
-    /// Length of the way there from where the body stands, metres.
+    /// Length of the route from the body, metres.
     pub way_m: f64,
-    /// Squares of floor that are unknown now, and how likely a look from there shows each.
+    /// Unknown floor cells with the probability that a look shows each.
     shows: Vec<(usize, f64)>,
     /// Area of a square, square metres.
     square_m2: f64,
@@ -30,7 +30,7 @@ pub struct Unseen {
 }
 
 impl Unseen {
-    /// Floor that a look is expected to show beyond those before it, square metres.
+    /// Floor that a look is expected to show beyond the earlier ones, square metres.
     pub fn gain_m2(&self, look: &Outlook) -> f64 {
         let left = |index: &usize| self.left.get(index).copied().unwrap_or(1.0);
         look.shows.iter().map(|(index, likely)| left(index) * likely).sum::<f64>() * look.square_m2
@@ -44,11 +44,11 @@ impl Unseen {
     }
 }
 
-/// Number of poses, those with the best gain for their cost, that are compared.
+/// Number of compared poses, those with the best gain per cost.
 const COMPARED: usize = 240;
 
-/// Poses, no more than `most`, that together show most of what can be seen of the unknown floor: first those to keep as far as they still promise
-/// anything, then each time the one that promises most beyond those before it for its cost.
+/// At most `most` poses that jointly show most of the visible unknown floor: first the poses to
+/// keep while still useful, then greedily by additional gain per cost.
 ///
 /// `looked`: the poses looked from so far; none is looked from twice.
 pub fn outlooks(
@@ -126,12 +126,13 @@ impl Floor<'_> {
 
 /// A frontier is looked at from no farther than this share of the camera's reach …
 const IN_RANGE: f64 = 0.9;
-/// … and left alone once two looks should have shown what lies behind it: less than this is likely to be shown by another.
+/// Minimum probability that another look shows a cell after two looks should have shown it; below
+/// it, the cell is given up.
 const LEFT: f64 = 0.2;
 
-/// The nearest frontier that can be reached, from as soon on the way there as it is in range and nothing stands before it, facing it (Yamauchi 1997).
-/// Where no way leads to any, for a camera does not see the floor at the body's feet, the body turns to the one nearest to where it stands. `None` if no
-/// frontier is left.
+/// Viewpoint of the nearest reachable frontier: first point on the route with the frontier in range
+/// and unoccluded, facing it (Yamauchi 1997). If none is reachable, as the camera does not see the
+/// floor at the body's feet, the body turns to the nearest. `None` without frontiers.
 pub fn nearest_frontier(
     grid: &Occupancy,
     looked: &[Isometry2<f64>],
@@ -177,8 +178,8 @@ impl Floor<'_> {
         unknown.filter_map(|s| self.index_beyond(s)).collect()
     }
 
-    /// Pose on the way to a place from which the place is first in range and unoccluded, with the
-    /// share of the way.
+    /// Pose on the route to a place from which the place is first in range and unoccluded, with the
+    /// share of the route.
     fn seen_from(
         &self,
         goal: &Point2<f64>,
@@ -195,7 +196,7 @@ impl Floor<'_> {
         on_way.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The shortest way to a square no farther from it than the body's radius and a square.
+    /// Shortest route to within the body's radius plus one cell of a cell, metres.
     fn nearest_way_m(&self, ways: &[f64], (column, row): (i64, i64), radius_m: f64) -> f64 {
         let reach = (radius_m / self.grid.cell_m).ceil() as i64 + 1;
         let around = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (column + x, row + y)));

@@ -19,15 +19,15 @@ use std::ops::RangeInclusive;
 /// Method for matching two plans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Matcher {
-    /// Odometry as it is.
+    /// Odometry alone.
     Odometry,
     /// Iterative closest point (Besl and McKay 1992) on all that was seen within the band of heights: the paper's peer.
     Icp,
-    /// The same, on what both fields of view see.
+    /// ICP on the jointly visible spots.
     IcpShared,
     /// The paper's: expectations over all correspondences, the rotation about one centroid, then the translation around odometry.
     IcpEmSplit,
-    /// The same expectations, rotation and translation together, from the best heading.
+    /// EM with rotation and translation estimated jointly, from the best heading.
     #[default]
     IcpEm,
 }
@@ -43,13 +43,15 @@ pub struct RectifyOptions {
     pub field: FieldOfView,
     /// Squares of the plan that are one point, metres.
     pub thin_m: f64,
-    /// Spread of points around where they belong, at the first and the last of the expectations, metres.
+    /// Standard deviation of spots around their partners in the first and the last iteration,
+    /// metres.
     pub sigma_m: (f64, f64),
-    /// Spread of odometry's way: a part of the step, and metres besides.
+    /// Standard deviation of odometry: a share of the step, and an absolute part in metres.
     pub way_sigma: (f64, f64),
     /// Spread of odometry's turn a step, radians.
     pub turn_sigma_rad: f64,
-    /// Least share of the second plan that must lie on the first where [`Matcher::IcpEm`] is to be believed: else odometry is.
+    /// Minimum share of the second plan that must match the first for [`Matcher::IcpEm`] to be
+    /// accepted; else odometry is used.
     pub explained: f64,
     /// Number of independent points that one plane counts for, as neighbouring errors are
     /// correlated.
@@ -92,12 +94,12 @@ impl RectifyOptions {
     }
 }
 
-/// Pose of the second of two stations in the frame of the first, with its certainty.
+/// Pose of the second of two stations in the frame of the first, with information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairFit {
     /// The pose found.
     pub before_from_after: Isometry2<f64>,
-    /// Share of the second plan that lies on the first, of what both fields of view see.
+    /// Matching share of the jointly visible part of the second plan.
     pub explained: f64,
     /// Spots of the two plans that both fields of view see.
     pub shared: (usize, usize),
@@ -111,7 +113,7 @@ const FEWEST: usize = 12;
 const EXPECTATIONS: usize = 3;
 /// Number of final alternations between translation and full pose.
 const ROUNDS: usize = 2;
-/// Headings are looked for in such steps, radians, in a field of this spread, metres.
+/// Step of the heading search, radians, and standard deviation of its likelihood field, metres.
 const HEADING_STEP_RAD: f64 = 0.01;
 const HEADING_SIGMA_M: f64 = 0.12;
 /// Ratio of each spread to the one before.
@@ -122,7 +124,7 @@ const STEPS_M: [f64; 2] = [0.03, 0.006];
 const WINDOW: f64 = 3.0;
 /// A fit farther from odometry, in spreads, is not believed.
 const STRAYED: f64 = 4.0;
-/// Steps by which the curvature at the pose found is measured: metres, radians.
+/// Steps for the numerical curvature at the result: metres, radians.
 const PROBE: (f64, f64) = (0.03, 0.015);
 
 /// Rectifies the step between two stations in a row.
@@ -168,7 +170,7 @@ pub fn chained(pairs: &[PairFit]) -> Vec<Isometry2<f64>> {
     poses
 }
 
-/// Fits the plan of one station onto that of another, from where odometry has it.
+/// Registers the plan of one station to that of another, starting from odometry.
 fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &RectifyOptions) -> PairFit {
     let seen = shared(before, &odometry.inverse(), &options.field);
     let moved = shared(after, odometry, &options.field);
@@ -231,7 +233,7 @@ impl Prior {
         Matrix3::from_diagonal(&Vector3::new(way, way, self.turn_sigma_rad.powi(-2)))
     }
 
-    /// Half the squared distance from it, in spreads.
+    /// Half the squared Mahalanobis distance from odometry.
     fn cost(&self, pose: &Isometry2<f64>) -> f64 {
         let way = (pose.translation.vector - self.pose.translation.vector).norm() / self.way_sigma_m;
         let turn = self.pose.rotation.angle_to(&pose.rotation) / self.turn_sigma_rad;
@@ -327,8 +329,8 @@ impl<'a> Problem<'a> {
         headings.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(start, |best| best.1)
     }
 
-    /// Calls `found` with each partner of a spot of the second plan and its probability (z of Eq.
-    /// 3).
+    /// Calls `found` with the probability and position of each partner of a spot of the second plan
+    /// (z of Eq. 3).
     fn expected(&self, at: &Point2<f64>, sigma_m: f64, mut found: impl FnMut(f64, &Point2<f64>)) {
         let (reach_m, per) = (REACH * sigma_m, 0.5 / (sigma_m * sigma_m));
         let from = self.before.partition_point(|b| b.at.x < at.x - reach_m);
@@ -408,7 +410,7 @@ impl<'a> Problem<'a> {
         Isometry2::from_parts(shift.into(), UnitComplex::new(pose.rotation.angle() + turn))
     }
 
-    /// The translation around odometry of which the error is least.
+    /// Translation around odometry with minimum error.
     fn shifted(&self, pose: &Isometry2<f64>) -> Isometry2<f64> {
         let at = |shift: Vector2<f64>| Isometry2::from_parts(shift.into(), pose.rotation);
         let mut best = (self.cost(pose), pose.translation.vector);
@@ -433,7 +435,7 @@ impl<'a> Problem<'a> {
         self.prior.cost(pose) - self.options.looks * self.field.mean(self.after, pose)
     }
 
-    /// Curvature of the cost, no less than what odometry says.
+    /// Curvature of the cost, at least that of odometry.
     fn information(&self, pose: &Isometry2<f64>) -> Matrix3<f64> {
         let cost = |by: Vector3<f64>| {
             let at = Isometry2::new(pose.translation.vector + by.xy(), pose.rotation.angle() + by.z);

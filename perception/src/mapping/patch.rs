@@ -1,4 +1,4 @@
-//! Patches of facets that lie side by side, and the planes through them (section 4.2).
+//! Patches of adjacent facets, and the planes through them (section 4.2).
 
 use super::cells::Facet;
 use crate::plane::{self, Plane};
@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::f64::consts::FRAC_PI_2;
 
-/// Method for fitting planes to patches and joining them.
+/// Method of fitting planes to patches and joining them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fit {
     /// The paper's: the median of the normals and the centroid; where planes are joined, their means weighted by area.
@@ -16,8 +16,7 @@ pub enum Fit {
     LeastSquares,
 }
 
-/// Prior knowledge of a building (section 4.4), checked where planes are fitted and where they are
-/// joined.
+/// Prior knowledge of a building (section 4.4), applied when planes are fitted and joined.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constraints {
     /// Walls are upright.
@@ -28,7 +27,7 @@ pub struct Constraints {
     pub within_rad: f64,
 }
 
-/// Facets that lie side by side, and the plane through them.
+/// Adjacent facets and the plane through them.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
     pub plane: Plane,
@@ -50,11 +49,13 @@ pub(super) struct Growth {
     pub within_m: f64,
     /// Nor so far along the normal, metres.
     pub across_m: f64,
-    /// Normals of a patch differ from that of its orientation, or from the first one's, by no more, radians.
+    /// Maximum angle between a facet's normal and that of the patch's orientation (or first facet),
+    /// radians.
     pub turned_rad: f64,
 }
 
-/// Groups facets that lie side by side. `normal` is that of the orientation; without one a patch has that of its first facet.
+/// Groups adjacent facets. `normal`: normal of the orientation; without it, a patch uses that of
+/// its first facet.
 pub(super) fn grow(
     facets: &[Facet],
     members: &[u32],
@@ -115,7 +116,7 @@ impl Constraints {
     }
 }
 
-/// The plane through facets, and its limits.
+/// Plane through facets, with its limits.
 pub(super) fn through(
     facets: &[Facet],
     members: Vec<u32>,
@@ -139,7 +140,7 @@ pub(super) fn through(
     placed(facets, members, Plane::through(&middle, normal), middle, edge_m)
 }
 
-/// A patch on a given plane: its middle there, its limits and its area.
+/// Patch on a given plane, with centre, limits and area.
 pub(super) fn placed(
     facets: &[Facet],
     members: Vec<u32>,
@@ -187,7 +188,8 @@ fn least_upright<'a>(facets: impl Iterator<Item = &'a Facet>, middle: &Point3<f6
     (least < 0.5 * most).then(|| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned().push(0.0))
 }
 
-/// Dominant direction of the normals by area, modulo a quarter turn; `None` if there is none.
+/// Dominant direction of the normals, area-weighted, modulo a quarter turn; `None` if there is
+/// none.
 pub(super) fn main_direction(patches: &[Patch], within_rad: f64) -> Option<f64> {
     const BINS: usize = 90;
     let direction = |p: &Patch| p.plane.normal.y.atan2(p.plane.normal.x).rem_euclid(FRAC_PI_2);

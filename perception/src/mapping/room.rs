@@ -1,4 +1,4 @@
-//! The map: walls with their openings, level surfaces, and the grid of what is open.
+//! Map: walls with their openings, level surfaces, and the occupancy grid.
 
 use super::cells::{Cells, CellsError, Facet, NormalOptions, Region};
 use super::cylinder::{CylinderOptions, UprightCylinder, cylinders};
@@ -17,7 +17,7 @@ use rustc_hash::FxHashSet;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// The parts of a building seen so far, to which a later drive adds.
+/// Accumulated observations of a building; later drives add to them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Survey {
@@ -25,7 +25,8 @@ pub struct Survey {
     lines: Sightlines,
 }
 
-/// Cells with fewer points say nothing of where a station stands; what lies farther than this from all of them is new, metres.
+/// Minimum number of points of a cell that is used for locating a station; and distance from all
+/// such cells beyond which a point is new, metres.
 const LEAST_KNOWN: u32 = 4;
 const NEAR_M: f64 = 0.3;
 
@@ -38,11 +39,12 @@ pub struct MapOptions {
     pub orientations: OrientationOptions,
     /// Maximum distance between neighbouring facets of one patch (λ), metres.
     pub grow_m: f64,
-    /// Normals of walls are tilted by no more, those of level surfaces from the plumb line, radians.
+    /// Maximum tilt of wall normals from horizontal, and of level surfaces' normals from vertical,
+    /// radians.
     pub tilt_rad: f64,
     /// Method for fitting planes.
     pub fit: Fit,
-    /// True: walls are upright, and parallel or square to most others where they nearly are.
+    /// True: walls are made upright, and parallel or perpendicular to the majority if nearly so.
     pub constrained: bool,
     /// Options for joining patches; `None`: no joining.
     pub fuse: Option<FuseOptions>,
@@ -50,11 +52,11 @@ pub struct MapOptions {
     pub cylinders: Option<CylinderOptions>,
     /// Smaller walls are left out, square metres …
     pub least_area_m2: f64,
-    /// … and lower ones, metres: they are things, not walls.
+    /// Minimum height of a wall, metres; lower ones are objects.
     pub least_height_m: f64,
     /// Smaller level surfaces are left out, square metres.
     pub least_level_m2: f64,
-    /// Walls leave open what is open at these heights, metres …
+    /// Height band in which openings of walls must be free, metres.
     pub opening_band_m: RangeInclusive<f64>,
     /// … and at least so wide, metres.
     pub opening_m: f64,
@@ -84,22 +86,22 @@ impl Default for MapOptions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
-    /// The plane; its normal points to where it was seen from.
+    /// Plane of the wall, with its normal towards the observer.
     pub plane: Plane,
     /// One end of the wall's foot, metres.
     pub from: Point2<f64>,
     /// The other.
     pub to: Point2<f64>,
-    /// Heights between which it was seen, metres.
+    /// Observed height range, metres.
     pub heights_m: (f64, f64),
     /// Area that was seen, square metres.
     pub area_m2: f64,
-    /// Stretches of wall from one end to the other, metres from `from`; between them it is open.
+    /// Stretches of wall, metres from `from`; the gaps are openings.
     pub stretches_m: Vec<(f64, f64)>,
 }
 
 impl Wall {
-    /// The feet of its stretches.
+    /// Ground lines of the stretches.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> {
         let along = (self.to - self.from).try_normalize(0.0).unwrap_or_else(Vector2::x);
         self.stretches_m.iter().map(move |(a, b)| (self.from + along * *a, self.from + along * *b))
@@ -117,9 +119,9 @@ impl Wall {
 pub struct Level {
     /// The height, metres.
     pub height_m: f64,
-    /// True if it was seen from above.
+    /// True if seen from above.
     pub faces_up: bool,
-    /// Corners of its convex hull, anticlockwise, metres.
+    /// Corners of the convex hull, anticlockwise, metres.
     pub outline: Vec<Point2<f64>>,
     /// Area that was seen, square metres.
     pub area_m2: f64,
@@ -148,8 +150,9 @@ impl RoomMap {
         of_walls.chain(self.cylinders.iter().flat_map(UprightCylinder::feet))
     }
 
-    /// The floor as a body that is up to `height_m` high must take it: open where it was seen open or where the body has stood (discs of `radius_m`
-    /// around poses), occupied under walls and under level surfaces lower than it.
+    /// Occupancy for a body of height `height_m`: open where seen open or where the body has been
+    /// (discs of `radius_m` around poses), occupied at walls and under level surfaces that are too
+    /// low.
     pub fn floor(&self, stood: &[Isometry2<f64>], radius_m: f64, height_m: f64) -> Option<Occupancy> {
         let mut grid = self.grid.clone()?;
         let tables =
@@ -194,8 +197,8 @@ impl Survey {
         &self.cells
     }
 
-    /// Adds what was seen from a station at a pose, by a camera `height_m` above the floor, no deeper than `far_m`; `band_m`: heights at which something is
-    /// in a body's way.
+    /// Adds a station's points at a pose, from a camera `height_m` above the floor, up to depth
+    /// `far_m`; `band_m`: height range of obstacles to the body.
     ///
     /// # Errors
     /// If the pose is none; nothing is added then.
@@ -214,14 +217,14 @@ impl Survey {
         Ok(())
     }
 
-    /// Open floor by lines of sight alone, without the walls; `None` if nothing was seen, or the
-    /// extent is too large for one grid.
+    /// Open floor from lines of sight alone, without walls; `None` if nothing was seen, or the
+    /// extent exceeds one grid.
     pub fn grid(&self) -> Option<Occupancy> {
         self.lines.occupancy(self.cells.edge_m())
     }
 
-    /// Locates a station by what was seen before, from the stated pose, which stays unless the
-    /// station says more.
+    /// Localises a station in earlier observations from the stated pose, which is kept if the
+    /// station is not informative.
     ///
     /// # Errors
     /// If an option or the pose cannot be used.
@@ -245,7 +248,7 @@ impl Survey {
         Ok(fit_cut(&shared(&known, &believed.inverse(), &options.field), &moved, believed, options))
     }
 
-    /// The map of what was seen so far.
+    /// Map from all observations so far.
     ///
     /// # Errors
     /// If an option cannot be used.
@@ -326,7 +329,7 @@ fn upright(facets: &[Facet], options: &MapOptions, edge_m: f64) -> (Vec<Patch>, 
     (patches, constraints.main_rad)
 }
 
-/// A patch as a wall with its openings; `None` if it is too small.
+/// Patch as a wall with its openings; `None` if too small.
 fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> Option<Wall> {
     let [(left, right), (low, high)] = patch.limits_m;
     if patch.area_m2 < options.least_area_m2 || high - low < options.least_height_m {

@@ -1,4 +1,4 @@
-//! Stop of a drive and its plan: floor and ceiling removed, heights dropped.
+//! Station of a drive and its plan: floor and ceiling removed, heights dropped.
 
 use crate::cloud::is_finite;
 use crate::view::View;
@@ -7,7 +7,8 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// A stop of the drive. The *level* frame has its origin on the floor under the camera, x ahead, y to the left, z up.
+/// Station of a drive. The *level* frame has its origin on the floor under the camera, x forward, y
+/// left, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     /// Points in the level frame, metres. Points that are not finite are ignored.
@@ -106,7 +107,7 @@ pub struct FieldOfView {
     pub left_rad: f64,
     /// The nearest depth, metres; of more than half a turn, the nearest range.
     pub near_m: f64,
-    /// The farthest depth that is used, metres: noise grows with its square.
+    /// Maximum depth used, metres; noise grows with its square.
     pub far_m: f64,
 }
 
@@ -117,7 +118,7 @@ impl Default for FieldOfView {
 }
 
 impl FieldOfView {
-    /// True for places of the level frame within it.
+    /// True for places of the level frame inside the field of view.
     pub fn sees(&self, place: &Point2<f64>) -> bool {
         let bearing = place.y.atan2(place.x);
         let depth = if self.left_rad - self.right_rad > PI { place.coords.norm() } else { place.x };
@@ -125,7 +126,7 @@ impl FieldOfView {
     }
 }
 
-/// The spots that the other field of view sees too, once they are moved into its frame.
+/// Spots that the other field of view also covers, after transformation into its frame.
 pub(super) fn shared(spots: &[Spot], other_from_here: &Isometry2<f64>, field: &FieldOfView) -> Vec<Spot> {
     spots.iter().filter(|s| field.sees(&(other_from_here * s.at))).copied().collect()
 }

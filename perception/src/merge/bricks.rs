@@ -1,15 +1,16 @@
-//! A sparse grid of voxels in bricks of 8 × 8 × 8, or 8 × 8 columns: a surface fills few bricks, and in each many voxels beside each other.
-//! Of columns it fills most: a brick of columns has a cell for each.
+//! Sparse grid of voxels in bricks of 8 × 8 × 8, or of 8 × 8 columns: a surface occupies few
+//! bricks, each with many neighbouring voxels. A brick of columns has a cell for every column.
 
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Voxels along a side of a brick, and along that of a brick with a layer of its neighbours' voxels around. From: work.
+/// Voxels along a side of a brick, and along a side with a margin of one voxel. From: work.
 pub(super) const SIDE: usize = 8;
 pub(super) const WIDE: usize = SIDE + 2;
-/// Mark of no cell, or no brick. From: mark.
+/// Mark of an absent cell or brick. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
-/// Most voxels along an axis: positions in single precision tell a sixteenth of a voxel then. From: derived, single precision has 24 bits.
+/// Maximum number of voxels along an axis: single precision then resolves a sixteenth of a voxel.
+/// From: derived, single precision has 24 bits.
 const MOST: f64 = (1 << 20) as f64;
 
 /// Voxels over a box, fixed to the world's origin.
@@ -25,7 +26,7 @@ impl Grid {
     /// Grid over a box, with voxels of `voxel_m`, or wider if the box needs more voxels than the
     /// index has numbers.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, voxel_m: f64) -> Grid {
-        /// Voxels of the grid's border, and of where it begins. From: chosen.
+        /// Margin of the grid around its bounds, voxels. From: chosen.
         const BORDER: f64 = 4.0;
         let voxel_m = voxel_m.max((high - low).amax() / (MOST - BORDER));
         let origin_m = low.coords.map(|c| ((c / voxel_m).floor() - 1.0) * voxel_m);
@@ -52,7 +53,7 @@ pub(super) struct Bricks<C> {
     slots: Vec<u32>,
     /// Layers of voxels in a brick, along z.
     layers: usize,
-    /// The cells; columns have theirs, `empty`, before they are occupied.
+    /// Cells; a column has its `empty` cell before it is occupied.
     pub cells: Vec<C>,
     empty: C,
     /// The number of occupied cells.
@@ -63,7 +64,7 @@ pub(super) struct Bricks<C> {
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
 
-/// Bricks along each axis of which one may be in `recent`. From: work.
+/// Size of the cache `recent` along each axis, bricks. From: work.
 const RECENT: usize = 4;
 
 impl<C: Copy> Bricks<C> {
@@ -91,7 +92,8 @@ impl<C: Copy> Bricks<C> {
         self.layers * SIDE * SIDE
     }
 
-    /// Number of the cell at a place, voxels from the grid's lowest corner; it is occupied from then on.
+    /// Number of the cell at a position (voxels from the grid's lowest corner); marks the cell as
+    /// occupied.
     #[inline(always)]
     pub fn cell(&mut self, at: &[f32; 3]) -> u32 {
         let mut voxel = at.map(|c| c as i32 as u32);
@@ -119,8 +121,8 @@ impl<C: Copy> Bricks<C> {
         *slot
     }
 
-    /// Puts the cells into the order of the bricks, so that those beside each other in space are so in memory; gives their former numbers.
-    /// Columns are in that order: `None`.
+    /// Sorts the cells by brick, so that neighbours in space are neighbours in memory; returns
+    /// their former numbers. `None` for columns, which already are in order.
     pub fn sort(&mut self) -> Option<Vec<u32>> {
         if self.are_columns() {
             return None;
@@ -176,8 +178,8 @@ impl<C: Copy> Bricks<C> {
         slots.filter(|slot| **slot != NONE).map(|slot| *slot as usize)
     }
 
-    /// Calls `found` for each cell of the brick in the middle with its number and, if it is of the mask, those of the cells in the 27 voxels
-    /// around it, itself among them.
+    /// Calls `found` for each cell of the middle brick with its number and, if the mask holds it,
+    /// the cell numbers in the 27 voxels around it, its own included.
     pub fn visit(&self, beside: &Beside, mask: &Mask, mut found: impl FnMut(usize, Option<&[u32]>)) {
         let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
         self.wide(beside, &mut wide);
@@ -212,7 +214,7 @@ impl<C: Copy> Bricks<C> {
         }
     }
 
-    /// Numbers of the cells of the brick of columns in the middle and of a layer of those around: by y, x.
+    /// Cell numbers of the middle brick of columns with a margin of one cell, by y, x.
     pub fn wide_columns(&self, beside: &Beside) -> [[u32; WIDE]; WIDE] {
         std::array::from_fn(|y| self.wide_row(beside, 1, y))
     }

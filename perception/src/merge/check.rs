@@ -1,4 +1,4 @@
-//! Consistency of views: groups of views that belong together, and views that contradict the others.
+//! Consistency of views: groups of consistent views, and views that contradict the others.
 
 use super::joint::Found;
 use super::parts::Part;
@@ -22,18 +22,18 @@ const MOST_CONTRADICTED: f64 = 0.22;
 /// A reason why a view is left out of a merge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Misfit {
-    /// It has no usable point in range.
+    /// The view has no usable point in range.
     Empty,
     /// The view shares too few points with the others: this many.
     Alone(usize),
-    /// It would have to move farther than localisation errs, metres and radians.
+    /// The required correction exceeds the localisation error, metres and radians.
     Far(f64, f64),
     /// Share of the view that contradicts free space seen by the others.
     Contradicted(f64),
 }
 
 impl Misfit {
-    /// True if the view and the others cannot both be as stated; false if it merely tells too little.
+    /// True if the view contradicts the others; false if it merely lacks information.
     pub(super) fn is_at_odds(&self) -> bool {
         matches!(self, Misfit::Far(..) | Misfit::Contradicted(_))
     }
@@ -60,7 +60,7 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// The view that least belongs, with the reason; `None` if all that are used belong together.
+/// Least consistent view, with the reason; `None` if all used views are consistent.
 pub(super) fn misfit(
     views: &[Prepared],
     used: &[bool],
@@ -88,8 +88,8 @@ pub(super) fn misfit(
     (share > MOST_CONTRADICTED).then_some((worst, Misfit::Contradicted(share)))
 }
 
-/// Tests whether a further view of a given looseness belongs with the used views as they lie, itself
-/// included.
+/// Tests whether a further view of a given looseness is consistent with the used views at their
+/// poses, itself included.
 pub(super) fn belongs(
     (view, loose, used): (usize, f64, &[bool]),
     views: &[Prepared],
@@ -104,8 +104,8 @@ pub(super) fn belongs(
         && contradicted(view, &all, views, parts, poses, maps) <= MOST_CONTRADICTED
 }
 
-/// Share of what a view shows, and of what others show, that contradicts the other: the mean over the others. With one other view there
-/// is nobody to ask who is wrong: the mean over those that can judge blames who disagrees with most.
+/// Share of a view's points, and of the others' points, that contradict the other: mean over the
+/// other views. With one other view only, the mean over those that can judge.
 fn contradicted(
     i: usize,
     active: &[usize],
@@ -126,9 +126,9 @@ fn contradicted(
 
 /// The correction of a camera pose as a multiple of the largest plausible one, and the misfit; `None` if plausible.
 fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, Misfit)> {
-    /// Maximum pose correction that is believed, in standard deviations of localisation, or in
-    /// metres and radians if that is more: stated errors are sometimes too small, and 10 cm and 6°
-    /// must be corrected. From: chosen.
+    /// Maximum accepted pose correction, in standard deviations of localisation, or in metres and
+    /// radians if larger: stated errors are sometimes too small, and 10 cm and 6° must be
+    /// corrected. From: chosen.
     const SPREADS: f64 = 5.0;
     const MENDED: (f64, f64) = (0.2, 0.2);
     let most = [(view.sigma_m, MENDED.0), (view.sigma_rad, MENDED.1)];
@@ -138,8 +138,8 @@ fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, M
     (excess > 1.0).then(|| (excess, Misfit::Far(shift.norm(), turn.norm())))
 }
 
-/// Share of what stands on the surface in a view, of what another camera can judge, through which that camera looked; none if it
-/// can judge too little.
+/// Share of a view's object points through which another camera looked, of those that this camera
+/// can judge; `None` if it can judge too few.
 fn contradiction(
     view: &Prepared,
     parts: &[Part],
@@ -149,7 +149,7 @@ fn contradiction(
 ) -> Option<f64> {
     /// Points of a view that another camera is asked about. From: chosen.
     const ASKED: usize = 300;
-    /// Fewest that it must be able to judge. From: chosen.
+    /// Minimum number of points to judge. From: chosen.
     const FEWEST: u32 = 25;
     let map = map?;
     let map_from_view = map_pose.inv_mul(pose);

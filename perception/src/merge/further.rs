@@ -1,4 +1,4 @@
-//! A further look at the same place: what was found of the earlier ones is kept.
+//! Incremental merge: a further view of the same place reuses the results of the earlier ones.
 //!
 //! What is known of a view by itself is kept as long as the view is the same. A further view alone is aligned, to the views beside it as they
 //! lie, and gathered; what it touches is settled, and the frame stays the average of what localisation said. What few views showed of where
@@ -34,15 +34,15 @@ use std::thread::{self, JoinHandle};
 const TOGETHER: usize = 2;
 /// Number of earlier views up to which all are merged together. From: chosen.
 const FEW: usize = 6;
-/// Number of views up to which the earlier ones may move once a further one is aligned with them.
-/// From: chosen, fewer false names at twice the assumed noise.
+/// Number of views up to which the earlier ones may move when a further one is aligned. From:
+/// chosen, fewer false names at twice the assumed noise.
 const MOVABLE: usize = 4;
-/// Least motion of the earlier views among each other by a further view from which they are gathered anew,
-/// metres. From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and
-/// four views, as with none.
+/// Minimum relative motion of the earlier views from which they are fused again, metres. From:
+/// chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and four
+/// views, as with none.
 const MOVED_M: f64 = 0.001;
 
-/// Merges the views of one place again and again, as they become more.
+/// Incremental merger of the growing set of views of one place.
 #[derive(Default)]
 pub struct Merger {
     kept: Kept,
@@ -57,8 +57,8 @@ struct Kept {
     digests: Vec<u64>,
     prepared: Vec<Prepared>,
     maps: Vec<Option<DepthMap>>,
-    /// The base on which a further view is aligned; none if the views are to be merged together for a new
-    /// base.
+    /// Base with which a further view is aligned; `None` if the views must be merged together for a
+    /// new base.
     base: Option<Base>,
 }
 
@@ -68,7 +68,7 @@ struct Base {
     aligned: Aligned,
     seen: Visibility,
     gathered: Vec<Gathered>,
-    /// The returns gathered from each view, while the views are few enough that they may still move.
+    /// Returns gathered from each view, while few enough views may still move.
     looked: Option<Vec<Arc<Looked>>>,
     fits: Vec<ViewFit>,
     steps: Vec<Step>,
@@ -81,7 +81,8 @@ impl fmt::Debug for Merger {
 }
 
 impl Merger {
-    /// As [`merge`](super::merge), but the last view is laid on what the others are merged to: quicker if they were merged last time.
+    /// Result of [`merge`](super::merge) with the last view aligned to the merge of the others;
+    /// faster if these were merged before.
     ///
     /// # Errors
     /// As [`merge`](super::merge).
@@ -92,8 +93,8 @@ impl Merger {
         })
     }
 
-    /// Starts, in a thread of its own, the part of the next merge that depends on the present views
-    /// alone. The result is the same without it, only later.
+    /// Starts the part of the next merge that depends on the present views alone, in a thread of
+    /// its own. The result is the same without it, only later.
     pub fn go_ahead(&mut self, views: Vec<View>) {
         let kept = self.kept();
         if kept.base.is_none() && kept.digests.len() == views.len() {
@@ -109,7 +110,7 @@ impl Merger {
         }
     }
 
-    /// Waits until what is done ahead is done.
+    /// Waits for the background work.
     pub fn wait(&mut self) {
         self.kept();
     }
@@ -204,7 +205,8 @@ impl Kept {
         Ok(Base { digests, aligned, seen, gathered, looked, fits, steps })
     }
 
-    /// The last of the first views with the others, which stay unless they are few; `None` if it does not fit in.
+    /// Merge of the last of the first views with the others, which stay fixed unless they are few;
+    /// `None` if it does not fit.
     fn further(&self, mut base: Base, views: &[View], options: &MergeOptions) -> Option<Base> {
         let last = views.len() - 1;
         let (prepared, maps) = (&self.prepared[..=last], &self.maps[..=last]);
@@ -243,7 +245,7 @@ impl Kept {
         Some(base)
     }
 
-    /// Moved onto the average of what localisation said of all used views.
+    /// Result moved onto the mean of the localised poses of all used views.
     fn onto_priors(&self, merged: Merged, Aligned { used, poses, .. }: &Aligned) -> Merged {
         let mut merged = merged.moved(&joint::onto_priors(&self.prepared, used, poses));
         for (fit, Prepared { prior, .. }) in merged.fits.iter_mut().zip(&self.prepared) {
@@ -257,8 +259,8 @@ impl Kept {
     }
 }
 
-/// The poses of the views after a further one is aligned with the others, with what the alignment found and
-/// the parts of the new view's points.
+/// Poses of the views after a further one is aligned, with the alignment's findings and the parts
+/// of the new view's points.
 struct Laid {
     poses: Vec<Isometry3<f64>>,
     found: Vec<Found>,
@@ -278,8 +280,8 @@ fn together(views: usize) -> usize {
 }
 
 impl Aligned {
-    /// Aligns the last of the views, its first alignment as asked: alone if the others stay, or all together
-    /// if they are few. `None` if that contradicts them.
+    /// Aligns the last view, with the given first alignment: alone if the others stay fixed, or all
+    /// together if they are few. `None` on contradiction.
     fn lay_further(&self, prepared: &[Prepared], maps: &[Option<DepthMap>], first: &Round) -> Option<Laid> {
         let last = prepared.len() - 1;
         let view = &prepared[last];
@@ -346,7 +348,7 @@ impl Aligned {
     }
 }
 
-/// The last view and, of those before it that are used, those whose cameras are nearest to its.
+/// Selects the last view and, of the used earlier ones, those with the nearest cameras.
 fn beside(used: &[bool], poses: &[Isometry3<f64>]) -> Vec<bool> {
     let last = poses.len() - 1;
     let apart = |i: usize| {

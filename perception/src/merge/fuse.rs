@@ -16,7 +16,7 @@ use crate::visibility::Visibility;
 use nalgebra::{Isometry3, Matrix3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// The state of a voxel: running weighted sums while it is gathered; then means.
+/// State of a voxel: running weighted sums while gathering, then means.
 #[derive(Clone, Copy)]
 pub(super) struct Cell {
     pub weight: f32,
@@ -24,7 +24,7 @@ pub(super) struct Cell {
     pub at: Vector3<f32>,
     /// Unit length or zero in the end.
     pub normal: Vector3<f32>,
-    /// Views that measured it, and the last of them.
+    /// Number of views that measured the voxel, and the last of them.
     pub views: u16,
     last: u16,
 }
@@ -59,12 +59,12 @@ impl Cell {
 /// Occupied voxels, or columns on a plane.
 pub(super) struct Gathered {
     pub grid: Grid,
-    /// The grid's axes: those of the world, or z away from a plane.
+    /// Axes of the grid: those of the world, or z along a plane's normal.
     pub axes_from_world: UnitQuaternion<f64>,
     /// True if the voxels are columns along z.
     pub flat: bool,
     pub bricks: Bricks<Cell>,
-    /// Weighted sums of the colours of each cell, if there are any.
+    /// Weighted colour sums of each cell, if coloured.
     pub colours: Vec<Vector3<f32>>,
     pub returns: usize,
     pub before: Before,
@@ -77,8 +77,9 @@ pub(super) struct Fused {
     pub voxel_m: f64,
 }
 
-/// Gathers and settles the used views at their corrected poses, with a sheet for each of the level planes. What is `known` of the first of them
-/// is taken as it is; what is looked through of the others is known then.
+/// Gathers and settles the used views at their corrected poses, with a height sheet for each level
+/// plane. Gathered returns of the first views in `known` are reused; those of the others are added
+/// to it.
 pub(super) fn gather(
     views: &[View],
     prepared: &[Prepared],
@@ -87,7 +88,7 @@ pub(super) fn gather(
     options: &MergeOptions,
     mut known: Option<&mut Vec<Arc<Looked>>>,
 ) -> Vec<Gathered> {
-    /// Factor by which voxels grow, at least, if there are too many. From: chosen.
+    /// Minimum growth factor of the voxels if there are too many. From: chosen.
     const GROWTH: f64 = 1.2;
     let _span = tracing::debug_span!("fuse", views = views.len()).entered();
     let used: Vec<usize> = (0..views.len()).filter(|&i| used[i]).collect();
@@ -134,8 +135,9 @@ pub(super) fn gather(
     }
 }
 
-/// Adds a further view to what was gathered with `planes`, as the view of that number, and settles what it touches. False, and nothing is added,
-/// if it does not go with it: it lies beyond its voxels, has no colours where that has, or makes it too large.
+/// Adds a further view, of the given number, to the voxels gathered with `planes`, and settles the
+/// touched cells. False, without changes, if the view lies outside the grid, lacks colours the grid
+/// has, or makes it too large.
 pub(super) fn gather_further(
     all: &mut [Gathered],
     number: usize,
@@ -174,7 +176,8 @@ struct Taken<'a> {
     colours: Option<&'a [[u8; 3]]>,
 }
 
-/// Sorts what is fused of some views into voxels and sheets; each is done with what is to be done then while others are filled.
+/// Sorts the fused returns of some views into voxels and sheets, and calls `then` on each as soon
+/// as it is complete.
 fn add(all: &mut [Gathered], some: &[Taken], then: impl Fn(&mut Gathered) + Sync) {
     pool::for_each(
         all,
@@ -195,7 +198,7 @@ struct Scale {
     /// Voxels a metre.
     turn: Matrix3<f32>,
     shift: Vector3<f32>,
-    /// The same turn for directions.
+    /// Rotation into the grid's axes, for directions.
     axes: Matrix3<f32>,
 }
 
@@ -207,7 +210,7 @@ impl Scale {
         Scale { turn: (axes / grid.voxel_m).cast(), shift: (shift / grid.voxel_m).cast(), axes: axes.cast() }
     }
 
-    /// True if none of some returns lies below the lowest voxel or so far off that it could not be told from another.
+    /// True if no return lies below the lowest voxel or beyond the resolvable range.
     fn holds(&self, returns: &[Return]) -> bool {
         let most = (1 << 19) as f32;
         returns.iter().all(|r| {
@@ -238,7 +241,7 @@ impl Gathered {
         }
     }
 
-    /// Nothing yet, over all that is in range of a camera.
+    /// Empty grid over the range of all cameras.
     fn over(
         cameras: &[Isometry3<f64>],
         on: Option<&Plane>,
@@ -259,7 +262,8 @@ impl Gathered {
         Gathered { grid, axes_from_world, flat, bricks, colours: Vec::new(), returns: 0, before }
     }
 
-    /// Adds returns. A pass for each thing that is waited for: what comes from far memory is asked for many times at once.
+    /// Adds returns, in separate passes for each dependent memory access, so that cache misses
+    /// overlap.
     fn add(&mut self, returns: &[Return], scale: &Scale, view: u16, colours: Option<&[[u8; 3]]>) {
         /// Returns that are added together. From: work.
         const SOME: usize = 512;

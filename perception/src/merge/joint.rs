@@ -22,9 +22,9 @@ pub(super) struct Round {
     pub to_m: f64,
     /// Most passes.
     pub passes: usize,
-    /// Points of each sort that a view asks for partners at most, all its partners together.
+    /// Maximum number of query points of each part per view, over all its partner views.
     pub asked: usize,
-    /// Weight of points on planes, and of what stands on no surface, against the objects.
+    /// Weight of points on planes, and of points on no surface, relative to object points.
     pub rest_weight: f32,
 }
 
@@ -46,14 +46,15 @@ struct Link {
     squares: f64,
 }
 
-/// Minimum standard deviation of corresponding points, metres: they are seldom the same surface
+/// Minimum standard deviation of corresponding points, metres, which are seldom the same surface
 /// point. From: derived, within the limits of the shape model.
 const LEAST_SIGMA_M: f32 = SHAPE_M as f32;
-/// Number of nearest views that hold a view in its place. From: chosen.
+/// Number of nearest views that constrain a view. From: chosen.
 pub(super) const PARTNERS: usize = 5;
 /// Smallest cosine between the normals of partners. From: chosen, about 41°.
 const SAME_SIDE: f32 = 0.75;
-/// Another point may be nearer than the partner by this part of how far a partner may be: the surface is much the same there. From: chosen.
+/// Allowed excess of a partner's distance over the nearest point's, as a share of the maximum
+/// distance; the surface is much the same there. From: chosen.
 const SLACK: f32 = 0.1;
 /// A pass that moves no camera farther than this, metres and radians, ends the round. From: chosen.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
@@ -113,7 +114,7 @@ pub(super) fn align(
     found
 }
 
-/// The points of a view that ask for partners, by what they belong to.
+/// Query points of a view, by part.
 struct Askers([Vec<u32>; 3]);
 
 impl Askers {
@@ -159,7 +160,7 @@ impl Asked {
     }
 }
 
-/// Pairs of views to match: all if they are few, else each with those whose cameras are nearest.
+/// Pairs of views to match: all if few, else each view with those of the nearest cameras.
 fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     /// Number of views from which not all pairs of views are matched. From: chosen.
     const ALL_BELOW: usize = 7;
@@ -184,10 +185,11 @@ fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(us
     pairs
 }
 
-/// Partners of the points that one view asks for in the other, and what they ask of both poses.
+/// Correspondences of one view's query points in the other view, and their normal equations for
+/// both poses.
 fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius: f64) -> Link {
-    /// Squared distances (half of the radius, and two spreads) at which a match has a quarter of its weight.
-    /// From: chosen.
+    /// Squared distances (half of the radius, and two standard deviations) at which a
+    /// correspondence has a quarter of its weight. From: chosen.
     const HALF_SQ: f32 = 0.25;
     const SPREADS_SQ: f32 = 4.0;
     let (i, j) = (asked.from, asked.to);
@@ -225,8 +227,9 @@ fn link(views: &[Prepared], asked: &mut Asked, poses: &[Isometry3<f64>], radius:
 }
 
 impl Link {
-    /// The equations in the world, of motions that turn a view about its camera, from the sums of motions of the first camera along the axes of
-    /// the second. The second camera's are the opposite; a turn about it shifts the first.
+    /// Normal equations in the world frame, with rotations about the cameras, from the sums over
+    /// motions of the first camera along the axes of the second. Those of the second camera are the
+    /// negatives, with a shift from its rotation.
     fn of(i: usize, j: usize, sums: &Sums, poses: &[Isometry3<f64>]) -> Link {
         let axes = poses[j].rotation.to_rotation_matrix().into_inner();
         let mut world = Matrix6::zeros();
@@ -319,7 +322,7 @@ fn step(
 
 /// The transform that moves views, fixed among each other, onto the robust average of their localised poses.
 pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Isometry3<f64> {
-    /// Gauss-Newton steps: the first all but ends it. From: chosen.
+    /// Number of Gauss-Newton steps; the first nearly suffices. From: chosen.
     const PASSES: usize = 4;
     let active: Vec<usize> = (0..poses.len()).filter(|&i| used[i]).collect();
     let sum: Vector3<f64> = active.iter().map(|&i| poses[i].translation.vector).sum();
@@ -351,14 +354,15 @@ pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<
     middle * about * middle.inverse()
 }
 
-/// A camera far from where localisation had it loses its say on the common frame: one lost view must not drag the others.
+/// Weight of a camera's prior in the common frame, decreasing with its departure, so that one lost
+/// view does not drag the others.
 fn prior_weight(sigmas: f64) -> f64 {
     /// Distance, in standard deviations, at which the weight is one half. From: chosen.
     const HALVED: f64 = 4.0;
     1.0 / (1.0 + (sigmas / HALVED).powi(2))
 }
 
-/// Turn (scaled axis) and shift of the camera from where localisation had it.
+/// Rotation (scaled axis) and shift of the camera from its localised pose.
 pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let turn = (pose.rotation * prior.rotation.inverse()).scaled_axis();
     (turn, pose.translation.vector - prior.translation.vector)

@@ -1,4 +1,4 @@
-//! Step 4, first half: what the points of each view belong to, and which way is up.
+//! Step 4, first half: partition of each view's points, and the up direction.
 
 use super::Step;
 use super::joint::in_world;
@@ -10,17 +10,19 @@ use rustc_hash::FxHashMap;
 
 /// A plane is dominant from this share of all points. From: chosen.
 const DOMINANT: f64 = 0.06;
-/// A plane is level if its normal is this near to up: the cosine of the angle between them. From: chosen, about 18°.
+/// Minimum cosine between up and the normal of a level plane. From: chosen, about 18°.
 const LEVEL: f64 = 0.95;
-/// Least and greatest height of things that stand on a surface, metres. From: chosen.
+/// Minimum and maximum height of objects on a surface, metres. From: chosen.
 const STANDING_M: (f64, f64) = (0.01, 0.5);
 /// Side of the cells in which the outline of the surface is sought, metres. From: chosen.
 const CELL_M: f64 = 0.05;
-/// A point lies on a dominant plane within this many spreads of its own and this distance, metres ... From: chosen.
+/// Maximum distance of a point on a dominant plane, in standard deviations and in metres (the
+/// larger counts). From: chosen.
 const PLANE: (f64, f64) = (3.0, 0.006);
-/// ... if it faces nearly the same way: the cosine of the angle between. From: chosen, about 37°.
+/// Minimum cosine between a point's normal and its plane's. From: chosen, about 37°.
 pub(super) const PLANE_FACING: f64 = 0.8;
-/// Fewest points of what stands on the surface in a view, or else off the planes, that tell where it belongs. From: chosen.
+/// Minimum number of object points of a view (or, without, of points off the planes) that determine
+/// its pose. From: chosen.
 pub(super) const FEWEST: usize = 60;
 
 /// The part of the scene that a point of a view belongs to.
@@ -28,10 +30,10 @@ pub(super) const FEWEST: usize = 60;
 pub(super) enum Part {
     /// A dominant plane.
     Plane,
-    /// An object on the surface that was measured best. These points decide the alignment: they are near and
-    /// are what is looked at. In a view that shows none of them, all points off the planes.
+    /// Object on the best measured surface. These points decide the alignment, because they are
+    /// near and of interest; in a view without any, all points off the planes.
     Standing,
-    /// Other things: farther off as a rule, where depth cameras bend the world.
+    /// Other object, usually farther away, where depth cameras distort.
     Around,
 }
 
@@ -45,7 +47,7 @@ pub(super) struct Parts {
     pub of: Vec<Vec<Part>>,
     /// The dominant planes, world frame.
     pub planes: Vec<Plane>,
-    /// Away from the ground, if that could be told.
+    /// Up direction, if determined.
     pub up: Option<Unit<Vector3<f64>>>,
     standing: Option<Standing>,
 }
@@ -64,7 +66,7 @@ impl Parts {
     }
 }
 
-/// Sorts the points of the used views, and tells which way is up.
+/// Partitions the points of the used views, and determines the up direction.
 pub(super) fn find(
     prepared: &[Prepared],
     used: &[bool],
@@ -72,7 +74,7 @@ pub(super) fn find(
     up: Option<Unit<Vector3<f64>>>,
     steps: &mut Vec<Step>,
 ) -> Parts {
-    /// Ways up that add up to less cancel out. From: rounding.
+    /// Minimum length of the mean up direction; shorter ones cancel out. From: rounding.
     const CANCELLED: f64 = 1e-6;
     let places: Vec<Vec<Point3<f64>>> = (0..prepared.len())
         .map(|i| if used[i] { in_world(&prepared[i], &poses[i]) } else { Vec::new() })
@@ -151,7 +153,7 @@ impl PlaneOfView {
         }
     }
 
-    /// True if a point of the view lies on the plane and faces as it does.
+    /// True if a point of the view lies on the plane with a similar normal.
     #[inline(always)]
     fn holds(&self, view: &Prepared, k: usize) -> bool {
         let near = PLANE.0 * f64::from(view.points[k].sigma_m) + PLANE.1;
@@ -160,7 +162,7 @@ impl PlaneOfView {
     }
 }
 
-/// The level plane that was measured best, and its outline.
+/// Best measured level plane, with its outline.
 #[derive(Debug)]
 struct Standing {
     up: Vector3<f64>,
@@ -209,7 +211,8 @@ impl Standing {
         height > STANDING_M.0 && height < STANDING_M.1 && self.outline.covers(p, 0.0)
     }
 
-    /// Tells points that stand on the surface from those around, if a view shows enough of the former.
+    /// Separates object points on the surface from other points, if a view shows enough of the
+    /// former.
     fn part(&self, parts: &mut [Part], places: &[Point3<f64>]) {
         let around: Vec<usize> =
             (0..places.len()).filter(|&k| parts[k] == Part::Standing && !self.holds(&places[k])).collect();

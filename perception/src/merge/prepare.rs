@@ -1,4 +1,5 @@
-//! Steps 1 and 2: each view into points with normals, thinned to voxels, in its own camera frame.
+//! Steps 1 and 2: each view becomes points with normals, thinned to voxels, in its own camera
+//! frame.
 
 use super::MergeOptions;
 use crate::cloud::{Cloud, Grid};
@@ -11,18 +12,19 @@ use crate::voxel;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Columns of the image in which points for the alignment are sought; more tells no more at a voxel of 1 cm. From: chosen.
+/// Number of image columns from which alignment points are taken; more add nothing at voxels of 1
+/// cm. From: chosen.
 const COLUMNS: usize = 216;
 
 /// Normals for the alignment: of many pixels, since one measurement is vague. From: chosen.
 const WIDE: normals::OrganisedOptions =
     normals::OrganisedOptions { reach: 2, depth_step_share: 0.025, base_m: 0.008, least: 8 };
 
-/// A view as the alignment sees it.
+/// View prepared for alignment.
 pub(super) struct Prepared {
     /// Thinned points in the order of the tree.
     pub points: Vec<Surfel>,
-    /// The points as a search tree; none, and no points, if there are more than it can hold.
+    /// Search tree of the points; `None`, and no points, if there are more than the tree can hold.
     pub tree: Option<Neighbours>,
     /// The points of an organised cloud to be merged, at a coarser resolution, with normals in the camera
     /// frame.
@@ -42,7 +44,7 @@ pub(super) struct Surfel {
     pub at: Point3<f32>,
     /// Unit length, towards the camera.
     pub normal: Vector3<f32>,
-    /// Spread of its measurement, metres.
+    /// Standard deviation of the measurement, metres.
     pub sigma_m: f32,
 }
 
@@ -67,7 +69,7 @@ pub(super) struct Within {
 }
 
 impl Within {
-    /// In range and in the height band, widened by `slack_m`, of a camera at a pose.
+    /// Range and height limits, widened by `slack_m`, for a camera at a pose.
     pub fn of(world_from_camera: &Isometry3<f64>, options: &MergeOptions, slack_m: f64) -> Within {
         let (up, heights_m) = match (options.up, options.height_band_m) {
             (Some(up), Some((low, high))) => {
@@ -85,7 +87,7 @@ impl Within {
         }
     }
 
-    /// The bounds of the fused returns: those of the merged ones, and of the region.
+    /// Limits of the fused returns: those of the merge, and the region.
     pub fn of_fused(world_from_camera: &Isometry3<f64>, options: &MergeOptions) -> Within {
         let within = Within::of(world_from_camera, options, 0.0);
         let (Some(up), Some(region)) = (options.up, &options.region) else { return within };
@@ -97,7 +99,7 @@ impl Within {
         Within { edges: region.edges(&up).into_iter().map(in_camera).collect(), ..within }
     }
 
-    /// False also for what is no return.
+    /// False also for a missing return.
     #[inline(always)]
     pub fn holds(&self, [x, y, z]: [f32; 3]) -> bool {
         let height = self.up.x * x + self.up.y * y + self.up.z * z;
@@ -176,7 +178,7 @@ fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
     }
 }
 
-/// Every nth row and column of an organised cloud, so that about as many columns are left; what is not to be merged is no return.
+/// Organised cloud subsampled to about `about` columns; excluded pixels become missing returns.
 pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Cloud> {
     /// Mark of a pixel without a return. From: mark.
     const NONE: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);

@@ -1,4 +1,4 @@
-//! Selection of the returns of a view that are fused, their normals, and the level planes that they lie on.
+//! Selection of a view's returns for fusion, with their normals and level planes.
 
 use super::MergeOptions;
 use super::parts::{self, Plane};
@@ -13,18 +13,20 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// A return between two neighbours this far before and behind it belongs to neither, as a share of its depth. From: chosen.
+/// Depth difference to both neighbours, one nearer and one farther, from which a return is a mixed
+/// pixel, as a share of its depth. From: chosen.
 const FLYING_SHARE: f32 = 0.02;
-/// A return lies on a plane within this many spreads of its own and this distance, metres ...
-/// From: derived, as far as a plane is taken to be measured where it is sought.
+/// Maximum distance of a return on a plane, in standard deviations and in metres (the larger
+/// counts). From: derived, as far as a plane is taken to be measured where it is sought.
 const PLANE_SPREADS: f32 = BAND.0 as f32;
 const PLANE_M: f32 = BAND.1 as f32;
-/// ... if it faces nearly the same way: the cosine of the angle between.
-/// From: derived, as where the planes are told from what stands on them.
+/// Minimum cosine between a return's normal and its plane's. From: derived, as where the planes are
+/// told from what stands on them.
 const PLANE_FACING: f32 = parts::PLANE_FACING as f32;
-/// Columns of the image in which normals of things are sought. From: chosen.
+/// Number of image columns from which normals of objects are computed. From: chosen.
 const COLUMNS: usize = 320;
-/// Things are finer than planes: their normals are those of few pixels. From: chosen.
+/// Normal estimation for objects, from small windows because they are finer than planes. From:
+/// chosen.
 const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.02, base_m: 0.006, least: 5 };
 
 /// Returns that are taken together of a cloud without rows. From: work.
@@ -32,7 +34,7 @@ const ROW: usize = 512;
 /// Pixels that are judged together. From: work.
 const LANES: usize = 16;
 
-/// Mark of a return in place of the number of its plane: not fused, or off the planes. From: mark.
+/// Mark of a return instead of a plane number: not fused, or off the planes. From: mark.
 const DROPPED: u32 = u32::MAX;
 const THING: u32 = u32::MAX - 1;
 
@@ -48,11 +50,11 @@ pub(super) struct Return {
     pub pixel: u32,
 }
 
-/// The returns of a view that are fused, by groups of rows: those off the planes, then those on each plane.
+/// Fused returns of a view, by groups of rows: those off the planes, then those on each plane.
 pub(super) struct Looked(Vec<Vec<Vec<Return>>>);
 
 impl Looked {
-    /// The returns of a view from its corrected pose, with these planes.
+    /// Returns of a view at its corrected pose, assigned to these planes.
     pub fn at(
         view: &View,
         prepared: &Prepared,
@@ -72,18 +74,18 @@ impl Looked {
         Looked(pool::each(rows.div_ceil(ROWS), 1, |n| look(n * ROWS)))
     }
 
-    /// True if it was told what lies on as many planes.
+    /// True if the returns were assigned to as many planes.
     pub fn is_with(&self, planes: &[Plane]) -> bool {
         self.0.iter().all(|found| found.len() == 1 + planes.len())
     }
 
-    /// The returns off the planes (0), or those on the plane of a number, counted from one.
+    /// Returns off the planes (0), or on the plane with this number, from 1.
     pub fn of_grid(&self, grid: usize) -> impl Iterator<Item = &[Return]> {
         self.0.iter().map(move |found| found[grid].as_slice())
     }
 }
 
-/// The returns of a view from its corrected pose.
+/// Selector of a view's returns at its corrected pose.
 struct Returns<'a> {
     view: &'a View,
     within: Within,
@@ -104,7 +106,7 @@ struct InCamera {
 }
 
 impl InCamera {
-    /// True if what is measured with that spread lies on it.
+    /// True if a measurement with this standard deviation lies on the plane.
     #[inline(always)]
     fn holds(&self, [x, y, z]: [f32; 3], sigma_m: f32) -> bool {
         let height_m = self.normal.x * x + self.normal.y * y + self.normal.z * z - self.along_m;
@@ -115,7 +117,7 @@ impl InCamera {
 /// Normals (camera frame) of some of a view's pixels: of every nth row and column.
 struct Facing<'a> {
     normals: Cow<'a, [Vector3<f32>]>,
-    /// Index of the first normal of each row, and offset of each column within its row.
+    /// Index of the first normal of each row, and column offset within a row.
     rows: Vec<usize>,
     columns: Vec<usize>,
 }
@@ -174,14 +176,14 @@ impl<'a> Returns<'a> {
         }
     }
 
-    /// A row of pixels, or as many points; nothing after the last.
+    /// Row of pixels, or a chunk of as many points; empty after the last.
     fn line(&self, row: usize) -> &[Point3<f32>] {
         let points = &self.view.cloud.points;
         &points[points.len().min(row * self.width)..points.len().min((row + 1) * self.width)]
     }
 
-    /// Calls `found` for those of some rows that are in range, band and region and do not fly, each with one more than the number of the plane
-    /// that it lies on, or zero.
+    /// Calls `found` for the returns of some rows in range, height band and region, without mixed
+    /// pixels, each with its plane number plus one, or zero.
     fn visit(&self, rows: Range<usize>, mut found: impl FnMut(usize, Return)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
         if let Some(before) = rows.start.checked_sub(1) {
@@ -271,7 +273,7 @@ struct Block {
     on: [u32; LANES],
 }
 
-/// A row of pixels, each coordinate by itself, with pixels without a return before and after.
+/// Row of pixels in structure-of-arrays form, padded with missing returns.
 struct Line([Vec<f32>; 3]);
 
 impl Line {
@@ -319,7 +321,7 @@ fn lying_on(cloud: &Cloud, normals: &[Vector3<f32>], within: &Within, planes: &[
     cloud.points.iter().zip(normals).map(on).collect()
 }
 
-/// Normals of what lies on no plane: a finer copy's of an organised cloud, else the cloud's own.
+/// Normals of points off the planes: from a finer copy of an organised cloud, else the cloud's own.
 fn things<'a>(view: &'a View, within: &Within, coarse: &Facing, on: &[u32]) -> Facing<'a> {
     let Some((cloud, Grid { width, .. })) = coarser(view, within, COLUMNS).zip(view.cloud.grid) else {
         let normals = Cow::Borrowed(view.cloud.normals.as_deref().unwrap_or_default());

@@ -1,4 +1,5 @@
-//! Step 4, first half: where the objects of a view fall best onto those of the others, before their distances can be trusted.
+//! Step 4, first half: exhaustive search for the pose of a view's objects on those of the other
+//! views, before point distances can be trusted.
 //!
 //! With the table level, what localisation leaves open is a shift along the table and a turn about the vertical. Small objects far apart
 //! give many wrong valleys to a local method; so the few degrees of freedom are searched on a grid, coarse to fine.
@@ -9,26 +10,28 @@ use crate::surface::floor;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use rustc_hash::FxHashSet;
 
-/// A place on a surface with its unit normal.
+/// Surface point with its unit normal.
 pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 
 /// Points of the view that are tried against the others. From: chosen.
 const TRIED: usize = 220;
-/// Surfaces farther than this from the middle of a view, along the table and in height, are nothing to fall onto, metres. From: chosen.
+/// Maximum distance of surfaces from a view's centre, along the table and in height, that take
+/// part, metres. From: chosen.
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres. From: chosen.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
 /// Smallest share of points that must fall on the others' surfaces. From: chosen.
 pub(super) const SURE_SHARE: f64 = 0.25;
-/// The same of a view that does not belong where it is without that: views from opposite sides share little.
-/// From: chosen, so that of 40 pairs of views from opposite sides none is left out, in place of 16.
+/// Minimum matching share for a view that would otherwise be left out: views from opposite sides
+/// share little. From: chosen, so that of 40 pairs of views from opposite sides none is left out,
+/// in place of 16.
 pub(super) const PERHAPS_SHARE: f64 = 0.0;
 
 /// Cost of a correction at the edge of the window (three spreads of localisation), as a share of the points.
 /// From: chosen.
 const PRIOR: f64 = 0.15;
 
-/// Score of a point in an occupied cell with the same facing, and in a neighbour of such a cell.
+/// Score of a point in an occupied cell of the same facing, and in a neighbour of such a cell.
 /// From: chosen.
 const HIT: u8 = 20;
 const BESIDE: u8 = 7;
@@ -51,7 +54,8 @@ fn sides(normal: &Vector3<f64>, least: f64) -> impl Iterator<Item = usize> {
 impl Cells {
     /// Cells around points, with room for `reach` cells to each side.
     fn new(points: &[Oriented], side_m: f64, reach: i32) -> Cells {
-        /// A surface faces each side along which its normal is longer than this. From: chosen.
+        /// Minimum component of a normal along a side for a surface to face that side. From:
+        /// chosen.
         const FACES: f64 = 0.3;
         let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| floor(c / side_m));
         let keys: Vec<[i32; 3]> = points.iter().map(|(p, _)| key(p)).collect();
@@ -142,17 +146,17 @@ pub(super) struct Window {
 pub(super) struct Placed {
     /// World from world.
     pub correction: Isometry3<f64>,
-    /// Share of its points that fall on the others' surfaces then.
+    /// Share of the view's points that match at the found pose.
     pub share: f64,
 }
 
-/// Share of the view's points that fall on the placed surfaces as they are.
+/// Share of the view's points that match the placed surfaces at the current pose.
 pub(super) fn fits(view: &[Oriented], placed: &[Oriented], up: &Unit<Vector3<f64>>) -> f64 {
     let Some(Levelled { tried, placed, .. }) = levelled(view, placed, &frame(up)) else { return 0.0 };
     Cells::new(&placed, CELLS_M[1], 0).scores(&turned(&tried, 0.0), 0)[0]
 }
 
-/// The points of a view that have something of the placed ones within a shift: the others can fall onto nothing.
+/// Points of a view with a placed point within the maximum shift; the others cannot match.
 fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Oriented> {
     let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| floor(c / shift_m));
     let taken: FxHashSet<[i32; 3]> = placed.iter().map(|(p, _)| cell(p)).collect();
@@ -164,7 +168,7 @@ fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Ori
     view.iter().filter(near).copied().collect()
 }
 
-/// A view and what it is to fall onto, turned level, metres from the middle of the view.
+/// View and placed points in a level frame, metres from the view's centre.
 struct Levelled {
     /// A sample of the view's points, at most about `TRIED`.
     tried: Vec<Oriented>,
@@ -173,7 +177,7 @@ struct Levelled {
     middle: Vector3<f64>,
 }
 
-/// `None` if nothing of either is left.
+/// Levelled points; `None` if no points of either are left.
 fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> Option<Levelled> {
     let stride = (view.len() / TRIED).max(1);
     let mut tried: Vec<Oriented> = view.iter().step_by(stride).map(|(p, n)| (level * p, level * n)).collect();
@@ -185,8 +189,9 @@ fn levelled(view: &[Oriented], placed: &[Oriented], level: &Isometry3<f64>) -> O
     (!tried.is_empty() && !placed.is_empty()).then_some(Levelled { tried, placed, middle })
 }
 
-/// The correction (world from world) that puts `view` (points and normals off the planes, world frame) best onto `placed`.
-/// `None` if there is too little to go by, or less than the least share of it falls together.
+/// Correction (world from world) that best matches `view` (points and normals off the planes, world
+/// frame) with `placed`; `None` if there are too few points, or less than the minimum share
+/// matches.
 pub(super) fn place(
     view: &[Oriented],
     placed: &[Oriented],
@@ -266,7 +271,7 @@ fn distinct(found: &[Candidate], apart: f64) -> [Candidate; 3] {
     kept
 }
 
-/// The points turned about the vertical, each with the side that it faces most.
+/// Points rotated about the vertical, each with its dominant facing.
 fn turned(points: &[Oriented], angle: f64) -> Vec<(Point3<f64>, usize)> {
     /// Components of a normal that differ by no more are equally long. From: rounding.
     const ALIKE: f64 = 1e-9;

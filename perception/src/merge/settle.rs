@@ -15,13 +15,13 @@ use nalgebra::{Point3, Vector3};
 use std::iter::Peekable;
 use std::slice::Iter;
 
-/// Maximum shift of a voxel along its normal by its neighbours, in spreads of its own. From: chosen.
+/// Maximum smoothing shift of a voxel along its normal, in its standard deviations. From: chosen.
 const TUBE_SPREADS: f32 = 2.5;
 /// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
 /// From: chosen, the sensor at .3 to 1.4 m has .0012 to .0031.
 const VOXEL_SPREAD_M: f32 = 0.003;
-/// Looks through a place this far off the surface say that nothing is there, metres.
-/// From: derived, as where views are held against each other.
+/// Minimum distance of a ray from the surface that proves free space there, metres. From: derived,
+/// as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
 /// Bricks that one thread settles in a row. From: work.
@@ -34,24 +34,24 @@ struct Settled {
     normal: Vector3<f32>,
     colour: [u8; 3],
     views: u16,
-    /// Number of its cell.
+    /// Number of the cell.
     cell: u32,
-    /// False if it is as it was settled before.
+    /// True if settled again.
     anew: bool,
 }
 
-/// The settled state of voxels or columns: cells that no view has touched since stay as they are.
+/// Settled state of voxels or columns; untouched cells keep theirs.
 #[derive(Default)]
 pub(super) struct Before {
     /// Means of the voxels; empty for columns.
     means: Vec<Cell>,
     /// The settled cells of some bricks in a row, cell by cell.
     rows: Vec<Vec<Settled>>,
-    /// Views that it was held against.
+    /// Number of views that the state was checked against.
     gazes: usize,
 }
 
-/// One cloud of what was settled.
+/// One cloud of all settled cells.
 pub(super) fn fused(all: &[Gathered]) -> Fused {
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let rows: Vec<&[Settled]> =
@@ -93,7 +93,7 @@ fn of_all<T: Zeroable + Send>(rows: &[&[Settled]], of: impl Fn(&Settled) -> T + 
 }
 
 impl Gathered {
-    /// Settles the cells: what was touched since the last time anew. What is settled is kept for a further look.
+    /// Settles the cells touched since the last time, and keeps the state for further views.
     pub(super) fn settle(&mut self, gazes: &[Gaze]) {
         let Before { means, mut rows, gazes: known } = std::mem::take(&mut self.before);
         let is_first = rows.is_empty();
@@ -119,7 +119,8 @@ impl Gathered {
         self.bricks.touched.fill(Mask::default());
     }
 
-    /// The means of all voxels, from those before. That of a voxel is asked for by all around it, that of a column by few.
+    /// Means of all voxels, reusing earlier ones. Voxel means are needed by all neighbours, column
+    /// means by few.
     fn means(&self, before: Vec<Cell>) -> Vec<Cell> {
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 4096;
@@ -136,7 +137,8 @@ impl Gathered {
         means
     }
 
-    /// Adds what the cells of a brick are settled to: those of the mask anew, of the others what was settled before.
+    /// Adds the settled state of a brick's cells: new for cells in the mask, unchanged for the
+    /// others.
     fn settle_brick(
         &self,
         brick: usize,
@@ -176,13 +178,13 @@ impl Gathered {
     }
 }
 
-/// The earlier settled state of a cell, after those of the cells before it were taken.
+/// Earlier settled state of a cell, after those of preceding cells were consumed.
 fn stays(before: &mut Peekable<Iter<Settled>>, cell: usize) -> Option<Settled> {
     before.next_if(|settled| settled.cell as usize == cell).map(|settled| Settled { anew: false, ..*settled })
 }
 
-/// Drops cells that only one view shows and another looked through. Cells that stay was held against the
-/// views that were known.
+/// Drops cells that only one view shows and another looked through; unchanged cells were already
+/// checked against the first `known` views.
 fn drop_looked_through(row: &mut Vec<Settled>, gazes: &[Gaze], known: usize) {
     let mut looked = [(false, known), (true, 0)].map(|(anew, known)| {
         let mut alone: Vec<Point3<f32>> = Vec::new();
@@ -201,7 +203,8 @@ fn drop_looked_through(row: &mut Vec<Settled>, gazes: &[Gaze], known: usize) {
     });
 }
 
-/// The voxel's mean, moved along its normal onto the mean of the like-facing voxels around it.
+/// Mean of a voxel, moved along its normal onto the mean of the surrounding voxels with similar
+/// normals.
 #[inline(always)]
 fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3<f32> {
     /// Voxels face alike if the cosine of the angle between their normals is more. From: chosen, about 46°.
@@ -220,7 +223,7 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
 }
 
 /// Calls `found` for each column of the middle brick with its number and, if the mask holds it, its
-/// mean and the same point moved along z to the mean of the columns around it.
+/// mean and the same point moved along z to the mean of the surrounding columns.
 fn level(
     bricks: &Bricks<Cell>,
     beside: &Beside,

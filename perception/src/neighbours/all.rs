@@ -21,12 +21,12 @@ struct NearLeaf {
     bounds: Bounds,
 }
 
-/// Candidates gathered before the bound is drawn tighter, beyond what is asked for.
+/// Number of candidates beyond `k` that are gathered before the bound is tightened.
 const SLACK: usize = 64;
 
 impl Neighbours {
-    /// For every finite point, `result` of its slot and its `k` nearest points (itself among them, in no particular order).
-    /// The answers stand at the indices of the points; where a point is not finite, `default` stands.
+    /// For every finite point, `result` of its slot and its `k` nearest points (itself included,
+    /// unordered); results are in point order, with `default` for non-finite points.
     pub(crate) fn map_all<T: Copy + Send + Sync>(
         &self,
         k: usize,
@@ -123,8 +123,9 @@ impl Neighbours {
         nearby.keep(k, bound)
     }
 
-    /// The leaves of the seed and those whose boxes come nearer to `own` than the square root of `reach`, nearest first.
-    /// Boxes just as far can only hold equals of what the seed has; coinciding points by the million would all be such.
+    /// Leaves of the seed, and those whose boxes are nearer to `own` than the square root of
+    /// `reach`, nearest first. Boxes at equal distance hold only ties, which coinciding points
+    /// would produce by the million.
     fn leaves_near(
         &self,
         own: &Bounds,

@@ -1,4 +1,4 @@
-//! Candidates of a nearest-neighbour search, and the choice of the k nearest among them.
+//! Candidates of a nearest-neighbour search, and selection of the k nearest.
 
 use super::LEAF;
 
@@ -55,7 +55,7 @@ impl Nearby {
         self.len = 0;
     }
 
-    /// Adds those of a leaf's points (its first slot is `first`) that are no farther than `bound`, which is finite.
+    /// Adds the points of a leaf (first slot `first`) within `bound`, a finite squared distance.
     #[inline(always)]
     pub(super) fn add(&mut self, distances: &[f32; LEAF], first: usize, bound: f32) {
         let end = self.len + LEAF;
@@ -79,7 +79,8 @@ impl Nearby {
         self.len += kept;
     }
 
-    /// Keeps the `k` nearest, all of which are no farther than `bound`, and tells the squared distance of the farthest of them. With `k` or fewer all stay.
+    /// Keeps the `k` nearest candidates, all within `bound`, and returns the squared distance of
+    /// the farthest; keeps all if there are at most `k`.
     #[inline(always)]
     pub(super) fn keep(&mut self, k: usize, bound: f32) -> f32 {
         if self.len > k {
@@ -105,8 +106,8 @@ impl Nearby {
         lanes.iter().chain(rest).fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
-    /// Squared distances between which the k-th nearest lies, with at most `FEW` candidates between them. On a surface the number of candidates
-    /// grows with the squared distance, so that a guess by proportion is seldom far off.
+    /// Squared distances that bracket the k-th nearest candidate with at most `FEW` in between. On
+    /// a surface, the count grows with the squared distance, so interpolation is usually close.
     #[inline(always)]
     fn part(&self, k: usize) -> Option<Parting> {
         let mut p = Parting { low: -1.0, below: 0, high: self.farthest(), above: self.len };
@@ -129,7 +130,7 @@ impl Nearby {
         None
     }
 
-    /// Keeps what lies below the parting and, of the few between, the nearest; equals by slot.
+    /// Keeps the candidates below the bracket and the nearest of those inside; ties by slot.
     #[inline(always)]
     fn cut(&mut self, k: usize, parting: Parting) {
         let mut between = [(f32::INFINITY, u32::MAX); FEW + 1];

@@ -1,4 +1,4 @@
-//! The noise of a camera from what it shows of a level face: the inverse of its depth is linear in the pixels.
+//! Estimates a camera's noise from level faces, on which inverse depth is linear in the pixels.
 
 use super::Sensor;
 use crate::pool;
@@ -6,32 +6,33 @@ use crate::surface::{Outline, Surface};
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-/// Pixels a side of the blocks whose residuals count, and of the smaller ones within them whose means tell how much neighbours err together. From: chosen.
+/// Side of the blocks whose residuals are used, pixels; and side of the smaller cells whose means
+/// show the error correlation of neighbours. From: chosen.
 const BLOCK_PX: usize = 24;
 pub(crate) const CELL_PX: usize = 8;
 /// Blocks of a view that are enough to go by. From: work.
 const BLOCKS: usize = 24;
-/// A block counts if this share of its pixels lies on the face. From: chosen.
+/// Minimum share of a block's pixels on the face. From: chosen.
 const COVERED: f64 = 0.8;
-/// Maximum distance from the face of a return that may belong to it, as a share of the depth, metres a metre.
-/// From: chosen.
+/// Maximum distance of a return from its face, as a share of the depth, metres per metre. From:
+/// chosen.
 const NEAR_SHARE: f64 = 0.012;
 /// A block is so far within the face, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
 /// Residual, in standard deviations of the block, beyond which a pixel is off the face.
 /// From: chosen.
 const OUTLIER: f64 = 4.0;
-/// Fewest blocks to go by, and the weight of what was assumed before, in blocks. From: chosen.
+/// Minimum number of blocks, and weight of the assumed noise, in blocks. From: chosen.
 const FEWEST: usize = 4;
 const ASSUMED: f64 = 4.0;
-/// Noise is told to be no less and no more than these multiples of what was assumed. From: chosen.
+/// Limits of the estimated noise, as multiples of the assumed noise. From: chosen.
 const BETWEEN: (f64, f64) = (0.5, 6.0);
-/// Neither term of the noise falls below this share of what it would be if both had grown alike. From: chosen.
+/// Minimum of either noise term, as a share of its value if both had grown alike. From: chosen.
 const LEAST: f64 = 0.2;
 /// Numbers that a plane takes. From: derived, two slopes and a height.
 const PLANE: f64 = 3.0;
 
-/// The residuals of views' returns from the level faces that they show.
+/// Residuals of views' returns from level faces.
 #[derive(Clone, Debug, Default)]
 pub struct Residuals {
     blocks: Vec<Block>,
@@ -41,14 +42,14 @@ pub struct Residuals {
 #[derive(Clone, Copy, Debug)]
 struct Block {
     depth_m: f64,
-    /// Spread of a return along its ray, metres.
+    /// Standard deviation of a return along its ray, metres.
     sigma_m: f64,
     /// Independent returns in a cell of 8 by 8.
     looks: f64,
 }
 
 impl Residuals {
-    /// Adds what a view shows of a surface.
+    /// Adds the residuals of a view at a surface.
     pub fn add(&mut self, map: &DepthMap, surface: &Surface) {
         let (width, height) = (map.intrinsics.width, map.intrinsics.height);
         let camera_from_surface = map.camera_from_world * surface.surface_from_world.inverse();
@@ -64,7 +65,7 @@ impl Residuals {
         self.blocks.extend(pool::filter(corners.len(), 1, |n| block(map, corners[n], &normal, offset_m)));
     }
 
-    /// The sensor that errs like that; what does not show stays as assumed.
+    /// Sensor with the estimated noise; unobserved parameters stay as assumed.
     pub fn fit(&self, assumed: &Sensor) -> Sensor {
         if self.blocks.len() < FEWEST {
             return *assumed;
@@ -109,7 +110,8 @@ fn is_on(
         && outline.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
 }
 
-/// A block of pixels, if it is of the face: residuals of inverse depth, of which the face's is linear.
+/// Residuals of inverse depth of a pixel block on the face, where it is linear; `None` if the block
+/// is not on the face.
 fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, offset_m: f64) -> Option<Block> {
     let mut seen: Vec<(usize, Vector3<f64>, f64)> = Vec::with_capacity(BLOCK_PX * BLOCK_PX);
     let mut depth_m = 0.0;
@@ -153,7 +155,7 @@ fn fit_plane(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<
 /// The number of independent errors among the returns of a cell: the variance of one return over that of the
 /// mean of a cell.
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
-    /// Cells of a block. From: derived, its side has so many.
+    /// Number of cells in a block. From: derived, its side has so many.
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);
     let mut sums = [(0.0, 0.0); CELLS];
     for ((cell, ..), (r, _)) in

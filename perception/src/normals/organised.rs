@@ -10,7 +10,8 @@ use nalgebra::{Point3, Vector3};
 pub struct OrganisedOptions {
     /// Pixels to each side: 2 looks at 5 x 5.
     pub reach: usize,
-    /// A neighbour counts if its depth differs by no more than this part of the depth (and `base_m`): beyond is another surface.
+    /// Maximum depth difference of a neighbour on the same surface, as a share of the depth (plus
+    /// `base_m`).
     pub depth_step_share: f32,
     /// Least depth difference that separates surfaces, metres.
     pub base_m: f32,
@@ -27,13 +28,13 @@ impl Default for OrganisedOptions {
 /// Pixels whose windows are summed up together.
 const LANES: usize = 16;
 
-/// Normals from the window around each pixel, turned towards the camera; `None` if the cloud has no grid that fits its points.
-/// Expects the camera's optical frame (depth along z).
+/// Normals from the window around each pixel, towards the camera; `None` without a grid that fits
+/// the points. Expects the optical frame (depth along z).
 pub fn organised(cloud: &Cloud, options: &OrganisedOptions) -> Option<Normals> {
     organised_where(cloud, options, |_| true)
 }
 
-/// The same only where a normal is wanted of a pixel; others may have none.
+/// Normals of the wanted pixels; others may have none.
 pub(crate) fn organised_where(
     cloud: &Cloud,
     options: &OrganisedOptions,
@@ -70,7 +71,7 @@ pub(crate) fn organised_where(
     Some(found)
 }
 
-/// The coordinates of an image, each by itself, with a frame of pixels without a return around it.
+/// Image coordinates in structure-of-arrays form, with a frame of missing returns.
 struct Image {
     planes: [Vec<f32>; 3],
     /// Pixels from row to row.
@@ -107,7 +108,7 @@ impl Image {
         self.planes.each_ref().map(|plane| plane[at..].first_chunk().copied().unwrap_or([f32::NAN; LANES]))
     }
 
-    /// `LANES` pixels from a column on and the sums of the windows around them; `None` if there is no return among them.
+    /// `LANES` pixels from a column on with their window sums; `None` without returns.
     #[inline(always)]
     fn sums(
         &self,
@@ -131,7 +132,7 @@ impl Image {
 }
 
 impl WindowSums {
-    /// Adds a neighbour of each pixel, where its depth is near enough. Lane by lane without a branch.
+    /// Adds a neighbour of each pixel if its depth is similar; branch-free per lane.
     #[inline(always)]
     fn add(&mut self, p: &[[f32; LANES]; 3], at: &[[f32; LANES]; 3], step: &[f32; LANES]) {
         let mut near = [0_u32; LANES];
@@ -153,14 +154,14 @@ impl WindowSums {
         }
     }
 
-    /// Normals towards the camera and the share of the spread along them, NaN where there is none. As [`spread::least`], but lane by lane
-    /// without a branch.
+    /// Normals towards the camera, and the share of the spread along each, NaN if undefined.
+    /// Equivalent to [`spread::least`], branch-free per lane.
     #[inline(always)]
     fn surfaces(&self, at: &[[f32; LANES]; 3], options: &OrganisedOptions) -> [[f32; LANES]; 4] {
         /// Number of Newton iterations; single precision has converged by then, unless no direction
         /// has the least variance.
         const STEPS: usize = 6;
-        /// Spread across a line below this part of that along it is rounding.
+        /// Minimum ratio of the spread across a line to that along it; below, it is rounding.
         const COLLINEAR: f32 = 1e-6;
         let least_count = options.least.max(3) as f32;
         let mut all = [[f32::NAN; LANES]; 4];

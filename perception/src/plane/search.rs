@@ -1,4 +1,5 @@
-//! RANSAC (Fischler and Bolles 1981) with scores that begin on a random part of the points, then least squares on what was found.
+//! RANSAC (Fischler and Bolles 1981) with preliminary scores on a random subset, then least squares
+//! on the inliers.
 
 use super::{Plane, PlaneError, PlaneFit, PlaneOptions};
 use crate::cloud::is_finite;
@@ -6,7 +7,8 @@ use crate::draw::Draws;
 use crate::spread::{self, Moments};
 use nalgebra::{Point3, Vector3};
 
-/// Points on which every sample is scored first; only those that may beat the best are scored on all.
+/// Number of points for the preliminary score; only hypotheses that may beat the best are scored on
+/// all points.
 const FIRST: usize = 1024;
 /// Points scored between two looks at whether the best can still be reached.
 const BLOCK: usize = 4096;
@@ -109,7 +111,7 @@ fn sample(
     (best.map(|(plane, _, _)| plane), used)
 }
 
-/// The plane through three points, unless they lie (nearly) on a line.
+/// Plane through three points, unless these are (nearly) collinear.
 fn through([a, b, c]: [Point3<f64>; 3]) -> Option<Plane> {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(&ac);
@@ -118,7 +120,7 @@ fn through([a, b, c]: [Point3<f64>; 3]) -> Option<Plane> {
     flat.then(|| Plane::through(&a, normal / length))
 }
 
-/// The plane with its normal as asked; `None` if it is not such a plane.
+/// Plane with the normal as requested; `None` if it violates the options.
 fn oriented(plane: Plane, options: &PlaneOptions) -> Option<Plane> {
     let Some((direction, within_rad)) = options.tilt else {
         return Some(plane.facing(&Point3::origin()));
@@ -129,7 +131,7 @@ fn oriented(plane: Plane, options: &PlaneOptions) -> Option<Plane> {
     (upright && placed).then_some(plane)
 }
 
-/// Least squares on the inliers, as long as it does not lose any.
+/// Least squares on the inliers, repeated while the number of inliers does not fall.
 fn polish(
     points: &[Point3<f32>],
     mut plane: Plane,

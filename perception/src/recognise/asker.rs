@@ -6,7 +6,8 @@ use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen, Visibility};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 
-/// Cosine of the angle within which cameras see the same side of a thing. From: chosen.
+/// Minimum cosine between viewing directions of cameras that see the same side of an object. From:
+/// chosen.
 const SAME_SIDE: f64 = 0.9;
 /// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;
@@ -25,7 +26,7 @@ pub struct Asker<'a> {
     pub tolerance_m: f64,
 }
 
-/// A camera, and where it is as seen from one body: in the surface's frame.
+/// Camera with its pose as registered at one body, in the surface's frame.
 #[derive(Clone, Copy)]
 pub struct Lying<'a> {
     pub map: &'a DepthMap,
@@ -58,7 +59,7 @@ impl<'a> Lying<'a> {
         (self.turn * place.coords + self.shift).into()
     }
 
-    /// The same as [`DepthMap::look`], of a place in the surface's frame.
+    /// [`DepthMap::look`] for a point in the surface's frame.
     pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
         self.map.look_from(&self.seen_at(place), tolerance_m)
     }
@@ -97,7 +98,8 @@ impl<'a> Asker<'a> {
         best
     }
 
-    /// Horizontal direction from a body to the cameras that had it in view, if they saw the same side of it.
+    /// Horizontal direction from a body to the cameras that had it in view, if all saw the same
+    /// side.
     pub fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
         /// A camera that is nearer to the axis, seen from above, looks from no side, metres. From: chosen.
         const ABOVE_M: f64 = 0.1;
@@ -136,7 +138,7 @@ impl<'a> Asker<'a> {
 
 /// The cameras that do not look through a body which others see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
-    /// A camera has a body in view if it measured more than one in this many of the sampled points.
+    /// Minimum measured share of the sampled points of a body in view of a camera, as a divisor.
     /// From: chosen.
     const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);

@@ -9,30 +9,30 @@ pub struct Frustum {
     /// Axis, surface frame.
     pub x: f64,
     pub y: f64,
-    /// Height of its foot and of its rim above the surface.
+    /// Heights of foot and rim above the surface.
     pub base_m: f64,
     pub top_m: f64,
     /// Radius at both.
     pub foot_m: f64,
     pub rim_m: f64,
-    /// Thickness of wall and floor; none if it is closed.
+    /// Thickness of wall and floor; `None` if closed.
     pub wall_m: Option<f64>,
 }
 
 /// An upright box; metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
-    /// The centre of the body, from which its sides are measured, surface frame.
+    /// Reference point inside the body for its sides, surface frame.
     pub x: f64,
     pub y: f64,
-    /// Sine and cosine of the angle by which it is turned.
+    /// Sine and cosine of the rotation about the vertical.
     pub turn: (f64, f64),
-    /// Least and greatest place along its own axes and height.
+    /// Minimum and maximum along the box's own axes and height.
     pub low: [f64; 3],
     pub high: [f64; 3],
 }
 
-/// A ray: where it begins, and how far it comes for each metre of depth; surface frame, metres.
+/// Ray: origin, and direction per metre of depth; surface frame, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
     pub from: [f64; 3],
@@ -41,7 +41,7 @@ pub struct Ray {
 
 /// A body that a ray can meet.
 pub trait Body {
-    /// The least depth at which a ray meets it, infinite if it passes by, metres.
+    /// Minimum depth at which a ray hits the body, metres; infinite if it misses.
     fn depth_m(&self, ray: &Ray) -> f64;
 
     /// The body moved along both axes of the surface, metres.
@@ -55,7 +55,7 @@ impl Frustum {
         Frustum { x: round.x, y: round.y, base_m, top_m, foot_m, rim_m, wall_m: None }
     }
 
-    /// The depths at which a ray crosses the infinite cone about its side, drawn in by `wall_m`, the lesser first.
+    /// Depths at which a ray crosses the infinite cone of the side, drawn in by `wall_m`, in order.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
         /// Least height of a body, metres. From: rounding.
@@ -118,7 +118,7 @@ impl Cuboid {
         }
     }
 
-    /// The same that goes on at one of its four ends: both of its first side, and both of its second.
+    /// Box extended at one of four ends: both ends of its first side, then both of its second.
     pub fn longer(&self, end: usize, by_m: f64) -> Cuboid {
         let mut longer = *self;
         match end % 2 {
@@ -133,7 +133,7 @@ impl Cuboid {
         self.high[end / 2] - self.low[end / 2]
     }
 
-    /// The box rotated about the point that its sides are measured from.
+    /// Box rotated about its reference point.
     pub fn turned(&self, by_rad: f64) -> Cuboid {
         let ((sin, cos), (sin_by, cos_by)) = (self.turn, by_rad.sin_cos());
         Cuboid { turn: (sin * cos_by + cos * sin_by, cos * cos_by - sin * sin_by), ..*self }

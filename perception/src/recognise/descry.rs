@@ -1,4 +1,5 @@
-//! Our recogniser: which hypothesis makes most likely what was measured, given what could be measured.
+//! Our recogniser: compares hypotheses by the likelihood of the measurements, given their
+//! visibility.
 //!
 //! Every known object and every family of things that are none of them is a hypothesis with a likelihood for size, form,
 //! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
@@ -27,29 +28,29 @@ use crate::visibility::Visibility;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// Our recogniser with its few numbers.
+/// Our recogniser with its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Descry {
     /// Probability before looking that an object on a table is one of the models. From: chosen.
     pub known: f64,
-    /// The number of things that differ from a known object in one feature (a handle, a lid, flat sides, a
-    /// taper), for each such object: a feature that was not seen stays in doubt. From: fitted, with the
-    /// chance of standing upside down, on 100 simulated arrangements: Brier score .0090, and .0098 with 1.5
-    /// and .03; no other values were compared.
+    /// Expected number of objects that differ from a known one in one feature (handle, lid, flat
+    /// sides, taper), per known object; an unseen feature stays in doubt. From: fitted, with the
+    /// chance of standing upside down, on 100 simulated arrangements: Brier score .0090, and .0098
+    /// with 1.5 and .03; no other values were compared.
     pub look_alikes: f64,
     /// Probability that a known object stands upside down. From: fitted, with the look-alikes.
     pub upside_down: f64,
-    /// The odds that a round thing lies on its side rather than stands; closed ones do five times as often.
-    /// From: chosen, as upside down.
+    /// Odds of a round object lying on its side rather than standing; five times higher for closed
+    /// ones. From: chosen, as upside down.
     pub lying: f64,
     /// Least probability with which a percept carries a model's name. From: chosen, likelier than not.
     pub least: f64,
-    /// Exponent on the likelihoods of sizes and form: below 1 softens them for what the model of the measurements leaves out. From: chosen.
+    /// Exponent on the likelihoods of sizes and form; below 1 it softens them for effects outside
+    /// the measurement model. From: chosen.
     pub temper: f64,
-    /// Exponent on how much less likely rays find a known object, or a length of a box, than what was measured: real things differ from
-    /// their models.
-    /// From: chosen.
+    /// Exponent on the likelihood ratio between a known object, or a box length, and the object's
+    /// own measures: real objects differ from their models. From: chosen.
     pub verified: f64,
 }
 
@@ -67,7 +68,7 @@ impl Default for Descry {
     }
 }
 
-/// A family of everyday things: its share, form, upper end and handle. Sizes are broad.
+/// Family of everyday objects: prior share, form, upper end and handle, with broad sizes.
 struct Family {
     share: f64,
     shape: Option<Shape>,
@@ -78,8 +79,8 @@ struct Family {
     width: (f64, f64),
 }
 
-/// Families of things on tables besides the known objects: a census guess that only sets how sceptical we
-/// start. From: chosen, a guess; nothing was counted.
+/// Families of objects on tables besides the known ones: a prior that only sets the initial
+/// scepticism. From: chosen, a guess; nothing was counted.
 const FAMILIES: [Family; 5] = [
     Family {
         share: 0.35,
@@ -133,7 +134,8 @@ impl Recogniser for Descry {
 }
 
 impl Descry {
-    /// Percepts after each segment was also explained by other bodies: a known one on or in another thing, or one with a neck.
+    /// Percepts after alternative explanations of each segment: a known body on or in another
+    /// object, or a body with a neck.
     ///
     /// Percepts of such bodies replace that of the segment where pixels are by far likelier with them and they are more probably known
     /// objects than the whole segment; if they are less probably so, the segment may still be one.
@@ -212,8 +214,7 @@ impl Descry {
         Parted { body: judge(body, upper), rest: judge(rest, lower), log }
     }
 
-    /// Judges a body with a neck: its sizes are those of the whole body, its form is that of the part below
-    /// the shoulder.
+    /// Judges a body with a neck: sizes of the whole body, form of the part below the shoulder.
     fn judge_necked(
         &self,
         setting: &Setting,
@@ -231,7 +232,8 @@ impl Descry {
     }
 }
 
-/// Segment with its foot on the bottom of the vessel around it, if rays find that by far likelier than its foot on the vessel.
+/// Segment with its foot on the bottom of the vessel around it, if rays make that far likelier than
+/// a foot on the vessel.
 fn within(setting: &Setting, of: usize, sigma_m: f64, seen: &Visibility) -> Option<Segment> {
     let (body, vessel) = resting::in_vessel(setting.scene, of, sigma_m)?;
     let segments = &setting.scene.segments;
@@ -256,7 +258,7 @@ fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
     residuals.fit(&KINECT)
 }
 
-/// The probability of each model, and its likelier stance.
+/// Probability of each model, and its likelier stance.
 struct Weighed {
     probabilities: Vec<f64>,
     stances: Vec<Stance>,
@@ -264,8 +266,8 @@ struct Weighed {
 
 /// Minimum probability by cheap measures for a model to be checked by rays. From: chosen.
 const DOUBT: f64 = 0.1;
-/// Log of how much likelier pixels have to be with two bodies than with one for a segment to be parted. From: derived, one more
-/// round body has five sizes, each told to one part in fifty.
+/// Minimum log likelihood ratio of two bodies against one for splitting a segment. From: derived,
+/// one more round body has five sizes, each told to one part in fifty.
 const FAR: f64 = 20.0;
 
 /// The percepts of both parts of a segment, and the log of how much likelier the parts make the pixels than one body does.
@@ -275,8 +277,8 @@ struct Parted {
     log: f64,
 }
 
-/// Factor by which tins, jars, rolls and boxes lie on their side more often than things that can spill.
-/// From: chosen.
+/// Factor by which closed objects (tins, jars, rolls, boxes) lie on their side more often than open
+/// ones. From: chosen.
 const CLOSED_LIES: f64 = 5.0;
 
 impl Descry {
@@ -290,7 +292,7 @@ impl Descry {
         self.judge_looked(setting, segment, measure(setting, segment, seen), seen, models)
     }
 
-    /// Judges a segment by its measures.
+    /// Judges a segment from its measures.
     fn judge_looked(
         &self,
         setting: &Setting,
@@ -343,8 +345,8 @@ impl Descry {
         percept(setting.scene, segment, measured, models, named, stances, probabilities, unknown)
     }
 
-    /// Returns the probability of each model and its stance; `against` is the log of the further evidence
-    /// against each as it stands, and as it lies either way.
+    /// Probability and stance of each model; `against`: log likelihood of further evidence against
+    /// each stance, standing or lying either way.
     fn weigh(
         &self,
         models: &[ObjectModel],
@@ -403,7 +405,7 @@ impl Descry {
         Weighed { probabilities: logs.iter().map(share).collect(), stances }
     }
 
-    /// Log likelihoods of what may lie, with either end for its foot, which is closed; none if it cannot lie.
+    /// Log likelihoods of a closed object lying, with either end as foot; empty if it cannot lie.
     fn lying_logs(&self, toppled: Option<&Toppled>, log: impl Fn(&Measured) -> f64) -> Vec<f64> {
         let Some(toppled) = toppled else { return Vec::new() };
         let ways = toppled.ways.each_ref().map(|way| &way.measured);
@@ -412,7 +414,7 @@ impl Descry {
         vec![way(ways[0], ways[1]), way(ways[1], ways[0])]
     }
 
-    /// Log likelihoods of a closed box that lies on each of its other sides; none of what is no such box.
+    /// Log likelihoods of a closed box on each of its other sides; empty for other objects.
     fn turned_logs(&self, model: &ObjectModel, log: impl Fn(&ObjectModel) -> f64) -> Vec<f64> {
         let way = |turned: &ObjectModel| (0.5 * CLOSED_LIES * self.lying).ln() + log(turned);
         model.on_other_sides().iter().map(way).collect()
@@ -433,23 +435,25 @@ impl Descry {
         self.temper * (size + wide) + top_log(top, m) + handle_log(model.handle, m)
     }
 
-    /// The things made like a model but for one feature; sizes are like the model's within a tenth. Those with a lid are so many times as
-    /// many.
+    /// Log likelihood of objects that resemble a model except for one feature, with sizes within a
+    /// tenth; `lids`: factor for those with a lid.
     fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured, lids: f64) -> f64 {
         /// Similarity: share of a size, or of a taper, by which things made like a known one differ.
         /// From: chosen.
         const ALIKE: f64 = 0.1;
-        /// Ratio of the width of a range to its standard deviation. From: derived, the root of 12, as of any
-        /// uniform distribution.
+        /// Ratio of the width of a uniform distribution to its standard deviation. From: derived,
+        /// the root of 12, as of any uniform distribution.
         const UNIFORM: f64 = 3.46;
-        /// Shares of things alike: with a handle, with a lid, with flat sides, of another taper, of other sides. From: chosen, a guess.
+        /// Shares of look-alikes with a handle, with a lid, with flat sides, with another taper,
+        /// with other sides. From: chosen, a guess.
         const HANDLED: f64 = 0.5;
         const LIDDED: f64 = 0.3;
         const FLAT: f64 = 0.2;
         const TAPERED: f64 = 0.3;
         const LONGER: f64 = 0.3;
-        /// Shares of things alike but for one side, which is longer or shorter by a part of it, but no less than can be told apart: what of
-        /// a side is hidden may be so. From: chosen, so that an end that no look showed leaves it in doubt.
+        /// Share of look-alikes with one longer or shorter side, by a relative amount but at least
+        /// the resolution; hidden sides leave this in doubt. From: chosen, so that an end that no
+        /// look showed leaves it in doubt.
         const OTHER_SIDE: f64 = 0.25;
         const BY: f64 = 0.2;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / UNIFORM));
@@ -509,14 +513,15 @@ impl Descry {
 
 /// Minimum standard deviation of an object's position, metres. From: chosen.
 const LEAST_PLACE_SIGMA_M: f64 = 0.001;
-/// Log of the chance that a thing of a family, as measured, is of none of the known kinds.
+/// Log probability that an object of a family, as measured, is of no known kind.
 fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
     let known = models.iter().map(|model| covers(model, family, m)).fold(0.0, f64::max);
     (1.0 - known).max(STRANGER).ln()
 }
 
-/// The chance that a thing of a family, as measured, is just what a model of a kind describes, so that it is no stranger:
-/// of the same make, and its sizes within the model's ranges. A single object, without ranges, describes no others.
+/// Probability that an object of a family, as measured, is described by a model of a kind and so is
+/// no stranger: same make, sizes within the model's ranges. A single object without ranges
+/// describes no others.
 fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
     let same_make =
         family.shape == Some(model.shape) && model.top == family.top && model.handle == family.handle;

@@ -1,4 +1,4 @@
-//! Ends of a thing, seen or unseen: its top, and the sides of its footprint.
+//! Observed and unobserved extents of an object: its top, and the sides of its footprint.
 
 use super::asker::Asker;
 use super::body::{Body, Cuboid};
@@ -44,8 +44,8 @@ impl Side {
         self.logs.iter().enumerate().map(|(n, log)| (self.least_m + EDGE_M * n as f64, *log))
     }
 
-    /// The likelihood of a length: ends are known no better than an edge, and beyond the longest that was
-    /// tried nothing more is told.
+    /// Likelihood of a length, blurred by the edge accuracy and constant beyond the longest tried
+    /// length.
     pub fn likelihood(&self, length_m: f64) -> f64 {
         let near = |(tried_m, log): (f64, f64)| log - 0.5 * ((length_m - tried_m) / EDGE_M).powi(2);
         let beyond = self.logs.last().copied().filter(|_| length_m > self.longest_m());
@@ -60,7 +60,8 @@ impl Side {
         (0..steps).map(|n| self.likelihood(length_m(n))).sum::<f64>() / f64::from(steps)
     }
 
-    /// The integral of the likelihood over lengths of a density, metres, of which there is so much beyond the longest that was tried.
+    /// Integral of the likelihood over a density of lengths; `beyond`: mass beyond the longest
+    /// tried length.
     pub fn sum(&self, density: impl Fn(f64) -> f64, beyond: f64) -> f64 {
         /// Number of steps below the smallest tried length that are integrated too. From: rounding.
         const SHORTER: usize = 8;
@@ -81,18 +82,18 @@ impl Side {
     }
 }
 
-/// Lengths are summed up in such steps, metres. From: work.
+/// Step of the sums over lengths, metres. From: work.
 const STEP_M: f64 = 0.5 * EDGE_M;
 /// Log from which the position of an end is beyond doubt. From: chosen.
 const SURE: f64 = 40.0;
-/// Steps by which the sides of a box and its turn are sought, one after the other, metres and radians, and how often each at the most.
-/// From: work, a turn moves the ends of what is 15 cm long by as much.
+/// Steps of the search for a box's sides and rotation, metres and radians, each with its maximum
+/// repetitions. From: work, a turn moves the ends of what is 15 cm long by as much.
 const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
 const TRIES: usize = 8;
 /// Number of rounds in which the views are aligned with the box, and the box with the views. From: work.
 const ROUNDS: usize = 2;
 
-/// A box, and where it suits each view.
+/// Box, with its best shift in each view.
 struct Boxed<'a> {
     rays: &'a Rays,
     placed: Vec<Placed>,
@@ -109,7 +110,7 @@ impl Boxed<'_> {
         boxed
     }
 
-    /// Moves each view to where the box suits it best.
+    /// Shifts each view to its best match with the box.
     fn place(&mut self) {
         self.placed = self.suited(&self.body, &self.placed);
         self.log = self.log_of(&self.body);
@@ -121,7 +122,7 @@ impl Boxed<'_> {
         pool::each(self.rays.views.len(), 1, of_view).iter().sum()
     }
 
-    /// Moves its ends and turns it to where it suits all views best.
+    /// Optimises the box's ends and rotation over all views.
     fn settle(&mut self) {
         for (step_m, step_rad) in SOUGHT {
             for _ in 0..TRIES {
@@ -136,8 +137,8 @@ impl Boxed<'_> {
         }
     }
 
-    /// The likelihoods of the lengths of the side between two ends: each length by the likelier end, with the
-    /// views where they suit the side best.
+    /// Likelihoods of lengths of the side between two ends; each length by the likelier end, with
+    /// the views shifted to match.
     fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
         let length_m = self.body.length_m(ends[0]);
         let log = |placed: &[Placed]| placed.iter().map(|view| view.log).sum::<f64>();
@@ -171,8 +172,8 @@ impl Boxed<'_> {
     }
 }
 
-/// The likelihoods of the lengths of both sides of a box from the rays around it, up to `longest_m`, if the
-/// box stands about where one of two rectangles lies.
+/// Likelihoods of the lengths of both sides of a box from the surrounding rays, up to `longest_m`,
+/// starting from one of two rectangles.
 pub fn sides(rays: &Rays, about: [&Rectangle; 2], heights_m: (f64, f64), longest_m: f64) -> [Side; 2] {
     let [mut one, other] = about.map(|rectangle| Boxed::of(rays, rectangle, heights_m));
     if other.log > one.log {

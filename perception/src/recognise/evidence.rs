@@ -1,4 +1,4 @@
-//! Measuring on one segment what tells objects apart, and what could have been measured at all.
+//! Measures of a segment that distinguish objects, with their visibility.
 
 use super::asker::{Asker, IN_VIEW_M};
 use super::body::Frustum;
@@ -19,16 +19,16 @@ use nalgebra::Point3;
 
 /// Distances from the body at which a handle has some of itself, metres. From: chosen.
 const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
-/// Heights at which it has, as shares of the body's height. From: chosen.
+/// Heights at which a handle is sought, as shares of the body's height. From: chosen.
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
-/// Heights at which a camera that looks through the side is asked for, as shares of the body's height, and at how many it must: the
-/// foot of a far side is often hidden by the near one. From: chosen.
+/// Heights at which a camera must look through the side, as shares of the body's height, and the
+/// minimum number of them: the foot of a far side is often hidden by the near one. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
 const THROUGH: usize = 3;
 /// Maximum share of directions in which a handle could be hidden for a body to count as having none.
 /// From: chosen.
 pub(super) const UNSEEN: f64 = 0.08;
-/// Share of its reach up to which what sticks out may be the body's own blurred side. From: chosen.
+/// Share of a protrusion's reach up to which it may be the body's own blurred side. From: chosen.
 const ROOT: f64 = 0.35;
 /// Log likelihood ratio from which an inside is reported as seen or absent. From: chosen.
 const SAID: f64 = 1.5;
@@ -39,14 +39,14 @@ pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
 /// Least height of a handle, metres. From: chosen.
 const HANDLE_HIGH_M: f64 = 0.012;
 
-/// Distance beside and above a thing within which pixels may tell of the thing, and beyond its edge at which
-/// free space is tested, metres. From: chosen.
+/// Margin around and above an object within which pixels are used, and distance beyond its edge at
+/// which free space is tested, metres. From: chosen.
 const BESIDE_M: f64 = 0.012;
-/// Least height of a thing, metres. From: rounding.
+/// Minimum height of an object, metres. From: rounding.
 const LEAST_HEIGHT_M: f64 = 0.001;
 /// The rim takes at least and at most these shares of the height. From: chosen.
 const RIMS: (f64, f64) = (0.1, 0.45);
-/// Points of a side that share their error, and how many groups of them count at the most. From: chosen.
+/// Number of side points that share an error, and maximum number of such groups. From: chosen.
 const SHARING: f64 = 12.0;
 const MOST_GROUPS: f64 = 60.0;
 
@@ -58,22 +58,23 @@ pub(super) struct Measured {
     pub blur_m: f64,
     pub round: Option<Round>,
     pub rectangle: Option<Rectangle>,
-    /// The residual of the side from the best round body of the other stance (about a horizontal axis for a
-    /// standing thing, about a vertical axis for a lying one), metres; infinite if there is none.
+    /// Residual of the side from the best round body of the other stance (horizontal axis for a
+    /// standing object, vertical for a lying one), metres; infinite if there is none.
     pub rival_m: f64,
-    /// Height above what it stands on, metres.
+    /// Height above the support, metres.
     pub height_m: f64,
     pub height_sigma_m: f64,
-    /// True if something in front may hide its true top.
+    /// True if an occluder may hide the true top.
     pub top_hidden: bool,
     /// The bounding rectangle seen from above, surface frame.
     pub footprint: Rectangle,
-    /// The likelihoods of the lengths of its sides, were the thing a box; only if it may be a box that is
-    /// asked about.
+    /// Likelihoods of the sides' lengths if the object is a box; computed for possible requested
+    /// boxes only.
     pub sides: Option<[Side; 2]>,
-    /// Share of the round body's visible-to-be side through which a camera looked: it is no body of that form.
+    /// Share of the round body's expected visible side through which a camera looked, evidence
+    /// against the form.
     pub looked_through: f64,
-    /// Points that tell the side's form, counted once for each group that shares its error.
+    /// Effective number of independent points on the side.
     pub independent: f64,
     /// Spread of one measurement, metres.
     pub sigma_m: f64,
@@ -89,20 +90,20 @@ impl Measured {
         if self.evidence.views > 1 { self.blur_m } else { 0.0 }
     }
 
-    /// The middle of its footprint, and the distance of the corners from there, metres.
+    /// Centre of the footprint, and distance to its corners, metres.
     pub fn footprint_reach(&self) -> ([f64; 2], f64) {
         let [long_m, short_m] = self.footprint.sides_m;
         ([self.footprint.x, self.footprint.y], 0.5 * distance(long_m, short_m))
     }
 }
 
-/// The measures of a thing, and the pixels around it.
+/// Measures of an object, and the pixels around it.
 pub(super) struct Looked {
     pub measured: Measured,
     pub rays: Rays,
 }
 
-/// A scene with what is asked of it for each of its things.
+/// Scene with its models, as the context for measuring each object.
 pub(super) struct Setting<'a> {
     pub scene: &'a Scene,
     pub sensor: Sensor,
@@ -124,11 +125,11 @@ impl<'a> Setting<'a> {
         Asker::of(seen, world_from_surface, &segment.points, tolerance_m(m.sigma_m))
     }
 
-    /// The maximum length of a thing that may be a box that is asked about, or is told from one by its
-    /// length, metres; none if the thing is too high or too low.
+    /// Maximum length of a box hypothesis for the object, metres; `None` if its height fits no
+    /// requested box.
     fn longest_box_m(&self, m: &Measured) -> Option<f64> {
-        /// Multiple of a known box's length up to which lengths are tried to tell a thing from that box.
-        /// From: chosen.
+        /// Multiple of a known box's length up to which lengths are tried, to distinguish longer
+        /// objects. From: chosen.
         const LONGER: f64 = 1.3;
         /// Number of spreads of a height from which a difference is beyond doubt. From: chosen.
         const SURE: f64 = 6.0;
@@ -162,7 +163,7 @@ impl Reach {
     }
 }
 
-/// The pixels around a thing that stands.
+/// Pixels around a standing object.
 fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, setting: &Setting) -> Rays {
     let m = own.1;
     let (x, y) = m.round.map_or((m.footprint.x, m.footprint.y), |round| (round.x, round.y));
@@ -172,7 +173,7 @@ fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, sett
     rays_around(([x, y], half_m, PIXELS), segment, own, asker, setting)
 }
 
-/// The rays around a thing of a given half width at a place, at most `pixels` of each view.
+/// Pixels around an object of a given half width, at most `pixels` of each view.
 pub(super) fn rays_around(
     ([x, y], half_m, pixels): ([f64; 2], f64, f64),
     segment: &Segment,
@@ -278,9 +279,9 @@ const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 
 /// The ends of the body's outline in each view against free space: left and right, at three heights.
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
-    /// Lost pixels at depth edges make what is seen narrower by about this on each side, metres. From: chosen.
+    /// Narrowing of each side by lost pixels at depth edges, metres. From: chosen.
     const LOST_M: f64 = 0.001;
-    /// Share of the points of a band that reach less far than its edge. From: chosen.
+    /// Quantile of the points of a band that defines its edge. From: chosen.
     const END: f64 = 0.985;
     /// Points of a band that are enough to go by. From: work.
     const ENOUGH: usize = 600;
@@ -317,7 +318,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     edges
 }
 
-/// Number of looks with the place (surface frame) inside the image and not behind something else.
+/// Number of views with the point (surface frame) in the image and unoccluded.
 fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
     asker.views.iter().filter(|view| !matches!(view.look(place, IN_VIEW_M), Seen::Never)).count()
 }
@@ -435,14 +436,15 @@ impl Sectors {
 
     /// Share of the directions in which a handle, about two sectors wide, could hide.
     fn unseen_share(&self) -> f64 {
-        /// Share of the places of a handle that were looked through from which there is none. From: chosen.
+        /// Minimum seen-through share of possible handle positions that excludes a handle. From:
+        /// chosen.
         const FREE: f64 = 0.6;
         let hides = |i: usize| self.handle_free[i] < FREE && self.handle_free[(i + 1) % SECTORS] < FREE;
         (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
     }
 }
 
-/// In which directions two or more points lie on the side.
+/// Directions in which two or more points lie on the side.
 pub(super) fn measured_sectors(
     round: &Round,
     points: &[Point3<f64>],
@@ -464,7 +466,7 @@ fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
     round::sector(p.x - round.x, p.y - round.y)
 }
 
-/// The largest thing that sticks out of the body in one direction.
+/// Largest protrusion of the body in one direction.
 pub(super) struct Protrusion {
     pub reach_m: f64,
     /// The direction of the protrusion: sine and cosine.
@@ -489,7 +491,8 @@ impl Protrusion {
         const WINDOW: usize = 3;
         /// Fewest points. From: chosen.
         const FEWEST: usize = 3;
-        /// Shares of its points that lie beyond its ends across and in height. From: chosen.
+        /// Quantiles of a protrusion's points that define its extent across and in height. From:
+        /// chosen.
         const SPAN: (f64, f64) = (0.1, 0.9);
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);
@@ -546,8 +549,8 @@ impl Protrusion {
         round.outside_m(p) > PLACE_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
-    /// True if the protrusion is a handle, and not the trace of misaligned views of a side whose spread about
-    /// its form is `spread_m`, metres.
+    /// True if the protrusion is a handle, and not an artefact of misaligned views of a side with
+    /// the spread `spread_m` about its form, metres.
     fn is_handle(&self, spread_m: f64) -> bool {
         self.points >= self.least
             && (HANDLE_M.0.max(SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)
@@ -556,7 +559,7 @@ impl Protrusion {
     }
 }
 
-/// A point's place from the axis, along a direction (sine and cosine) and across it, metres.
+/// Coordinates of a point from the axis, along a direction (sine and cosine) and across it, metres.
 fn along_and_across(round: &Round, p: &Point3<f64>, (sin, cos): (f64, f64)) -> (f64, f64) {
     let (x, y) = (p.x - round.x, p.y - round.y);
     (x * cos + y * sin, y * cos - x * sin)

@@ -11,16 +11,16 @@ use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 /// Least density and least chance that are assumed. From: chosen.
 const LEAST_DENSITY: f64 = 1e-12;
 const LEAST_CHANCE: f64 = 1e-6;
-/// Share of a family's things of the measured size that are of a known kind all the same, at the least. From: chosen.
+/// Minimum share of a family's objects of the measured size that are of a known kind. From: chosen.
 pub(super) const STRANGER: f64 = 0.05;
 
-/// The chance that what was measured lies within a range; none for a single value.
+/// Probability that the measured value lies within a range; `None` for a single value.
 pub(super) fn inside(value: f64, sigma: f64, r: Range) -> f64 {
     normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
 }
 
-/// Chance that a measurement is an outlier: flat tails. From: chosen, a tenth of it was tried, and with it a
-/// real mug that narrows was no mug.
+/// Probability of an outlier measurement: flat tails. From: chosen, a tenth of it was tried, and
+/// with it a real mug that narrows was no mug.
 const ASTRAY: f64 = 0.002;
 
 /// Density of a measure under a range: a uniform, blurred by the measurement.
@@ -48,9 +48,11 @@ fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64
 
 /// Median, metres, and log-normal spread of the heights of everyday things. From: chosen, a guess; nothing was measured.
 pub(super) const HEIGHTS: (f64, f64) = (0.11, 0.6);
-/// The same of their widths. From: chosen, a guess; nothing was measured.
+/// Median, metres, and log-normal spread of the widths of everyday things. From: chosen, a guess;
+/// nothing was measured.
 pub(super) const WIDTHS: (f64, f64) = (0.10, 0.6);
-/// The same of their tapers, which have no unit. From: chosen, a guess; nothing was measured.
+/// Median and log-normal spread of the tapers of everyday things, dimensionless. From: chosen, a
+/// guess; nothing was measured.
 const TAPERS: (f64, f64) = (0.95, 0.25);
 /// Least error of a taper, however well the side is measured. From: chosen.
 const RATIO_SIGMA: f64 = 0.05;
@@ -75,8 +77,8 @@ pub(super) fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measu
     measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
 }
 
-/// Diameter and form of a round body together: a circle that is not as wide as the body is no circle of its side, and then its
-/// roundness says nothing for it.
+/// Log density of diameter and form of a round body jointly: a circle narrower than the body is no
+/// circle of its side, so roundness is no evidence then.
 pub(super) fn round_log(range: Option<Range>, m: &Measured) -> f64 {
     let form = form_log(Some(Shape::Round), m);
     let Some(r) = range.filter(|_| m.round.is_some()) else { return diameter_log(range, WIDTHS, m) + form };
@@ -97,7 +99,8 @@ pub(super) fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
     measure_log(taper, sigma, range, TAPERS)
 }
 
-/// Log of the chance that the taper lies outside a range by more than a margin: a thing that is alike but for its side.
+/// Log probability that the taper lies outside a range by more than a margin, for look-alikes with
+/// another side.
 pub(super) fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
     let (taper, sigma) = taper(m);
     (1.0 - inside(taper, sigma, Range { low: range.low - margin, high: range.high + margin }))
@@ -105,9 +108,9 @@ pub(super) fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
         .ln()
 }
 
-/// The taper and its standard deviation.
+/// Taper and its standard deviation.
 fn taper(m: &Measured) -> (f64, f64) {
-    /// Taper and its spread where no circle fits. From: chosen.
+    /// Taper and its standard deviation if no circle fits. From: chosen.
     const UNKNOWN: (f64, f64) = (1.0, 0.2);
     let Some(round) = m.round else { return UNKNOWN };
     let sigma = m.height_m * round.slope_sigma / round.radius_m.max(EDGE_M);
@@ -119,14 +122,14 @@ fn side_sigma_m(m: &Measured) -> f64 {
     EDGE_M.hypot(2.0 * m.sigma_m)
 }
 
-/// Log density of the sides of a footprint, of a thing that is no known box: one side only, as for a round body, since densities of as
-/// many measures must be compared.
+/// Log density of the footprint of an object that is no known box: one side only, as for a round
+/// body, so that densities of equal dimension are compared.
 pub(super) fn sides_log(m: &Measured) -> f64 {
     measure_log(m.footprint.sides_m[0], side_sigma_m(m), None, WIDTHS)
         + measure_log(1.0, RATIO_SIGMA, None, TAPERS)
 }
 
-/// Log density of what rays tell of both sides of a box of the given ones, either of which may be the longer.
+/// Log density of both sides of a known box from the rays, with either side the longer.
 pub(super) fn box_sides_log(sides: Option<(Range, Range)>, m: &Measured) -> f64 {
     let known = |range: Range| {
         move |side: &Side| {
@@ -138,7 +141,7 @@ pub(super) fn box_sides_log(sides: Option<(Range, Range)>, m: &Measured) -> f64 
     sides.map_or_else(none, |(width, depth)| both_sides_log(m, [known(width), known(depth)]))
 }
 
-/// The same for things alike: median and log-normal spread of the one side and of the other.
+/// Log density of both sides for look-alikes: median and log-normal spread of each side.
 pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
     both_sides_log(
         m,
@@ -151,24 +154,26 @@ pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
     )
 }
 
-/// Divisor that turns the likelihood of a length into a density like that of a measurement, metres.
-/// From: derived, the integral of one whose spread is that of an edge.
+/// Divisor that turns the likelihood of a length into a density, metres. From: derived, the
+/// integral of one whose spread is that of an edge.
 const SIDE_UNIT_M: f64 = EDGE_M * BELL;
 
-/// Log density of both sides, either of which may be the one; without what rays tell it is no box that is asked about.
+/// Log density of both sides in either order; without ray evidence the object is no requested box.
 fn both_sides_log(m: &Measured, [one, other]: [impl Fn(&Side) -> f64; 2]) -> f64 {
     let Some([a, b]) = &m.sides else { return 2.0 * LEAST_DENSITY.ln() };
     let log = |density: f64| density.max(LEAST_DENSITY).ln();
     0.5_f64.ln() + log_sum(&[log(one(a)) + log(other(b)), log(one(b)) + log(other(a))])
 }
 
-/// However many points: what the forms leave out (rounded boxes, bulging cups) bounds what they tell. From: chosen.
+/// Minimum log likelihood of a form, because the forms' simplifications (rounded boxes, bulging
+/// cups) limit their evidence. From: chosen.
 const LEAST_FORM: f64 = -12.0;
 
-/// The log likelihood of a form of the side, relative to the best form, with the evidence that the side is
-/// there at all. `None` is a form that is neither round nor a box.
+/// Log likelihood of a form of the side relative to the best form, with evidence that the side
+/// exists; `None` is a form neither round nor a box.
 pub(super) fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
-    /// Log by which each share of the side that was looked through, beyond what may be an accident, speaks against it. From: chosen.
+    /// Slope of the log likelihood over the seen-through share of the side, and the share that may
+    /// be accidental. From: chosen.
     const THROUGH: (f64, f64) = (-60.0, 0.15);
     let all = [Some(Shape::Round), Some(Shape::Box), None].map(|s| raw_form_log(s, m));
     let best = all.into_iter().fold(miss_log(m.rival_m, m), f64::max);
@@ -181,7 +186,8 @@ pub(super) fn form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     (raw_form_log(shape, m) - best).max(LEAST_FORM) + through + beside
 }
 
-/// However well a circle fits a part of the side: a round body has nothing beside it but a handle, and what views blur.
+/// Log likelihood of points beside the side: a round body has only a handle there, and the blur of
+/// the views.
 fn beside_log(m: &Measured) -> f64 {
     let Some(round) = m.round else { return 0.0 };
     let beside_m = (m.footprint.sides_m[0] - 2.0 * round.radius_m - HANDLE_M.1).max(0.0);
@@ -209,7 +215,7 @@ fn miss_log(miss_m: f64, m: &Measured) -> f64 {
 }
 
 pub(super) fn top_log(top: Top, m: &Measured) -> f64 {
-    /// A lid or an inside is missed, or seen where there is none, about this often. From: chosen.
+    /// Probability that a lid or an inside is missed, or falsely seen. From: chosen.
     const ASTRAY_TOP: f64 = 0.01;
     let open = ASTRAY_TOP + (1.0 - 2.0 * ASTRAY_TOP) / (1.0 + (-m.upper.open_log).exp());
     match top {
@@ -220,15 +226,17 @@ pub(super) fn top_log(top: Top, m: &Measured) -> f64 {
 }
 
 pub(super) fn handle_log(handle: Handle, m: &Measured) -> f64 {
-    /// Reaches of a protrusion, metres: up to the first it may be the trace of misaligned views of a side;
-    /// from the second it is a handle. From: chosen, the first is the least reach of a handle.
+    /// Reaches of a protrusion, metres: below the first it may be an artefact of misaligned views
+    /// of a side; from the second it is a handle. From: chosen, the first is the least reach of a
+    /// handle.
     const REACHES_M: (f64, f64) = (HANDLE_M.0, 0.022);
-    /// Chances that a handle in view is missed and found, and that one out of view is found all the same.
-    /// From: chosen.
+    /// Probabilities that a visible handle is missed, and that one out of view is found all the
+    /// same. From: chosen.
     const MISSED: f64 = 0.04;
     const FOUND: f64 = 0.9;
     const STRAY: f64 = 0.02;
-    /// Chances that no handle is found where there is none, and that one is. From: chosen.
+    /// Probabilities that no handle is found where there is none, and that one is found. From:
+    /// chosen.
     const NEITHER: (f64, f64) = (0.99, 0.01);
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
     let sure = match m.evidence.handle {

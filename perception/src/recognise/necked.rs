@@ -10,26 +10,28 @@ const NARROWS: f64 = 1.3;
 /// Shares of the height that show body and neck. From: chosen.
 const BODY: f64 = 0.4;
 const NECK: f64 = 0.1;
-/// The body reaches up to where it has this share of its radius. From: chosen.
+/// Minimum radius, as a share of the body's, that still belongs below the shoulder. From: chosen.
 const SHOULDER: f64 = 0.9;
-/// Share of the points of the body that lie on its side. From: chosen, more than half.
+/// Minimum share of the body's points on its side. From: chosen, more than half.
 const ON_SIDE: f64 = 0.55;
-/// Quantile of the distances from the axis that tells a radius. From: chosen, some points lie on the top.
+/// Quantile of the distances from the axis that defines a radius. From: chosen, some points lie on
+/// the top.
 const RADIUS: f64 = 0.75;
 
 /// A body with a neck.
 pub(super) struct Necked {
-    /// The whole body, and the part below its shoulder.
+    /// Whole body, and its part below the shoulder.
     pub whole: Segment,
     pub body: Segment,
     pub height_m: f64,
     /// Diameter at the base over diameter at the top.
     pub taper: f64,
-    /// Segments that are pieces of it.
+    /// Segments that are pieces of the body.
     pub pieces: Vec<usize>,
 }
 
-/// The body with a neck that a segment may be, with what stands coaxially on it, if some model is one as high.
+/// Body with a neck that a segment may be together with coaxial pieces on top, if some model is one
+/// of that height.
 pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: f64) -> Option<Necked> {
     let low = &scene.segments[of];
     let narrows = |m: &ObjectModel| m.shape == Shape::Round && m.taper.low > NARROWS;
@@ -80,7 +82,7 @@ pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: 
     Some(Necked { body, height_m, taper: foot_radius_m / neck_m, pieces, whole })
 }
 
-/// The radius of a body about an axis between two heights, metres; none where too little of the body is seen.
+/// Radius of a body about an axis between two heights, metres; `None` if too little is visible.
 fn radius_m(of: &Segment, axis: &Round, between_m: std::ops::Range<f64>) -> Option<f64> {
     /// Fewest points. From: chosen.
     const FEWEST: usize = 8;

@@ -29,7 +29,7 @@ impl Body for Form {
     }
 }
 
-/// Two bodies, of which a ray meets the nearer.
+/// Two bodies; a ray hits the nearer.
 #[derive(Clone, Copy)]
 struct Pair(Form, Form);
 
@@ -43,7 +43,7 @@ impl Body for Pair {
     }
 }
 
-/// Measures of an upright thing with the heights of its foot and of its upper end, metres.
+/// Measures of an upright object, with the heights of its foot and its upper end, metres.
 #[derive(Clone, Copy)]
 pub(super) struct Standing<'a> {
     pub measured: &'a Measured,
@@ -52,24 +52,24 @@ pub(super) struct Standing<'a> {
 }
 
 impl<'a> Standing<'a> {
-    /// Thing of its measured height above a foot.
+    /// Object of its measured height, on a given foot height.
     pub fn at(measured: &'a Measured, base_m: f64) -> Standing<'a> {
         Standing { measured, base_m, top_m: base_m + measured.height_m }
     }
 
-    /// Round body of its measures: a vessel with walls, or closed.
+    /// Round body from the measures: a vessel with walls, or closed.
     fn round(&self, wall_m: Option<f64>) -> Option<Form> {
         let round = self.measured.round?;
         Some(Form::Round(Frustum { wall_m, ..Frustum::around(&round, self.base_m, self.top_m) }))
     }
 
-    /// Box of its measures.
+    /// Box from the measures.
     fn cuboid(&self) -> Form {
         let rectangle = self.measured.rectangle.unwrap_or(self.measured.footprint);
         Form::Box(Cuboid::around(&rectangle, self.base_m, self.top_m))
     }
 
-    /// Round body, if a circle fits, and box of its measures.
+    /// Candidate forms: round body if a circle fits, and box.
     fn forms(&self) -> Vec<Form> {
         let wall_m = (self.measured.upper.open_log > 0.0).then_some(WALL_M);
         self.round(wall_m).into_iter().chain([self.cuboid()]).collect()
@@ -100,7 +100,8 @@ impl Held<'_> {
     }
 }
 
-/// Log likelihoods of the views given the likeliest of some bodies, against no body; that of no body if none is likelier.
+/// Log likelihoods of the views for the likeliest of some bodies, against no body; zero if none is
+/// likelier.
 fn best<B: Body + Sync>(rays: &Rays, bodies: &[B]) -> Vec<f64> {
     let of = |body: &B| pool::map(&rays.views, 1, |view| placed(view, body, [0.0; 2], MERGED).log);
     let none = vec![0.0; rays.views.len()];
@@ -118,12 +119,12 @@ fn likelier_log(with: &[f64], without: &[f64]) -> f64 {
     with.iter().zip(without).map(of_view).sum()
 }
 
-/// Log likelihood ratio of a body with its holder against both in one piece.
+/// Log likelihood ratio of a body and its holder against both in one piece.
 pub(super) fn parted_log(rays: &Rays, whole: Standing, held: Held) -> f64 {
     likelier_log(&held.logs(rays), &best(rays, &whole.forms()))
 }
 
-/// Log likelihood ratio of a body within its holder against the body on its holder.
+/// Log likelihood ratio of a body inside its holder against the body on top of it.
 pub(super) fn within_log(rays: &Rays, within: Held, on: Held) -> f64 {
     likelier_log(&within.logs(rays), &on.logs(rays))
 }

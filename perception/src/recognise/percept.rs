@@ -13,20 +13,20 @@ pub enum Stance {
     UpsideDown,
     /// The axis of the object lies in the plane of the surface.
     Lying,
-    /// The views do not tell.
+    /// Not determined by the views.
     #[default]
     Unknown,
 }
 
-/// The sighting of a feature: seen, absent, or not looked for everywhere it could be.
+/// Sighting of a feature: seen, absent, or not everywhere observed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sighting {
     /// The feature was seen.
     Seen,
-    /// The places where it could be were looked through: it is not there.
+    /// All possible places were looked through: absent.
     Absent,
-    /// Places where it could be have not been seen.
+    /// Some possible places have not been seen.
     #[default]
     Unseen,
 }
@@ -42,9 +42,9 @@ pub struct Evidence {
     pub taper: f64,
     /// Root mean square distance of the points from that body, metres.
     pub round_residual_m: f64,
-    /// Share of the points that lie on that body.
+    /// Share of the points on the round body.
     pub round_inliers: f64,
-    /// Share of the body's circumference where its side was measured.
+    /// Share of the circumference where the side was measured.
     pub arc: f64,
     /// Root mean square distance of the outline from the best rectangle, metres.
     pub box_residual_m: f64,
@@ -67,28 +67,29 @@ pub struct Evidence {
 /// One object on the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Percept {
-    /// Name of the known object that it most likely is; `None` is *unknown*.
+    /// Name of the most likely known object; `None`: *unknown*.
     pub label: Option<String>,
     /// The kind of the object.
     pub kind: Option<String>,
-    /// Probability of each model, in the order of the models. With `unknown` they sum to one.
-    /// (The published recogniser gives similarity scores here, which are no probabilities.)
+    /// Probability of each model, in model order; with `unknown` they sum to one. (The published
+    /// recogniser gives similarity scores here, which are no probabilities.)
     pub probabilities: Vec<(String, f64)>,
     /// Probability of each kind: the sum over its models, in order of first mention.
     pub kinds: Vec<(String, f64)>,
-    /// Probability that it is none of the models.
+    /// Probability that the object is none of the models.
     pub unknown: f64,
-    /// The position of the object, world frame, metres: the centre of its body's footprint on its support.
+    /// Position, world frame, metres: centre of the body's footprint on its support.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate of the position within the cloud, metres (errors of localisation not included).
     pub position_sigma_m: f64,
-    /// Longer and shorter side of its footprint, height; metres, what the plane cut off added again.
+    /// Longer and shorter side of the footprint, and height, metres, including the part cut off by
+    /// the plane.
     pub size_m: [f64; 3],
     /// The stance of the object.
     pub stance: Stance,
-    /// Points of the cloud that belong to it.
+    /// Number of cloud points of the object.
     pub points: usize,
-    /// Share of its visible hull (sides and top) that some view saw or looked past.
+    /// Share of the visible hull (sides and top) that some view saw or looked past.
     pub seen_fraction: f64,
     /// The evidence for and against each model.
     pub evidence: Evidence,
@@ -98,7 +99,7 @@ pub struct Percept {
 }
 
 impl Percept {
-    /// The same where each known object is no less probable than it is to be a part of it.
+    /// Percept with each known object's probability at least that of a part.
     pub(super) fn at_least(mut self, part: &Percept) -> Percept {
         for ((_, own), (_, part)) in self.probabilities.iter_mut().zip(&part.probabilities) {
             *own = own.max(*part);
@@ -112,12 +113,12 @@ impl Percept {
         self
     }
 
-    /// Probability of the known object that it most likely is.
+    /// Probability of the most likely known object.
     pub(super) fn known(&self) -> f64 {
         self.probabilities.iter().map(|(_, p)| *p).fold(0.0, f64::max)
     }
 
-    /// Probability that it is the object or kind called `name`; 0 for names that no model has.
+    /// Probability that the object is, or is of the kind, `name`; 0 for names without a model.
     pub fn probability_of(&self, name: &str) -> f64 {
         let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
         of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)

@@ -12,13 +12,14 @@ use crate::visibility::Visibility;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// The published recogniser with its two numbers.
+/// Published recogniser with its two parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Published {
-    /// Scale of differences in size, metres (α). From: chosen, paper 004 does not state it.
+    /// Scale of size differences in metres (α). From: chosen, paper 004 does not state it.
     pub alpha_m: f64,
-    /// Least score of a known object (θ). From: paper, 004 names it; its value is that of the code that its authors published (fawkes).
+    /// Minimum score of a known object (θ). From: paper, 004 names it; its value is that of the
+    /// code that its authors published (fawkes).
     pub theta: f64,
 }
 

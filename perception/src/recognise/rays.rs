@@ -13,18 +13,20 @@ use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Pixels of a view that are asked, about: whether there is a body, and where it ends. From: work.
+/// Approximate number of pixels sampled per view, for the existence of a body and for its extent.
+/// From: work.
 pub(super) const PIXELS: f64 = 300.0;
 pub const EDGE_PIXELS: f64 = 1200.0;
-/// Chance of something nearer, of what is behind being the surface, and of its being something else. From: chosen.
+/// Probabilities of an occluder, of background being the surface, and of background being another
+/// object. From: chosen.
 const NEARER: f64 = 0.1;
 const SURFACE: f64 = 0.6;
 const ELSE: f64 = 0.3;
-/// Depth over which something else may be anywhere, metres. From: chosen.
+/// Depth range over which another object is uniformly distributed, metres. From: chosen.
 const ANYWHERE_M: f64 = 1.0;
 /// Bound of the log likelihood ratio of one pixel. From: chosen.
 pub(super) const MOST: f64 = 10.0;
-/// Chance that a view says nothing of a body. From: chosen.
+/// Probability that a view is uninformative about a body. From: chosen.
 pub(super) const BAD_VIEW: f64 = 0.05;
 /// Maximum number of independent measurements that a block of pixels counts for: errors of the pose
 /// are common to all. From: chosen.
@@ -33,7 +35,7 @@ const MOST_LOOKS: f64 = 2.3;
 /// that balance each other.
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 
-/// The pixels of all views that may tell of one body.
+/// Pixels of all views that carry evidence about one body.
 pub struct Rays {
     pub views: Vec<ViewRays>,
 }
@@ -41,10 +43,10 @@ pub struct Rays {
 /// The pixels of one view.
 pub struct ViewRays {
     pub from: [f64; 3],
-    /// Offsets added to a ray that wanders by the noise across it, to either side and up.
+    /// Offsets of a ray displaced by the lateral noise, to either side and up.
     pub wander: [[f64; 3]; 3],
     pub pixels: Vec<Pixel>,
-    /// Looks that each of them counts for.
+    /// Number of independent looks that each pixel counts for.
     pub looks: f64,
 }
 
@@ -57,7 +59,7 @@ pub struct Pixel {
     pub sigma_m: f64,
     /// Density of the depth without a body, one by a metre.
     pub without: f64,
-    /// True if it shows another thing.
+    /// True if the pixel shows another object.
     pub other: bool,
 }
 
@@ -74,7 +76,8 @@ pub struct Around {
 }
 
 impl Rays {
-    /// The pixels of the views around a place; `others` are points of other things, `own` those of the body, surface frame.
+    /// Pixels of the views around a place; `others`: points of other objects, `own`: those of the
+    /// body, surface frame.
     pub fn of<'p>(
         asker: &Asker,
         sensor: &Sensor,
@@ -109,7 +112,7 @@ impl Rays {
     }
 }
 
-/// Log of the likelihood ratio of a view that says nothing with a chance, whatever it seems to say for or against.
+/// Log likelihood ratio of a view that is uninformative with probability `bad`.
 pub fn bounded(log: f64, bad: f64) -> f64 {
     let against = |log: f64| ((1.0 - bad) * log.exp() + bad).ln();
     if log < 0.0 { against(log) } else { -against(-log) }
@@ -155,7 +158,8 @@ impl ViewRays {
         (!pixels.is_empty()).then_some(ViewRays { from, wander, pixels, looks })
     }
 
-    /// Log of how much likelier this view is with a body than without; what its depths err by together is what suits best.
+    /// Log likelihood ratio of this view with a body against without, at the best common depth
+    /// error.
     pub fn log_likelihood(&self, body: &impl Body) -> f64 {
         let mut met: Vec<f64> = Vec::with_capacity(self.pixels.len());
         let (mut sum, mut weight) = (0.0, 0.0);
@@ -174,8 +178,8 @@ impl ViewRays {
         self.looks * log_product(ratios) - 0.5 * (shared_m / EDGE_M).powi(2)
     }
 
-    /// The likelihood ratio of a pixel's depth with a body met at a depth against no body. A ray that speaks
-    /// against the body may have passed by its edge.
+    /// Likelihood ratio of a pixel's depth given a body at `at_m` against no body; a contradicting
+    /// ray may have passed the body's edge.
     #[inline(always)]
     fn ratio(&self, pixel: &Pixel, body: &impl Body, at_m: f64, shared_m: f64) -> f64 {
         let mut with = pixel.with_body(at_m + shared_m);
@@ -193,7 +197,7 @@ impl ViewRays {
     }
 }
 
-/// Log of the product of ratios, each of which says no more than [`MOST`]: the log of a few at once.
+/// Log of a product of ratios, each at most [`MOST`]; takes the log of several at once.
 fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
     /// Exponent, in units of [`MOST`], beyond which one more factor could overflow a product.
     /// From: rounding.
@@ -212,10 +216,10 @@ fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Pixel {
-    /// Density of its depth where it meets a body at a depth.
+    /// Density of the depth given a body at a depth.
     #[inline(always)]
     pub fn with_body(&self, at_m: f64) -> f64 {
-        /// Chance of a return that has to do with nothing there. From: derived, the sensor's.
+        /// Probability of a stray return. From: derived, the sensor's.
         const STRAY: f64 = KINECT.stray;
         /// Range of the error of a stray depth, metres. From: chosen.
         const RANGE_M: f64 = 5.0;
@@ -239,7 +243,7 @@ pub fn normal(off: f64, sigma: f64) -> f64 {
     if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * BELL) }
 }
 
-/// The pixels that a place may fall on: columns and rows. None if it is not in view, or reaches behind the camera.
+/// Pixel window (columns and rows) of a region; `None` if out of view, or partly behind the camera.
 fn window(
     lying: &Lying,
     camera_from_surface: &Isometry3<f64>,

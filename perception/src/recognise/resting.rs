@@ -1,4 +1,4 @@
-//! Known round bodies that rest on or in something else and were segmented together with it.
+//! Known round bodies on or in another object, segmented together with it.
 //!
 //! A known body is sought from above: the height map of a segment is searched for circles of the radii that known bodies have, along which
 //! heights drop. What surrounds such a circle tells the height of what would bear the body, or the vessel that it would stand in.
@@ -16,39 +16,43 @@ const CELL_M: f64 = PLACE_M;
 /// Minimum drop of height at the edge of a body's top, metres. From: derived, two points farther
 /// apart are in two places.
 const DROP_M: f64 = APART_M;
-/// Share of a circle on which heights drop, for a body to be sought there. From: chosen, a single view shows half of a top.
+/// Minimum share of a circle with a height drop for a body to be sought there. From: chosen, a
+/// single view shows half of a top.
 const CIRCLE: f64 = 0.5;
 /// Radii that are tried are so far apart, metres. From: derived, half a cell.
 const RADII_M: f64 = EDGE_M;
 /// Circles of one segment that are followed up. From: work.
 const MOST: usize = 3;
-/// Least and greatest distance from a body at which its surroundings are searched, metres. From: chosen, no
-/// nearer than an edge is known.
+/// Minimum and maximum distance from a body in which its surroundings are searched, metres.
+/// From: chosen, no nearer than an edge is known.
 const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
-/// Fewest directions around a body in which something is seen that may bear it. From: chosen, a single view
+/// Minimum number of directions around a body with a visible support. From: chosen, a single view
 /// shows half of what is around a foot.
 const BEARS: usize = 9;
-/// Share of the greatest number of directions in which any level is seen that a level must reach; the support
-/// is the highest such level. From: chosen, nearly all.
+/// Share of the maximum directional support that a level must reach; the highest such level is the
+/// support. From: chosen, nearly all.
 const NEARLY: f64 = 0.8;
-/// Spread of the height that it is found to have, metres. From: derived, a place.
+/// Standard deviation of the support's height, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
-/// Number of directions in which an enclosing vessel must be seen for a body to stand in it, unless a
-/// support right beside its foot is seen in so many. From: chosen.
+/// Minimum number of directions in which an enclosing vessel must be seen for a body inside, unless
+/// a support right beside the foot is seen in as many. From: chosen.
 const ALL_AROUND: usize = 27;
 const BORNE: usize = 14;
-/// Share of the least height of a known body that tells its axis, below its top. From: chosen.
+/// Part below the top, as a share of the lowest known body's height, that determines the axis.
+/// From: chosen.
 const SIDE: f64 = 0.8;
-/// Share of the points between top and support that lie on the side of a body that stands there. From: chosen, more than half.
+/// Minimum share of the points between top and support on the body's side. From: chosen, more than
+/// half.
 const ON_SIDE: f64 = 0.55;
-/// Farthest from a body that something may be its handle, metres. From: derived, the greatest reach of one.
+/// Maximum distance of a handle's points from the body, metres. From: derived, the greatest reach
+/// of one.
 const REACH_M: f64 = HANDLE_M.1;
 
-/// Fewest points from which the remainder of a segment is a thing of its own. From: derived, the fewest of a
-/// segment.
+/// Minimum number of remaining points that form an object of their own. From: derived, the fewest
+/// of a segment.
 const FEWEST_LEFT: usize = 60;
 
-/// A body in a segment, and what is left of that.
+/// Body found in a segment, and the remaining points.
 pub(super) struct Resting {
     pub body: Segment,
     pub rest: Segment,
@@ -87,15 +91,15 @@ impl Rounds {
     }
 }
 
-/// Bodies with one of some radii that a segment may have on or in it.
+/// Bodies with one of the given radii on or in a segment.
 pub(super) fn seek(segment: &Segment, models: &Rounds, sigma_m: f64) -> Vec<Resting> {
     let Some(map) = HeightMap::of(segment) else { return Vec::new() };
     let circles = map.circles(&models.radii_m);
     circles.iter().filter_map(|circle| resting(segment, circle, models.least_m, sigma_m)).collect()
 }
 
-/// Segment with its foot on the bottom of another segment, and the index of that segment: a possible vessel, which is seen all
-/// around and at least as high as the foot.
+/// Segment with its foot on the bottom of another one, a possible vessel that surrounds it at least
+/// as high as the foot; with the vessel's index.
 pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<(Segment, usize)> {
     let segment = &scene.segments[of];
     if segment.base_m < BOTTOM_M.0 + PLACE_M {
@@ -120,7 +124,7 @@ struct HeightMap {
 }
 
 impl HeightMap {
-    /// The height map of a segment; none for one that is too large to be told from a room's furniture.
+    /// Height map of a segment; `None` if the segment is as large as furniture.
     fn of(segment: &Segment) -> Option<HeightMap> {
         /// Cells at the most. From: work.
         const MOST_CELLS: usize = 1 << 20;
@@ -210,7 +214,7 @@ impl HeightMap {
     }
 }
 
-/// The cells that a circle goes through, from its middle.
+/// Cells of a circle, relative to its centre.
 fn ring(radius_m: f64) -> Vec<(i32, i32)> {
     /// Maximum distance of a cell's middle from a circle that goes through the cell, cells. From: derived,
     /// between half a side and half a diagonal.
@@ -223,8 +227,8 @@ fn ring(radius_m: f64) -> Vec<(i32, i32)> {
     cells.filter(is_on).collect()
 }
 
-/// Finds the body below a circle that may be its rim: standing on what is around it, or in a vessel
-/// around it. `None` if it is lower than `least_m`.
+/// Finds the body below a circle that may be its rim, standing on its surroundings or in a vessel;
+/// `None` if lower than `least_m`.
 fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Option<Resting> {
     let outside_m = |p: &Point3<f64>| distance(p.x - circle.x, p.y - circle.y) - circle.radius_m;
     let mut beside = [false; SECTORS];
@@ -255,8 +259,8 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
     (rest.indices.len() >= FEWEST_LEFT).then_some(Resting { body, rest, is_within })
 }
 
-/// Evidence of a support below a body: number of directions in which the surroundings of its foot
-/// are seen, and in which something as high as the foot is seen right beside it.
+/// Evidence of a support below a body: number of directions in which the foot's surroundings are
+/// seen, and in which a level at the foot is seen right beside it.
 struct Bearing {
     around: usize,
     level: usize,
@@ -264,8 +268,8 @@ struct Bearing {
 
 impl Bearing {
     fn of(other: &Segment, axis: &Round, foot_m: f64) -> Bearing {
-        /// Maximum distance of a level from the foot's height, metres. From: derived, an edge, and how far
-        /// things differ from their forms.
+        /// Maximum height difference between a level and the foot, metres. From: derived, an edge,
+        /// and how far things differ from their forms.
         const OFF_M: f64 = EDGE_M + SHAPE_M;
         let [mut around, mut level] = [[false; SECTORS]; 2];
         for p in other.points.iter().filter(|p| (p.z - foot_m).abs() < REACH_M) {
@@ -281,7 +285,8 @@ impl Bearing {
     }
 }
 
-/// Height of what is seen around a body, metres above the surface; none if nothing is, well below its top.
+/// Height of the support around a body, metres above the surface; `None` if nothing well below its
+/// top is seen.
 fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     let band_m = segment.base_m..top_m - APART_M;
     let level = |z: f64| ((z - segment.base_m) / EDGE_M) as usize;
@@ -306,7 +311,7 @@ fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     (level_m > segment.base_m + PLACE_M).then_some(level_m)
 }
 
-/// A segment parted into the body above what is around it, and the rest.
+/// Segment split into the body above its surroundings, and the rest.
 fn parted(segment: &Segment, axis: &Round, top_m: f64, level_m: f64) -> (Segment, Segment) {
     let is_body = |p: &Point3<f64>| {
         p.z > level_m + PLACE_M

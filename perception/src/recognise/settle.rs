@@ -1,4 +1,4 @@
-//! Laying what the views show of one round body on each other.
+//! Local registration of views on one round body.
 //!
 //! Views are merged as wholes, and as such they lie within a centimetre or so of each other: localisation errs, a tracker drifts, and
 //! the front of a lone cup and its back have no point in common that would hold them together. Of a round body each view by itself
@@ -16,29 +16,31 @@ use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix4, Point3, Vector3, Vector4};
 use rustc_hash::FxHashMap;
 
-/// Maximum shift of a view, metres: farther off, the view shows something else. From: chosen.
+/// Maximum shift of a view, metres; beyond it, the view shows another object. From: chosen.
 const MOST_M: f64 = 0.03;
-/// The side has to spread by no more than this share of what it did. From: chosen.
+/// Maximum ratio of the side's spread after and before registration. From: chosen.
 const ROUNDER: f64 = 0.85;
-/// Points farther from the side than this tell nothing of it, metres: at first, and once it is near. From: chosen, one a step.
+/// Maximum distance of used points from the side, metres, decreasing over the iterations. From:
+/// chosen, one a step.
 const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
-/// Points of a view that are enough to go by, and those that it needs. From: chosen.
+/// Number of points used of each view, and minimum number required. From: chosen.
 const ENOUGH: usize = 400;
 const FEWEST: usize = 40;
-/// Share of what a view shows of the body that has to lie on it, and how well, in spreads of a measurement, when the view is settled.
-/// From: chosen.
+/// Minimum share of a view's points on the registered body, and their distance in standard
+/// deviations. From: chosen.
 const ON_IT: f64 = 0.7;
 const WELL: f64 = 1.3;
 
-/// A body whose views are laid on each other.
+/// Body with registered views.
 pub(super) struct Settled<'a> {
     pub segment: Segment,
-    /// The cameras as they lie there.
+    /// Cameras at their registered poses.
     pub asker: Asker<'a>,
     pub round: Round,
 }
 
-/// A body with its views laid on each other; none if they lie so already, or if what they show becomes no rounder by it.
+/// Body with its views registered on it; `None` if they already are, or if registration does not
+/// make the points rounder.
 pub(super) fn settle<'a>(
     round: &Round,
     segment: &Segment,
@@ -94,10 +96,11 @@ impl Side {
     }
 }
 
-/// The body, and by how much each view lies beside it, surface frame, metres: axis, radius, slope and shifts by Gauss-Newton. None if
-/// there is nothing to move, or if what a view shows does not lie on the body even then.
+/// Body and shift of each view, surface frame, metres, by Gauss-Newton over axis, radius, slope and
+/// shifts. `None` if nothing moves, or if a view's points still do not lie on the body.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
-    /// Columns before those of the shifts: axis, radius and slope. From: derived, two for the axis and one each for radius and slope.
+    /// Number of body parameters (axis, radius, slope) before the shifts. From: derived, two for
+    /// the axis and one each for radius and slope.
     const BODY: usize = 4;
     /// Distance from the axis below which the direction away from it is undefined, metres. From: rounding.
     const AT_AXIS_M: f64 = 1e-6;
@@ -160,7 +163,7 @@ impl Side {
     /// True if the points, moved back by a shift, lie on the side of a body, as smooth as the camera
     /// measures.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
-        /// Distance from the side beyond which, if it is also beyond two spreads, a point is not tested,
+        /// Maximum distance of tested points from the side, if also beyond two standard deviations,
         /// metres. From: derived, the last of the gates.
         const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
         let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
@@ -172,9 +175,9 @@ impl Side {
     }
 }
 
-/// The cells that the points of a body lie in, seen from above, those beside them, and their range of heights.
+/// Cells of a body's points seen from above, with their neighbours and height range.
 struct Cells {
-    /// The first cell of a rectangle of them, and how many it has along both axes.
+    /// First cell of the bounding rectangle, and its size in cells.
     first: [i32; 2],
     sizes: [i32; 2],
     /// For each cell of the rectangle: true if points lie in the cell, and true if any lie in or beside the
@@ -231,7 +234,7 @@ impl Cells {
         self.place(p).is_some_and(|place| self.own[place])
     }
 
-    /// True if a point is in or beside the cells, no lower and no higher than the body.
+    /// True if a point is in or next to the cells and within the body's height range.
     fn reaches(&self, p: &Point3<f64>) -> bool {
         p.z > self.low.z && p.z < self.high.z && self.place(p).is_some_and(|place| self.beside[place])
     }
@@ -260,7 +263,8 @@ fn shown_of(view: &Lying<'_>, body: &Cells) -> Vec<Point3<f64>> {
     shown
 }
 
-/// The pixels that a body's box may fall on: columns and rows. None if it is not in view, or reaches behind the camera.
+/// Pixel window (columns and rows) of a body's box; `None` if out of view, or partly behind the
+/// camera.
 fn pixels_of(
     map: &DepthMap,
     camera_from_surface: &Isometry3<f64>,
@@ -282,7 +286,7 @@ fn pixels_of(
     Some([ranges.next()?, ranges.next()?])
 }
 
-/// One point in each small cube: the middle of those there.
+/// One point per small cube: the mean.
 fn thinned(points: impl Iterator<Item = Point3<f64>>) -> Vec<Point3<f64>> {
     let mut cubes: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();

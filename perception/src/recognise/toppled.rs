@@ -1,4 +1,4 @@
-//! A round thing that lies on its side: once it is turned as if it stood, it is measured as what stands.
+//! Round objects lying on their side, measured like standing ones after rotation.
 //!
 //! Which of its ends is the foot is not known: it is turned both ways.
 
@@ -19,19 +19,19 @@ use crate::segment::{Segment, VOXEL_ENDS, quantile};
 use crate::visibility::Visibility;
 use nalgebra::Point3;
 
-/// An end that a camera sees flatter than this tells neither lid nor inside: what it is off by leads far along the ray, cosine of 60
-/// degrees. From: chosen.
+/// Minimum cosine between an end's normal and the viewing direction for the end to show lid or
+/// inside; errors extend far along the ray otherwise, cosine of 60 degrees. From: chosen.
 const FACING: f64 = 0.5;
 
-/// The measures of a thing that may lie, with either end for its foot, and the pixels used for each.
+/// Measures of an object that may lie, with either end as foot, and the pixels used for each.
 pub(super) struct Toppled {
     pub ways: [Way; 2],
-    /// The pixels around it as it lies.
+    /// Pixels around the lying object.
     flat: Rays,
     base_m: f64,
 }
 
-/// A thing turned so that one of its ends is down.
+/// Object rotated so that one of its ends is down.
 pub(super) struct Way {
     pub measured: Measured,
     rays: Rays,
@@ -39,8 +39,8 @@ pub(super) struct Way {
 }
 
 impl Toppled {
-    /// The measures of a thing that may lie. None if it is not as large as any of the models when lying, or
-    /// not round about an axis along the surface.
+    /// Measures of an object that may lie; `None` if no model lying is as large, or the object is
+    /// not round about a horizontal axis.
     pub fn of(
         setting: &Setting,
         segment: &Segment,
@@ -74,7 +74,7 @@ impl Toppled {
         self.ways[0].measured.evidence.round_residual_m
     }
 
-    /// The references that known models that lie are compared with, for each way.
+    /// References for lying models, by end.
     pub fn own(&self, measured: &Measured) -> [Own<'_>; 2] {
         let as_it_lies = Own::of(&self.flat, measured, self.base_m);
         self.ways.each_ref().map(|way| as_it_lies.turned(&way.rays, &way.measured, way.foot_m))
@@ -118,7 +118,7 @@ impl Way {
     }
 }
 
-/// True if a model that lies on its side could be measured so: half of its length may be hidden.
+/// True if a lying model could give these measures; half of its length may be hidden.
 fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
     let (Shape::Round, Some(thick_m)) = (model.shape, model.diameter_m) else { return false };
     let out_m = if model.handle == Handle::None { 0.0 } else { HANDLE_M.1 };
@@ -129,7 +129,7 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
         && is_near(m.footprint.sides_m[0], 0.5 * long_m.low, long_m.high + out_m)
 }
 
-/// The handle of a lying thing, if any was seen.
+/// Handle of a lying object, if seen.
 struct HandleSeen {
     sighting: Sighting,
     /// Share of the directions in which one could hide.
@@ -139,7 +139,7 @@ struct HandleSeen {
 }
 
 impl Found {
-    /// The handle lies beside the body or above it: what it rests on leaves no room below.
+    /// Handle beside or above the body; the support leaves no room below.
     fn handle(&self) -> HandleSeen {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         let band = side_band(low, high);
@@ -162,8 +162,8 @@ impl Found {
         HandleSeen { sighting, unseen, reach_m }
     }
 
-    /// The spread of the side without a possible handle, which says nothing against the roundness of its
-    /// body, metres.
+    /// Spread of the side without a possible handle, which is no evidence against roundness,
+    /// metres.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)

@@ -7,15 +7,15 @@ use super::verify::WALL_M;
 use crate::noise::normal_cdf;
 use crate::scale::{EDGE_M, PLACE_M, SPREADS};
 
-/// Chance that a view says nothing of an upper end, whatever it seems to show. From: chosen.
+/// Probability that a view is uninformative about an upper end. From: chosen.
 const BAD_VIEW: f64 = 0.002;
 
 /// The evidence on the upper end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Upper {
-    /// Log of how much likelier the views are if it is open.
+    /// Log likelihood ratio of an open against a closed end.
     pub open_log: f64,
-    /// Shares of the rays into it that met something below, and something at the rim's height.
+    /// Share of the rays into the end that met something below, and share at the rim's height.
     pub open: f64,
     pub lid: f64,
 }
@@ -25,16 +25,17 @@ impl Upper {
     pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
         /// Distance from the rim within which a ray gives no evidence, metres. From: chosen.
         const RIM_M: f64 = 0.006;
-        /// A ray that falls less tells of no end. From: rounding.
+        /// Minimum descent of a ray that tests an end. From: rounding.
         const LEVEL: f64 = 1e-3;
-        /// Share of the rays into it that tell, and the density of what the others say. From: chosen.
+        /// Share of informative rays into the end, and density of the others. From: chosen.
         const TELL: f64 = 0.9;
         const REST: f64 = 0.02;
-        /// Chance that a ray into an open body meets its wall or floor, rather than something on the way
-        /// there. From: chosen.
+        /// Probability that a ray into an open body meets its wall or floor rather than contents.
+        /// From: chosen.
         const EMPTY: f64 = 0.5;
-        /// A lid lies so many spreads of a measurement below what is taken for the top, one as likely as the other: noise makes things
-        /// higher. From: derived, the highest but one in a hundred lies two spreads above the middle.
+        /// Depths of a lid below the apparent top, in standard deviations, equally likely: noise
+        /// raises the top. From: derived, the highest but one in a hundred lies two spreads above
+        /// the middle.
         const LOWER: [f64; 3] = [0.0, 1.0, 2.0];
         let hollow = Frustum { wall_m: Some(WALL_M), ..*body };
         let (mut all, mut open, mut lid, mut open_logs) = (0.0, 0.0, 0.0, [0.0; LOWER.len()]);

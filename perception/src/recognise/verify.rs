@@ -11,19 +11,19 @@ use crate::scale::{EDGE_M, PLACE_M};
 
 /// Thickness of the walls of vessels, metres. From: chosen.
 pub(super) const WALL_M: f64 = 0.003;
-/// Steps by which a body is moved to where it suits a view best, one after the other, metres. From: work.
+/// Steps of the search for a body's best shift in a view, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
 /// Maximum error of views that were aligned with each other, metres, and maximum number of tries of each
 /// step. From: derived, as exactly as an edge is known; work.
 const LAID: (f64, usize) = (EDGE_M, 2);
-/// The same of views that lie as they were merged. From: derived, a place; work, so that they are moved up to 3 cm.
+/// Standard deviation and number of steps of the shift for views at their merged poses. From:
+/// derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
 /// Least radius of a round body, metres. From: rounding.
 const LEAST_M: f64 = 0.01;
 
-/// The log likelihood of a body in a view, and the shift of the body for it along both axes of the surface,
-/// metres.
+/// Log likelihood of a body in a view, and its best shift along both axes of the surface, metres.
 #[derive(Clone, Copy)]
 pub(super) struct Placed {
     pub log: f64,
@@ -35,12 +35,13 @@ impl Placed {
     pub const UNMOVED: Placed = Placed { log: 0.0, shift_m: [0.0; 2] };
 }
 
-/// The reference that a known model is compared with: the best body of a thing's own measures.
+/// Reference for known models: the best body with the object's own measures.
 pub(super) struct Own<'a> {
     rays: &'a Rays,
     measured: &'a Measured,
     base_m: f64,
-    /// In each view: where its frustum suits best, and the log likelihood of the better of frustum and box, against there being none.
+    /// Per view: best shift of the frustum, and log likelihood of the better of frustum and box,
+    /// against no body.
     placed: Vec<Placed>,
     logs: Vec<f64>,
 }
@@ -65,13 +66,14 @@ impl<'a> Own<'a> {
         Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
     }
 
-    /// The same of the thing turned as if it stood; what explains it best as it lies stays.
+    /// Reference for the object rotated upright; the best explanation as lying is kept.
     pub fn turned<'b>(&self, rays: &'b Rays, measured: &'b Measured, base_m: f64) -> Own<'b> {
         let placed = vec![Placed::UNMOVED; rays.views.len()];
         Own { rays, measured, base_m, placed, logs: self.logs.clone() }
     }
 
-    /// Log of how much less likely a model makes the views than the best body of the thing's own measures: 0 or less.
+    /// Log likelihood ratio of a model against the best body with the object's own measures; at
+    /// most 0.
     pub fn log_against(&self, model: &ObjectModel, stance: Stance) -> f64 {
         let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {
             return 0.0;
@@ -108,12 +110,13 @@ impl<'a> Own<'a> {
     }
 }
 
-/// The upper end is told by itself: all bodies have the likelier one.
+/// Wall thickness of the likelier upper end, common to all bodies, because the upper end is judged
+/// separately.
 fn wall_m(measured: &Measured) -> Option<f64> {
     (measured.upper.open_log > 0.0).then_some(WALL_M)
 }
 
-/// The evidence of one view, bounded where it speaks against the model, since the view may be a bad one.
+/// Evidence of one view, bounded against the model, as the view may be a bad one.
 fn against(log: f64) -> f64 {
     if log < 0.0 { bounded(log, BAD_VIEW) } else { log }
 }
@@ -123,7 +126,7 @@ fn total(logs: &[f64]) -> f64 {
     logs.iter().sum()
 }
 
-/// A body where it suits a view best, were it a good one, near where it lies moved already.
+/// Body at its best shift in a view, near an initial shift.
 pub(super) fn placed(
     view: &ViewRays,
     body: &impl Body,

@@ -1,4 +1,4 @@
-//! The rounds: pair, sum, move, until it settles.
+//! ICP iterations: match, accumulate, move, until convergence.
 
 use super::equations::{Motion, Sums};
 use super::pairs::{Partner, Place};
@@ -9,18 +9,21 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 /// Points whose sums are added up together: fixed, so that the sums do not depend on the number of threads.
 const CHUNK: usize = 1024;
 
-/// Spread of a surface along its normal against along itself in [`Method::Generalised`] (Segal et al. 2009, section III.B).
+/// Variance of a surface along its normal relative to that along itself in [`Method::Generalised`]
+/// (Segal et al. 2009, section III.B).
 const FLAT: f64 = 1e-3;
 
-/// The first rounds look at one point in several only, as long as this many remain: far from the end, fewer points tell the way as well.
+/// Minimum size of the point sample in early iterations, where fewer points give the direction as
+/// well.
 const SAMPLE: usize = 2000;
 const WIDEST_STRIDE: usize = 16;
-/// The sample has done its work when a round moves less than this many times what counts as settled: many small steps of
-/// [`Method::PointToPoint`] are worth taking on it, but of the few large ones of the others the last would lead it into a valley of its own.
+/// Multiple of the convergence threshold below which the sample is replaced by all points: the many
+/// small steps of [`Method::PointToPoint`] are worth taking on the sample, but the few large steps
+/// of the others would end in a local minimum of the sample.
 const NEARLY: f64 = 10.0;
 const NEARLY_BY_PLANES: f64 = 100.0;
 
-/// Moves the source until its points lie on the target.
+/// Aligns the source with the target.
 ///
 /// # Errors
 /// If a cloud is empty, lacks the normals that the method needs, or an option makes no sense. Clouds that do not overlap are no error: see [`Fit::ending`].
@@ -97,12 +100,12 @@ fn middle(points: &[Point3<f32>], pose: &Isometry3<f64>) -> Point3<f64> {
 struct Run<'a> {
     target: &'a Prepared,
     options: &'a RegisterOptions,
-    /// The source in the order of its tree, so that neighbours are searched for one after another.
+    /// Source points in tree order, so that consecutive searches are close.
     points: Vec<Point3<f32>>,
     source: &'a Prepared,
     /// Stride through the points.
     stride: usize,
-    /// The partner of each of those points.
+    /// Correspondence of each of these points.
     partners: Vec<Partner>,
     matched: usize,
     square: f64,
@@ -124,7 +127,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Looks at other points from now on. What was found for the points looked at so far is where the search for those beside them begins.
+    /// Changes the sample stride; earlier correspondences seed the searches of neighbouring points.
     fn look_at_every(&mut self, stride: usize) {
         let guess = |i: usize| self.partners[(i / self.stride).min(self.partners.len() - 1)].guess();
         self.partners = (0..self.points.len()).step_by(stride).map(guess).collect();
@@ -235,7 +238,8 @@ impl<'a> Run<'a> {
         sums.add_scalar(j, r, self.weight(r * r));
     }
 
-    /// The covariance of a surface with normal n is I − (1 − ε) n nᵀ; where there is no surface it is I.
+    /// Generalised-ICP term: the covariance of a surface with normal n is I − (1 − ε) n nᵀ, and I
+    /// without a surface.
     #[inline(always)]
     fn generalised(&self, sums: &mut Sums, p: [f64; 3], t: [f64; 3], ns: [f64; 3], nt: [f64; 3]) {
         let clean = |n: [f64; 3]| if n[0].is_nan() { [0.0; 3] } else { n };

@@ -1,4 +1,4 @@
-//! The sums of one round, and the motion that follows from them.
+//! Normal equations of one iteration, and the resulting motion.
 
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point3, Rotation3, SymmetricEigen, Translation3, UnitQuaternion, Vector3,
@@ -83,7 +83,8 @@ impl Sums {
         full
     }
 
-    /// A difference `d` of two points about the centre, of which the moved one is `p`, weighed by the symmetric matrix `m` (xx xy xz yy yz zz).
+    /// Adds a difference `d` of two points relative to the centre (`p`: the moved one), weighted by
+    /// the symmetric matrix `m` (xx xy xz yy yz zz).
     #[inline(always)]
     pub(super) fn add_weighted(&mut self, p: [f64; 3], d: [f64; 3], m: [f64; 6], weight: f64) {
         let [x, y, z] = p;
@@ -206,7 +207,8 @@ fn ordered(u: Matrix3<f64>, v_t: Matrix3<f64>, values: &Vector3<f64>) -> (Matrix
     (u, v_t)
 }
 
-/// A direction of motion is free if its information is below this part of the best-held one (rotations measured at the typical distance from the centre).
+/// Minimum information of a constrained direction, relative to the best-constrained one (rotations
+/// scaled by the typical distance from the centre).
 const FREE: f64 = 1e-5;
 
 /// The inverse of a normal matrix on the directions that are held, and how many are not.

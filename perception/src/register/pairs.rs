@@ -19,7 +19,8 @@ pub struct Pair {
     pub distance_sq: f32,
 }
 
-/// For each point of the source, in order, the nearest of the target no farther than `within_m` under the pose, if there is one.
+/// For each source point, in order, the nearest target point within `within_m` under the pose, if
+/// any.
 pub fn pairs(
     source: &Prepared,
     target: &Prepared,
@@ -61,10 +62,10 @@ impl Place {
     }
 }
 
-/// The state of one source point's partner since its last search.
+/// Cached correspondence of one source point.
 #[derive(Clone, Copy)]
 pub(crate) struct Partner {
-    /// The position of the point at its last search.
+    /// Position of the point at its last search.
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
     slot: u32,
@@ -84,7 +85,7 @@ impl Partner {
         distance_sq: f32::INFINITY,
     };
 
-    /// The same partner, to be made sure of.
+    /// Correspondence as a guess that needs verification.
     pub(crate) fn guess(self) -> Partner {
         Partner { slot: self.slot, ..Partner::UNKNOWN }
     }
@@ -94,7 +95,8 @@ impl Partner {
         self.others_m == f32::NEG_INFINITY
     }
 
-    /// Brings the partner up to date for the point at `at`; its slot, if it is no farther than `within_m`. Others may be nearer by up to `slack_m`.
+    /// Updates the correspondence for the point at `at`; returns its slot if within `within_m`.
+    /// Others may be nearer by up to `slack_m`.
     #[inline(always)]
     pub(crate) fn update(
         &mut self,
@@ -154,8 +156,8 @@ impl Two {
 }
 
 impl Neighbours {
-    /// Slot and squared distance of the nearest point below `limit_sq`, and the squared distance of the second (or the limit, if that is nearer).
-    /// `guess` is a slot that is likely near.
+    /// Slot and squared distance of the nearest point below `limit_sq`, and the squared distance of
+    /// the second (or the limit, if nearer); `guess`: slot that is likely near.
     fn nearest_two(&self, q: &[f32; 3], limit_sq: f32, guess: u32) -> (Option<(u32, f32)>, f32) {
         let mut two = Two { slot: NONE, first_sq: limit_sq, second_sq: limit_sq };
         if self.is_empty() || !q.iter().all(|c| c.is_finite()) {

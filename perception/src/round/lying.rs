@@ -1,4 +1,4 @@
-//! A round body that lies on its side: about an axis along the surface.
+//! Round body lying on its side: axis parallel to the surface.
 
 use super::{NO_CIRCLE, Round, SEED, side_band};
 use crate::outline::Rectangle;
@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 /// Turns of the trial axes from the sides of the bounding rectangle seen from above, radians. From: chosen.
 const TURNS: [f64; 3] = [0.0, 0.1, -0.1];
-/// Points by which the direction of its axis is sought, at the most. From: chosen.
+/// Maximum number of points for the search of the axis direction. From: chosen.
 const SCOUTS: usize = 300;
 
 /// A round body about an axis along the surface.
@@ -16,13 +16,13 @@ const SCOUTS: usize = 300;
 pub struct LyingRound {
     /// Surface to a frame in which the axis is z and y leads away from the surface.
     pub turned: Isometry3<f64>,
-    /// The body there, and where it ends.
+    /// Body and the positions of its ends.
     pub round: Round,
     pub ends_m: [f64; 2],
 }
 
 impl LyingRound {
-    /// The body with its other end down.
+    /// Body with its other end down.
     pub fn over(&self) -> LyingRound {
         let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), std::f64::consts::PI);
         let LyingRound { turned, round, ends_m: [foot, rim] } = *self;
@@ -31,12 +31,12 @@ impl LyingRound {
     }
 }
 
-/// A body that was found, the points in its frame, and the direction of its axis.
+/// Found body, the points in its frame, and the direction of its axis.
 pub(crate) struct Found {
     pub body: LyingRound,
     pub points: Vec<Point3<f64>>,
     angle: f64,
-    /// Mean squared distance of the points from the side, each at most that of what is clear of it, square metres.
+    /// Mean squared distance of the points from the side, each clamped, square metres.
     miss_m2: f64,
 }
 
@@ -59,8 +59,8 @@ pub(crate) fn fit(points: &[Point3<f64>], bounds: &Rectangle, base_m: f64, sigma
     [Some(found), risen].into_iter().flatten().min_by(best)
 }
 
-/// Fits a body of revolution to an axis of given direction and elevation; `None` unless it rests on
-/// what is below.
+/// Fits a body of revolution about an axis of given direction and elevation; `None` unless it rests
+/// on the support.
 fn about(
     points: &[Point3<f64>],
     origin: &Translation3<f64>,

@@ -1,4 +1,4 @@
-//! The points that can lie on the side of a body, coordinate by coordinate, and sums over them.
+//! Candidate side points of a body in structure-of-arrays form, and sums over them.
 
 use super::{OUTSIDE_M, Round, side_band};
 use nalgebra::{Matrix4, Point3, Vector4};
@@ -14,9 +14,10 @@ pub struct Judges {
     y: Vec<f32>,
 }
 
-/// Points as seen from the first of them, where a tenth of a micrometre is more than they know; filled up with NaN, which is on no side.
+/// Points relative to the first one, in single precision to a tenth of a micrometre; padded with
+/// NaN, which is on no side.
 pub struct Side {
-    /// In the surface's frame, metres.
+    /// Origin in the surface's frame, metres.
     pub origin: [f64; 3],
     x: Vec<f32>,
     y: Vec<f32>,
@@ -36,7 +37,7 @@ pub struct Sums {
     pub count: f64,
     /// Sum of the squared distances of all points that are not inside, each at most [`OUTSIDE_M`].
     pub spread: f64,
-    /// The number of those points.
+    /// Number of points outside the side.
     pub outside: f64,
 }
 
@@ -66,12 +67,12 @@ impl Side {
         self.len
     }
 
-    /// A point's place seen from above, from the first of them.
+    /// Horizontal position of a point relative to the first one.
     pub fn place(&self, i: usize) -> [f64; 2] {
         [self.x[i], self.y[i]].map(f64::from)
     }
 
-    /// The side with every n-th point, at most `to` of them.
+    /// Side with every n-th point, at most `to` of them.
     pub fn thinned(&self, to: usize) -> Side {
         let stride = self.len.div_ceil(to).max(1);
         let len = self.len.div_ceil(stride);
@@ -84,7 +85,7 @@ impl Side {
         Side { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
-    /// Every n-th point, at most `count` of them.
+    /// Every n-th point as a judge, at most `count` of them.
     pub fn judges(&self, count: usize) -> Judges {
         let stride = self.len.div_ceil(count).max(1);
         let pick = |column: &[f32]| column[..self.len].iter().step_by(stride).copied().collect();
@@ -122,7 +123,7 @@ impl Side {
 }
 
 impl Judges {
-    /// The score of a circle given the points, seen from above; `None` if it is not better than `best`.
+    /// Score of a circle for the points, seen from above; `None` if not better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
         /// Penalty of a point inside the circle: less than the half for one outside. From: chosen.
         const INSIDE: f32 = 0.15;
@@ -177,8 +178,8 @@ impl Seen {
         Seen { x, y, middle_m, radius_m, slope, gate }
     }
 
-    /// The terms that each point adds to the sums: the products of the outward normal, the rise above the
-    /// middle and the distance from the side, if it is near, and its square if it is not inside.
+    /// Terms of each point for the sums: products of outward normal, height above the middle and
+    /// distance from the side, if near; and the square of the distance if not inside.
     #[inline(always)]
     fn terms(&self, [x, y, z]: [&Lanes; 3]) -> [Lanes; 17] {
         /// Distance from the axis below which the direction away from it is undefined, metres.

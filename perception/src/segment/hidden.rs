@@ -1,4 +1,4 @@
-//! Bodies that something before them parts: two ends of one face, and what lies between them hidden from all views.
+//! Bodies split by an occluder: two ends of one face, with the gap hidden in all views.
 
 use super::patches::Voxels;
 use super::{SIDE_VOXELS, VOXEL_ENDS, is_upright, members, quantile};
@@ -9,13 +9,16 @@ use crate::visibility::{Seen, Visibility};
 use nalgebra::{Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
-/// Upright faces that a view shows of a box. From: derived, one of two that are across from each other is turned away.
+/// Maximum number of visible upright faces of a box. From: derived, one of two that are across from
+/// each other is turned away.
 const FACES: usize = 2;
-/// Normals of one upright face, and those of two ends of one, turn by no more about it (15°), as a cosine. From: chosen.
+/// Minimum cosine between the normals of one upright face, and between those of two ends of one
+/// (15°). From: chosen.
 const FLAT: f64 = 0.966;
 /// Widest part of a face that is taken to be hidden, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
-/// Steps in which what is between is looked at, metres, and at which shares of its height. From: work.
+/// Step along a gap at which visibility is tested, metres, and at which shares of its height. From:
+/// work.
 const STEP_M: f64 = 0.01;
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
 
@@ -23,20 +26,20 @@ const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
 struct Face {
     /// Unit, horizontal.
     normal: Vector2<f64>,
-    /// Distance of its plane from the origin along the normal, metres.
+    /// Distance of the face's plane from the origin along the normal, metres.
     offset_m: f64,
-    /// The start and the end of the face along its horizontal direction, metres.
+    /// Start and end of the face along its horizontal direction, metres.
     span_m: (f64, f64),
 }
 
-/// A part with its faces.
+/// Part with its faces.
 struct Body {
     name: u32,
     top_m: f64,
     faces: Vec<Face>,
 }
 
-/// Gives the ends of one body that a thing before it parts the same name, the lower one.
+/// Merges parts of one body split by an occluder, under the lower name.
 pub(super) fn join(voxels: &Voxels, part_of_voxel: &mut [u32], seen: &Visibility, surface: &Surface) {
     let body = |(name, of): &(u32, Vec<usize>)| Body::of(*name, voxels, of);
     let bodies = pool::heaviest_first(&members(part_of_voxel), |(_, of)| of.len(), body);
@@ -59,8 +62,7 @@ impl Body {
         Body { name, top_m: quantile(&mut heights, VOXEL_ENDS.1), faces: faces(voxels, of) }
     }
 
-    /// True if faces of both bodies lie in one plane, are equally high, and are hidden in the gap between
-    /// them.
+    /// True if both bodies have coplanar, equally high faces, and the gap between these is hidden.
     fn goes_on_in(&self, other: &Body, seen: &Visibility, surface: &Surface) -> bool {
         (self.top_m - other.top_m).abs() < PLACE_M
             && self.faces.iter().any(|a| {
@@ -70,7 +72,8 @@ impl Body {
     }
 }
 
-/// The upright faces that a part shows, widest first: the direction that most of what is left of its side agrees with, again and again.
+/// Visible upright faces of a part, widest first: repeatedly the direction that most remaining side
+/// points agree on.
 fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
     let mut side: Vec<(Point3<f64>, Vector2<f64>)> = of
         .iter()
@@ -112,7 +115,7 @@ impl Face {
         })
     }
 
-    /// A place in its plane so far along it.
+    /// Point of the face's plane at a distance along it and a height.
     fn at(&self, along_m: f64, height_m: f64) -> Point3<f64> {
         let flat = self.normal * self.offset_m + Vector2::new(-self.normal.y, self.normal.x) * along_m;
         Point3::new(flat.x, flat.y, height_m)
@@ -135,7 +138,7 @@ impl Face {
     }
 }
 
-/// The unseen part of a face between two of its ends.
+/// Unseen part of a face between two of its ends.
 struct Gap<'a> {
     face: &'a Face,
     from_m: f64,

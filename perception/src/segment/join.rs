@@ -9,12 +9,12 @@ use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 
-/// Greatest distance of a patch's voxels from its seed, metres. From: chosen.
+/// Maximum distance of a patch's voxels from its seed, metres. From: chosen.
 const PATCH_REACH_M: f64 = 0.02;
-/// Greatest angle between a voxel's normal and its patch's, as a cosine (25°). From: chosen.
+/// Maximum angle between a voxel's normal and its patch's, as a cosine (25°). From: chosen.
 const PATCH_COS: f64 = 0.906;
-/// A concave joint is still smooth up to this angle, radians (as in locally convex connected patches).
-/// From: chosen, .25 was tried on piles of things and not kept.
+/// Maximum angle of a concave joint that is still smooth, radians (as in locally convex connected
+/// patches). From: chosen, .25 was tried on piles of things and not kept.
 const SMOOTH_RAD: f64 = 0.35;
 
 /// Sets of voxels within which parts are sought.
@@ -22,7 +22,7 @@ pub(super) struct Sets {
     thin: Vec<bool>,
     /// The connected sets of voxels that are not thin.
     sets: Vec<Vec<usize>>,
-    /// The number of each voxel in its set; [`NONE`] of what is thin.
+    /// Index of each voxel in its set; [`NONE`] for thin ones.
     place: Vec<u32>,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options:
     parts
 }
 
-/// Voxels that hang together, none of them thin. Its functions number them as they come.
+/// Connected voxels without thin ones; the methods use indices within the piece.
 pub(super) struct Piece<'a> {
     pub voxels: &'a Voxels,
     /// Their numbers among all, ascending.
@@ -65,7 +65,7 @@ pub(super) struct Piece<'a> {
 }
 
 impl<'a> Piece<'a> {
-    /// `place` is the number here of each of all voxels, [`NONE`] of what is in no piece.
+    /// Piece of the given voxels; `place`: index in its piece by voxel, [`NONE`] outside.
     fn of(voxels: &'a Voxels, of: &'a [usize], place: &[u32]) -> Piece<'a> {
         let count = of.iter().map(|&voxel| voxels.neighbours(voxel).len()).sum();
         let (mut starts, mut near) = (Vec::with_capacity(of.len() + 1), Vec::with_capacity(count));
@@ -104,12 +104,13 @@ impl<'a> Piece<'a> {
     }
 }
 
-/// Voxels with far fewer points than those around them: frayed edges, which hang between objects and connect nothing.
+/// Voxels with far fewer points than their neighbours: frayed edges that hang between objects and
+/// must not connect them.
 fn thin(voxels: &Voxels) -> Vec<bool> {
     /// Share of a neighbour's points below which a voxel has far fewer points than that neighbour.
     /// From: chosen.
     const SHARE: f64 = 0.25;
-    /// Share of the surrounding cells that must be fuller by that factor. From: chosen.
+    /// Minimum share of surrounding cells that are fuller by that factor. From: chosen.
     const MOST: f64 = 0.75;
     let is_thin = |i: usize| {
         let own = f64::from(voxels.counts[i]);
@@ -120,7 +121,7 @@ fn thin(voxels: &Voxels) -> Vec<bool> {
     pool::each(voxels.len(), SOME, is_thin)
 }
 
-/// Gives each thin voxel to the part of its fullest neighbour that is not thin.
+/// Assigns each thin voxel to the part of its fullest neighbour that is not thin.
 fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
     let full = |i: usize| {
         let near = voxels.neighbours(i).iter().map(|&j| j as usize).filter(|&j| !thin[j]);
@@ -173,7 +174,8 @@ struct Patch {
 }
 
 fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
-    /// One over the curvature of a ball, whose normals tell nothing. From: derived, equal moments along three axes.
+    /// Factor by which a sphere's curvature is scaled to one; normals on a sphere give no axis.
+    /// From: derived, equal moments along three axes.
     const PER_BALL: f64 = 3.0;
     /// Normals that add up to less cancel out. From: rounding.
     const CANCELLED: f64 = 1e-9;
@@ -198,7 +200,7 @@ fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
 /// Two neighbouring patches, the lower number first.
 pub(super) struct Border {
     pub patches: (u32, u32),
-    /// Pairs of voxels along it.
+    /// Number of voxel pairs along the border.
     pub length: u32,
 }
 
@@ -235,7 +237,7 @@ fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
     borders
 }
 
-/// True if the surface bends outwards from one patch to the other, or hardly bends.
+/// True if the surface is convex or nearly flat from one patch to the other.
 fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     /// Normals that differ by less (sine) have no crease. From: rounding.
     const NO_CREASE: f64 = 1e-3;

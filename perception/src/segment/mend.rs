@@ -1,4 +1,4 @@
-//! The mends for vessels and handles: what creases wrongly parted.
+//! Repairs of over-segmentation at creases, for vessels and handles.
 
 use super::join::{Border, Piece, Union};
 use super::patches::SOME;
@@ -10,7 +10,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;
 
-/// A part smaller than this share of its neighbour is no object of its own. From: chosen.
+/// Size relative to a neighbour below which a part is no object of its own. From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
 /// Minimum number of voxels of a part that is no fragment. From: chosen.
 const CRUMB_VOXELS: usize = 40;
@@ -18,7 +18,7 @@ const CRUMB_VOXELS: usize = 40;
 /// attached to (a handle, a spout). From: chosen.
 const HANGING_SHARE: f64 = 0.25;
 
-/// Joins what the creases wrongly parted: insides of vessels, handles, crumbs.
+/// Joins parts separated wrongly by creases: insides of vessels, handles, crumbs.
 ///
 /// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
 pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_of: &[u32]) {
@@ -57,7 +57,7 @@ pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_
     }
 }
 
-/// A part that belongs to a neighbour, in the order in which they are joined: few points first, then long borders.
+/// Part that belongs to a neighbour, in joining order: few points first, then long borders.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Belonging {
     points: u32,
@@ -124,7 +124,7 @@ impl Part {
         self.hull.get_or_init(|| convex_hull(self.outer.clone()))
     }
 
-    /// The union of both parts, without the links between them.
+    /// Union of both parts, without the links between them.
     fn with(self, other: Part, both: [u32; 2], made: u32) -> Part {
         let (mut large, small) =
             if self.places.len() >= other.places.len() { (self, other) } else { (other, self) };
@@ -186,7 +186,7 @@ fn gather(joined: &mut Union, Piece { voxels, of, .. }: &Piece, patch_of: &[u32]
     parts
 }
 
-/// Links each part with the parts that it borders on, with the length of the border.
+/// Links bordering parts, with the lengths of the borders.
 fn link(parts: &mut [Option<Part>], joined: &mut Union, borders: &[Border]) {
     let mut links: Vec<(u32, u32, u32)> = Vec::with_capacity(2 * borders.len());
     for Border { patches: (a, b), length } in borders {
@@ -208,7 +208,8 @@ fn is_crumb(small: &Part, large: &Part) -> bool {
     f64::from(small.points) < CRUMB_SHARE * f64::from(large.points) && small.places.len() < CRUMB_VOXELS
 }
 
-/// The inside of a vessel: within the outline of the body and no higher than its rim.
+/// True if the small part is the inside of a vessel: within the body's outline and no higher than
+/// its rim.
 fn is_inside(small: &Part, large: &Part) -> bool {
     small.top_m() < large.top_m() + PLACE_M && most_within(large.hull(), &small.places, |p| *p)
 }

@@ -24,7 +24,7 @@ pub(super) struct Voxels {
     /// run.
     run_starts: Vec<u32>,
     of_run: Vec<u32>,
-    /// The same runs voxel by voxel, and where those of each voxel end.
+    /// Point runs grouped by voxel, and the end of each voxel's group.
     runs: Vec<(u32, u32)>,
     run_ends: Vec<u32>,
 }
@@ -73,7 +73,7 @@ impl Voxels {
         ends.zip(self.of_run[of].iter().map(|&voxel| voxel as usize))
     }
 
-    /// The points of some voxels, voxel by voxel, from those that the voxels were made of.
+    /// Points of some voxels, voxel by voxel; `all`: points that the voxels were made from.
     pub fn points_of(&self, of: &[usize], all: &[Point3<f64>]) -> Vec<Point3<f64>> {
         let count: u32 = of.iter().map(|&v| self.counts[v]).sum();
         let mut points = Vec::with_capacity(count as usize);
@@ -115,13 +115,13 @@ impl Moments {
     }
 }
 
-/// Voxels whose normals are told side by side. From: work.
+/// Number of voxels whose normals are computed together. From: work.
 const LANES: usize = 4;
 /// Voxels that one thread takes in a row. From: work.
 pub(super) const SOME: usize = 256;
 
-/// Gathers points into voxels of a side and estimates a normal for each from its surroundings. Meanwhile something else is told of them that
-/// needs no normals.
+/// Groups points into voxels of the given side, and estimates each voxel's normal from its
+/// surroundings; meanwhile computes a value that needs no normals.
 pub(super) fn voxels<T: Send>(
     points: &[Point3<f64>],
     side_m: f64,
@@ -246,7 +246,7 @@ fn surfaces(
     first: usize,
     viewpoints: &[Point3<f64>],
 ) -> [Option<(Vector3<f64>, f64)>; LANES] {
-    /// Fewest points that tell a normal. From: chosen.
+    /// Minimum number of points for a normal. From: chosen.
     const FEWEST: f64 = 5.0;
     let mut covariances = [[0.0; LANES]; 6];
     for (lane, voxel) in (first..voxels.len()).take(LANES).enumerate() {

@@ -1,6 +1,6 @@
 //! Values by their rank.
 
-/// The value below which a share of the values lies; 0 for none. Reorders them.
+/// Quantile of the values; 0 if empty. Reorders them.
 pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -12,7 +12,7 @@ fn rank(count: usize, share: f64) -> usize {
     ((count - 1) as f64 * share).round() as usize
 }
 
-/// Values among which a limit is chosen, and how many values there must be to make that worthwhile. From: work.
+/// Size of the sample for choosing a limit, and minimum number of values for sampling. From: work.
 const SAMPLE: usize = 64;
 const WORTH_IT: usize = 4 * SAMPLE;
 
@@ -25,7 +25,7 @@ pub fn end(values: &[f64], share: f64) -> f64 {
     if share < 0.5 { lowest(values, rank, |v| v) } else { -lowest(values, values.len() - 1 - rank, |v| -v) }
 }
 
-/// The value of a rank (0 the least) among the values, each taken in a way. Only those up to a limit that a sample suggests are sorted.
+/// Value of a rank (0 is the minimum) among mapped values; sorts only those up to a sampled limit.
 fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
     /// Values that are passed over together. From: work.
     const BLOCK: usize = 16;
@@ -46,7 +46,7 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
     *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// An upper limit, from a sample, below which hardly fewer than `rank` of the values lie.
+/// Upper limit from a sample, below which at least about `rank` of the values lie.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
     /// Spreads of how many of the sample fall below a value that more are let through by. From: work.
     const SAFE: f64 = 3.0;

@@ -1,4 +1,5 @@
-//! Upright round bodies in parts that are more than that: a cup beside a box, whose sides run level where they meet.
+//! Extraction of upright round bodies from larger parts: a cup beside a box, where no crease
+//! separates them.
 //!
 //! The normals of a round body's side point away from its axis. Each voxel of a side votes for the axes that it may belong to; where many
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
@@ -17,9 +18,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Radii that are sought, metres. From: chosen.
 const RADII_M: (f64, f64) = (0.025, 0.085);
-/// Their step and that of places, metres. From: derived, so many radii in that range.
+/// Step of the radii and of the positions, metres. From: derived, so many radii in that range.
 const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
-/// Distance from the body beyond which a point is no longer part of the body, metres. From: chosen, a
+/// Maximum distance of a point from the body that still belongs to it, metres. From: chosen, a
 /// millimetre less leaves a piece beside one thing in 32.
 const CLEAR_M: f64 = 0.009;
 /// Distance from the body beyond which a point is no image of the body in a misplaced view, metres.
@@ -28,16 +29,17 @@ const BESIDE_M: f64 = 0.035;
 /// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
 /// From: chosen, between 1 and the cosine of 45°.
 const FACING: f64 = 0.9;
-/// Share of what stands at the radius that must face so. From: chosen.
+/// Minimum share of the voxels at the radius with radial normals. From: chosen.
 const ROUND_SHARE: f64 = 0.75;
 /// Fewest directions around an axis that must show the side: a third. From: chosen.
 const LEAST_SECTORS: usize = 12;
 /// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
-/// Degree to which the normals of a box stand at right angles (1: all of them). From: chosen.
+/// Minimum concentration of a box's normals at right angles (1: all). From: chosen.
 const SQUARE: f64 = 0.55;
 
-/// Parts round bodies off, and joins what of them creases parted. Parts are named by one of their voxels.
+/// Separates round bodies from parts, and joins their pieces split by creases. A part is named by
+/// one of its voxels.
 pub(super) fn part(
     voxels: &Voxels,
     points: &[Point3<f64>],
@@ -78,7 +80,7 @@ pub(super) fn part(
     }
 }
 
-/// True if the side of a part is that of a box: its normals stand at right angles, and a rectangle fits it.
+/// True if a part's side is that of a box: normals at right angles, and a fitting rectangle.
 fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     let side: Vec<usize> = of.iter().copied().filter(|&v| is_upright(&voxels.normals[v])).collect();
     // Turned by four times their angle, the normals of all sides of a rectangle are one.
@@ -91,9 +93,9 @@ fn is_box(voxels: &Voxels, of: &[usize], points: &[Point3<f64>]) -> bool {
     outline::fits(&voxels.points_of(&side, points), PLACE_M)
 }
 
-/// A round body, and what is left of the parts that it takes voxels from.
+/// Round body, and the remainders of the parts that it takes voxels from.
 struct Cut {
-    /// The voxels of the body with its handle and frayed edge, ascending.
+    /// Voxels of the body with its handle and frayed edge, ascending.
     body: Vec<usize>,
     /// The voxels apart from the body, in connected pieces, each ascending.
     left: Vec<Vec<usize>>,
@@ -134,8 +136,8 @@ impl Cut {
     }
 }
 
-/// True if the remainder beside a body is more than its handle, its frayed edge or its image in a misaligned
-/// view, or rises above the body.
+/// True if the remainder beside a body is more than its handle, its frayed edge or its image in a
+/// misaligned view, or rises above the body.
 fn is_apart(voxels: &Voxels, rest: &[usize], body: &[usize], axis: &Axis) -> bool {
     let heights = |of: &[usize]| {
         let mut heights: Vec<f64> = of.iter().map(|&v| voxels.centres[v].z).collect();
@@ -157,7 +159,7 @@ fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints:
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
 }
 
-/// The votes of the side of what hangs together.
+/// Hough votes of a part's side.
 fn votes_of(voxels: &Voxels, of: &[usize]) -> Votes {
     let (low, high) = bounds(of.iter().map(|&v| voxels.centres[v].xy()));
     let low = [low.x, low.y].map(|c| cell_of(c - RADII_M.1) - 1);
@@ -173,7 +175,7 @@ fn votes_of(voxels: &Voxels, of: &[usize]) -> Votes {
     votes
 }
 
-/// The cells of the axes that a voxel may belong to, radius by radius, if it is one of a side.
+/// Cells of the possible axes of a side voxel, by radius; `None` for other voxels.
 fn voted_for(voxels: &Voxels, voxel: usize) -> Option<[[i32; 2]; RADII]> {
     let (place, normal) = (&voxels.centres[voxel], &voxels.normals[voxel]);
     is_upright(normal).then(|| {
@@ -202,7 +204,7 @@ impl Axis {
     fn sought(votes: &Votes) -> Vec<Axis> {
         /// Axes that are tried. From: chosen.
         const MOST: usize = 8;
-        /// A place and radius has more votes of its own than this. From: chosen.
+        /// Minimum number of own votes of a position and radius, exclusive. From: chosen.
         const FEW: u16 = 3;
         /// Minimum distance between axes, in steps. From: chosen.
         const APART: f64 = 3.0;
@@ -230,7 +232,8 @@ impl Axis {
         distance(p.x - self.x, p.y - self.y)
     }
 
-    /// The voxels, ascending, of the body about the axis: its side, from enough directions, and what is within.
+    /// Voxels (ascending) of the body about an axis: its side, seen from enough directions, and its
+    /// inside.
     fn body(&self, voxels: &Voxels, of: &[usize]) -> Option<Vec<usize>> {
         let near = |v: &usize| {
             is_upright(&voxels.normals[*v])

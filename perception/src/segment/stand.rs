@@ -1,4 +1,4 @@
-//! Support of each thing: the surface, another thing, or the bottom of one that the thing stands in.
+//! Support of each object: the surface, another object, or the bottom of a vessel around it.
 
 use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
 use crate::pool;
@@ -8,19 +8,21 @@ use crate::surface::Outline;
 use nalgebra::{Point3, Vector3};
 use std::sync::OnceLock;
 
-/// Height of the bottom of a vessel or of an open carton in which something stands, metres, and its spread.
-/// From: chosen, bottoms of tins and pans are about one millimetre thick, those of bowls and pots up to seven.
+/// Height of the bottom of a vessel or open carton with an object inside, and its standard
+/// deviation, metres. From: chosen, bottoms of tins and pans are about one millimetre thick, those
+/// of bowls and pots up to seven.
 pub const BOTTOM_M: (f64, f64) = (0.004, 0.003);
 
-/// Maximum distance between a thing's lower edge and the measured top of its support, metres. From: chosen.
+/// Maximum distance between an object's lower edge and the measured top of its support, metres.
+/// From: chosen.
 const MEETS_M: f64 = 0.03;
 /// Minimum number of directions in which an enclosing object is seen around a place, and a
 /// supporting one. From: chosen.
 const AROUND: usize = 27;
 const BEARS: usize = 15;
 
-/// Tells for each segment what it stands on: the surface, another segment that is seen around its foot, or the bottom of one that is
-/// around it. Gives all tops.
+/// Determines the support of each segment: the surface, another segment around its foot, or the
+/// bottom of one that encloses it. Returns all tops.
 pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
     let (tops, boxes): (Vec<f64>, Vec<_>) = pool::map(parts, 1, of).into_iter().unzip();
@@ -61,10 +63,10 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     tops
 }
 
-/// The height at which another thing bears a part, metres: the top of that thing is seen around the part's
-/// foot, or its side below. None if it does not bear the part.
+/// Height at which another object supports a part, metres: that object's top around the part's
+/// foot, or its side below; `None` without support.
 fn borne_at_m(outline: &Outline, (place, low): ([f64; 2], f64), other: &[Point3<f64>]) -> Option<f64> {
-    /// Share of them that lie lower than the top. From: chosen.
+    /// Quantile of the supporting points that defines the top. From: chosen.
     const TOP: f64 = 0.8;
     let is_beside = |p: &&Point3<f64>| {
         (p.z - low).abs() < MEETS_M && outline.covers(p, APART_M) && !outline.covers(p, -PLACE_M)
@@ -81,7 +83,7 @@ fn outline_of(points: &[Point3<f64>]) -> Outline {
     Outline::of(&corners.collect::<Vec<_>>(), &Vector3::z())
 }
 
-/// True if a box is wider than another both ways.
+/// True if a box is wider than another in both directions.
 fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>, Point3<f64>)) -> bool {
     (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
 }

@@ -14,8 +14,8 @@ use std::sync::OnceLock;
 const WIDEST_M: f64 = 0.14;
 /// Share of the points of both that lie on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
-/// Share of the side of each of two parts that must lie on its own round body for both to be images of one, and of a rim on its circle:
-/// its handles do not. From: chosen, more than half.
+/// Minimum share of the side of each of two parts on its own round body for both to be images of
+/// one, and of a rim on its circle; handles are off. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
 /// Bodies are in one place if their axes are nearer than this share of the smaller radius.
 /// From: chosen, two bodies cannot stand so near to each other.
@@ -23,9 +23,9 @@ const ONE_PLACE: f64 = 0.5;
 /// Maximum residual of a body's side, as a share of the residual of any box. From: chosen.
 const OF_BOX: f64 = 0.6;
 
-/// A part with what the pairs ask of it again and again.
+/// Part with cached values for pairwise tests.
 pub struct Candidate {
-    /// Among all; none of what was joined.
+    /// Index among all parts; `None` if joined.
     number: Option<usize>,
     segment: Segment,
     low: Point3<f64>,
@@ -59,7 +59,7 @@ impl Candidate {
             .as_ref()
     }
 
-    /// The round body on its side that it is, if it is one rather than a box.
+    /// Lying round body of the part, if rounder than a box.
     fn lying(&self, viewpoints: &[Point3<f64>]) -> Option<&LyingRound> {
         let fit = || {
             let points = &self.segment.points;
@@ -81,7 +81,7 @@ impl Candidate {
     }
 }
 
-/// Joins parts that lie on one upright round body, and what lies inside it.
+/// Joins parts on one upright round body, and the parts inside it.
 pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment> {
     parts.sort_by(|a, b| b.indices.len().cmp(&a.indices.len()).then(a.indices.cmp(&b.indices)));
     let parts = parts.into_iter().enumerate();
@@ -107,7 +107,7 @@ pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    /// Points of both that tell a body. From: work.
+    /// Number of points of both parts used for fitting a body. From: work.
     const ENOUGH: usize = 2000;
     if !near(large, small) {
         return is_level(large, small) && is_in_reach(large, small) && one_rim([large, small], viewpoints);
@@ -137,7 +137,7 @@ fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) 
     }) || one_rim([large, small], viewpoints)
 }
 
-/// True if a part lies within another part, a round body on its side.
+/// True if a part lies inside another part that is a lying round body.
 fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
     large.lying(viewpoints).is_some_and(|LyingRound { turned, round, ends_m: [low, high] }| {
         let ends_m = low - PLACE_M..high + PLACE_M;
@@ -179,7 +179,7 @@ fn is_level(large: &Candidate, small: &Candidate) -> bool {
     (large.top_m - small.top_m).abs() <= APART_M
 }
 
-/// The round body that nearly all of the side of the points lies on, if it is one rather than a box.
+/// Round body with nearly all side points on it, if rounder than a box.
 pub(super) fn round_body(
     points: &[Point3<f64>],
     low_m: f64,
@@ -211,7 +211,7 @@ impl Fitted {
         !outline::fits(points, self.body.residual_m / share)
     }
 
-    /// Judged by what lies on it: a handle does not.
+    /// True if the spread of the inliers is small; a handle is excluded.
     fn is_tight(&self, points: &[Point3<f64>]) -> bool {
         self.is_near(points, ON_BODY)
     }
@@ -224,7 +224,8 @@ impl Fitted {
             && self.beats_box(points, OF_BOX)
     }
 
-    /// True if most of the points lie on the body, nearer than to a box, and determine its position.
+    /// True if most of the points lie on the body, nearer than to a box, and determine its
+    /// position.
     fn is_placed(&self, points: &[Point3<f64>]) -> bool {
         self.body.inliers >= ON_MOST
             && self.body.place_sigma_m < ONE_PLACE * self.body.radius_m
@@ -242,8 +243,8 @@ fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> boo
         && other.is_placed(&b.segment.points)
 }
 
-/// True if a part is the protrusion of a vessel's side: the part begins at the wall, is no wider than a
-/// handle, reaches no further, and ends below the rim.
+/// True if a part is a handle of a vessel: it begins at the wall, has a handle's width and reach,
+/// and ends below the rim.
 fn is_handle(body: &Round, large: &Candidate, small: &Candidate) -> bool {
     let points = &small.segment.points;
     let [x, y] = middle(points);

@@ -1,17 +1,17 @@
 //! Votes for upright axes: a place and a radius each, counted in cells.
 
-/// Radii that are voted for. From: chosen, steps of 6 mm in the range that is sought.
+/// Number of radii of the Hough transform. From: chosen, steps of 6 mm in the range that is sought.
 pub const RADII: usize = 11;
 /// Cells along each side of a tile. From: work.
 const TILE: usize = 16;
 
-/// Counts in tiles, which are laid where votes fall.
+/// Hough accumulator in tiles, allocated on demand.
 pub struct Votes {
     /// The lowest cell.
     low: [i32; 2],
     /// Tiles along y.
     deep: usize,
-    /// Number of each tile among those that are laid, plus one.
+    /// Index plus one of each allocated tile.
     tiles: Vec<u32>,
     counts: Vec<[u16; RADII]>,
 }
@@ -23,7 +23,7 @@ impl Votes {
         Votes { low, deep: tiles(1), tiles: vec![0; tiles(0) * tiles(1)], counts: Vec::new() }
     }
 
-    /// Tile and place in it; none beyond the cells that were named.
+    /// Tile and index inside it; `None` beyond the declared cells.
     fn locate(&self, x: i32, y: i32) -> Option<(usize, usize)> {
         // What is lower than the lowest is far beyond the highest.
         let [i, j] = [x.wrapping_sub(self.low[0]), y.wrapping_sub(self.low[1])].map(|at| at as u32 as usize);
@@ -31,7 +31,7 @@ impl Votes {
         (j / TILE < self.deep && tile < self.tiles.len()).then_some((tile, i % TILE * TILE + j % TILE))
     }
 
-    /// One vote more for each radius, in the cell that goes with it. Beyond the cells that were named, votes are lost.
+    /// Adds one vote per radius in the given cells; votes beyond the declared cells are dropped.
     pub fn add(&mut self, cells: &[[i32; 2]; RADII]) {
         self.change(cells, |count| count.saturating_add(1));
     }
@@ -50,7 +50,7 @@ impl Votes {
         }
     }
 
-    /// Those of another over the same cells are added.
+    /// Adds the votes of another accumulator over the same cells.
     pub fn join(&mut self, other: &Votes) {
         for (tile, laid) in other.tiles.iter().enumerate().filter(|(_, laid)| **laid > 0) {
             let more = &other.counts[(*laid as usize - 1) * TILE * TILE..*laid as usize * TILE * TILE];
@@ -60,7 +60,7 @@ impl Votes {
         }
     }
 
-    /// The counts of a tile, which is laid if it was not.
+    /// Counts of a tile, allocated if needed.
     fn lay(&mut self, tile: usize) -> &mut [[u16; RADII]] {
         if self.tiles[tile] == 0 {
             self.counts.resize(self.counts.len() + TILE * TILE, [0; RADII]);
@@ -76,7 +76,8 @@ impl Votes {
         self.counts.get(laid * TILE * TILE + place)
     }
 
-    /// The cells with more than `few` votes of their own and `most` or more with those around: how many these are, and x, y and radius.
+    /// Cells with more than `few` votes of their own and at least `most` with their neighbours:
+    /// count, and x, y and radius.
     pub fn peaks(&self, few: u16, most: u32) -> Vec<(u32, [i32; 3])> {
         let mut peaks = Vec::new();
         for (tile, laid) in self.tiles.iter().enumerate().filter(|(_, laid)| **laid > 0) {
@@ -95,7 +96,7 @@ impl Votes {
         peaks
     }
 
-    /// For each radius the votes for it and those next to it, in the cell and the eight around.
+    /// Votes by radius, including neighbouring radii and the eight cells around.
     fn around(&self, x: i32, y: i32) -> [u32; RADII] {
         let mut columns = [0; RADII];
         for counts in (-1..=1).flat_map(|i| (-1..=1).filter_map(move |j| self.at(x + i, y + j))) {

@@ -1,4 +1,4 @@
-//! Extent of a plane where things on it hide it: the plane goes on from where it was seen, as long as no
+//! Extent of a plane under objects that hide it: it continues from its visible part as long as no
 //! camera saw its absence.
 
 use super::face::Grid;
@@ -12,15 +12,16 @@ use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Maximum distance that a plane is assumed to go on behind and beneath things that hide it, metres: few
-/// things are twice as wide. From: chosen.
+/// Maximum assumed continuation of a plane behind and beneath objects, metres: few objects are
+/// twice as wide. From: chosen.
 const HIDDEN_M: f64 = 0.3;
-/// Maximum height of a thing on a plane, metres. From: chosen.
+/// Maximum height of an object on a plane, metres. From: chosen.
 pub(crate) const TALLEST_M: f64 = 0.6;
-/// Height below the plane's edge from which a thing stands beside the plane, metres. From: chosen.
+/// Depth below the plane's edge from which an object stands beside the plane, metres. From: chosen.
 const BESIDE_M: f64 = 0.3;
 
-/// Places of a cell that are tested, from its corner, cells. From: chosen, the middle and near the corners.
+/// Tested positions inside a cell, from its corner, in cells. From: chosen, the middle and near the
+/// corners.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
 /// The part of a plane that a cell belongs to.
@@ -77,7 +78,8 @@ impl<'a> Hiding<'a> {
         Hiding { cameras, rings: (HIDDEN_M / grid.side_m) as usize }
     }
 
-    /// True if no camera saw anything lower than the plane at a cell, and, unless that may be unseen, one saw something above it.
+    /// True if no camera saw anything below the plane at a cell and (unless `unseen`) a camera saw
+    /// something above it.
     fn allows(&self, [x, y]: [i32; 2], unseen: bool) -> bool {
         let mut any = unseen;
         for [dx, dy] in PLACES {
@@ -92,8 +94,8 @@ impl<'a> Hiding<'a> {
         any
     }
 
-    /// Tells of each cell around some whether the plane may reach on there, if that was not told yet; keeps those that do not lie amid
-    /// cells of their own part.
+    /// Decides for each neighbour of some cells whether the plane may continue there; keeps
+    /// neighbours that are not inside their own part.
     fn ask(&self, owners: &mut Owners, border: &mut Vec<[i32; 2]>, unseen: bool) {
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 256;
@@ -115,8 +117,8 @@ impl<'a> Hiding<'a> {
         open.for_each(|(cell, _)| *owners.at(*cell) = Owner::Open);
     }
 
-    /// Gives the hidden cells around those that are owned to their owners, ring by ring, those that no camera had in view as well if told so;
-    /// tells which owners meet.
+    /// Grows owned cells over hidden neighbours, ring by ring (with `unseen`, also over cells
+    /// outside all views); returns the pairs of owners that meet.
     pub fn spread(&self, owners: &mut Owners, mut border: Vec<[i32; 2]>, unseen: bool) -> Vec<[u32; 2]> {
         let mut meeting = Vec::new();
         for _ in 0..self.rings {
@@ -143,14 +145,14 @@ impl<'a> Hiding<'a> {
     }
 }
 
-/// A cell and the eight next to it.
+/// Cell with its eight neighbours.
 pub(super) fn around([x, y]: [i32; 2]) -> impl Iterator<Item = [i32; 2]> {
     (0..9).map(move |k| [x + k % 3 - 1, y + k / 3 - 1])
 }
 
 impl Above<'_> {
-    /// Returns true if the return at a place of the plane, in cells, lies above the plane and false if it
-    /// lies lower; none if the return lies on the plane or is missing.
+    /// True if the return at a plane position (in cells) is above the plane, false if below; `None`
+    /// if on the plane or missing.
     fn above(&self, [x, y]: [f64; 2]) -> Option<bool> {
         let q = self.origin + self.steps[0] * x + self.steps[1] * y;
         let (u, v) = self.map.intrinsics.project(&q.into())?;
@@ -172,7 +174,7 @@ fn longest_ray(camera: &Intrinsics) -> f64 {
 }
 
 impl Surface {
-    /// Adds the places on which things stand that hide the surface's edge.
+    /// Surface extended by the places where objects hide its edge.
     pub(super) fn with_hidden(self, samples: &[Sample], seen: &Visibility) -> Surface {
         let plane = Plane { normal: self.up.into_inner(), offset: self.offset_m };
         let grid = Grid::fine(&plane);
@@ -224,7 +226,7 @@ impl Surface {
     }
 }
 
-/// The cells along the edges of a surface, in order around it.
+/// Cells along the edges of a surface, in order.
 fn along_edges(surface: &Surface, grid: &Grid) -> Vec<[i32; 2]> {
     /// Maximum number of places named along one edge. From: chosen.
     const MOST: f64 = 2000.0;

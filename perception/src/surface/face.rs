@@ -1,4 +1,4 @@
-//! The connected parts of a plane, each with its convex hull.
+//! Connected parts of a plane, each with its convex hull.
 
 use super::extent::{Hiding, Owner, Owners, around};
 use super::hull::{area, convex_hull, parts};
@@ -10,17 +10,17 @@ use crate::scale::{APART_M, SHAPE_M};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Side of the cells that tell which points of a plane hang together, metres. From: chosen.
+/// Cell size for connecting a plane's points, metres. From: chosen.
 const CELL_M: f64 = 0.03;
-/// Fewest samples a cell of a wide plane: with fewer, the cells are twice as wide, and twice again at the
-/// most, as long as there are at least `MANY` of them. From: chosen.
+/// Minimum mean number of samples per cell of a wide plane; with fewer, cells double in width, at
+/// most twice, while at least `MANY` remain. From: chosen.
 const FULL: f64 = 2.0;
 const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
 /// Fewest samples of a piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
 
-/// The connected parts of a plane, most returns first. None if no camera is above it.
+/// Connected parts of a plane by decreasing returns; empty if no camera is above.
 pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Visibility) -> Vec<Surface> {
     let viewpoints = seen.viewpoints();
     if !viewpoints.is_empty() && viewpoints.iter().all(|v| plane.distance(v) < APART_M) {
@@ -95,7 +95,7 @@ fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
     owners
 }
 
-/// The parts of a plane that hang together behind and beneath what hides it.
+/// Parts of a plane joined where they connect behind and beneath occluders.
 fn joined(parts: Vec<Vec<[i32; 2]>>, hiding: &Hiding) -> Vec<Vec<[i32; 2]>> {
     let meeting = match parts.len() {
         0 | 1 => return parts,
@@ -112,7 +112,7 @@ fn joined(parts: Vec<Vec<[i32; 2]>>, hiding: &Hiding) -> Vec<Vec<[i32; 2]>> {
     whole
 }
 
-/// Samples near a plane, and as far again below and above it.
+/// Numbers of samples near a plane, and equally far below and above.
 #[derive(Clone, Copy, Default)]
 struct Counts {
     near: u32,
@@ -125,18 +125,19 @@ impl Counts {
         Counts { near: self.near + other.near, beside }
     }
 
-    /// True if the plane goes through a wall or clutter here: about as much lies on either side of it as near it.
+    /// True if the plane cuts a wall or clutter: as many samples lie on either side as near it.
     fn is_slice(&self) -> bool {
-        /// Share of samples on either side of the plane from which it goes through a body; a body gives a
-        /// half. From: chosen, less than that half.
+        /// Share of samples on either side from which the plane cuts a body; a body gives a half.
+        /// From: chosen, less than that half.
         const SHARE: f64 = 0.2;
         f64::from(self.beside[0].min(self.beside[1])) > SHARE * f64::from(self.near)
     }
 
-    /// True if it is hardly more than where something upright begins: of a wall, half as much lies above as near it.
+    /// True if the plane is merely the foot of something upright: a wall has half as many samples
+    /// above as near.
     fn is_foot(&self) -> bool {
-        /// Share of samples above the plane, of those near it, beyond which something upright begins there; a
-        /// wall gives a half. From: chosen, less than that half.
+        /// Share of samples above the plane, relative to those near it, from which something
+        /// upright begins there; a wall gives a half. From: chosen, less than that half.
         const SHARE: f64 = 0.35;
         f64::from(self.beside[1]) > SHARE * f64::from(self.near)
     }
@@ -169,7 +170,7 @@ impl Grid {
         Grid { turn, side_m: CELL_M, axes }
     }
 
-    /// The finest in which samples of the plane lie cell by cell rather than here and there.
+    /// Finest grid whose cells the plane's samples fill.
     fn filled_by(plane: &Plane, held: &[&Sample]) -> Grid {
         /// Stride of the samples that are enough for the widest cells. From: work.
         const STRIDE: usize = 4;
@@ -206,7 +207,7 @@ fn level(plane: &Plane) -> UnitQuaternion<f64> {
     })
 }
 
-/// The surface of a plane with a hull that was found across another almost like it.
+/// Surface of a plane with a hull found across a nearly equal one.
 fn face(
     plane: &Plane,
     found_in: &Plane,

@@ -1,4 +1,4 @@
-//! Sets of cells and of points in a plane: what hangs together, and the hull.
+//! Connected sets of cells in a plane, and convex hulls.
 
 /// The largest set of cells that hang together, up to two cells apart (shadows of objects); ties go to the first in order. Each cell
 /// is named once.
@@ -31,7 +31,7 @@ fn rank(cell: [i32; 2]) -> u64 {
     x << 32 | y
 }
 
-/// Area of a polygon with its corners anticlockwise.
+/// Area of a polygon with anticlockwise corners.
 pub(crate) fn area(corners: &[[f64; 2]]) -> f64 {
     let next = corners.iter().cycle().skip(1);
     0.5 * corners.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
@@ -67,12 +67,12 @@ struct Run {
     x: i32,
     /// The first and the last.
     ends: [i32; 2],
-    /// The index of the run's first cell among all cells in order, and the number of its cells.
+    /// Index of the run's first cell among all cells in order, and its number of cells.
     at: usize,
     len: usize,
 }
 
-/// For each of some cells in order the first that it hangs together with.
+/// First connected cell, for each of the cells in order.
 fn first_of_part(order: &[([i32; 2], u32)]) -> Vec<usize> {
     /// Cells so far apart hang together: shadows of objects. From: chosen.
     const GAP: i32 = 2;
@@ -144,7 +144,7 @@ pub fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// The points that reach farthest in some ways.
+/// Extreme points in the given directions.
 fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 2]; N] {
     let mut far = [(f64::NEG_INFINITY, [0.0; 2]); N];
     for p in points {
@@ -158,13 +158,15 @@ fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 
     far.map(|(_, p)| p)
 }
 
-/// Drops what lies well inside the octagon of the extreme points, which is no corner of the hull (Akl and Toussaint 1978).
+/// Drops points well inside the octagon of extreme points, which are no hull corners (Akl and
+/// Toussaint 1978).
 fn drop_inner(points: &mut Vec<[f64; 2]>) {
     /// Number of points below which they are sorted directly. From: work.
     const WORTH_IT: usize = 64;
     /// Directions of the corners of a box. From: derived, the four diagonals.
     const SLANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
-    /// Twice the area by which a point is inside of an edge, square metres. From: rounding.
+    /// Minimum doubled area between a point and an edge for the point to be inside, square metres.
+    /// From: rounding.
     const CLEAR_M2: f64 = 1e-12;
     if points.len() < WORTH_IT {
         return;

@@ -1,4 +1,4 @@
-//! Things above and below a surface.
+//! Points above and below a surface's outline.
 
 use super::Surface;
 use nalgebra::{Point3, Vector3};
@@ -6,12 +6,12 @@ use nalgebra::{Point3, Vector3};
 /// The half spaces whose common part is above and below a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
-    /// Unit normals into the surface, and how far along them the edges lie, metres.
+    /// Unit normals into the surface, with the edges' offsets along them, metres.
     edges: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Outline {
-    /// The outline of a convex region, from its corners, anticlockwise seen from above.
+    /// Outline of a convex region with anticlockwise corners, seen from above.
     pub(crate) fn of(hull: &[Point3<f64>], up: &Vector3<f64>) -> Outline {
         let n = hull.len();
         let edge = |i: usize| {
@@ -28,14 +28,14 @@ impl Outline {
     }
 }
 
-/// An outline in rows across the surface's frame: of most places they tell without asking every edge.
+/// Outline as rows in the surface's frame, which decides most points without testing every edge.
 pub struct Rows {
     outline: Outline,
     low_m: f64,
     rows: Vec<Row>,
 }
 
-/// Along x, metres: where places of the row are certainly covered, and where they may be.
+/// Intervals along x, metres: certainly covered, and possibly covered.
 struct Row {
     inside: (f64, f64),
     around: (f64, f64),
@@ -74,7 +74,8 @@ impl Rows {
 
 impl Row {
     fn of(flat: &Outline, ends_m: [f64; 2]) -> Row {
-        /// An edge whose normal leans no more along the row is taken to run along it. From: rounding.
+        /// Maximum component of a normal along the row for an edge that runs along the row. From:
+        /// rounding.
         const ALONG: f64 = 1e-9;
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let mut row = Row { inside: everywhere, around: everywhere };

@@ -6,9 +6,10 @@ use crate::scale;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Points looked at when a plane is sought; more do not change it. From: chosen.
+/// Number of points sampled for the plane search; more change nothing. From: chosen.
 pub(super) const SAMPLE: usize = 16_000;
-/// Points looked at in a single view, which shows less. From: chosen, on piles of things and on recordings.
+/// Number of points sampled of a single view, which shows less. From: chosen, on piles of things
+/// and on recordings.
 pub(super) const SAMPLE_OF_ONE: usize = 12_000;
 /// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
@@ -25,8 +26,8 @@ const BLOCK: usize = 128;
 /// Points that one thread takes in a row. From: work.
 const SOME: usize = 2048;
 
-/// A measurement of a plane lies within this many spreads of its own and this distance of it, metres.
-/// From: derived, as exactly as an edge is known.
+/// Maximum distance of a measurement from its plane, in standard deviations and in metres (the
+/// larger counts). From: derived, as exactly as an edge is known.
 pub(crate) const BAND: (f64, f64) = (scale::SPREADS, scale::EDGE_M);
 
 #[derive(Clone, Copy)]
@@ -50,7 +51,7 @@ impl Plane {
         Plane::band_of(sample.sigma_m)
     }
 
-    /// The maximum distance of a measurement with a given spread from its plane, metres.
+    /// Maximum distance of a measurement with the given standard deviation from its plane, metres.
     pub fn band_of(sigma_m: f64) -> f64 {
         BAND.0 * sigma_m + BAND.1
     }
@@ -80,8 +81,8 @@ pub(crate) fn dominant_planes(
     planes.into_iter().filter(holds).map(|p| (p.normal, p.offset)).collect()
 }
 
-/// Calls back for at most this many large planes, one after another, each fitted without the points
-/// of those before.
+/// Calls back for at most this many large planes in turn, each fitted without the points of earlier
+/// ones.
 pub(super) fn large_planes(
     samples: &[Sample],
     (seed, rounds): (u64, usize),
@@ -160,14 +161,14 @@ impl Cubes {
         }
     }
 
-    /// The points in the cube of a point, itself among them.
+    /// Points in the cube of a point, itself included.
     fn around(&self, point: usize) -> &[u32] {
         let cube = self.of[point] as usize;
         &self.members[self.starts[cube] as usize..self.starts[cube + 1] as usize]
     }
 }
 
-/// The number of each point's cube, and which cubes these are, as they come.
+/// Cube number of each point, and the cubes in order of appearance.
 fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
     /// Cubes a metre. From: derived, their side.
     const PER_M: f64 = 1.0 / REACH_M;
@@ -194,13 +195,14 @@ struct Judges {
     count: usize,
     origin: Vector3<f64>,
     coordinates: [Vec<f32>; 3],
-    /// One over how far each may be off a plane that it speaks for, per metre.
+    /// Inverse of each judge's maximum distance from its plane, per metre.
     per_band: Vec<f32>,
 }
 
 impl Judges {
     fn of(samples: &[Sample]) -> Judges {
-        /// Spreads of a judge, beside the distance that a measurement may have, up to which it speaks for a plane. From: chosen.
+        /// Maximum distance of a supporting judge, in its standard deviations beyond the usual
+        /// band. From: chosen.
         const SPREADS: f64 = 2.0;
         let judges = || samples.iter().step_by(samples.len().div_ceil(JUDGES).max(1));
         let (count, origin) =
@@ -215,9 +217,9 @@ impl Judges {
         Judges { count, origin, coordinates, per_band }
     }
 
-    /// The score of the plane: the nearer a judging point, the more it adds (Torr and Zisserman 2000), so
-    /// that a plane that leans through two steps scores less than the plane of one. `None` as soon as the
-    /// score cannot exceed `beaten`.
+    /// Plane score: nearer judges add more (Torr and Zisserman 2000), so that a plane leaning
+    /// through two steps scores less than the plane of one. `None` as soon as the score cannot
+    /// exceed `beaten`.
     fn near(&self, plane: &Plane, beaten: f64) -> Option<f64> {
         /// Sums side by side. From: work.
         const LANES: usize = 8;
@@ -254,7 +256,7 @@ fn propose(
     rng: &mut Draws,
     plausible: &impl Fn(&Plane) -> bool,
 ) -> Option<Plane> {
-    /// Points tell no plane if twice the area between them is less, square metres. From: chosen.
+    /// Minimum doubled area of three points that define a plane, square metres. From: chosen.
     const FLAT_M2: f64 = 1e-4;
     let judges = Judges::of(left);
     let drawn = (0..PROPOSALS).filter_map(|_| {
@@ -317,7 +319,8 @@ fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
     Some(plane)
 }
 
-/// The plane of least squares through samples, each weighed by its spread; its normal on a side.
+/// Least-squares plane through samples weighted by their variances, with its normal on a given
+/// side.
 pub(super) fn least_squares<'a>(
     samples: impl Iterator<Item = &'a Sample>,
     side: &Vector3<f64>,
@@ -329,7 +332,7 @@ fn weight(sample: &Sample) -> f64 {
     1.0 / (sample.sigma_m * sample.sigma_m)
 }
 
-/// Sums over samples, each weighed by its spread.
+/// Variance-weighted sums over samples.
 #[derive(Default)]
 struct Sums {
     weight: f64,
@@ -356,7 +359,7 @@ impl Sums {
         self
     }
 
-    /// The plane of least squares; its normal on a side.
+    /// Least-squares plane, with its normal on a given side.
     fn plane(&self, side: &Vector3<f64>) -> Option<Plane> {
         if self.weight <= 0.0 {
             return None;

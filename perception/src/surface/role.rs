@@ -1,4 +1,4 @@
-//! Role of a level surface: the floor, or something to stand things on.
+//! Role of a level surface: floor or support.
 //!
 //! A camera that looks past the edge of a table sees what lies lower. Past the floor nothing lies lower: where it ends in an image, the image
 //! ends, something stands before it or a wall rises from it.
@@ -16,9 +16,9 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
-    /// Something to stand things on.
+    /// Supporting surface.
     Support,
-    /// Either that or the floor: nothing tells.
+    /// Undecided: support or floor.
     Untold,
     /// The floor.
     Floor,
@@ -26,23 +26,23 @@ pub enum Role {
     Other,
 }
 
-/// The sign that tells the role of a surface.
+/// Evidence for the role of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sign {
-    /// A surface at its height was asked for.
+    /// A surface at this height was requested.
     Asked,
-    /// Cameras saw past its edge to what lies lower.
+    /// Cameras saw lower points past the edge.
     SeenPast {
-        /// Share of the returns that lie there.
+        /// Share of the returns below.
         share: f64,
     },
-    /// Nothing lies lower, and a surface to stand things on lies above it.
+    /// Nothing lies lower, and a support lies above.
     Under {
         /// The height of that surface above this one, metres.
         by_m: f64,
     },
-    /// Nothing lies lower, and it is larger than tables are.
+    /// Nothing lies lower, and the surface is larger than tables.
     Wide {
         /// Area in view, square metres.
         area_m2: f64,
@@ -66,12 +66,12 @@ pub enum Sign {
         /// Angle between the normals, radians.
         by_rad: f64,
     },
-    /// Nothing lower was seen past its edge.
+    /// Nothing lower was seen past the edge.
     NoEdge {
         /// The mean height of the cameras above the surface, metres.
         eye_m: f64,
     },
-    /// The viewpoint is unknown, and nothing lies lower.
+    /// Nothing lies lower, and the viewpoint is unknown.
     NoCamera,
 }
 
@@ -118,8 +118,8 @@ const AROUND_M: f64 = 0.1;
 const AROUND_RAYS: usize = 5;
 /// Maximum deviation of these hits from the support plane, metres. From: chosen.
 const LEVEL_M: f64 = 0.012;
-/// Minimum and maximum height of an object's top above the surface that it stands on (on the floor: of
-/// a step), metres. From: chosen.
+/// Minimum and maximum height of an object's top above its support (on the floor: of a step),
+/// metres. From: chosen.
 const THING_M: (f64, f64) = (0.015, 0.3);
 /// Minimum number of samples seen beneath a raised surface. From: chosen.
 const BENEATH: usize = 15;
@@ -139,13 +139,13 @@ const WIDE_M2: f64 = 2.5;
 /// A height band no wider than this speaks of tables alone, metres. From: chosen.
 const TELLING_M: f64 = 1.0;
 
-/// The origin of a ray, if known, and the place of its return.
+/// Origin of a ray, if known, and its return.
 pub(super) struct Ray {
     eye: Option<Point3<f64>>,
     end: Point3<f64>,
 }
 
-/// Tells the role of each surface, and how high it lies above the floor.
+/// Determines the role of each surface and its height above the floor.
 pub(super) fn tell(
     surfaces: &mut [Surface],
     samples: &[Sample],
@@ -191,7 +191,8 @@ fn assign(surfaces: &mut [Surface], told: Vec<(Role, Sign)>) {
     }
 }
 
-/// The way up that the surfaces with most returns share; what leans away from a hint of it counts less.
+/// Up direction shared by the surfaces, weighted by returns; less for those that lean away from the
+/// hint.
 fn level(surfaces: &[Surface], hint: Option<&Unit<Vector3<f64>>>) -> Unit<Vector3<f64>> {
     let upright = |s: &Surface| hint.map_or(1.0, |up| up.dot(&s.up).powi(2));
     let returns = |s: &Surface| -> f64 {
@@ -225,7 +226,7 @@ pub(super) fn rays(samples: &[Sample], seen: &Visibility) -> Vec<Ray> {
     rays
 }
 
-/// Share of the returns that lie lower than a surface, past its edge; `None` if it may be an accident.
+/// Share of the returns below a surface, past its edge; `None` if it may be accidental.
 ///
 /// What is seen lower *through* a surface is a reflection in it.
 fn past(surface: &Surface, rays: &[Ray]) -> Option<f64> {
@@ -246,7 +247,7 @@ fn past(surface: &Surface, rays: &[Ray]) -> Option<f64> {
     (count >= PAST_RAYS && share >= PAST_SHARE).then_some(share)
 }
 
-/// The role of a surface that is part of something else, or past whose edge cameras saw.
+/// Role of a surface that is part of another object, or past whose edge cameras saw.
 fn supports(
     n: usize,
     surfaces: &[Surface],
@@ -278,7 +279,7 @@ fn supports(
     }
 }
 
-/// True if every camera sees most of a surface through a better one above it.
+/// True if every camera sees most of a surface through a better one above: a mirror image.
 fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
     let surface = &surfaces[n];
     let is_through = |above: &Surface| {
@@ -295,7 +296,7 @@ fn is_mirrored(n: usize, surfaces: &[Surface], eyes: &[Point3<f64>]) -> bool {
     surfaces[..n].iter().any(is_through)
 }
 
-/// The role of a surface below which nothing was seen.
+/// Role of a surface below which nothing was seen.
 fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Role, Sign) {
     if surface.role != Role::Untold {
         return (surface.role, surface.because.clone());
@@ -314,7 +315,7 @@ fn lowest(surface: &Surface, surfaces: &[Surface], eyes: &[Point3<f64>]) -> (Rol
     }
 }
 
-/// A surface without other evidence is the floor if it is level with a floor surface.
+/// Role of a surface without other evidence: floor if level with a floor surface.
 fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
     let goes_on = |floor: &Surface| {
         let gap = surface.middle() - floor.middle();
@@ -341,13 +342,13 @@ impl Surface {
         Point3::from(self.surface_from_world.inverse().translation.vector)
     }
 
-    /// Longest way across its outline, metres.
+    /// Greatest extent of the outline, metres.
     pub fn reach_m(&self) -> f64 {
         let pairs = self.hull.iter().flat_map(|a| self.hull.iter().map(move |b| (a - b).norm()));
         pairs.fold(0.0, f64::max)
     }
 
-    /// Shortest way across its outline, metres.
+    /// Smallest width of the outline, metres.
     pub fn width_m(&self) -> f64 {
         let edges = self.hull.iter().zip(self.hull.iter().cycle().skip(1));
         let across = |(a, b): (&Point3<f64>, &Point3<f64>)| {
@@ -361,7 +362,7 @@ impl Surface {
         self.up.dot(&other.up) >= PARALLEL
     }
 
-    /// True if something was seen beneath it.
+    /// True if points were seen beneath the surface.
     fn is_open_beneath(&self, samples: &[Sample]) -> bool {
         let outline = self.outline();
         let is_beneath =
@@ -369,7 +370,8 @@ impl Surface {
         samples.iter().filter(is_beneath).take(BENEATH).count() == BENEATH
     }
 
-    /// True if the other, which lies lower, goes on around this: it is seen beside it, and hardly anything lower still.
+    /// True if the lower surface continues around this one: it is seen beside it, with hardly
+    /// anything lower.
     fn stands_on(&self, other: &Surface, rays: &[Ray]) -> bool {
         if !self.is_parallel(other) {
             return false;

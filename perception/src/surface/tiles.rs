@@ -1,4 +1,4 @@
-//! Cells of a plane in square tiles, which are laid where something is.
+//! Cells of a plane in square tiles, allocated on demand.
 
 use rustc_hash::FxHashMap;
 use std::cell::Cell;
@@ -11,9 +11,9 @@ const SIDE: usize = 1 << BITS;
 pub struct Tiles<T> {
     /// The start of each tile in `values`.
     starts: FxHashMap<[i32; 2], usize>,
-    /// The tile that was asked for last, and where it begins.
+    /// Most recently used tile, with its start.
     last: Cell<([i32; 2], usize)>,
-    /// The tiles in the order in which they were laid.
+    /// Tiles in order of allocation.
     tiles: Vec<[i32; 2]>,
     values: Vec<T>,
 }
@@ -30,7 +30,7 @@ impl<T: Copy + Default> Tiles<T> {
         }
     }
 
-    /// The start of a cell's tile, if the tile is laid.
+    /// Start of a tile's cells, if allocated.
     #[inline(always)]
     fn start(&self, tile: [i32; 2]) -> Option<usize> {
         let (last, start) = self.last.get();
@@ -88,7 +88,7 @@ impl<T: Copy + Default> Tiles<T> {
     }
 }
 
-/// The index of a cell in its tile.
+/// Index of a cell in its tile.
 #[inline(always)]
 fn place(cell: [i32; 2]) -> usize {
     let [x, y] = cell.map(|at| at.cast_unsigned() as usize % SIDE);

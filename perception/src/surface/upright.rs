@@ -1,5 +1,5 @@
-//! Estimation of the up direction where it is not given: the direction under which the seen planes are level
-//! or upright, and things stand on the level ones.
+//! Estimates the unknown up direction: the one under which planes are level or upright, and objects
+//! stand on the level ones.
 //!
 //! Every direction that the large planes in view suggest is a hypothesis: a plane may be level, or upright as a wall, alone or with another.
 //! It is as likely as cameras are held so, as most of what was seen lies in planes that are level or upright then, and as what lies in none of
@@ -18,9 +18,10 @@ use rustc_hash::FxHashMap;
 
 /// Planes that are sought at most. From: chosen, a shelf has a dozen.
 const PLANES: usize = 12;
-/// Share of the returns below which a plane is a thing or a piece of one. From: chosen.
+/// Minimum share of the returns on a plane; smaller ones are objects or their pieces. From: chosen.
 const LEAST_SHARE: f64 = 0.0125;
-/// Planes are level or upright if they are no farther off, radians. From: chosen, 8°: twice what a poor camera bends.
+/// Maximum deviation of level and upright planes, radians. From: chosen, 8°: twice what a poor
+/// camera bends.
 const ALIKE_RAD: f64 = 0.14;
 /// Hypotheses that lie no farther apart are one, radians. From: chosen, 15°.
 const ONE_RAD: f64 = 0.26;
@@ -28,38 +29,42 @@ const ONE_RAD: f64 = 0.26;
 /// is against how cameras are held. From: chosen, more likely than not, and as good as sure.
 const LIKELY: f64 = 0.5;
 pub(super) const SURE: f64 = 0.95;
-/// A way up that is farther from how cameras are held is against it, radians. From: chosen, about 70°.
+/// Angle from the cameras' usual attitude beyond which an up direction is implausible, radians.
+/// From: chosen, about 70°.
 const HELD_RAD: f64 = 1.2;
 /// Independent pieces of evidence that all returns make. From: chosen.
 const PIECES: f64 = 20.0;
-/// Shares of returns on planes that are level and face a camera, upright, level and face none (the underside of boards), and neither, each for
-/// those of a plane that lies anyhow. From: chosen, most of what is built is level or upright.
+/// Relative likelihood of returns on planes that are level facing a camera, upright, level facing
+/// away (undersides), and neither, against an arbitrary plane. From: chosen, most of what is built
+/// is level or upright.
 const LEVEL: f64 = 4.0;
 const UPRIGHT: f64 = 4.0;
 const UNDERSIDE: f64 = 3.0;
 const OBLIQUE: f64 = 0.05;
-/// Prior probability that a requested surface is not in view, against one that covers this share of
-/// the returns or more; and that planes tell no upward direction at all. From: chosen.
+/// Prior probability that no requested surface is in view, against one that covers this share of
+/// the returns; and that planes say nothing about up. From: chosen.
 const NO_LEVEL: f64 = 0.1;
 const SHOWN: f64 = 0.2;
 const SHAPELESS: f64 = 0.2;
-/// Share of what lies in no plane that stands on what is level if up is right, and if nothing is known. From: chosen.
+/// Share of the returns off the planes that stand on level ones if up is right, and by chance.
+/// From: chosen.
 const STANDS: f64 = 0.8;
 const ANYHOW: f64 = 0.5;
-/// Independent pieces of evidence that things make, and the share of returns from which on they make them all. From: chosen.
+/// Effective number of independent pieces of evidence from objects, and the share of returns from
+/// which on it is full. From: chosen.
 const THINGS: f64 = 10.0;
 const MANY: f64 = 0.05;
 
 /// The reason the up direction is undecided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
-    /// Nothing in view is a plane.
+    /// No plane is in view.
     NoPlane,
-    /// More than one direction may be up, or the up direction shows nothing level.
+    /// The up direction is ambiguous, or shows nothing level.
     Untold,
 }
 
-/// The way up in the world that cameras saw something of, and how likely it is that.
+/// Up direction in the world, with its probability.
 pub(super) fn up(
     samples: &[Sample],
     seen: &Visibility,
@@ -94,7 +99,7 @@ pub(super) fn up(
     if is_told { Ok((settled(&best.up, &faces), chance)) } else { Err(Doubt::Untold) }
 }
 
-/// The way up that all level planes tell together, each by what it holds: that of a small one may be off.
+/// Up direction refined over all level planes, weighted by returns, as a small plane's may be off.
 fn settled(up: &Unit<Vector3<f64>>, faces: &[Face]) -> Unit<Vector3<f64>> {
     let level = faces.iter().filter(|face| is_level(face, up));
     let sum: Vector3<f64> = level.map(|face| face.plane.normal * face.share).sum();
@@ -106,16 +111,16 @@ fn is_level(face: &Face, up: &Vector3<f64>) -> bool {
     face.plane.normal.dot(up) > ALIKE_RAD.cos()
 }
 
-/// A plane with the returns that it holds.
+/// Plane with its returns.
 struct Face {
-    /// The plane, with its normal on the side of the cameras.
+    /// Plane with its normal towards the cameras.
     plane: Plane,
     members: Vec<Point3<f64>>,
     /// Share of all returns.
     share: f64,
 }
 
-/// The large planes, and what lies in none of them.
+/// Large planes, and the points on none of them.
 fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Point3<f64>>) {
     let viewpoints = seen.viewpoints();
     let mut planes: Vec<Plane> = Vec::new();
@@ -146,8 +151,8 @@ fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Po
 }
 
 impl Face {
-    /// Marks the places of things that would stand on the plane, were it level: they begin near it and are no
-    /// higher than things are.
+    /// Marks the points of objects that would stand on the plane if it were level: they begin near
+    /// it and are no taller than objects.
     fn carries(&self, places: &[Point3<f64>]) -> Vec<bool> {
         /// Side of the cells that separate objects, and height above the plane at which an object
         /// begins, metres. From: chosen.
@@ -179,17 +184,18 @@ impl Face {
 
 /// The returns that lie in no plane.
 struct Things {
-    /// For each plane, which of it would stand on it.
+    /// For each plane, the points that would stand on it.
     standing: Vec<Vec<bool>>,
     /// Share of all returns.
     share: f64,
 }
 
-/// Directions that may be up: those in which a plane is level, and those in which one or two are upright.
+/// Candidate up directions: those that make a plane level, and those that make one or two upright.
 fn ways(faces: &[Face], seen: &Visibility) -> Vec<Unit<Vector3<f64>>> {
-    /// A direction that is nearly across all that is asked for is none. From: chosen.
+    /// Minimum length of a projected direction; shorter ones are undefined. From: chosen.
     const LEAST: f64 = 0.1;
-    /// Planes of which two are taken together, and the sine of the least angle between two walls. From: chosen.
+    /// Number of largest planes of which pairs are taken as walls, and minimum sine between two
+    /// walls. From: chosen.
     const WALLS: usize = 4;
     const APART: f64 = 0.9;
     // Upright planes leave open where up is, but for how cameras are held.
@@ -215,7 +221,7 @@ fn ways(faces: &[Face], seen: &Visibility) -> Vec<Unit<Vector3<f64>>> {
 /// A direction that may be up.
 struct Hypothesis {
     up: Unit<Vector3<f64>>,
-    /// Log of how likely it is, against planes that lie anyhow.
+    /// Log likelihood ratio against arbitrarily oriented planes.
     log: f64,
     /// True if something level that faces a camera is in view.
     is_level: bool,
@@ -251,15 +257,16 @@ impl Hypothesis {
     }
 }
 
-/// Log of how likely cameras are held so that this is up, all of them alike, against the likeliest way.
+/// Log probability of this up direction given how cameras are held, all alike, relative to the
+/// likeliest.
 fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
-    /// Standard deviation of a camera's roll, radians; and probability that it is rotated by a
-    /// quarter or a half turn, for each, or by any other angle. From: chosen.
+    /// Standard deviation of a camera's roll, radians; and probabilities of a quarter or half turn,
+    /// and of any other angle. From: chosen.
     const ROLLED_RAD: f64 = 0.2;
     const TURNED: f64 = 0.003;
     const ANY_WAY: f64 = 0.0003;
-    /// Angle up to which cameras look up at full chance, radians, the spread beyond, radians, and log of the
-    /// least chance. From: chosen.
+    /// Maximum upward pitch of cameras at full probability, radians, standard deviation beyond,
+    /// radians, and minimum log probability. From: chosen.
     const RAISED_RAD: f64 = 0.2;
     const RAISED_SPREAD_RAD: f64 = 0.25;
     const LEAST_RAISED: f64 = -5.0;

@@ -77,7 +77,7 @@ pub(super) struct Header {
 }
 
 impl Header {
-    /// Bytes a point. Cannot overflow: `parse` bounds it.
+    /// Bytes per point; `parse` bounds the value, so that it cannot overflow.
     pub(super) fn stride(&self) -> usize {
         self.fields.iter().map(Field::bytes).sum()
     }
@@ -100,7 +100,8 @@ impl Header {
         )
     }
 
-    /// Refuses `data` that go on for a point or more after `needed` bytes: the header says less than is there. Zeros are padding.
+    /// Rejects `data` that continue for a point or more after `needed` bytes, because the header
+    /// declares too few; zeros are padding.
     pub(super) fn ends_with(&self, data: &[u8], needed: usize) -> Result<(), FileError> {
         let rest = data.get(needed..).unwrap_or_default();
         let more = rest.len() / self.stride();
@@ -116,7 +117,7 @@ impl Header {
     }
 }
 
-/// The entries of the header, each with its line.
+/// Header entries, each with its line number.
 #[derive(Default)]
 struct Said<'a> {
     fields: Option<(usize, Vec<&'a str>)>,

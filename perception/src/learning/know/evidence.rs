@@ -1,5 +1,5 @@
-//! Evidence for a model at a pose: each of its points is a ray of the camera that ends there,
-//! before it or behind it.
+//! Evidence for a model at a pose: the camera ray of each model point ends at the point, in front
+//! of it, or behind it.
 
 use super::scene::Seen;
 use super::skin::{Skin, across};
@@ -11,29 +11,31 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Evidence {
-    /// Points of the model that face the camera, and those that face away where nothing of it is before them: of the side that would be seen there
-    /// nothing was learned.
+    /// Model points facing the camera, plus back-facing ones without a front: points of a visible
+    /// side that was never learned.
     pub facing: usize,
     /// Number of these points at which the camera measured a surface with the model's normal …
     pub explained: usize,
-    /// … points that it saw through …
+    /// Number of facing points that the camera saw through.
     pub through: usize,
-    /// … and points of which nothing is known: something nearer hides them, nothing came back from there, they lie beyond the image, or face away.
+    /// Number of points without information: occluded, without return, outside the image, or
+    /// back-facing.
     pub hidden: usize,
     /// Similarity of colours where explained: 1 the same, 0 altogether different; `None` if model
     /// or scene has no colour.
     pub colour: Option<f64>,
-    /// Mean distance along the ray where it is explained, in standard deviations of the camera.
+    /// Mean distance along the ray at explained points, in standard deviations of the camera.
     pub off_sigmas: f64,
-    /// Mean angle between the normals of the model and of the scene where it is explained, radians.
+    /// Mean angle between model and scene normals at explained points, radians.
     pub turned_rad: f64,
-    /// Share of the places just beyond the model's border where the scene carries on its surface: it may be part of something larger.
+    /// Share of border positions just beyond the model where the scene surface continues, so that
+    /// the model may be part of something larger.
     pub beyond: f64,
     /// Features that voted for the pose.
     pub votes: usize,
 }
 
-/// Weights of what a [`Judge`] looks at.
+/// Number of weights of a [`Judge`].
 pub const WEIGHTS: usize = 9;
 
 /// Judge: logistic regression from evidence to probability.
@@ -44,18 +46,19 @@ pub struct Judge {
 }
 
 impl Default for Judge {
-    /// Weights in the order of [`Evidence::measures`], as part `judge` of `experiments/measure/src/learning` with seed 501 and 80 scenes fits them to drawn objects that
-    /// no evaluation knows, half of them known from all sides and half from one or two looks, among furniture and leaflets that no model is of.
+    /// Weights in the order of [`Evidence::measures`], fitted by part `judge` of
+    /// `experiments/measure/src/learning` (seed 501, 80 scenes) on generated objects that no
+    /// evaluation uses: half known from all sides, half from one or two views, among furniture and
+    /// leaflets without a model.
     fn default() -> Self {
         Judge { weights: [8.30, 8.01, 1.52, -15.86, 1.41, -4.78, -2.84, -9.09, -7.26] }
     }
 }
 
 impl Evidence {
-    /// The features that a [`Judge`] weighs: share of the points that could be seen that are explained;
-    /// likeness of colour, and whether there is none; what carries on beyond; votes; share of the model's
-    /// side that is hidden; share of the points that could be seen that are seen through; how far normals are
-    /// turned from the model's; and one.
+    /// Features of a [`Judge`]: explained share of visible points; colour likeness, and its
+    /// absence; continuation beyond the border; votes; hidden share of the model's side;
+    /// seen-through share of visible points; normal deviation; and a constant one.
     pub fn measures(&self) -> [f64; WEIGHTS] {
         [
             self.explained_share(),
@@ -70,12 +73,12 @@ impl Evidence {
         ]
     }
 
-    /// Share of the points that nothing hides that are explained.
+    /// Explained share of the unoccluded points.
     pub fn explained_share(&self) -> f64 {
         self.explained as f64 / self.open().max(1) as f64
     }
 
-    /// Points that nothing hides.
+    /// Number of unoccluded points.
     pub(super) fn open(&self) -> usize {
         self.facing.saturating_sub(self.hidden)
     }
@@ -94,7 +97,7 @@ impl Evidence {
 }
 
 impl Judge {
-    /// Probability that a model with this evidence is where it is said to be.
+    /// Probability that a model with this evidence is at its pose.
     pub fn confidence(&self, evidence: &Evidence) -> f64 {
         let sum: f64 = self.weights.iter().zip(evidence.measures()).map(|(w, m)| w * m).sum();
         1.0 / (1.0 + (-sum).exp())
@@ -108,8 +111,8 @@ pub(super) const NEAR_M: f32 = 0.012;
 /// Colour difference (CIE 1976, lightness counts half) at which colours no longer speak for a
 /// match.
 const UNLIKE: f32 = 14.0;
-/// Distance beyond the explained points at which the scene is tested for carrying on, metres, where no point
-/// of the model lies within this distance; and the least cosine between normals for it to do so.
+/// Distance beyond explained points at which continuation of the scene is tested, metres, where no
+/// model point is that near; and minimum cosine between the normals for continuation.
 const BEYOND_M: f32 = 0.018;
 const WITHIN_M: f32 = 0.010;
 const SMOOTH: f32 = 0.94;
@@ -135,7 +138,8 @@ pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, vo
     Verified { evidence, claims }
 }
 
-/// The same as if nothing carried on beyond the model's border and each side of it had been learned.
+/// Evidence as if the scene did not continue beyond the model and each side of the model had been
+/// learned.
 pub(super) fn unbounded(
     model: &Skin,
     camera_from_model: &Isometry3<f64>,
@@ -169,12 +173,12 @@ fn towards_camera(camera_from_model: &Isometry3<f64>) -> Vector3<f32> {
     (camera_from_model.inverse() * Point3::origin()).coords.cast::<f32>().normalize()
 }
 
-/// True if a ray through a place met nothing up to there and farther than a measurement errs.
+/// True if a ray through a point met nothing up to it and ended farther than the measurement error.
 fn sees_through(z_m: f32, nearest_m: f32) -> bool {
     nearest_m > z_m + tolerance_m(z_m).max(0.01)
 }
 
-/// Adds what rays say of the sides of a model that would be seen and were not learned: the camera saw through them, or nothing is known of them.
+/// Adds the evidence of visible but never learned sides: seen through, or without information.
 fn add_backs(
     evidence: &mut Evidence,
     model: &Skin,
@@ -242,8 +246,8 @@ fn likeness(model: &Skin, scene: &Skin, pairs: &[(usize, usize)]) -> Option<f64>
     Some(pairs.iter().map(alike).sum::<f64>() / pairs.len() as f64)
 }
 
-/// Share of the places just beyond the model's border where the scene carries on the surface that the model would end: of places that something hides, or
-/// that sent nothing back, nothing is known. Whatever fits inside a wall fits the wall, so that wide planes count as all else does.
+/// Share of border positions where the scene continues the model's surface, without occluded
+/// positions and missing returns. Any patch fits a larger wall, so wide planes count too.
 pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, claims: &[u32]) -> f64 {
     let model_from_camera = camera_from_model.inverse();
     let (mut carried, mut asked) = (0_usize, 0_usize);

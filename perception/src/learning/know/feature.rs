@@ -1,4 +1,5 @@
-//! Local features: shape where a surface bends (SHOT: Tombari, Salti, Di Stefano 2010), the printed pattern where it is coloured.
+//! Local features: shape where the surface bends (SHOT: Tombari, Salti, Di Stefano 2010), and
+//! printed pattern where it is coloured.
 
 use super::skin::{Skin, across};
 use crate::pool;
@@ -14,7 +15,7 @@ pub struct Feature {
 /// Bytes that are compared in one go: of descriptors, and of codes.
 const BLOCK: usize = 32;
 const CODE: usize = 16;
-/// Number of units of the descriptor's sums in one unit of its code.
+/// Quantisation step of the descriptor's group sums in a code.
 const COARSE: u16 = 4;
 
 /// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
@@ -23,7 +24,8 @@ pub struct Features {
     pub all: Vec<Feature>,
     kind: Kind,
     pub blocks: Vec<[u8; BLOCK]>,
-    /// Sums of groups of bytes, coarsely: what is alike has codes that are, and they have a quarter of the bytes or fewer.
+    /// Quantised sums of groups of descriptor bytes: similar descriptors have similar codes, of a
+    /// quarter of the size or less.
     pub codes: Vec<[u8; CODE]>,
 }
 
@@ -45,7 +47,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Bytes of a descriptor, and of its code.
+    /// Length of a descriptor and of its code, bytes.
     pub const fn lengths(self) -> (usize, usize) {
         match self {
             Kind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
@@ -114,7 +116,8 @@ impl Features {
         &self.codes[k * each..(k + 1) * each]
     }
 
-    /// Adds those of another view of the same thing that are not here yet: at another place, or described otherwise.
+    /// Adds another view's features of the same object that are new: at another place, or with
+    /// another descriptor.
     pub fn add_new(&mut self, more: &Features) {
         let before = self.all.len();
         for (k, feature) in more.all.iter().enumerate() {
@@ -131,13 +134,12 @@ impl Features {
         }
     }
 
-    /// The features that are most alike to others of the same kind, at most `most` of them, the most alike
-    /// first, and the median distance of all features to their most alike ones. Codes select the pairs that
-    /// are compared.
+    /// At most `most` features with the most similar partners of the same kind, best first, and the
+    /// median distance of all features to their best partners. Codes preselect the compared pairs.
     pub fn most_alike(&self, others: &Features, most: usize) -> (Vec<Alike>, u32) {
-        /// Number of candidates whose descriptors are compared, in multiples of the wanted number, and the
-        /// number of others that each is compared with. In drawn scenes as many are named then as when all
-        /// are compared; with two times as many, more was said where nothing stands.
+        /// Number of candidates with full comparison, in multiples of the wanted number, and number
+        /// of partners compared with each. In generated scenes recognition then equals that of full
+        /// comparison; a factor of two gave more false answers.
         const LIKELY: usize = 6;
         const CLOSE: usize = 24;
         /// Number of features in the middle by their codes that give the median.
@@ -196,7 +198,8 @@ const SAME_OFF: u32 = 256;
 const SHAPE_M: f32 = 0.04;
 /// Sectors of azimuth, elevation and radius, and bins of the angle between normals.
 const SECTORS: [usize; 4] = [8, 2, 2, 11];
-/// A neighbourhood whose normals are more of one mind is flat: nothing to tell apart. One less the length of their mean.
+/// Flatness threshold: one minus the length of the mean normal; neighbourhoods below it have no
+/// distinctive shape.
 const FLAT: f32 = 0.04;
 const FEWEST: usize = 20;
 
@@ -272,15 +275,16 @@ fn local_frame(
 /// A colour pattern is sampled on a square of this many cells a side, and this side length, metres.
 const CELLS: usize = 8;
 const CELL_M: f32 = 0.006;
-/// Least change of lightness from the middle to the border of a pattern that gives it a direction, in units of L*.
+/// Minimum lightness difference between centre and border of a pattern that defines its direction,
+/// in L* units.
 const CONTRAST: f32 = 4.0;
 /// Least share of the cells that must have been seen.
 const COVERED: f32 = 0.75;
 /// Bytes a unit: of lightness after normalising, and of a* and b*.
 const SCALES: [f32; 2] = [40.0, 2.0];
 
-/// Lightness and colour on a square of the tangent plane, turned to where it gets lighter and free of contrast, as Brown, Szeliski and Winder (2005)
-/// do in images.
+/// Contrast-normalised lightness and colour on a square of the tangent plane, oriented by the
+/// lightness gradient, as in Brown, Szeliski and Winder (2005).
 fn pattern(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
     let lab = skin.lab.as_ref()?;
     let (at, normal) = (skin.points[centre], skin.normals[centre]);

@@ -1,4 +1,5 @@
-//! Correspondences that one pose explains (geometric consistency: Chen and Bhanu 2007), and that pose.
+//! Geometric-consistency grouping of correspondences (Chen and Bhanu 2007), and the pose of each
+//! group.
 
 use super::feature::{Feature, Features};
 use crate::register::rigid;
@@ -9,7 +10,7 @@ use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 pub struct Match<'a> {
     pub model: &'a Feature,
     pub scene: &'a Feature,
-    /// Distance of the descriptors in units of the median of all matches of its kind.
+    /// Descriptor distance in units of the median of all matches of the same kind.
     pub off: f32,
 }
 
@@ -19,7 +20,7 @@ const SEEDS: usize = 120;
 /// Matches of a group agree in distances to this, metres, and in cosines between normals to this.
 const AGREE_M: f32 = 0.01;
 const AGREE_COS: f32 = 0.25;
-/// Matches nearer to each other tell nothing new, metres.
+/// Minimum distance between matches in a group, metres; nearer ones are redundant.
 const APART_M: f32 = 0.012;
 /// Fewest matches of a group.
 const FEWEST: usize = 3;
@@ -38,14 +39,14 @@ pub fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
     found.collect()
 }
 
-/// A pose and the number of matches that speak for it.
+/// Pose with its number of supporting matches.
 #[derive(Clone, Copy, Debug)]
 pub struct Vote {
     pub scene_from_model: Isometry3<f64>,
     pub matches: usize,
 }
 
-/// Poses by groups of matches that agree with each other, those of most matches first.
+/// Poses of consistent groups of matches, by decreasing number of matches.
 pub(super) fn votes(matches: &mut [Match]) -> Vec<Vote> {
     matches.sort_by(|a, b| a.off.total_cmp(&b.off));
     let n = matches.len();
@@ -72,13 +73,14 @@ pub(super) fn votes(matches: &mut [Match]) -> Vec<Vote> {
     votes
 }
 
-/// Least part of a normal that is level, for it to say how a thing that stands is turned.
+/// Minimum horizontal component of a normal that determines the heading of a standing object.
 const LEVEL: f64 = 0.4;
-/// Matches by which a thing stands so near to the same place, metres and radians, speak for one pose.
+/// Tolerance within which standing poses of two matches are one, metres and radians.
 const ONE: (f64, f64) = (0.02, 0.26);
 
-/// Poses of a thing that stands as it stood when it was learned, those that most matches speak for first: where up is known, the place and the normal of one
-/// match say the rest, so that what is small and smooth has a pose by matches that would not agree in groups. `up` is up in the model and in the scene.
+/// Upright poses of an object, by decreasing number of supporting matches. With a known up
+/// direction, place and normal of one match determine the pose, so that small smooth objects get
+/// poses without consistent groups. `up`: up direction in model and scene.
 pub fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
     let poses: Vec<Isometry3<f64>> = matches.iter().filter_map(|m| stood(m, up)).collect();
     let is_one = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
@@ -100,7 +102,7 @@ pub fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<V
     apart
 }
 
-/// The pose of a thing that stands, by one match; none if its normal is steep, or rises otherwise.
+/// Upright pose from one match; `None` if the normal is steep, or has another slope in the scene.
 fn stood(m: &Match, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
     let (of_model, of_scene) = (m.model.normal.cast::<f64>(), m.scene.normal.cast::<f64>());
     let rises = (of_model.dot(&up[0]), of_scene.dot(&up[1]));

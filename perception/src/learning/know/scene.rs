@@ -24,16 +24,16 @@ pub struct Seen {
 
 const NORMALS: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
-/// Neighbours that a normal is made of where there are no pixels, and for registration.
+/// Number of neighbours for normals of unorganised clouds and for registration.
 const NEIGHBOURS: usize = 20;
-/// Most wide planes, and how far points lie from them at most, metres.
+/// Maximum number of wide planes, and maximum distance of a point from its plane, metres.
 const PLANES: usize = 6;
 const PLANE_M: f32 = 0.012;
-/// Least cosine between the normals of a point and its wide plane.
+/// Minimum cosine between the normals of a point and of its wide plane.
 const LEVEL: f32 = 0.85;
 
 impl Seen {
-    /// Prepares what lies within `range_m`. Planes of more than `widest_m2` are of no object.
+    /// Prepares the returns within `range_m`; planes larger than `widest_m2` belong to no object.
     pub fn new(view: &View, range_m: f64, widest_m2: f64) -> Result<Seen, KnowError> {
         let map = DepthMap::from_view(view, &Isometry3::identity()).ok_or(KnowError::NoCamera)?;
         let near = |p: &Point3<f32>| is_finite(p) && f64::from(p.z) <= range_m;
@@ -50,7 +50,8 @@ impl Seen {
         Ok(Seen { skin, wide, target, map })
     }
 
-    /// Depth measured at the pixel of a point and the least around it, metres; `None` beyond the image or where nothing came back at all.
+    /// Depth at the pixel of a point, and the minimum around it, metres; `None` outside the image
+    /// or without any return.
     pub fn around(&self, p: &Point3<f64>) -> Option<(f32, f32)> {
         let (u, v) = self.map.intrinsics.project(p)?;
         let pixel = self.map.intrinsics.pixel(u, v)?;

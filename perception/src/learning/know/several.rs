@@ -12,10 +12,10 @@ const LEAST: f64 = 0.02;
 /// Fewest points of a model that a look could have shown for the look to say anything of the model.
 const FEWEST: usize = 40;
 
-/// A look made ready, with what it suggests.
+/// Prepared view, with its recognition candidates.
 pub struct Glance {
     scene: Seen,
-    /// Models that may be there, whatever shares their place, the surest first.
+    /// Candidate models, most confident first, possibly overlapping.
     pub guesses: Vec<Guess>,
 }
 
@@ -28,25 +28,25 @@ pub struct Guess {
     pub camera_from_model: Isometry3<f64>,
     /// Probability, by this look alone.
     pub confidence: f64,
-    /// Features that voted for it.
+    /// Number of features that voted for the candidate.
     pub votes: usize,
 }
 
-/// A model at a place as several looks have it.
+/// Model at a pose, judged by several views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// Pose in the world, by the look that shows most of it.
+    /// Pose in the world, from the view that shows most of the model.
     pub world_from_model: Isometry3<f64>,
     /// Evidence of all looks.
     pub evidence: Evidence,
     /// Probability of this object at this pose.
     pub confidence: f64,
-    /// Number of looks that could have shown it.
+    /// Number of views in which the model could be visible.
     pub looks: usize,
 }
 
 impl Library {
-    /// Makes a look ready and guesses what is in it.
+    /// Prepares a view and finds candidates in it.
     ///
     /// # Errors
     /// If the view is no depth image.
@@ -67,7 +67,8 @@ impl Library {
         Ok(Glance { scene, guesses })
     }
 
-    /// Holds a guess, which is somewhere in the world, against some looks, each with where its camera stood; `None` if none could have shown it.
+    /// Judges a candidate (world pose) by several views with their camera poses; `None` if it could
+    /// be visible in none.
     ///
     /// # Errors
     /// If a pose cannot be refined.

@@ -1,4 +1,4 @@
-//! A surface at one resolution: what models and scenes are compared as.
+//! Surface at a fixed resolution, the form in which models and scenes are compared.
 
 use crate::cloud::{Cloud, CloudError, is_finite};
 use crate::neighbours::Neighbours;
@@ -7,9 +7,9 @@ use crate::voxel;
 use nalgebra::{Point3, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Distance of its points, metres.
+/// Spacing of the points, metres.
 pub(super) const STEP_M: f32 = 0.004;
-/// Cells in which what lies behind is hidden, and how far behind, metres.
+/// Cell size for occlusion tests, and minimum distance behind the front, metres.
 const CELL_M: f32 = 0.008;
 const BEHIND_M: f32 = 0.012;
 /// Minimum cosine between a normal and its viewing direction.
@@ -21,7 +21,7 @@ pub fn across(along: &Vector3<f32>) -> Vector3<f32> {
     along.cross(&aside).normalize()
 }
 
-/// Points about `STEP_M` apart, with normals towards whoever sees them.
+/// Points about `STEP_M` apart, with normals towards the viewers.
 pub struct Skin {
     pub points: Vec<Point3<f32>>,
     pub normals: Vec<Vector3<f32>>,
@@ -59,8 +59,8 @@ impl Skin {
         (0..self.points.len() as u32).filter(seen).collect()
     }
 
-    /// The foremost points in a direction that face away, in cells without any seen point: a body that is no
-    /// shell has a side there that hides them, of which nothing is known.
+    /// Foremost back-facing points in a direction, in cells without a visible point: a solid body
+    /// has an unknown side there that hides them.
     pub fn backs_from(&self, away: &Vector3<f32>, seen: &[u32]) -> Vec<u32> {
         let front = Front::of(self, away);
         let shown: FxHashSet<_> = seen.iter().map(|&i| front.cell(&self.points[i as usize])).collect();
@@ -82,7 +82,8 @@ impl Skin {
         })
     }
 
-    /// One index a cube of `step_m`, of the points for which `wanted` holds: that nearest to the middle of those in the cube.
+    /// One index per cube of `step_m` among the points accepted by `wanted`: the point nearest to
+    /// the cube's mean.
     pub fn keypoints(&self, step_m: f32, wanted: impl Fn(usize) -> bool) -> Vec<u32> {
         let chosen: Vec<u32> = (0..self.points.len() as u32).filter(|&i| wanted(i as usize)).collect();
         let points: Vec<Point3<f32>> = chosen.iter().map(|&i| self.points[i as usize]).collect();
@@ -129,7 +130,7 @@ impl Front {
         (at(&self.axes[0]), at(&self.axes[1]))
     }
 
-    /// True if nothing lies before a point of the skin.
+    /// True if no part of the skin occludes the point.
     fn has(&self, p: &Point3<f32>) -> bool {
         self.away.dot(&p.coords) > self.heights[&self.cell(p)] - BEHIND_M
     }
@@ -138,7 +139,8 @@ impl Front {
 /// Neighbours that a normal is made of.
 const NEIGHBOURS: usize = 20;
 
-/// A cloud of a body that was seen from all around with normals that point out: away from the middle of its bounds, which holds for bodies that bulge.
+/// Cloud of a body seen from all around, with outward normals, away from the centre of its bounds;
+/// valid for convex-like bodies.
 ///
 /// # Errors
 /// If there are more points than 32-bit indices can name.

@@ -11,21 +11,21 @@ const TILTED_RAD: f64 = 0.35;
 /// Points no higher above the lowest are of the foot, metres.
 const FOOT_M: f32 = 0.015;
 /// Number of directions around the foot, and distance from it in metres, in which a support is
-/// looked for.
+/// sought.
 const AROUND: u16 = 24;
 const BESIDE_M: f32 = 0.02;
-/// Maximum height difference between a level surface and the foot that it carries, metres: of a model the
-/// lowest centimetre may be missing.
+/// Maximum height difference between a level surface and the supported foot, metres; a model may
+/// lack the lowest centimetre.
 const STEP_M: f64 = 0.03;
-/// Least cosine between up and the normal of what is level.
+/// Minimum cosine between up and the normal of a level surface.
 const LEVEL: f64 = 0.8;
 /// Fewest places that give evidence.
 const LEAST: usize = 6;
 /// Ratio of places seen past to places that carry the model from which the model floats.
 const FLOATS: usize = 2;
 
-/// False if a model is tilted, or if hardly anything is beneath it: all around its foot the camera saw past where it would stand. `up` is up in the model
-/// and in the camera's frame.
+/// False if a model is tilted, or hardly supported: the camera saw past the support height all
+/// around its foot. `up`: up direction in the model and in the camera frame.
 pub fn stands(
     model: &Skin,
     camera_from_model: &Isometry3<f64>,
@@ -53,7 +53,7 @@ pub fn stands(
     carried + past < LEAST || past <= FLOATS * carried
 }
 
-/// Places around the foot of a model, at its height.
+/// Points around the foot of a model, at its height.
 fn beside_foot(model: &Skin, up: &Vector3<f32>) -> Vec<Point3<f32>> {
     let height = |p: &Point3<f32>| up.dot(&p.coords);
     let low = model.points.iter().map(height).fold(f32::INFINITY, f32::min);

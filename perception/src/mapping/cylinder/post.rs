@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Turns that are tried, and rounds in which the sides come to rest.
 const TURNS: usize = 22;
 const ROUNDS: usize = 5;
-/// Columns farther from a side do not pull it, in tolerances.
+/// Maximum distance of columns that influence a side, in tolerances.
 const PULLS: f64 = 1.5;
 
 /// A column in the frame of the post.
@@ -17,7 +17,8 @@ struct Local<'a> {
     towards: Vector2<f64>,
 }
 
-/// Mean square distance of columns from the post that fits them best, each at most the square of the tolerance.
+/// Mean squared distance of columns from the best-fitting post, each limited to the squared
+/// tolerance.
 pub(super) fn misses_m2(columns: &[Column], tolerance_m: f64) -> f64 {
     let turned = |k: usize| {
         let turn = Rotation2::new(-FRAC_PI_2 * k as f64 / TURNS as f64);
@@ -27,7 +28,7 @@ pub(super) fn misses_m2(columns: &[Column], tolerance_m: f64) -> f64 {
     (0..TURNS).map(turned).fold(f64::INFINITY, f64::min)
 }
 
-/// The same for a post whose sides lie along the axes.
+/// Mean squared distance of columns from the best axis-parallel post.
 fn upright_m2(columns: &[Local], tolerance_m: f64) -> f64 {
     let end = |axis: usize, share: f64| {
         let mut values: Vec<f64> = columns.iter().map(|c| c.at[axis]).collect();

@@ -2,7 +2,9 @@
 
 mod columns;
 pub mod depth;
+mod error;
 mod las;
+mod loaded;
 #[doc(hidden)]
 pub mod lzf;
 mod npy;
@@ -10,63 +12,8 @@ pub mod pcd;
 pub mod ply;
 mod text;
 
-use crate::cloud::{Cloud, CloudError, Grid};
-use nalgebra::{Isometry3, Point3, Vector3};
-
-/// The place of an error in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A line of text, counted from 1.
-    Line(usize),
-    /// An offset in bytes from the beginning.
-    Byte(usize),
-}
-
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Place::Line(line) => write!(f, "line {line}"),
-            Place::Byte(byte) => write!(f, "byte {byte}"),
-        }
-    }
-}
-
-/// Error of an unreadable file: place, expected and found content, and remedy.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{place}: expected {expected}, found {found}; {mend}")]
-pub struct FileError {
-    /// The place of the error.
-    pub place: Place,
-    /// The expected content.
-    pub expected: String,
-    /// The content that was found.
-    pub found: String,
-    /// Remedy.
-    pub mend: String,
-}
-
-impl FileError {
-    fn new(
-        place: Place,
-        expected: impl Into<String>,
-        found: impl Into<String>,
-        mend: impl Into<String>,
-    ) -> Self {
-        FileError { place, expected: expected.into(), found: found.into(), mend: mend.into() }
-    }
-}
-
-/// Cloud read from a file, with the file's further information.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Loaded {
-    /// Cloud; contains finite points only, unless it has a grid.
-    pub cloud: Cloud,
-    /// Sensor pose stated by the file (`VIEWPOINT` of PCD), else identity; points are not
-    /// transformed by it.
-    pub viewpoint: Isometry3<f64>,
-    /// Notes for a person: points left out, suspicious units, attributes ignored.
-    pub notes: Vec<String>,
-}
+pub use error::{FileError, Place};
+pub use loaded::Loaded;
 
 /// Reads a cloud (PCD, PLY, NPY, LAS, or text: XYZ, CSV, PTS); the format follows from the first
 /// bytes.
@@ -87,64 +34,4 @@ pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
         return text::read(bytes);
     }
     pcd::read(bytes)
-}
-
-/// Maximum padding after the data, bytes: a memory page, to which the Point Cloud Library fills its
-/// files. From: chosen, 64 KiB.
-const MOST_PADDING: usize = 1 << 16;
-
-/// True if the remaining bytes are padding: zeros to the end of a page, or a line end.
-fn is_padding(rest: &[u8]) -> bool {
-    rest.len() < MOST_PADDING && rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
-}
-
-/// Marks pixels at the sensor's own position as missing returns and counts them; skipped if the
-/// file states a sensor position other than the origin.
-fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
-    if viewpoint.translation.vector != Vector3::zeros() {
-        return 0;
-    }
-    let mut voided = 0;
-    for p in cloud.points.iter_mut().filter(|p| p.coords == Vector3::zeros()) {
-        voided += 1;
-        *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
-    }
-    voided
-}
-
-/// Normalises raw points: infinite ones become missing returns, and clouds without a grid drop
-/// missing returns; adds notes.
-fn finish(
-    mut cloud: Cloud,
-    viewpoint: Isometry3<f64>,
-    mut notes: Vec<String>,
-    place: Place,
-) -> Result<Loaded, FileError> {
-    if cloud.grid.is_some_and(|Grid { width, height }| height <= 1 || width <= 1) {
-        cloud.grid = None;
-    }
-    let organised = cloud.grid.is_some();
-    let at_lens = if organised { void_at_sensor(&mut cloud, &viewpoint) } else { 0 };
-    if at_lens > 0 {
-        notes.push(format!("{at_lens} points at (0, 0, 0), where the sensor is, are taken as \"no return\""));
-    }
-    let mut infinite = 0usize;
-    let mut missing = 0usize;
-    for p in cloud.points.iter_mut().filter(|p| !crate::cloud::is_finite(p)) {
-        missing += 1;
-        infinite += usize::from(p.iter().any(|c| c.is_infinite()));
-        *p = Point3::new(f32::NAN, f32::NAN, f32::NAN);
-    }
-    if infinite > 0 {
-        notes.push(format!("{infinite} points with infinite coordinates are taken as \"no return\""));
-    }
-    if !organised && missing > 0 {
-        notes.push(format!("{missing} points without finite coordinates were left out"));
-        cloud = cloud.finite();
-    }
-    notes.extend(cloud.unit_warning());
-    cloud.check().map_err(|e: CloudError| {
-        FileError::new(place, "attributes that fit the points", e.to_string(), "mend the header")
-    })?;
-    Ok(Loaded { cloud, viewpoint, notes })
 }

@@ -1,6 +1,6 @@
 //! Depth images of 16 bits: PNG and PGM.
 
-use super::{FileError, Place};
+use super::error::{FileError, Place};
 
 /// Depths along the optical axis, row by row.
 #[derive(Clone, Debug, PartialEq)]

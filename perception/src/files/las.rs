@@ -1,7 +1,8 @@
 //! LAS of laser surveys, versions 1.0 to 1.4: positions and colours.
 
 use super::columns::to_origin;
-use super::{FileError, Loaded, Place, finish};
+use super::error::{FileError, Place};
+use super::loaded::{Loaded, finish};
 use crate::cloud::Cloud;
 use nalgebra::{Isometry3, Point3};
 

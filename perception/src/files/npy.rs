@@ -1,7 +1,8 @@
 //! NPY of NumPy: one array of numbers, a row a point, or rows and columns of an image with a point a pixel.
 
 use super::columns::Columns;
-use super::{FileError, Loaded, Place, finish};
+use super::error::{FileError, Place};
+use super::loaded::{Loaded, finish};
 use crate::cloud::Grid;
 use nalgebra::Isometry3;
 

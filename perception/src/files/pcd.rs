@@ -2,7 +2,9 @@
 
 mod header;
 
-use super::{FileError, Loaded, Place, finish, lzf};
+use super::error::{FileError, Place};
+use super::loaded::{Loaded, finish};
+use super::lzf;
 use crate::cloud::{Cloud, Grid};
 use header::{Encoding as Stored, Field, Header};
 use nalgebra::{Point3, Vector3};

@@ -2,7 +2,8 @@
 //! properties; only vertices are used.
 
 use super::columns::to_origin;
-use super::{FileError, Loaded, Place, finish, is_padding};
+use super::error::{FileError, Place};
+use super::loaded::{Loaded, finish, is_padding};
 use crate::cloud::{Cloud, Grid};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 

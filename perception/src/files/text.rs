@@ -2,7 +2,8 @@
 //! count.
 
 use super::columns::Columns;
-use super::{FileError, Loaded, Place, finish};
+use super::error::{FileError, Place};
+use super::loaded::{Loaded, finish};
 use nalgebra::Isometry3;
 
 /// Bytes in which the first line must end. From: chosen.

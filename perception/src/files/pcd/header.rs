@@ -1,6 +1,7 @@
 //! The header of a PCD file.
 
-use crate::files::{FileError, Place, is_padding};
+use crate::files::error::{FileError, Place};
+use crate::files::loaded::is_padding;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

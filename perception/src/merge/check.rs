@@ -2,7 +2,7 @@
 
 use super::joint::Found;
 use super::parts::Part;
-use super::prepare::Prepared;
+use super::prepare::{Prepared, departure};
 use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Isometry3;
@@ -133,7 +133,7 @@ fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, M
     const MENDED: (f64, f64) = (0.2, 0.2);
     let most = [(view.sigma_m, MENDED.0), (view.sigma_rad, MENDED.1)];
     let most = most.map(|(sigma, mended)| loose * (SPREADS * sigma).max(mended));
-    let (turn, shift) = super::joint::departure(pose, &view.prior);
+    let (turn, shift) = departure(pose, &view.prior);
     let excess = (shift.norm() / most[0]).max(turn.norm() / most[1]);
     (excess > 1.0).then(|| (excess, Misfit::Far(shift.norm(), turn.norm())))
 }

@@ -7,17 +7,20 @@
 //! look, nor the next look for that: it is done ahead, while the body drives. Which views are merged together follows from the views alone,
 //! not from what was merged before: the same views give the same bytes, whatever was kept.
 
+use super::align::{
+    Aligned, FIRST, Objects, SECOND, WIDE, as_stated, fit, fits, objects, only_levelled, place, visibility,
+};
 use super::check::{belongs, misfit};
-use super::fuse::{gather, gather_further};
-use super::joint::{Found, Round};
+use super::error::MergeError;
+use super::fuse::{Gathered, gather, gather_further};
+use super::joint::{self, Found, Round};
+use super::merged::{Merged, Step, ViewFit};
+use super::options::MergeOptions;
 use super::parts::{Part, level_again};
-use super::prepare::Prepared;
+use super::prepare::{Prepared, Ready, departure, filter_and_thin};
 use super::returns::Looked;
 use super::search::{PERHAPS_SHARE, SURE_SHARE};
-use super::{
-    Aligned, FIRST, Gathered, MergeError, MergeOptions, Merged, Objects, Ready, SECOND, Step, ViewFit, WIDE,
-    as_stated, check, filter_and_thin, fit, fits, joint, merged, objects, only_levelled, place, visibility,
-};
+use super::settle::merged;
 use crate::cloud::Cloud;
 use crate::pool;
 use crate::view::View;
@@ -126,7 +129,7 @@ impl Merger {
 
 impl Kept {
     fn merge(&mut self, views: &[View], options: &MergeOptions) -> Result<Merged, MergeError> {
-        check(views, options)?;
+        options.check(views)?;
         if self.options.as_ref() != Some(options) {
             *self = Kept { options: Some(options.clone()), ..Kept::default() };
         }
@@ -252,7 +255,7 @@ impl Kept {
             if !fit.used {
                 fit.world_from_camera = *prior;
             }
-            let (turn, shift) = joint::departure(&fit.world_from_camera, prior);
+            let (turn, shift) = departure(&fit.world_from_camera, prior);
             (fit.moved_m, fit.moved_rad) = (shift.norm(), turn.norm());
         }
         merged

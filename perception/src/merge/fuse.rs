@@ -3,12 +3,13 @@
 //! Returns at depth edges that hang between two surfaces are dropped. The rest are averaged in voxels, each weighted by the spread of its
 //! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
 
+use super::align::Aligned;
 use super::bricks::{Bricks, Grid};
+use super::options::MergeOptions;
 use super::parts::Plane;
 use super::prepare::Prepared;
 use super::returns::{Looked, Return};
 use super::settle::Before;
-use super::{Aligned, MergeOptions};
 use crate::cloud::Cloud;
 use crate::pool;
 use crate::view::View;

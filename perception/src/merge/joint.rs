@@ -4,7 +4,7 @@
 //! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
 
 use super::parts::Part;
-use super::prepare::{Prepared, Surfel};
+use super::prepare::{Prepared, Surfel, departure};
 use crate::pool;
 use crate::register::{Partner, Sums};
 use crate::scale::SHAPE_M;
@@ -360,15 +360,4 @@ fn prior_weight(sigmas: f64) -> f64 {
     /// Distance, in standard deviations, at which the weight is one half. From: chosen.
     const HALVED: f64 = 4.0;
     1.0 / (1.0 + (sigmas / HALVED).powi(2))
-}
-
-/// Rotation (scaled axis) and shift of the camera from its localised pose.
-pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let turn = (pose.rotation * prior.rotation.inverse()).scaled_axis();
-    (turn, pose.translation.vector - prior.translation.vector)
-}
-
-/// Points of the view in the world.
-pub(super) fn in_world(view: &Prepared, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
-    view.points.iter().map(|p| pose * p.at()).collect()
 }

@@ -1,8 +1,7 @@
 //! Step 4, first half: partition of each view's points, and the up direction.
 
-use super::Step;
-use super::joint::in_world;
-use super::prepare::Prepared;
+use super::merged::Step;
+use super::prepare::{Prepared, in_world};
 use crate::spread::{self, Moments, tangents};
 use crate::surface::{self, Outline};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};

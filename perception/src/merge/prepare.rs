@@ -1,13 +1,17 @@
 //! Steps 1 and 2: each view becomes points with normals, thinned to voxels, in its own camera
 //! frame.
 
-use super::MergeOptions;
+use super::error::MergeError;
+use super::merged::Step;
+use super::options::MergeOptions;
 use crate::cloud::{Cloud, Grid};
 use crate::neighbours::Neighbours;
 use crate::noise::frontal_sigma_m;
 use crate::normals;
+use crate::pool;
 use crate::surface::floor;
 use crate::view::View;
+use crate::visibility::DepthMap;
 use crate::voxel;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
@@ -195,4 +199,55 @@ pub(super) fn coarser(view: &View, within: &Within, about: usize) -> Option<Clou
         }
     }
     Some(Cloud { points, grid: Some(Grid { width: columns, height: rows }), ..Cloud::default() })
+}
+
+/// The data of each view that depend on no other view.
+pub(super) struct Ready {
+    pub prepared: Vec<Prepared>,
+    pub maps: Vec<Option<DepthMap>>,
+}
+
+impl Ready {
+    pub fn of(views: &[View], options: &MergeOptions) -> Ready {
+        let (prepared, maps) = pool::map(views, 1, |view| Ready::of_view(view, options)).into_iter().unzip();
+        Ready { prepared, maps }
+    }
+
+    pub fn of_view(view: &View, options: &MergeOptions) -> (Prepared, Option<DepthMap>) {
+        pool::join(|| prepare(view, options), || DepthMap::from_view(view, &view.world_from_camera))
+    }
+}
+
+/// Carries out steps 1 and 2 of the paper: transforms the views by their poses into the world, filters them
+/// by height and range, and thins them.
+pub(super) fn filter_and_thin(
+    views: &[View],
+    prepared: &[Prepared],
+    options: &MergeOptions,
+) -> Result<Vec<Step>, MergeError> {
+    let given = pool::map(views, 1, |view| view.cloud.count_finite()).into_iter().sum();
+    let points = prepared.iter().map(|p| p.points.len()).sum();
+    if points == 0 {
+        let band = options
+            .height_band_m
+            .map_or(String::new(), |(low, high)| format!(" and {low:.2} to {high:.2} m high"));
+        return Err(MergeError::Empty { views: views.len(), range_m: options.range_m, band });
+    }
+    let step = |name: &str, points, result: String| Step { name: name.to_owned(), points, result };
+    let thinned = format!("within {} m, voxels of {:.0} mm", options.range_m, 1e3 * options.align_voxel_m);
+    Ok(vec![
+        step("initial alignment", given, format!("{} views by their stated poses", views.len())),
+        step("filter and thin", points, thinned),
+    ])
+}
+
+/// Rotation (scaled axis) and shift of the camera from its localised pose.
+pub(super) fn departure(pose: &Isometry3<f64>, prior: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let turn = (pose.rotation * prior.rotation.inverse()).scaled_axis();
+    (turn, pose.translation.vector - prior.translation.vector)
+}
+
+/// Points of the view in the world.
+pub(super) fn in_world(view: &Prepared, pose: &Isometry3<f64>) -> Vec<Point3<f64>> {
+    view.points.iter().map(|p| pose * p.at()).collect()
 }

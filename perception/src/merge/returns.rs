@@ -1,6 +1,6 @@
 //! Selection of a view's returns for fusion, with their normals and level planes.
 
-use super::MergeOptions;
+use super::options::MergeOptions;
 use super::parts::{self, Plane};
 use super::prepare::{Prepared, Within, coarser};
 use crate::cloud::{Cloud, Grid};

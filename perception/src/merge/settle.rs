@@ -7,9 +7,10 @@
 use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
+use super::merged::{Merged, Step, ViewFit};
 use crate::cloud::{Cloud, is_finite};
 use crate::pool;
-use crate::visibility::Gaze;
+use crate::visibility::{Gaze, Visibility};
 use bytemuck::Zeroable;
 use nalgebra::{Point3, Vector3};
 use std::iter::Peekable;
@@ -52,7 +53,7 @@ pub(super) struct Before {
 }
 
 /// One cloud of all settled cells.
-pub(super) fn fused(all: &[Gathered]) -> Fused {
+fn fused(all: &[Gathered]) -> Fused {
     let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
     let rows: Vec<&[Settled]> =
         all.iter().flat_map(|gathered| gathered.before.rows.iter().map(Vec::as_slice)).collect();
@@ -258,4 +259,20 @@ fn level(
             }
         }
     }
+}
+
+/// Merged cloud of the gathered voxels, with its diagnostics.
+pub(super) fn merged(
+    gathered: &[Gathered],
+    seen: Visibility,
+    fits: Vec<ViewFit>,
+    mut steps: Vec<Step>,
+) -> Merged {
+    let fused = fused(gathered);
+    steps.push(Step {
+        name: "fuse".to_owned(),
+        points: fused.cloud.len(),
+        result: format!("{} returns in voxels of {:.1} mm", fused.returns, 1e3 * fused.voxel_m),
+    });
+    Merged { cloud: fused.cloud, views_per_point: fused.views_per_point, visibility: seen, fits, steps }
 }

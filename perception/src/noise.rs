@@ -2,6 +2,7 @@
 
 mod fit;
 
+use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use fit::CELL_PX;
@@ -96,4 +97,14 @@ pub fn frontal_sigma_m(z_m: f32) -> f32 {
 /// Standard normal distribution function.
 pub fn normal_cdf(x: f64) -> f64 {
     libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2) / 2.0
+}
+
+/// Spread of a depth camera's range at a distance (Nguyen et al.), metres.
+pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
+    if distance_m > 0.0 { KINECT.frontal_sigma_m(distance_m) } else { KINECT.axial_m }
+}
+
+/// Standard deviation of a measurement of a point from the nearest viewpoint, metres.
+pub(crate) fn nearest_sigma_m(p: &Point3<f64>, viewpoints: &[Point3<f64>]) -> f64 {
+    range_sigma_m(viewpoints.iter().map(|v| (p - v).norm()).min_by(f64::total_cmp).unwrap_or(1.0))
 }

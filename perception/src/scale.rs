@@ -17,3 +17,10 @@ pub(crate) const SPREADS: f64 = 3.0;
 /// chosen.
 pub(crate) const HANDLE_M: (f64, f64) = (0.014, 0.06);
 pub(crate) const HANDLE_WIDTH_M: f64 = 0.035;
+
+/// [`f64::floor`], which is a call on some processors.
+#[inline(always)]
+pub(crate) fn floor(value: f64) -> i32 {
+    let whole = value as i32;
+    whole.saturating_sub(i32::from(value < f64::from(whole)))
+}

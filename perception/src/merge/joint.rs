@@ -9,8 +9,7 @@ use crate::pool;
 use crate::register::{Partner, Sums};
 use crate::scale::SHAPE_M;
 use nalgebra::{
-    DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Point3, Translation3, UnitQuaternion, Vector3,
-    Vector6,
+    DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 
 /// The parameters of one round of alignment.

@@ -2,7 +2,8 @@
 
 use super::Sensor;
 use crate::pool;
-use crate::surface::{Outline, Surface};
+use crate::surface::level::Surface;
+use crate::surface::outline::Outline;
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 

@@ -3,10 +3,12 @@
 
 use super::face::Grid;
 use super::hull::{area, convex_hull, parts};
-use super::planes::{Plane, Sample};
+use super::level::Surface;
+use super::planes::Plane;
+use super::sample::Sample;
 use super::tiles::Tiles;
-use super::{Surface, range_sigma_m};
 use crate::camera::Intrinsics;
+use crate::noise::range_sigma_m;
 use crate::pool;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};

@@ -2,11 +2,12 @@
 
 use super::extent::{Hiding, Owner, Owners, around};
 use super::hull::{area, convex_hull, parts};
-use super::planes::{FEWEST, Plane, Sample, least_squares};
+use super::level::{Role, Sign, Surface};
+use super::planes::{FEWEST, Plane, least_squares};
+use super::sample::Sample;
 use super::tiles::Tiles;
-use super::{Role, Sign, Surface, floor};
 use crate::cloud::Cloud;
-use crate::scale::{APART_M, SHAPE_M};
+use crate::scale::{APART_M, SHAPE_M, floor};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 

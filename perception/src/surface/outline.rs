@@ -1,6 +1,6 @@
 //! Points above and below a surface's outline.
 
-use super::Surface;
+use super::level::Surface;
 use nalgebra::{Point3, Vector3};
 
 /// The half spaces whose common part is above and below a surface.

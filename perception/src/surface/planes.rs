@@ -1,16 +1,12 @@
 //! The large planes of a sample of points.
 
+use super::sample::{SAMPLE, Sample};
 use crate::draw::Draws;
 use crate::pool;
-use crate::scale;
+use crate::scale::{self, floor};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Number of points sampled for the plane search; more change nothing. From: chosen.
-pub(super) const SAMPLE: usize = 16_000;
-/// Number of points sampled of a single view, which shows less. From: chosen, on piles of things
-/// and on recordings.
-pub(super) const SAMPLE_OF_ONE: usize = 12_000;
 /// Fewest points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.
@@ -55,13 +51,6 @@ impl Plane {
     pub fn band_of(sigma_m: f64) -> f64 {
         BAND.0 * sigma_m + BAND.1
     }
-}
-
-#[derive(Clone, Copy)]
-pub(super) struct Sample {
-    pub point: Point3<f64>,
-    /// Standard deviation of the measurement along the ray, metres.
-    pub sigma_m: f64,
 }
 
 /// Normals and offsets of planes that hold at least a share of all `total` places, which come with their spreads, metres.
@@ -175,7 +164,7 @@ fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
     let (mut numbers, mut keys): (FxHashMap<[i32; 3], u32>, Vec<[i32; 3]>) = Default::default();
     let mut last = ([i32::MIN; 3], 0);
     let number = |sample: &Sample| {
-        let key = [0, 1, 2].map(|k| super::floor(sample.point[k] * PER_M));
+        let key = [0, 1, 2].map(|k| floor(sample.point[k] * PER_M));
         if key != last.0 {
             let number = *numbers.entry(key).or_insert_with(|| {
                 keys.push(key);
@@ -374,4 +363,14 @@ impl Sums {
         let offset = normal.dot(&mean);
         normal.iter().all(|c| c.is_finite()).then_some(Plane { normal, offset })
     }
+}
+
+/// Plane with its normal up: along the hint, else towards the cameras.
+pub(super) fn face_up(plane: &Plane, up: Option<&Vector3<f64>>, viewpoints: &[Point3<f64>]) -> Plane {
+    let rise = match up {
+        Some(up) => plane.normal.dot(up),
+        None if viewpoints.is_empty() => plane.normal.z,
+        None => viewpoints.iter().map(|v| plane.distance(v)).sum(),
+    };
+    if rise < 0.0 { Plane { normal: -plane.normal, offset: -plane.offset } } else { *plane }
 }

@@ -3,102 +3,17 @@
 //! A camera that looks past the edge of a table sees what lies lower. Past the floor nothing lies lower: where it ends in an image, the image
 //! ends, something stands before it or a wall rises from it.
 
-use super::planes::Sample;
-use super::{Level, MOST, Surface, SurfaceOptions, TALLEST_M};
+use super::extent::TALLEST_M;
+use super::level::{Level, Role, Sign, Surface};
+use super::options::SurfaceOptions;
+use super::sample::Sample;
 use crate::pool;
 use crate::scale::APART_M;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
-use serde::{Deserialize, Serialize};
-use std::fmt;
 
-/// The role of a level surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Role {
-    /// Supporting surface.
-    Support,
-    /// Undecided: support or floor.
-    Untold,
-    /// The floor.
-    Floor,
-    /// None of these.
-    Other,
-}
-
-/// Evidence for the role of a surface.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sign {
-    /// A surface at this height was requested.
-    Asked,
-    /// Cameras saw lower points past the edge.
-    SeenPast {
-        /// Share of the returns below.
-        share: f64,
-    },
-    /// Nothing lies lower, and a support lies above.
-    Under {
-        /// The height of that surface above this one, metres.
-        by_m: f64,
-    },
-    /// Nothing lies lower, and the surface is larger than tables.
-    Wide {
-        /// Area in view, square metres.
-        area_m2: f64,
-    },
-    /// The surface is a further part of the floor.
-    LevelWithFloor,
-    /// The surface is the top of something that stands on another surface.
-    OnTop {
-        /// The height above that surface, metres.
-        by_m: f64,
-    },
-    /// The surface was seen through another one: a mirror image.
-    Mirrored,
-    /// The surface is a strip.
-    Narrow {
-        /// The width of the strip, metres.
-        width_m: f64,
-    },
-    /// The surface is not level with the surfaces that hold most returns.
-    Slanted {
-        /// Angle between the normals, radians.
-        by_rad: f64,
-    },
-    /// Nothing lower was seen past the edge.
-    NoEdge {
-        /// The mean height of the cameras above the surface, metres.
-        eye_m: f64,
-    },
-    /// Nothing lies lower, and the viewpoint is unknown.
-    NoCamera,
-}
-
-impl fmt::Display for Sign {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Sign::Asked => write!(f, "a surface at its height was asked for"),
-            Sign::SeenPast { share } => {
-                write!(f, "{:.0} % of the returns lie lower, past its edge", 100.0 * share)
-            }
-            Sign::Under { by_m } => {
-                write!(f, "nothing lies lower, and a surface to stand things on {by_m:.2} m higher")
-            }
-            Sign::Wide { area_m2 } => write!(f, "nothing lies lower in a view of {area_m2:.1} m²"),
-            Sign::LevelWithFloor => write!(f, "it is level with the floor"),
-            Sign::OnTop { by_m } => write!(f, "it is the top of something {by_m:.2} m high"),
-            Sign::Mirrored => write!(f, "it was seen through another surface, as in a mirror"),
-            Sign::Narrow { width_m } => write!(f, "it is a strip {width_m:.2} m wide"),
-            Sign::Slanted { by_rad } => write!(f, "it leans by {:.0}°", by_rad.to_degrees()),
-            Sign::NoEdge { eye_m } => {
-                write!(f, "seen from {eye_m:.2} m above it, and nothing lower past its edge")
-            }
-            Sign::NoCamera => write!(f, "nothing lies lower, and no camera is known that could have seen it"),
-        }
-    }
-}
-
+/// Fraction that counts as most: the first number of the second, seven of ten. From: chosen.
+const MOST: (usize, usize) = (7, 10);
 /// Rays that are looked at for each camera. From: chosen.
 const RAYS: usize = 5000;
 /// Distance below a surface from which returns count as lower, metres. From: chosen.

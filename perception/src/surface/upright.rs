@@ -6,11 +6,13 @@
 //! them stands on level ones. A wall seen head-on and a floor seen from straight above are told apart by no more than that; where that is not
 //! enough, nothing is said.
 
-use super::THINGS_M;
 use super::hull::convex_hull;
+use super::level::{SURE, THINGS_M};
 use super::outline::Outline;
-use super::planes::{Plane, Sample, large_planes};
+use super::planes::{Plane, face_up, large_planes};
+use super::sample::Sample;
 use crate::pool;
+use crate::scale::floor;
 use crate::spread::tangents;
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Unit, Vector3};
@@ -25,10 +27,9 @@ const LEAST_SHARE: f64 = 0.0125;
 const ALIKE_RAD: f64 = 0.14;
 /// Hypotheses that lie no farther apart are one, radians. From: chosen, 15°.
 const ONE_RAD: f64 = 0.26;
-/// Minimum probability of the up direction, against all other directions; and the minimum where the direction
-/// is against how cameras are held. From: chosen, more likely than not, and as good as sure.
+/// Minimum probability of the up direction, against all other directions; where the direction is against how
+/// cameras are held, [`SURE`]. From: chosen, more likely than not.
 const LIKELY: f64 = 0.5;
-pub(super) const SURE: f64 = 0.95;
 /// Angle from the cameras' usual attitude beyond which an up direction is implausible, radians.
 /// From: chosen, about 70°.
 const HELD_RAD: f64 = 1.2;
@@ -94,7 +95,7 @@ pub(super) fn up(
     let rivals: f64 = distinct.iter().map(|h| (h.log - best.log).exp()).sum();
     let chance = 1.0 / (rivals + (SHAPELESS.ln() - best.log).exp());
     tracing::debug!(chance, is_level = best.is_level, "way up");
-    let is_contrary = super::held_up(seen).is_some_and(|held| held.angle(&best.up) > HELD_RAD);
+    let is_contrary = held_up(seen).is_some_and(|held| held.angle(&best.up) > HELD_RAD);
     let is_told = best.is_level && chance >= if is_contrary { SURE } else { LIKELY };
     if is_told { Ok((settled(&best.up, &faces), chance)) } else { Err(Doubt::Untold) }
 }
@@ -129,7 +130,7 @@ fn faces(samples: &[Sample], seen: &Visibility, seed: u64) -> (Vec<Face>, Vec<Po
         (seed, PLANES),
         |_| true,
         |plane| {
-            planes.push(super::face_up(&plane, None, &viewpoints));
+            planes.push(face_up(&plane, None, &viewpoints));
         },
     );
     let mut members: Vec<Vec<Point3<f64>>> = vec![Vec::new(); planes.len()];
@@ -164,7 +165,7 @@ impl Face {
         let corner = |[x, y]: [f64; 2]| Point3::from(a * x + b * y + normal * offset);
         let hull = convex_hull(self.members.iter().map(flat).collect());
         let outline = Outline::of(&hull.into_iter().map(corner).collect::<Vec<_>>(), &normal);
-        let cell = |p: &Point3<f64>| flat(p).map(|m| super::floor(m / CELL_M));
+        let cell = |p: &Point3<f64>| flat(p).map(|m| floor(m / CELL_M));
         let over = |p: &Point3<f64>| {
             let high_m = self.plane.distance(p);
             let is_over = high_m > THINGS_M.0 && high_m < THINGS_M.1 && outline.covers(p, 0.0);
@@ -199,7 +200,7 @@ fn ways(faces: &[Face], seen: &Visibility) -> Vec<Unit<Vector3<f64>>> {
     const WALLS: usize = 4;
     const APART: f64 = 0.9;
     // Upright planes leave open where up is, but for how cameras are held.
-    let held = super::held_up(seen);
+    let held = held_up(seen);
     let aside = |normal: &Vector3<f64>| match held {
         Some(held) => held.into_inner() - normal * held.dot(normal),
         None => seen.maps.first().map_or(Vector3::zeros(), |map| {
@@ -293,4 +294,16 @@ fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
     };
     let logs = seen.maps.iter().map(|map| log(map.camera_from_world.rotation * up));
     logs.sum::<f64>() / seen.maps.len().max(1) as f64
+}
+
+/// Up as people and robots hold cameras: against the images' downward axis.
+fn held_up(seen: &Visibility) -> Option<Unit<Vector3<f64>>> {
+    /// Minimum length of the mean up direction; shorter ones cancel out. From: rounding.
+    const CANCELLED: f64 = 1e-6;
+    if !seen.held {
+        return None;
+    }
+    let sum: Vector3<f64> =
+        seen.maps.iter().map(|m| m.camera_from_world.rotation.inverse() * -Vector3::y()).sum();
+    Unit::try_new(sum, CANCELLED)
 }

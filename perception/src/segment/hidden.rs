@@ -1,7 +1,7 @@
 //! Bodies split by an occluder: two ends of one face, with the gap hidden in all views.
 
-use super::patches::Voxels;
-use super::{SIDE_VOXELS, VOXEL_ENDS, is_upright, members, quantile};
+use super::patches::{SIDE_VOXELS, Voxels, is_upright, members};
+use super::quantile::{VOXEL_ENDS, quantile};
 use crate::pool;
 use crate::scale::PLACE_M;
 use crate::surface::Surface;

@@ -1,8 +1,8 @@
 //! Grouping of voxels into objects: patches, and the creases between them.
 
-use super::SceneOptions;
 use super::mend::mend;
 use super::patches::{SOME, Voxels};
+use super::scene::SceneOptions;
 use crate::pool;
 use crate::scale::PLACE_M;
 use nalgebra::{Point3, Vector3};

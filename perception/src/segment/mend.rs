@@ -1,8 +1,9 @@
 //! Repairs of over-segmentation at creases, for vessels and handles.
 
+use super::footprint::most_within;
 use super::join::{Border, Piece, Union};
 use super::patches::SOME;
-use super::{VOXEL_ENDS, most_within};
+use super::quantile::VOXEL_ENDS;
 use crate::pool;
 use crate::scale::PLACE_M;
 use crate::surface::convex_hull;

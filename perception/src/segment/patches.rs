@@ -1,11 +1,14 @@
 //! Points in voxels, with normals and neighbours.
 
-use super::bounds;
+use super::footprint::bounds;
 use crate::lattice::{Around, Lattice};
 use crate::pool;
 use crate::spread;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
+
+/// Minimum number of voxels of an upright side. From: chosen.
+pub(super) const SIDE_VOXELS: usize = 25;
 
 /// Occupied voxels of a set of points, in order of their place.
 pub(super) struct Voxels {
@@ -268,4 +271,32 @@ fn surfaces(
         let normal = Vector3::from(least.normal);
         Some((if normal.dot(&nearest) < 0.0 { -normal } else { normal }, least.share))
     })
+}
+
+/// Voxels of each part, ascending, by the part's name (one of its voxels).
+pub(super) fn members(part_of_voxel: &[u32]) -> Vec<(u32, Vec<usize>)> {
+    let mut counts = vec![0; part_of_voxel.len()];
+    part_of_voxel.iter().for_each(|part| counts[*part as usize] += 1);
+    let named = (0..).zip(&counts).filter(|(_, count)| **count > 0);
+    let mut members: Vec<(u32, Vec<usize>)> =
+        named.map(|(name, count)| (name, Vec::with_capacity(*count))).collect();
+    let mut places = counts;
+    members.iter().enumerate().for_each(|(place, (name, _))| places[*name as usize] = place);
+    let all = part_of_voxel.iter().enumerate();
+    all.for_each(|(voxel, part)| members[places[*part as usize]].1.push(voxel));
+    members
+}
+
+/// True of the normal of something upright.
+pub(super) fn is_upright(normal: &Vector3<f64>) -> bool {
+    normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
+}
+
+/// Removes from a sorted list the elements of another sorted list.
+pub(super) fn take_away(from: &mut Vec<usize>, others: &[usize]) {
+    let mut others = others.iter().peekable();
+    from.retain(|own| {
+        while others.next_if(|other| *other < own).is_some() {}
+        others.peek() != Some(&own)
+    });
 }

@@ -1,5 +1,11 @@
 //! Values by their rank.
 
+/// Quantiles of a segment's point heights that define its lower edge and its top, excluding noise.
+/// From: chosen.
+pub const POINT_ENDS: (f64, f64) = (0.01, 0.99);
+/// Quantiles for the voxels of a part, and for protrusions of a body. From: chosen.
+pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
+
 /// Quantile of the values; 0 if empty. Reorders them.
 pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {

@@ -4,10 +4,10 @@
 //! The normals of a round body's side point away from its axis. Each voxel of a side votes for the axes that it may belong to; where many
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
 
-use super::patches::Voxels;
+use super::patches::{SIDE_VOXELS, Voxels, is_upright, members, take_away};
+use super::quantile::{VOXEL_ENDS, quantile};
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
-use super::{SIDE_VOXELS, VOXEL_ENDS, is_upright, members, quantile, take_away};
 use crate::outline;
 use crate::pool;
 use crate::round::{SECTORS, distance, sector};

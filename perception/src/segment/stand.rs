@@ -1,6 +1,8 @@
 //! Support of each object: the surface, another object, or the bottom of a vessel around it.
 
-use super::{POINT_ENDS, Segment, bounds, end, hull_from_above, middle, quantile, top_m};
+use super::footprint::{bounds, hull_from_above, middle};
+use super::quantile::{POINT_ENDS, end, quantile};
+use super::scene::{Segment, top_m};
 use crate::pool;
 use crate::round::{SECTORS, sector};
 use crate::scale::{APART_M, PLACE_M};

@@ -1,6 +1,8 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
-use super::{OUTSIDE, POINT_ENDS, Segment, bounds, end, hull_from_above, middle, most_within, top_m};
+use super::footprint::{OUTSIDE, bounds, hull_from_above, middle, most_within};
+use super::quantile::{POINT_ENDS, end};
+use super::scene::{Segment, top_m};
 use crate::outline;
 use crate::pool;
 use crate::round::lying::{self, LyingRound};

@@ -1,0 +1,50 @@
+//! Extent and outline of points as seen from above.
+
+use crate::surface::convex_hull;
+use nalgebra::Point3;
+
+/// Maximum share, as a fraction, of places outside an enclosing outline. From: chosen.
+pub const OUTSIDE: (usize, usize) = (3, 10);
+
+#[doc(hidden)]
+pub fn middle(points: &[Point3<f64>]) -> [f64; 2] {
+    let n = points.len().max(1) as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x, y + p.y));
+    [x / n, y / n]
+}
+
+/// Lowest and highest corner of the box around points.
+pub fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
+    let first = points.first().copied().unwrap_or_else(Point3::origin);
+    let (mut low, mut high) = (first, first);
+    for p in points {
+        for k in 0..3 {
+            low[k] = if p[k] < low[k] { p[k] } else { low[k] };
+            high[k] = if p[k] > high[k] { p[k] } else { high[k] };
+        }
+    }
+    (low, high)
+}
+
+/// The convex outline of points.
+pub fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
+    convex_hull(points.iter().map(|p| [p.x, p.y]).collect())
+}
+
+/// True if a convex anticlockwise outline holds most of the places: all but [`OUTSIDE`].
+pub fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2]) -> bool {
+    let outside = of.iter().filter(|p| !holds(hull, place(p)));
+    // The first that is too many settles it.
+    outside.take(of.len() * OUTSIDE.0 / OUTSIDE.1 + 1).count() * OUTSIDE.1 <= of.len() * OUTSIDE.0
+}
+
+/// True if a convex anticlockwise outline holds the place.
+fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
+    let n = hull.len();
+    n >= 3
+        && (0..n).all(|i| {
+            let (a, b) = (hull[i], hull[(i + 1) % n]);
+            let (x, y) = (b[0] - a[0], b[1] - a[1]);
+            x * (p[1] - a[1]) - y * (p[0] - a[0]) >= 0.0
+        })
+}

@@ -1,6 +1,6 @@
 //! Stands around an object and their order (section IV-A).
 
-use super::LearningError;
+use super::error::LearningError;
 use crate::cloud::is_finite;
 use crate::neighbours::Neighbours;
 use nalgebra::{Point2, Point3, Vector2};

@@ -1,6 +1,6 @@
 //! Fusion of all looks into one cloud, each place from the measurement that is least in doubt (section V-C).
 
-use super::LearningError;
+use super::error::LearningError;
 use super::frame::Frame;
 use super::grow;
 use super::mask::Mask;

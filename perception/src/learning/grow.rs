@@ -1,7 +1,7 @@
 //! Propagation of the object mask from view to view: points at the object's position, grown over
 //! smooth surfaces (section V-B).
 
-use super::LearningError;
+use super::error::LearningError;
 use super::frame::Frame;
 use super::mask::Mask;
 use crate::neighbours::Neighbours;

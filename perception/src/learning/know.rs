@@ -3,6 +3,7 @@
 //! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, where up is known also by how a
 //! thing stands; poses are refined on the scene's surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
 
+mod error;
 pub mod evidence;
 #[doc(hidden)]
 pub mod feature;
@@ -16,11 +17,11 @@ pub mod skin;
 #[doc(hidden)]
 pub mod stood;
 
-use crate::cloud::{Cloud, CloudError};
+use crate::cloud::Cloud;
 use crate::pool;
-use crate::register::{Method, Prepared, RegisterError, RegisterOptions, align};
+use crate::register::{Method, Prepared, RegisterOptions, align};
 use crate::view::View;
-use crate::voxel::VoxelError;
+pub use error::KnowError;
 use evidence::{Evidence, Judge, Verified, first_sight, unbounded, verify};
 use feature::{Features, Kind};
 use group::{Vote, matches, standing, votes};
@@ -74,31 +75,6 @@ pub struct Recognised {
     pub confidence: f64,
     /// Evidence for it.
     pub evidence: Evidence,
-}
-
-/// Models or views that cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum KnowError {
-    /// A model without normals or with next to no points.
-    #[error("the model has {points} points with a normal: learn it, or estimate normals that point outwards")]
-    Model {
-        /// Number of points.
-        points: usize,
-    },
-    /// A view whose pixels are not known.
-    #[error(
-        "the view shows no pixels in front of a camera: give an organised cloud in the optical frame (z forward), or intrinsics"
-    )]
-    NoCamera,
-    /// Too many points.
-    #[error(transparent)]
-    Cloud(#[from] CloudError),
-    /// Points too far out.
-    #[error(transparent)]
-    Voxel(#[from] VoxelError),
-    /// A pose could not be refined.
-    #[error(transparent)]
-    Register(#[from] RegisterError),
 }
 
 /// Learned models, made ready.

@@ -1,6 +1,6 @@
 //! A model grown over looks, from the pixels that the object has in the first (section V).
 
-use super::LearningError;
+use super::error::LearningError;
 use super::frame::Frame;
 use super::fuse::Measured;
 use super::grow::{grown, transferred, without_outliers};

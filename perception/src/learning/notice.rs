@@ -1,7 +1,7 @@
 //! Change detection against the static structure of a place (section III; Ambruş et al.,
 //! *Meta-Rooms*, 2014).
 
-use super::LearningError;
+use super::error::LearningError;
 use super::mask::Mask;
 use crate::cloud::{Cloud, Grid, is_finite};
 use crate::cluster;

@@ -4,7 +4,7 @@
 //! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why. Then what is
 //! printed on things brings together what surfaces leave loose, and they are aligned once more from there.
 
-use super::LearningError;
+use super::error::LearningError;
 use super::texture;
 use crate::merge::{self, MergeOptions};
 use crate::view::View;

@@ -3,7 +3,7 @@
 //! Seeded by cubes, then each pixel goes to the best of the pieces beside it by place and normal, as superpixels do (Achanta et al. 2012;
 //! Papon et al. 2013).
 
-use super::LearningError;
+use super::error::LearningError;
 use super::frame::Frame;
 use super::mask::Mask;
 use crate::voxel;

@@ -1,7 +1,7 @@
 //! Extension of a model by a later encounter (the paper's future work): the new model is registered
 //! to the known one, and both are fused.
 
-use super::LearningError;
+use super::error::LearningError;
 use super::fuse::Measured;
 use crate::cloud::Cloud;
 use crate::register::{Method, Prepared, RegisterOptions, align};

@@ -1,6 +1,6 @@
 //! A look made ready to be recognised in.
 
-use super::KnowError;
+use super::error::KnowError;
 use super::skin::{STEP_M, Skin};
 use crate::cloud::{Cloud, is_finite};
 use crate::draw::Draws;

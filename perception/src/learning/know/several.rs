@@ -1,9 +1,10 @@
 //! Recognition from several looks: candidates of each look are tested against all others.
 
+use super::error::KnowError;
 use super::evidence::{Evidence, verify};
 use super::scene::Seen;
 use super::stood::stands;
-use super::{KnowError, KnowOptions, Library, Recognised, WITHIN_M, refined};
+use super::{KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 

@@ -32,7 +32,7 @@ pub struct Skin {
 
 impl Skin {
     /// The skin of a cloud with normals.
-    pub fn of(cloud: &Cloud) -> Result<Skin, super::KnowError> {
+    pub fn of(cloud: &Cloud) -> Result<Skin, super::error::KnowError> {
         Ok(Skin::gathered(&voxel::downsample(cloud, STEP_M)?)?)
     }
 

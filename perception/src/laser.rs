@@ -27,13 +27,14 @@ pub mod violation;
 pub use crate::occupancy::{Occupancy, Space};
 pub use align::{Alignment, align, align_consistent};
 pub use background::{Cluster, Ignored, Observation, ObserveError, ObserveOptions, observe, things};
-pub use features::{FeatureClass, Features, Nearest, classes, groups, nearest};
+pub use features::{FeatureClass, HullFeatures, Nearest, classes, groups, nearest};
 pub use fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
 pub use known::{
-    Candidate, KnownShape, RecogniseOptions, Recognition, Verdict, recognise, recognise_scan, recognise_scans,
+    KnownShape, RecogniseOptions, Recognition, ShapeCandidate, Verdict, recognise, recognise_scan,
+    recognise_scans,
 };
-pub use next::{NextOptions, NextScan, Outlook, next_scan, undetermined_m2};
+pub use next::{NextOptions, NextScan, ScanGain, next_scan, undetermined_m2};
 pub use scan::{Scan, ScanError};
 pub use shape::{ObjectScan, PosedScan, ShapeError, ShapeModel};
 pub use solve::{Objective, Solver, SolverOptions};
-pub use violation::{Side, Violation};
+pub use violation::{ScanEnd, Violation};

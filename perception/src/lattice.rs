@@ -76,20 +76,20 @@ impl Lattice {
 }
 
 /// Walks along sorted keys and keeps track of the occupied voxels around.
-pub struct Around<'a> {
+pub struct NeighbourSweep<'a> {
     keys: &'a [u64],
     columns: [i64; 9],
     starts: [usize; 9],
 }
 
-impl<'a> Around<'a> {
+impl<'a> NeighbourSweep<'a> {
     /// A walk that begins at the key number `first`.
-    pub fn from(lattice: &Lattice, keys: &'a [u64], first: usize) -> Around<'a> {
+    pub fn from(lattice: &Lattice, keys: &'a [u64], first: usize) -> NeighbourSweep<'a> {
         let columns = lattice.columns();
         let starts = columns.map(|c| {
             keys.get(first).map_or(0, |key| keys.partition_point(|k| *k < key.wrapping_add_signed(c)))
         });
-        Around { keys, columns, starts }
+        NeighbourSweep { keys, columns, starts }
     }
 
     /// Calls `found` with the indices of the occupied voxels among the 27 around a key, including

@@ -25,9 +25,9 @@ mod unite;
 
 pub use around::{AroundOptions, nearest, stands, trajectories};
 pub use error::LearningError;
-pub use know::evidence::{Evidence, Judge, WEIGHTS};
+pub use know::evidence::{Judge, PoseEvidence, WEIGHTS};
 pub use know::several::{Glance, Guess, Judged};
-pub use know::{Candidate, KnowError, KnowOptions, Library, Recognised, choose, outward};
+pub use know::{Hypothesis, KnowError, KnowOptions, Library, Recognised, choose, outward};
 pub use model::{LearnOptions, LearnedModel, Used, learn};
 pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use register::{Keyframe, keyframes, register};

@@ -4,7 +4,7 @@
 //! The pipeline, a file a step: what the camera saw at each stop of the drive, levelled ([`Station`]), and its plan without floor and ceiling;
 //! how two stops in a row lie to each other ([`rectify_pair`]: ICP-EM, Eq. 1 to 3); where the drive came by again ([`closures`]) and all poses
 //! together ([`PoseGraph`]), which the paper leaves open; all points as small pieces of surface ([`Cells`], normals by regions: Eq. 4); the
-//! orientations of walls ([`orientations`]: k-means); patches grown and planes put through them ([`Fit`], [`Constraints`]) and joined
+//! orientations of walls ([`orientations`]: k-means); patches grown and planes put through them ([`PlaneEstimator`], [`Constraints`]) and joined
 //! ([`FuseOptions`]); pillars and round walls ([`UprightCylinder`]); the map of walls, level surfaces and open floor ([`Survey`], [`RoomMap`]); where to go next to see more of it ([`next_poses`]).
 
 mod cells;
@@ -37,6 +37,6 @@ pub use graph::{Edge, GraphError, PoseGraph, Settled};
 pub use orientation::{OrientationOptions, Orientations, orientations};
 pub use outlook::{Outlook, Unseen, nearest_frontier, outlooks};
 pub use pair::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
-pub use patch::{Constraints, Fit};
+pub use patch::{Constraints, PlaneEstimator};
 pub use room::{Level, MapOptions, RoomMap, Survey, Wall};
 pub use station::{FieldOfView, Station, StationError};

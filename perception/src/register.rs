@@ -114,7 +114,7 @@ impl Default for RegisterOptions {
 
 /// The reason registration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ending {
+pub enum Termination {
     /// The last round moved less than asked.
     Settled,
     /// All rounds were used while the source still moved.
@@ -123,12 +123,12 @@ pub enum Ending {
     TooFewPartners,
 }
 
-impl std::fmt::Display for Ending {
+impl std::fmt::Display for Termination {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Ending::Settled => "settled",
-            Ending::OutOfRounds => "out of rounds while still moving",
-            Ending::TooFewPartners => "too few partners: the clouds do not overlap there",
+            Termination::Settled => "settled",
+            Termination::OutOfRounds => "out of rounds while still moving",
+            Termination::TooFewPartners => "too few partners: the clouds do not overlap there",
         })
     }
 }
@@ -148,7 +148,7 @@ pub struct Fit {
     /// Rounds used.
     pub rounds: usize,
     /// The reason registration ended.
-    pub ending: Ending,
+    pub ending: Termination,
     /// Displacement of the correspondences' centroid from the initial pose, metres.
     pub moved_m: f64,
     /// Rotation from the initial pose, radians.
@@ -166,7 +166,7 @@ pub struct Fit {
 impl Fit {
     /// True if the iteration converged and every direction of motion is constrained.
     pub fn converged(&self) -> bool {
-        self.ending == Ending::Settled && self.free == 0
+        self.ending == Termination::Settled && self.free == 0
     }
 }
 

@@ -8,7 +8,7 @@ pub mod side;
 use crate::draw::Draws;
 use crate::scale::{EDGE_M, PLACE_M};
 use nalgebra::{Point3, Vector4};
-use side::{Side, Sums};
+use side::{SidePoints, Sums};
 use std::ops::Range;
 
 /// Radii that are tried, metres. From: chosen.
@@ -141,7 +141,7 @@ pub fn distance(x: f64, y: f64) -> f64 {
 /// `None` if there are too few side points or they lie on no circle of a sensible size.
 pub fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: u64) -> Option<Round> {
     let height = top_m - base_m;
-    let side = Side::between(points, base_m, top_m);
+    let side = SidePoints::between(points, base_m, top_m);
     if side.len() < FEWEST.0 {
         return None;
     }
@@ -178,7 +178,7 @@ pub(crate) fn refit(
     top_m: f64,
     sigma_m: f64,
 ) -> Option<Round> {
-    let side = Side::between(points, base_m, top_m);
+    let side = SidePoints::between(points, base_m, top_m);
     let tolerance = tolerance(sigma_m);
     let mut round = *round;
     let few = side.thinned(SCOUTS);
@@ -243,7 +243,7 @@ pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
 }
 
 /// The circle through three points that most points lie on and fewest outside of, seen from above, from the first point of the side.
-fn propose(side: &Side, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
+fn propose(side: &SidePoints, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
     let judges = side.judges(JUDGES);
     let mut best: Option<(f32, [f64; 3])> = None;
@@ -273,7 +273,7 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
 }
 
 /// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
-fn improve(round: &Round, side: &Side, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
+fn improve(round: &Round, side: &SidePoints, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
     let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
     if count < FEWEST.1 as f64 {
         return None;

@@ -28,7 +28,7 @@ pub use error::SurfaceError;
 pub(crate) use extent::TALLEST_M;
 pub use hull::{convex_hull, largest_part};
 use level::THINGS_M;
-pub use level::{Level, Role, Sign, Surface};
+pub use level::{Overhang, Role, Sign, Surface};
 pub use options::{Region, SurfaceOptions};
 pub use outline::Outline;
 pub(crate) use outline::Rows;

@@ -37,7 +37,7 @@ fn same(a: &Cloud, b: &Cloud) -> bool {
 
 #[test]
 fn pcd_comes_back_as_it_was() {
-    for encoding in [pcd::Encoding::Ascii, pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+    for encoding in [pcd::PcdEncoding::Ascii, pcd::PcdEncoding::Binary, pcd::PcdEncoding::BinaryCompressed] {
         for organised in [false, true] {
             let cloud = sample(organised);
             let loaded = files::read_cloud(&pcd::write(&cloud, encoding)).unwrap();
@@ -54,7 +54,7 @@ fn pcd_comes_back_as_it_was() {
 
 #[test]
 fn ply_comes_back_as_it_was() {
-    for encoding in [ply::Encoding::Ascii, ply::Encoding::Binary] {
+    for encoding in [ply::PlyEncoding::Ascii, ply::PlyEncoding::Binary] {
         let cloud = sample(false);
         assert!(
             same(&files::read_cloud(&ply::write(&cloud, encoding)).unwrap().cloud, &cloud),
@@ -62,7 +62,7 @@ fn ply_comes_back_as_it_was() {
         );
     }
     let organised = sample(true);
-    assert_eq!(files::read_cloud(&ply::write(&organised, ply::Encoding::Binary)).unwrap().cloud.len(), 11);
+    assert_eq!(files::read_cloud(&ply::write(&organised, ply::PlyEncoding::Binary)).unwrap().cloud.len(), 11);
 }
 
 fn read(text: &str) -> Result<Loaded, String> {
@@ -196,7 +196,7 @@ fn what_the_header_does_not_declare_is_refused() {
         &format!("{head}DATA binary\n{bytes}"),
         &["1 points", declares, "24 bytes more, as 2 points"],
     );
-    let mut packed = pcd::write(&sample(true), pcd::Encoding::BinaryCompressed);
+    let mut packed = pcd::write(&sample(true), pcd::PcdEncoding::BinaryCompressed);
     packed.extend([7; 100]);
     let error = files::read_cloud(&packed).unwrap_err().to_string();
     assert!(cut.iter().all(|part| error.contains(part)) && error.contains("100 bytes more"), "{error}");
@@ -222,12 +222,12 @@ fn padding_and_empty_lines_are_nothing() {
     let head = "FIELDS x y z\nPOINTS 1\nPOINTS 1\n";
     assert_eq!(read(&format!("{head}DATA ascii\n1 2 3\n\n \n# end\n")).unwrap().cloud.len(), 1);
     assert_eq!(read(&format!("{head}DATA binary\n123456789abc\n")).unwrap().cloud.len(), 1);
-    for encoding in [pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+    for encoding in [pcd::PcdEncoding::Binary, pcd::PcdEncoding::BinaryCompressed] {
         let mut padded = pcd::write(&sample(true), encoding);
         padded.resize(padded.len().next_multiple_of(4096), 0);
         assert!(same(&files::read_cloud(&padded).unwrap().cloud, &sample(true)), "{encoding:?}");
     }
-    let mut ply = ply::write(&sample(false), ply::Encoding::Binary);
+    let mut ply = ply::write(&sample(false), ply::PlyEncoding::Binary);
     ply.extend(b"\n");
     assert_eq!(files::read_cloud(&ply).unwrap().cloud.len(), 12);
 }
@@ -390,11 +390,11 @@ fn files_of_all_kinds() -> Vec<Vec<u8>> {
         b"x,y,z,label\n1,2,3,4\n4,5,6,7\n".to_vec(),
         npy("<f4", "(2, 2, 3)", &[7; 48]),
         las(2, 1),
-        pcd::write(&cloud, pcd::Encoding::Ascii),
-        pcd::write(&cloud, pcd::Encoding::Binary),
-        pcd::write(&cloud, pcd::Encoding::BinaryCompressed),
-        ply::write(&cloud, ply::Encoding::Ascii),
-        ply::write(&cloud, ply::Encoding::Binary),
+        pcd::write(&cloud, pcd::PcdEncoding::Ascii),
+        pcd::write(&cloud, pcd::PcdEncoding::Binary),
+        pcd::write(&cloud, pcd::PcdEncoding::BinaryCompressed),
+        ply::write(&cloud, ply::PlyEncoding::Ascii),
+        ply::write(&cloud, ply::PlyEncoding::Binary),
     ]
 }
 

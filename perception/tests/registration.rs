@@ -2,7 +2,7 @@
 
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use descry_perception::register::{
-    Ending, Fit, Method, Prepared, RegisterError, RegisterOptions, align, pairs,
+    Fit, Method, Prepared, RegisterError, RegisterOptions, Termination, align, pairs,
 };
 
 /// A floor, two walls and a ball in a corner: held in every direction.
@@ -90,7 +90,7 @@ fn a_plane_alone_leaves_three_directions_free() {
 fn clouds_apart_say_so() {
     let away = Isometry3::translation(5.0, 0.0, 0.0);
     let fit = run(&moved(&corner(0.0), &away), &corner(0.0), &RegisterOptions::default());
-    assert_eq!((fit.ending, fit.matched, fit.rounds), (Ending::TooFewPartners, 0, 0));
+    assert_eq!((fit.ending, fit.matched, fit.rounds), (Termination::TooFewPartners, 0, 0));
     assert_eq!(fit.target_from_source, Isometry3::identity());
 }
 
@@ -108,7 +108,7 @@ fn what_cannot_be_registered() {
     assert_eq!(align(&bare, &bare, &options), Err(RegisterError::Start));
     let one = Prepared::new(&[Point3::origin()]).unwrap();
     let options = RegisterOptions { start_target_from_source: Isometry3::identity(), ..options };
-    assert_eq!(align(&one, &one, &options).unwrap().ending, Ending::TooFewPartners);
+    assert_eq!(align(&one, &one, &options).unwrap().ending, Termination::TooFewPartners);
 }
 
 #[test]

@@ -5,9 +5,10 @@ use crate::corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_vi
 use crate::tabletop::Draws;
 use corridor::measure::{BODY_M, MAP_FAR_M, score, score_pillars, survey};
 use descry_perception::mapping::{
-    Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, Fit, MapOptions, MappingError, Matcher,
-    NormalOptions, PairFit, Reach, RectifyOptions, RoomMap, Station, Survey, Unseen, by_regions, chained,
-    closures, correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive, rectify_pair, standable,
+    Cells, CellsError, ClosureOptions, ExploreOptions, FieldOfView, MapOptions, MappingError, Matcher,
+    NormalOptions, PairFit, PlaneEstimator, Reach, RectifyOptions, RoomMap, Station, Survey, Unseen,
+    by_regions, chained, closures, correct_drive, nearest_frontier, next_poses, outlooks, rectify_drive,
+    rectify_pair, standable,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Point3, Vector2, Vector3};
 use descry_perception::occupancy::Space;
@@ -157,9 +158,9 @@ fn normals_by_regions_are_those_of_the_surface() {
 fn walls_stand_where_they_are_and_doors_stay_open() {
     let Drive { building, truths, .. } = drive();
     for (fit, constrained, off_deg, off_m) in [
-        (Fit::Median, true, 1.5, 0.08),
-        (Fit::LeastSquares, false, 0.8, 0.02),
-        (Fit::LeastSquares, true, 0.2, 0.01),
+        (PlaneEstimator::Median, true, 1.5, 0.08),
+        (PlaneEstimator::LeastSquares, false, 0.8, 0.02),
+        (PlaneEstimator::LeastSquares, true, 0.2, 0.01),
     ] {
         let map = seen().map(&MapOptions { fit, constrained, ..MapOptions::default() }).unwrap();
         let score = score(&map, building, 0.15, truths, truths);

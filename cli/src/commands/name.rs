@@ -45,7 +45,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
         remembered.keep(&store, now_unix_s).map_err(CommandError::broken)?;
     }
     if let (Some(old), Some(file)) = (&arguments.old, &arguments.points) {
-        let points = ply::write(&find(&remembered, old)?.cloud, ply::Encoding::Binary);
+        let points = ply::write(&find(&remembered, old)?.cloud, ply::PlyEncoding::Binary);
         std::fs::write(file, points)
             .map_err(|e| CommandError::BadInput(format!("--points {}: {e}", file.display())))?;
     }

@@ -6,20 +6,10 @@ use super::error::{FileError, Place};
 use super::loaded::{Loaded, finish};
 use super::lzf;
 use crate::cloud::{Cloud, Grid};
-use header::{Encoding as Stored, Field, Header};
+pub use header::PcdEncoding;
+use header::{Field, Header};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
-
-/// The encoding in which [`write()`] stores the points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    /// Text, one point a line.
-    Ascii,
-    /// Point after point, little endian.
-    Binary,
-    /// Field after field, LZF.
-    BinaryCompressed,
-}
 
 /// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`, `label`; others are noted and left out.
 ///
@@ -30,9 +20,9 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let data = &bytes[header.data_at..];
     let place = Place::Byte(header.data_at);
     let table = match header.encoding {
-        Stored::Ascii => Table::from_text(&header, data)?,
-        Stored::Binary => Table::from_rows(&header, data)?,
-        Stored::BinaryCompressed => Table::from_columns(&header, data)?,
+        PcdEncoding::Ascii => Table::from_text(&header, data)?,
+        PcdEncoding::Binary => Table::from_rows(&header, data)?,
+        PcdEncoding::BinaryCompressed => Table::from_columns(&header, data)?,
     };
     let mut notes = header.notes.clone();
     let cloud = table.cloud(&header, &mut notes)?;
@@ -245,16 +235,16 @@ fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> R
 
 /// Encodes a cloud as PCD 0.7: `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` and
 /// `label` (U 4) if present.
-pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
+pub fn write(cloud: &Cloud, encoding: PcdEncoding) -> Vec<u8> {
     let columns = columns(cloud);
     let points = cloud.len();
     let (width, height) = cloud.grid.map_or((points, 1), |g| (g.width, g.height));
     let per_field =
         |value: &dyn Fn(&Column) -> String| columns.iter().map(value).collect::<Vec<_>>().join(" ");
     let name = match encoding {
-        Encoding::Ascii => "ascii",
-        Encoding::Binary => "binary",
-        Encoding::BinaryCompressed => "binary_compressed",
+        PcdEncoding::Ascii => "ascii",
+        PcdEncoding::Binary => "binary",
+        PcdEncoding::BinaryCompressed => "binary_compressed",
     };
     let mut out = format!(
         "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
@@ -266,15 +256,15 @@ pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
     )
     .into_bytes();
     match encoding {
-        Encoding::Ascii => write_text(&columns, points, &mut out),
-        Encoding::Binary => {
+        PcdEncoding::Ascii => write_text(&columns, points, &mut out),
+        PcdEncoding::Binary => {
             for i in 0..points {
                 for column in &columns {
                     out.extend_from_slice(&(column.bits)(i).to_le_bytes());
                 }
             }
         }
-        Encoding::BinaryCompressed => {
+        PcdEncoding::BinaryCompressed => {
             let raw: Vec<u8> =
                 columns.iter().flat_map(|c| (0..points).flat_map(|i| (c.bits)(i).to_le_bytes())).collect();
             let packed = lzf::pack(&raw);

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// The encoding in which [`write()`] stores the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
+pub enum PlyEncoding {
     /// Text, one vertex a line.
     Ascii,
     /// Little endian.
@@ -434,11 +434,11 @@ fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<(
 }
 
 /// The finite points of a cloud as a PLY file (float coordinates, uchar colours, float normals, uint label). PLY knows no grid.
-pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
+pub fn write(cloud: &Cloud, encoding: PlyEncoding) -> Vec<u8> {
     let finite = cloud.finite();
     let format = match encoding {
-        Encoding::Ascii => "ascii",
-        Encoding::Binary => "binary_little_endian",
+        PlyEncoding::Ascii => "ascii",
+        PlyEncoding::Binary => "binary_little_endian",
     };
     let mut head = format!("ply\nformat {format} 1.0\nelement vertex {}\n", finite.len());
     let mut declare = |kind: &str, names: &[&str]| {
@@ -458,8 +458,8 @@ pub fn write(cloud: &Cloud, encoding: Encoding) -> Vec<u8> {
     let mut out = head.into_bytes();
     for i in 0..finite.len() {
         match encoding {
-            Encoding::Ascii => text_vertex(&finite, i, &mut out),
-            Encoding::Binary => binary_vertex(&finite, i, &mut out),
+            PlyEncoding::Ascii => text_vertex(&finite, i, &mut out),
+            PlyEncoding::Binary => binary_vertex(&finite, i, &mut out),
         }
     }
     out

@@ -2,7 +2,7 @@
 
 use super::shape::{PosedScan, ShapeError, ShapeModel};
 use super::solve::{Objective, Problem, SolverOptions, solve};
-use super::violation::{Assembly, Kind, Side, Violation};
+use super::violation::{Assembly, Kind, ScanEnd, Violation};
 use nalgebra::Isometry2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -31,7 +31,7 @@ pub struct Alignment {
     pub left_out: Vec<usize>,
     /// Ends that contradict other scans, with the index of the scan; in the model, the scan is open
     /// on that side. Set by [`align_consistent`] only.
-    pub opened: Vec<(usize, Side)>,
+    pub opened: Vec<(usize, ScanEnd)>,
 }
 
 impl Alignment {
@@ -113,7 +113,7 @@ pub fn align_consistent(
     let all = align(scans, options)?;
     let mut best = all.clone();
     let mut kept: Vec<(usize, PosedScan)> = scans.iter().cloned().enumerate().collect();
-    let mut opened: Vec<(usize, Side)> = Vec::new();
+    let mut opened: Vec<(usize, ScanEnd)> = Vec::new();
     while best.longest_m() > longest_m {
         let rest: Vec<PosedScan> = kept.iter().map(|(_, scan)| scan.clone()).collect();
         let found = contradictions(&rest, longest_m, options)?;
@@ -142,15 +142,15 @@ pub fn align_consistent(
 }
 
 /// Moves the bound of a scan far away from the object on one side.
-fn open(posed: &mut PosedScan, side: Side) {
+fn open(posed: &mut PosedScan, side: ScanEnd) {
     let scan = &mut posed.scan;
     let most = |other: f64| (other.abs() - 1e-3).min(OPEN_RAD);
     match side {
-        Side::Left => {
+        ScanEnd::Left => {
             let room = PI - (scan.left_object_rad - scan.right_bound_rad);
             scan.left_bound_rad = scan.left_object_rad + most(room);
         }
-        Side::Right => {
+        ScanEnd::Right => {
             let room = PI - (scan.left_bound_rad - scan.right_object_rad);
             scan.right_bound_rad = scan.right_object_rad - most(room);
         }
@@ -160,7 +160,7 @@ fn open(posed: &mut PosedScan, side: Side) {
 /// Scans that contradict others, by their index in the list.
 #[derive(Default)]
 struct Contradictions {
-    ends: BTreeSet<(usize, Side)>,
+    ends: BTreeSet<(usize, ScanEnd)>,
     scans: BTreeSet<usize>,
 }
 
@@ -180,8 +180,8 @@ fn contradictions(
     let robust = align(scans, &SolverOptions { outlier_m: longest_m, ..*options })?;
     let assembly = Assembly::new(robust.model.scans().iter().map(std::slice::from_ref));
     let placed = assembly.placed(&vec![Isometry2::identity(); scans.len()]);
-    let mut beyond: BTreeMap<(usize, Side), BTreeSet<usize>> = BTreeMap::new();
-    let mut short: BTreeMap<(usize, Side), BTreeSet<usize>> = BTreeMap::new();
+    let mut beyond: BTreeMap<(usize, ScanEnd), BTreeSet<usize>> = BTreeMap::new();
+    let mut short: BTreeMap<(usize, ScanEnd), BTreeSet<usize>> = BTreeMap::new();
     assembly.residuals(&placed, 0.0, |r| {
         let of = match r.kind {
             Kind::Exterior => &mut beyond,
@@ -195,10 +195,12 @@ fn contradictions(
     let mut found = Contradictions::default();
     found.ends.extend(beyond.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end));
     // A scan of which an end is false lacks what lies there.
-    let lacks =
-        |scan: &usize| [Side::Left, Side::Right].iter().any(|side| found.ends.contains(&(*scan, *side)));
+    let lacks = |scan: &usize| {
+        [ScanEnd::Left, ScanEnd::Right].iter().any(|side| found.ends.contains(&(*scan, *side)))
+    };
     short.values_mut().for_each(|by| by.retain(|scan| !lacks(scan)));
-    let far: Vec<(usize, Side)> = short.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end).collect();
+    let far: Vec<(usize, ScanEnd)> =
+        short.iter().filter(|(_, by)| by.len() > 1).map(|(end, _)| *end).collect();
     found.ends.extend(far);
     let mut accused: BTreeMap<usize, usize> = BTreeMap::new();
     for (_, by) in beyond.iter().chain(&short).filter(|(end, _)| !found.ends.contains(*end)) {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// Pose-invariant features of a shape's convex hull, and its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Features {
+pub struct HullFeatures {
     /// Square metres.
     pub area_m2: f64,
     /// Metres.
@@ -16,7 +16,7 @@ pub struct Features {
     pub centre: Point2<f64>,
 }
 
-impl Features {
+impl HullFeatures {
     fn vector(&self) -> Vector2<f64> {
         Vector2::new(self.area_m2, self.perimeter_m)
     }
@@ -41,7 +41,7 @@ pub struct FeatureClass {
 
 impl FeatureClass {
     /// Mahalanobis distance of features from the class mean.
-    pub fn distance(&self, features: &Features) -> f64 {
+    pub fn distance(&self, features: &HullFeatures) -> f64 {
         let off = features.vector() - self.mean;
         let inverse = self.covariance.try_inverse().unwrap_or_else(Matrix2::zeros);
         (off.transpose() * inverse * off)[0].max(0.0).sqrt()
@@ -88,7 +88,7 @@ pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -
 
 /// Class with the smallest Mahalanobis distance; `None` without classes. The caller decides on
 /// acceptance.
-pub fn nearest<'a>(classes: &'a [FeatureClass], features: &Features) -> Option<Nearest<'a>> {
+pub fn nearest<'a>(classes: &'a [FeatureClass], features: &HullFeatures) -> Option<Nearest<'a>> {
     let mut ranked: Vec<(f64, &FeatureClass)> = classes.iter().map(|c| (c.distance(features), c)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let second = ranked.get(1).map_or(f64::INFINITY, |r| r.0);
@@ -97,7 +97,7 @@ pub fn nearest<'a>(classes: &'a [FeatureClass], features: &Features) -> Option<N
 
 /// Categories without names: models whose mean features differ by fewer than `apart` usual spreads are joined, the nearest first (average linkage).
 /// Indices of each category ascend; categories come in order of their first.
-pub fn groups(models: &[Features], apart: f64) -> Vec<Vec<usize>> {
+pub fn groups(models: &[HullFeatures], apart: f64) -> Vec<Vec<usize>> {
     let scaled: Vec<Vector2<f64>> = models
         .iter()
         .map(|f| Vector2::new(f.area_m2 / USUAL_SPREAD.0, f.perimeter_m / USUAL_SPREAD.1))

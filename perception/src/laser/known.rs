@@ -1,6 +1,6 @@
 //! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
 
-use super::features::{Features, USUAL_SPREAD};
+use super::features::{HullFeatures, USUAL_SPREAD};
 use super::fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
 use super::scan::direction;
 use super::shape::{ObjectScan, ShapeModel};
@@ -22,7 +22,7 @@ pub struct KnownShape {
     pub model: ShapeModel,
     /// Features of the model's hull, kept so that many known shapes are gone through quickly.
     #[serde(skip)]
-    features: Features,
+    features: HullFeatures,
 }
 
 /// Known shape in file form.
@@ -46,7 +46,7 @@ impl KnownShape {
     }
 
     /// Features of the hull.
-    pub fn features(&self) -> &Features {
+    pub fn features(&self) -> &HullFeatures {
         &self.features
     }
 }
@@ -96,7 +96,7 @@ impl RecogniseOptions {
 
 /// A known shape that features or width did not rule out.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct ShapeCandidate {
     /// The index in the list of known shapes.
     pub index: usize,
     /// Distance of features or width from the class, in standard deviations.
@@ -123,7 +123,7 @@ pub struct Recognition {
     /// Verdict.
     pub verdict: Verdict,
     /// The known shapes that were aligned, the best fit first.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<ShapeCandidate>,
     /// The number of known shapes that features or width ruled out.
     pub ruled_out: usize,
     /// Names that are not ruled out, best fit first.
@@ -134,11 +134,15 @@ pub struct Recognition {
 pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise", known = known.len()).entered();
     let features = instance.features();
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut candidates: Vec<ShapeCandidate> = Vec::new();
     for (index, shape) in known.iter().enumerate() {
         let distance = apart(&features, &shape.features);
         if distance <= options.gate {
-            candidates.push(Candidate { index, distance, fit: fit(&shape.model, instance, &options.fits()) });
+            candidates.push(ShapeCandidate {
+                index,
+                distance,
+                fit: fit(&shape.model, instance, &options.fits()),
+            });
         }
     }
     decide(candidates, known, options)
@@ -150,20 +154,20 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
 /// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
 pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise_scan", known = known.len()).entered();
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut candidates: Vec<ShapeCandidate> = Vec::new();
     for (index, shape) in known.iter().enumerate() {
         let distance = width_apart_m(scan, &shape.model) / USUAL_SPREAD.1;
         if distance <= options.gate {
             let fit = localise(&shape.model, scan, Start::AllAngles, &options.fits());
-            candidates.push(Candidate { index, distance, fit });
+            candidates.push(ShapeCandidate { index, distance, fit });
         }
     }
     decide(candidates, known, options)
 }
 
-/// Classifies several scans, possibly from one side. `loose_m`: mean distance by which the object
-/// may extend beyond the measured hull ([`super::Outlook::looseness_m`]); if small, hull features
-/// are compared, else only the width in each scan.
+/// Classifies several scans, perhaps all from one side. `loose_m` is the mean distance by which the
+/// object may extend beyond the measured hull ([`super::ScanGain::looseness_m`]): if it is small,
+/// the features of the hull are compared, else only the width in each scan.
 pub fn recognise_scans(
     scans: &ShapeModel,
     loose_m: f64,
@@ -176,13 +180,13 @@ pub fn recognise_scans(
         true => fit_scans(&shape.model, scans, &options.fits()),
         false => worst_fit(&shape.model, scans, &options.fits()),
     };
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut candidates: Vec<ShapeCandidate> = Vec::new();
     for (index, shape) in known.iter().enumerate() {
         let apart_m = scans.scans().iter().map(|s| width_apart_m(&s.scan, &shape.model)).fold(0.0, f64::max);
         let by_features = features.as_ref().map_or(0.0, |f| apart(f, &shape.features));
         let distance = by_features.max(apart_m / USUAL_SPREAD.1);
         if distance <= options.gate {
-            candidates.push(Candidate { index, distance, fit: fit(shape) });
+            candidates.push(ShapeCandidate { index, distance, fit: fit(shape) });
         }
     }
     decide(candidates, known, options)
@@ -218,7 +222,11 @@ fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
 }
 
 /// Names of the shapes that fit, and of those not ruled out.
-fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
+fn decide(
+    mut candidates: Vec<ShapeCandidate>,
+    known: &[KnownShape],
+    options: &RecogniseOptions,
+) -> Recognition {
     let ruled_out = known.len() - candidates.len();
     candidates.sort_by(|a, b| a.fit.between.per_pair_m().total_cmp(&b.fit.between.per_pair_m()));
     let within = |limit_m: f64| {
@@ -244,7 +252,7 @@ fn decide(mut candidates: Vec<Candidate>, known: &[KnownShape], options: &Recogn
 
 /// Distance between the features of two models, in standard deviations of such a difference: the
 /// larger of area's and perimeter's.
-fn apart(a: &Features, b: &Features) -> f64 {
+fn apart(a: &HullFeatures, b: &HullFeatures) -> f64 {
     let area = (a.area_m2 - b.area_m2) / USUAL_SPREAD.0;
     let perimeter = (a.perimeter_m - b.perimeter_m) / USUAL_SPREAD.1;
     area.abs().max(perimeter.abs()) / std::f64::consts::SQRT_2

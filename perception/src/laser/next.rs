@@ -49,7 +49,7 @@ pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
 
 /// Expected gain of scans from several poses, jointly and separately.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outlook {
+pub struct ScanGain {
     /// Perimeter of the hull of all hits, metres.
     pub perimeter_m: f64,
     cell_m2: f64,
@@ -58,10 +58,10 @@ pub struct Outlook {
     settles: Vec<Vec<u32>>,
 }
 
-impl Outlook {
+impl ScanGain {
     /// Undetermined cells of a model, and those that scans from the given laser poses (model frame)
     /// would settle.
-    pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Outlook {
+    pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> ScanGain {
         let _span = tracing::debug_span!("outlook", poses = poses.len()).entered();
         let hull = model.hull();
         let open = undetermined(model, &hull, options);
@@ -70,7 +70,7 @@ impl Outlook {
             let cells = (0u32..).zip(&open).filter(|(_, cell)| settles(&laser, cell, &hull, options));
             cells.map(|(index, _)| index).collect()
         };
-        Outlook {
+        ScanGain {
             perimeter_m: hull.perimeter_m(),
             cell_m2: options.cell_m * options.cell_m,
             open: open.len(),
@@ -98,7 +98,7 @@ impl Outlook {
 ///
 /// Whether a pose can be reached, and what that costs, is for the caller to weigh.
 pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Vec<NextScan> {
-    let outlook = Outlook::new(model, poses, options);
+    let outlook = ScanGain::new(model, poses, options);
     let all_m2 = outlook.leaves_m2(&[]);
     let of = |index: usize| {
         let leaves_m2 = outlook.leaves_m2(&[index]);

@@ -1,6 +1,6 @@
 //! Shape model: constraints on an object's outline from one scan or many.
 
-use super::features::Features;
+use super::features::HullFeatures;
 use super::scan::is_pose;
 use crate::hull::{Hull, convex};
 use crate::plane::Plane;
@@ -123,9 +123,9 @@ impl ShapeModel {
     }
 
     /// Area, perimeter and centre of the hull.
-    pub fn features(&self) -> Features {
+    pub fn features(&self) -> HullFeatures {
         let hull = self.hull();
-        Features { area_m2: hull.area_m2(), perimeter_m: hull.perimeter_m(), centre: hull.centre() }
+        HullFeatures { area_m2: hull.area_m2(), perimeter_m: hull.perimeter_m(), centre: hull.centre() }
     }
 
     /// Model with its frame transformed: `t(N, p)` of Eq. 4.

@@ -48,7 +48,7 @@ const FAR_RAD: f64 = 0.2;
 /// End of the object in a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Side {
+pub enum ScanEnd {
     /// The left.
     Left,
     /// The right.
@@ -84,13 +84,13 @@ impl Rays {
 
     /// Object ray on the side of `other` that its scan must reach (Eq. 2), with the bound beside
     /// it; `None` if `other` is between the bounds and need not see either end.
-    fn facing(&self, other: &Point2<f64>) -> Option<(Side, Vector2<f64>, Vector2<f64>)> {
+    fn facing(&self, other: &Point2<f64>) -> Option<(ScanEnd, Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
         if side < 0.0 && self.right_bound.dot(&towards) > 0.0 {
-            Some((Side::Right, self.right_object, self.right_bound))
+            Some((ScanEnd::Right, self.right_object, self.right_bound))
         } else if side > 0.0 && self.left_bound.dot(&towards) > 0.0 {
-            Some((Side::Left, self.left_object, self.left_bound))
+            Some((ScanEnd::Left, self.left_object, self.left_bound))
         } else {
             None
         }
@@ -129,7 +129,7 @@ pub enum Kind {
 pub struct Residual {
     pub kind: Kind,
     /// Side of the scan with the line.
-    pub side: Side,
+    pub side: ScanEnd,
     pub value_m: f64,
     pub normal: Vector2<f64>,
     pub at: Point2<f64>,
@@ -247,10 +247,10 @@ fn errors(
     whole: Option<&Point2<f64>>,
     corners: &[Point2<f64>],
     soft_m: f64,
-    mut each: impl FnMut((Kind, Side), f64, Vector2<f64>, Point2<f64>),
+    mut each: impl FnMut((Kind, ScanEnd), f64, Vector2<f64>, Point2<f64>),
 ) {
     // Eq. 1, left and right: the point farthest beyond the bound.
-    for (side, bound) in [(Side::Left, rays.left_bound), (Side::Right, rays.right_bound)] {
+    for (side, bound) in [(ScanEnd::Left, rays.left_bound), (ScanEnd::Right, rays.right_bound)] {
         let (beyond, at) = farthest(&bound, &rays.laser, corners, soft_m);
         if beyond > 0.0 {
             each((Kind::Exterior, side), beyond, bound, at);

@@ -22,11 +22,11 @@ use crate::pool;
 use crate::register::{Method, Prepared, RegisterOptions, align};
 use crate::view::View;
 pub use error::KnowError;
-use evidence::{Evidence, Judge, Verified, first_sight, unbounded, verify};
-use feature::{Features, Kind};
+use evidence::{Judge, PoseEvidence, Verified, first_sight, unbounded, verify};
+use feature::{DescriptorKind, Descriptors};
 use group::{Vote, matches, standing, votes};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use scene::Seen;
+use scene::SceneView;
 use serde::{Deserialize, Serialize};
 use skin::Skin;
 pub use skin::outward;
@@ -74,7 +74,7 @@ pub struct Recognised {
     /// Probability of this object at this pose.
     pub confidence: f64,
     /// Evidence for it.
-    pub evidence: Evidence,
+    pub evidence: PoseEvidence,
 }
 
 /// Learned models, made ready.
@@ -87,12 +87,12 @@ struct Known {
     skin: Skin,
     /// Stride through the points for a first, coarse check.
     coarse: Skin,
-    features: [Features; 2],
+    features: [Descriptors; 2],
     /// Largest extent, metres.
     size_m: f64,
 }
 
-const KINDS: [Kind; 2] = [Kind::Shape, Kind::Pattern];
+const KINDS: [DescriptorKind; 2] = [DescriptorKind::Shape, DescriptorKind::Pattern];
 /// Distance of the points that a first sight looks at, metres.
 const COARSE_M: f32 = 0.01;
 /// Fewest points of a model.
@@ -133,12 +133,12 @@ impl Library {
         if skin.points.len() < LEAST_POINTS {
             return Err(KnowError::Model { points: skin.points.len() });
         }
-        let mut all = KINDS.map(Features::none);
+        let mut all = KINDS.map(Descriptors::none);
         for away in directions() {
             let part = skin.part(&skin.seen_from(&away))?;
             let keypoints = part.keypoints(options.keypoint_m, |_| true);
             for (features_of, kind) in all.iter_mut().zip(KINDS) {
-                features_of.add_new(&Features::of(&part, &keypoints, kind));
+                features_of.add_new(&Descriptors::of(&part, &keypoints, kind));
             }
         }
         let few: Vec<u32> = skin.keypoints(COARSE_M, |_| true);
@@ -171,29 +171,29 @@ impl Library {
     ///
     /// # Errors
     /// As [`Library::recognise`].
-    pub fn judged(&self, view: &View, options: &KnowOptions) -> Result<Vec<Candidate>, KnowError> {
+    pub fn judged(&self, view: &View, options: &KnowOptions) -> Result<Vec<Hypothesis>, KnowError> {
         let _span = tracing::debug_span!("know again", models = self.models.len()).entered();
         self.candidates_in(&self.scene(view, options)?, &view.world_from_camera, options)
     }
 
     /// A look made ready.
-    fn scene(&self, view: &View, options: &KnowOptions) -> Result<Seen, KnowError> {
+    fn scene(&self, view: &View, options: &KnowOptions) -> Result<SceneView, KnowError> {
         let widest_m = self.models.iter().map(|m| m.size_m).fold(0.0, f64::max);
-        Seen::new(view, options.range_m, widest_m * widest_m)
+        SceneView::new(view, options.range_m, widest_m * widest_m)
     }
 
     fn candidates_in(
         &self,
-        scene: &Seen,
+        scene: &SceneView,
         world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
-    ) -> Result<Vec<Candidate>, KnowError> {
+    ) -> Result<Vec<Hypothesis>, KnowError> {
         let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
-        let described = KINDS.map(|kind| Features::of(&scene.skin, &keypoints, kind));
+        let described = KINDS.map(|kind| Descriptors::of(&scene.skin, &keypoints, kind));
         let of_model = |(number, model): (usize, &Known)| {
             model.find(number, &described, scene, world_from_camera, options)
         };
-        let all: Vec<Vec<Candidate>> = pool::each(self.models.len(), 1, |n| of_model((n, &self.models[n])))
+        let all: Vec<Vec<Hypothesis>> = pool::each(self.models.len(), 1, |n| of_model((n, &self.models[n])))
             .into_iter()
             .collect::<Result<_, _>>()?;
         Ok(all.into_iter().flatten().collect())
@@ -202,16 +202,16 @@ impl Library {
 
 /// Model at a pose, judged in isolation.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
+pub struct Hypothesis {
     /// Candidate.
     pub recognised: Recognised,
     /// Indices of the view's surface points that the model explains, ascending.
     explained: Vec<u32>,
 }
 
-impl Candidate {
+impl Hypothesis {
     /// True if both explain much of the same.
-    fn conflicts(&self, other: &Candidate) -> bool {
+    fn conflicts(&self, other: &Hypothesis) -> bool {
         let shared = self.explained.iter().filter(|c| other.explained.binary_search(c).is_ok()).count();
         shared as f64 > SHARED * self.explained.len().min(other.explained.len()) as f64
     }
@@ -231,11 +231,11 @@ impl Known {
     fn find(
         &self,
         number: usize,
-        described: &[Features; 2],
-        scene: &Seen,
+        described: &[Descriptors; 2],
+        scene: &SceneView,
         world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
-    ) -> Result<Vec<Candidate>, KnowError> {
+    ) -> Result<Vec<Hypothesis>, KnowError> {
         let up = options.up.map(|up| [*up, world_from_camera.rotation.inverse() * *up]);
         let mut judged = Vec::new();
         for vote in self.promising(described, scene, up.as_ref(), options)? {
@@ -245,7 +245,7 @@ impl Known {
             let confidence = options.confidence(&evidence, stands);
             let world_from_model = world_from_camera * pose;
             let recognised = Recognised { model: number, world_from_model, confidence, evidence };
-            judged.push(Candidate { recognised, explained: claims });
+            judged.push(Hypothesis { recognised, explained: claims });
         }
         Ok(judged)
     }
@@ -254,8 +254,8 @@ impl Known {
     /// promising; duplicates are merged. `up`: up direction in model and scene.
     fn promising(
         &self,
-        described: &[Features; 2],
-        scene: &Seen,
+        described: &[Descriptors; 2],
+        scene: &SceneView,
         up: Option<&[Vector3<f64>; 2]>,
         options: &KnowOptions,
     ) -> Result<Vec<Vote>, KnowError> {
@@ -291,7 +291,7 @@ impl Known {
 
     /// Upper bound of the confidence over some poses, from a few model points; 1 if too few are
     /// visible.
-    fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &Seen, judge: &Judge) -> f64 {
+    fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &SceneView, judge: &Judge) -> f64 {
         let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
         let mut most = 0.0_f64;
         for pose in poses {
@@ -308,7 +308,7 @@ impl Known {
 impl KnowOptions {
     /// Probability that a model with this evidence is at its pose, given whether it stands as when
     /// learned.
-    fn confidence(&self, evidence: &Evidence, stands: bool) -> f64 {
+    fn confidence(&self, evidence: &PoseEvidence, stands: bool) -> f64 {
         let p = self.judge.confidence(evidence);
         if stands { p } else { LYING * p / (1.0 - p + LYING * p) }
     }
@@ -319,7 +319,7 @@ impl KnowOptions {
 fn refined(
     skin: &Skin,
     start: &Isometry3<f64>,
-    scene: &Seen,
+    scene: &SceneView,
     within_m: &[f32],
 ) -> Result<Isometry3<f64>, KnowError> {
     let mut pose = *start;
@@ -358,7 +358,7 @@ fn same(a: &Isometry3<f64>, b: &Isometry3<f64>, (within_m, within_rad): (f64, f6
 /// confident first: greedy from each single best candidate, with single improving exchanges (add
 /// one, drop its conflicts). Competing explanations share confidence by their odds; candidates
 /// below `least_confidence` are dropped.
-pub fn choose(mut found: Vec<Candidate>, least_confidence: f64) -> Vec<Recognised> {
+pub fn choose(mut found: Vec<Hypothesis>, least_confidence: f64) -> Vec<Recognised> {
     found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let n = found.len();
     let conflicts: Vec<Vec<bool>> =

@@ -1,7 +1,7 @@
 //! Patches of one wall made one (section 4.3), openings kept.
 
 use super::cells::Facet;
-use super::patch::{Constraints, Fit, Patch, placed, through};
+use super::patch::{Constraints, Patch, PlaneEstimator, placed, through};
 use crate::plane::Plane;
 use nalgebra::Point3;
 
@@ -29,7 +29,7 @@ const ROUNDS: usize = 8;
 pub(super) fn fuse(
     facets: &[Facet],
     mut patches: Vec<Patch>,
-    fit: Fit,
+    fit: PlaneEstimator,
     constraints: &Constraints,
     options: &FuseOptions,
     edge_m: f64,
@@ -92,10 +92,17 @@ fn corners(patch: &Patch) -> [Point3<f64>; 4] {
         .map(|(u, v)| patch.middle + patch.along * u + up * v)
 }
 
-fn joined(facets: &[Facet], a: &Patch, b: &Patch, fit: Fit, constraints: &Constraints, edge_m: f64) -> Patch {
+fn joined(
+    facets: &[Facet],
+    a: &Patch,
+    b: &Patch,
+    fit: PlaneEstimator,
+    constraints: &Constraints,
+    edge_m: f64,
+) -> Patch {
     let mut members: Vec<u32> = a.facets.iter().chain(&b.facets).copied().collect();
     members.sort_unstable();
-    if fit == Fit::LeastSquares {
+    if fit == PlaneEstimator::LeastSquares {
         return through(facets, members, fit, constraints, edge_m);
     }
     let share = b.area_m2 / (a.area_m2 + b.area_m2);

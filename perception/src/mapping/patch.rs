@@ -8,7 +8,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Method of fitting planes to patches and joining them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Fit {
+pub enum PlaneEstimator {
     /// The paper's: the median of the normals and the centroid; where planes are joined, their means weighted by area.
     Median,
     /// Least squares of the distances of all facets.
@@ -120,7 +120,7 @@ impl Constraints {
 pub(super) fn through(
     facets: &[Facet],
     members: Vec<u32>,
-    fit: Fit,
+    fit: PlaneEstimator,
     constraints: &Constraints,
     edge_m: f64,
 ) -> Patch {
@@ -128,9 +128,9 @@ pub(super) fn through(
     let middle = Point3::from(of().map(|f| f.at.coords).sum::<Vector3<f64>>() / members.len().max(1) as f64);
     let side = of().map(|f| f.normal).sum::<Vector3<f64>>();
     let normal = match fit {
-        Fit::Median => median(&members, |m| facets[m as usize].normal),
-        Fit::LeastSquares if constraints.upright => least_upright(of(), &middle),
-        Fit::LeastSquares => {
+        PlaneEstimator::Median => median(&members, |m| facets[m as usize].normal),
+        PlaneEstimator::LeastSquares if constraints.upright => least_upright(of(), &middle),
+        PlaneEstimator::LeastSquares => {
             let points: Vec<Point3<f32>> = of().map(|f| f.at.cast()).collect();
             plane::refit(&points).map(|p| p.normal)
         }

@@ -7,7 +7,7 @@ use super::fuse::{FuseOptions, fuse};
 use super::grid::Sightlines;
 use super::orientation::{OrientationOptions, orientations};
 use super::pair::{PairFit, RectifyOptions, fit_cut};
-use super::patch::{Constraints, Fit, Growth, Patch, grow, main_direction, through};
+use super::patch::{Constraints, Growth, Patch, PlaneEstimator, grow, main_direction, through};
 use super::station::{Station, shared};
 use crate::hull::convex;
 use crate::occupancy::{Occupancy, Space};
@@ -43,7 +43,7 @@ pub struct MapOptions {
     /// radians.
     pub tilt_rad: f64,
     /// Method for fitting planes.
-    pub fit: Fit,
+    pub fit: PlaneEstimator,
     /// True: walls are made upright, and parallel or perpendicular to the majority if nearly so.
     pub constrained: bool,
     /// Options for joining patches; `None`: no joining.
@@ -69,7 +69,7 @@ impl Default for MapOptions {
             orientations: OrientationOptions::default(),
             grow_m: 0.25,
             tilt_rad: 0.35,
-            fit: Fit::LeastSquares,
+            fit: PlaneEstimator::LeastSquares,
             constrained: true,
             fuse: Some(FuseOptions::default()),
             cylinders: Some(CylinderOptions::default()),

@@ -2,7 +2,7 @@
 
 use super::equations::{Motion, Sums};
 use super::pairs::{Partner, Place};
-use super::{Ending, Fit, Method, Prepared, RegisterError, RegisterOptions};
+use super::{Fit, Method, Prepared, RegisterError, RegisterOptions, Termination};
 use crate::pool;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
@@ -136,21 +136,21 @@ impl<'a> Run<'a> {
 
     /// Runs at most `most` iterations in all; ends when the motion is below `ease` times the
     /// convergence limit.
-    fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Ending {
+    fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Termination {
         let options = self.options;
         let mut first = true;
         loop {
             let sums = self.sums(&at.pose, &at.centre);
             if sums.matched < least {
-                return Ending::TooFewPartners;
+                return Termination::TooFewPartners;
             }
             let (settle_m, settle_rad) = (ease * options.settle_m, ease * options.settle_rad);
             let settled = |m: &Motion| m.shift_m < settle_m && m.turn_rad < settle_rad;
             if !first && at.last.as_ref().is_some_and(settled) {
-                return Ending::Settled;
+                return Termination::Settled;
             }
             if at.rounds >= most {
-                return Ending::OutOfRounds;
+                return Termination::OutOfRounds;
             }
             let motion = match options.method {
                 Method::PointToPoint => sums.closed_form(&at.centre),

@@ -8,7 +8,7 @@ const LANES: usize = 4;
 
 type Lanes = [f32; LANES];
 
-/// Points that judge circles, seen from above, as of [`Side`].
+/// Points that judge circles, seen from above, as of [`SidePoints`].
 pub struct Judges {
     x: Vec<f32>,
     y: Vec<f32>,
@@ -16,7 +16,7 @@ pub struct Judges {
 
 /// Points relative to the first one, in single precision to a tenth of a micrometre; padded with
 /// NaN, which is on no side.
-pub struct Side {
+pub struct SidePoints {
     /// Origin in the surface's frame, metres.
     pub origin: [f64; 3],
     x: Vec<f32>,
@@ -41,9 +41,9 @@ pub struct Sums {
     pub outside: f64,
 }
 
-impl Side {
+impl SidePoints {
     /// The points between base and top that can lie on the side.
-    pub fn between(points: &[Point3<f64>], base_m: f64, top_m: f64) -> Side {
+    pub fn between(points: &[Point3<f64>], base_m: f64, top_m: f64) -> SidePoints {
         let band = side_band(base_m, top_m);
         let column = || Vec::with_capacity(points.len().next_multiple_of(LANES));
         let (mut x, mut y, mut z) = (column(), column(), column());
@@ -60,7 +60,7 @@ impl Side {
         for column in [&mut x, &mut y, &mut z] {
             column.resize(len.next_multiple_of(LANES), f32::NAN);
         }
-        Side { origin, x, y, z, len }
+        SidePoints { origin, x, y, z, len }
     }
 
     pub fn len(&self) -> usize {
@@ -73,7 +73,7 @@ impl Side {
     }
 
     /// Side with every n-th point, at most `to` of them.
-    pub fn thinned(&self, to: usize) -> Side {
+    pub fn thinned(&self, to: usize) -> SidePoints {
         let stride = self.len.div_ceil(to).max(1);
         let len = self.len.div_ceil(stride);
         let pick = |column: &[f32]| {
@@ -82,7 +82,7 @@ impl Side {
             few.resize(len.next_multiple_of(LANES), f32::NAN);
             few
         };
-        Side { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
+        SidePoints { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
     /// Every n-th point as a judge, at most `count` of them.

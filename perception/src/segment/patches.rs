@@ -1,7 +1,7 @@
 //! Points in voxels, with normals and neighbours.
 
 use super::footprint::bounds;
-use crate::lattice::{Around, Lattice};
+use crate::lattice::{Lattice, NeighbourSweep};
 use crate::pool;
 use crate::spread;
 use nalgebra::{Point3, Vector3};
@@ -218,7 +218,7 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     const SHARES: usize = 8;
     let of = |range: Range<usize>| {
         let (mut starts, mut near) = (Vec::with_capacity(range.len() + 1), Vec::new());
-        let mut around = Around::from(lattice, keys, range.start);
+        let mut around = NeighbourSweep::from(lattice, keys, range.start);
         for i in range {
             starts.push(near.len() as u32);
             around.visit(keys[i], |j| {

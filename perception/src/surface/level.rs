@@ -131,7 +131,7 @@ pub struct Surface {
     #[serde(default = "said")]
     pub up_chance: f64,
     /// Outlines of the other supports above this surface, metres in the world.
-    pub over: Vec<Level>,
+    pub over: Vec<Overhang>,
 }
 
 fn said() -> f64 {
@@ -140,14 +140,14 @@ fn said() -> f64 {
 
 /// The outline and height of another surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Level {
+pub struct Overhang {
     /// The height above, metres.
     pub above_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
 }
 
-impl Level {
+impl Overhang {
     /// The outline of the surface, prepared for tests of many points.
     pub(crate) fn outline(&self, up: &Vector3<f64>) -> Outline {
         Outline::of(&self.hull, up)

@@ -4,7 +4,7 @@
 //! ends, something stands before it or a wall rises from it.
 
 use super::extent::TALLEST_M;
-use super::level::{Level, Role, Sign, Surface};
+use super::level::{Overhang, Role, Sign, Surface};
 use super::options::SurfaceOptions;
 use super::sample::Sample;
 use crate::pool;
@@ -88,7 +88,7 @@ pub(super) fn tell(
     let is_board =
         |(s, open): &(&Surface, &bool)| s.role == Role::Support && s.residual_m < APART_M && **open;
     let boards: Vec<&Surface> = surfaces.iter().zip(&open).filter(is_board).map(|(s, _)| s).collect();
-    let over: Vec<Vec<Level>> = surfaces.iter().map(|s| over(s, &boards)).collect();
+    let over: Vec<Vec<Overhang>> = surfaces.iter().map(|s| over(s, &boards)).collect();
     for (surface, over) in surfaces.iter_mut().zip(over) {
         surface.above_floor_m = ground.as_ref().map(|floor| floor.height_m(&surface.middle()));
         surface.over = over;
@@ -245,9 +245,9 @@ fn level_with_floor(surface: &Surface, surfaces: &[Surface]) -> (Role, Sign) {
 }
 
 /// The boards above a surface.
-fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Level> {
+fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Overhang> {
     let is_over = |s: &&&Surface| s.is_parallel(surface);
-    let level = |s: &&Surface| Level { above_m: surface.height_m(&s.middle()), hull: s.hull.clone() };
+    let level = |s: &&Surface| Overhang { above_m: surface.height_m(&s.middle()), hull: s.hull.clone() };
     boards.iter().filter(is_over).map(level).filter(|level| level.above_m > LOWER_M).collect()
 }
 

@@ -25,7 +25,7 @@ proptest! {
         entries.dedup_by_key(|e| e.0);
         let keys: Vec<u64> = entries.iter().map(|e| e.0).collect();
         let first = keys.len() / 3;
-        let mut around = Around::from(&lattice, &keys, first);
+        let mut around = NeighbourSweep::from(&lattice, &keys, first);
         for (key, own) in entries.iter().skip(first) {
             let own = voxel(&places[*own as usize]);
             let near = |other: &[i64; 3]| (0..3).all(|k| (own[k] - other[k]).abs() <= 1);

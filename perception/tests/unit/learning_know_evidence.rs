@@ -4,7 +4,7 @@ use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
 use descry_perception::learning::know::KnowOptions;
 use descry_perception::learning::know::evidence::*;
-use descry_perception::learning::know::scene::Seen;
+use descry_perception::learning::know::scene::SceneView;
 use descry_perception::learning::know::skin::Skin;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -13,7 +13,7 @@ const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 
 const PLATE_M: f32 = 0.1;
 
 /// A camera's view of a wall a metre away, with a square plate before the wall or none.
-fn wall(plate_before_m: f32) -> Seen {
+fn wall(plate_before_m: f32) -> SceneView {
     let depth = |i: usize| {
         let (u, v) = ((i % 320) as f32 - 159.5, (i / 320) as f32 - 119.5);
         let near = 1.0 - plate_before_m;
@@ -22,7 +22,8 @@ fn wall(plate_before_m: f32) -> Seen {
     };
     let depths: Vec<f32> = (0..320 * 240).map(depth).collect();
     let cloud = CAMERA.cloud_from_depth(&depths).expect("the camera is sound");
-    Seen::new(&View { intrinsics: Some(CAMERA), ..View::alone(cloud) }, 2.5, 0.05).expect("a depth image")
+    SceneView::new(&View { intrinsics: Some(CAMERA), ..View::alone(cloud) }, 2.5, 0.05)
+        .expect("a depth image")
 }
 
 /// A square plate that faces the camera.
@@ -82,7 +83,7 @@ fn a_side_of_which_nothing_was_learned_is_not_known() {
 #[test]
 fn what_is_turned_otherwise_or_seen_through_is_less_sure() {
     // Of a mug and what is none, as it was recorded.
-    let other = Evidence {
+    let other = PoseEvidence {
         facing: 1035,
         explained: 570,
         through: 106,
@@ -93,8 +94,8 @@ fn what_is_turned_otherwise_or_seen_through_is_less_sure() {
         beyond: 0.06,
         votes: 4,
     };
-    let sure = |e: &Evidence| Judge::default().confidence(e);
+    let sure = |e: &PoseEvidence| Judge::default().confidence(e);
     assert!(sure(&other) < KnowOptions::default().least_confidence, "{}", sure(&other));
-    assert!(sure(&other) < sure(&Evidence { turned_rad: 0.2, ..other }));
-    assert!(sure(&other) < sure(&Evidence { through: 0, ..other }));
+    assert!(sure(&other) < sure(&PoseEvidence { turned_rad: 0.2, ..other }));
+    assert!(sure(&other) < sure(&PoseEvidence { through: 0, ..other }));
 }

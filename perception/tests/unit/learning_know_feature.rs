@@ -5,9 +5,9 @@ use descry_perception::learning::know::feature::*;
 use nalgebra::{Point3, Vector3};
 
 /// Features that are drawn, every third near to the one before.
-fn drawn(kind: Kind, count: usize, seed: u64) -> Features {
+fn drawn(kind: DescriptorKind, count: usize, seed: u64) -> Descriptors {
     let mut draws = Draws::new(seed);
-    let mut features = Features::none(kind);
+    let mut features = Descriptors::none(kind);
     let mut bytes = vec![0_u8; kind.lengths().0];
     for k in 0..count {
         for byte in &mut bytes {
@@ -21,13 +21,13 @@ fn drawn(kind: Kind, count: usize, seed: u64) -> Features {
 
 #[test]
 fn what_is_most_alike_is_found() {
-    for kind in [Kind::Shape, Kind::Pattern] {
+    for kind in [DescriptorKind::Shape, DescriptorKind::Pattern] {
         let (own, mut others) = (drawn(kind, 60, 1), drawn(kind, 200, 2));
         // Three of the others are made of three of these, and alike to them.
         for (k, from) in [(7, 3), (41, 20), (120, 59)] {
             let near: Vec<u8> =
                 own.descriptor(from).as_flattened().iter().map(|b| b.saturating_add(3)).collect();
-            let mut made = Features::none(kind);
+            let mut made = Descriptors::none(kind);
             made.push(own.all[from], &near[..kind.lengths().0]);
             replace(&mut others, k, &made);
         }
@@ -46,7 +46,7 @@ fn what_is_most_alike_is_found() {
 }
 
 /// Puts the only feature of others in the place of one.
-fn replace(of: &mut Features, k: usize, by: &Features) {
+fn replace(of: &mut Descriptors, k: usize, by: &Descriptors) {
     let (each, code) = (by.blocks.len(), by.codes.len());
     of.all[k] = by.all[0];
     of.blocks[k * each..(k + 1) * each].copy_from_slice(&by.blocks);
@@ -55,7 +55,7 @@ fn replace(of: &mut Features, k: usize, by: &Features) {
 
 #[test]
 fn what_is_described_alike_at_the_same_place_is_one() {
-    let (mut all, more) = (drawn(Kind::Pattern, 9, 1), drawn(Kind::Pattern, 9, 2));
+    let (mut all, more) = (drawn(DescriptorKind::Pattern, 9, 1), drawn(DescriptorKind::Pattern, 9, 2));
     all.add_new(&all.clone());
     assert_eq!(all.all.len(), 9);
     all.add_new(&more);

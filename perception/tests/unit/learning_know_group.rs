@@ -31,8 +31,8 @@ fn a_thing_stands_where_single_matches_say() {
             normal: (truth.rotation * f.normal.cast::<f64>()).cast(),
         })
         .collect();
-    let matches: Vec<Match> =
-        model.iter().zip(&scene).map(|(model, scene)| Match { model, scene, off: 1.0 }).collect();
+    let matches: Vec<Correspondence> =
+        model.iter().zip(&scene).map(|(model, scene)| Correspondence { model, scene, off: 1.0 }).collect();
     let found = standing(&matches, &up, 9);
     assert_eq!(found.len(), 1);
     let pose = found[0].scene_from_model;

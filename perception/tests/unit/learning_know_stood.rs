@@ -2,7 +2,7 @@
 
 use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
-use descry_perception::learning::know::scene::Seen;
+use descry_perception::learning::know::scene::SceneView;
 use descry_perception::learning::know::skin::Skin;
 use descry_perception::learning::know::stood::*;
 use descry_perception::view::View;
@@ -14,14 +14,15 @@ const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.5, fy: 
 const HIGH_M: f64 = 1.0;
 const FLOOR_M: f64 = 1.7;
 
-fn table() -> Seen {
+fn table() -> SceneView {
     let depth = |i: usize| {
         let x = (i % 320) as f64 - 159.5;
         (if x < 0.0 { HIGH_M } else { FLOOR_M }) as f32
     };
     let depths: Vec<f32> = (0..320 * 240).map(depth).collect();
     let cloud = CAMERA.cloud_from_depth(&depths).expect("the camera is sound");
-    Seen::new(&View { intrinsics: Some(CAMERA), ..View::alone(cloud) }, 2.5, 0.05).expect("a depth image")
+    SceneView::new(&View { intrinsics: Some(CAMERA), ..View::alone(cloud) }, 2.5, 0.05)
+        .expect("a depth image")
 }
 
 /// A post of 6 cm across and 10 cm high on the origin, z up.

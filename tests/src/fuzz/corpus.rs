@@ -107,10 +107,10 @@ pub fn clouds() -> Vec<Vec<u8>> {
     npy.extend_from_slice(format!("{header:<117}\n").as_bytes());
     npy.extend(points().iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f32::to_le_bytes));
     let mut all = vec![npy, lines(" ", ""), lines(",", "x,y,z\n"), lines(" ", "40\n")];
-    for form in [pcd::Encoding::Ascii, pcd::Encoding::Binary, pcd::Encoding::BinaryCompressed] {
+    for form in [pcd::PcdEncoding::Ascii, pcd::PcdEncoding::Binary, pcd::PcdEncoding::BinaryCompressed] {
         all.push(pcd::write(&cloud, form));
     }
-    for form in [ply::Encoding::Ascii, ply::Encoding::Binary] {
+    for form in [ply::PlyEncoding::Ascii, ply::PlyEncoding::Binary] {
         all.push(ply::write(&cloud, form));
     }
     all

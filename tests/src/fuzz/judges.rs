@@ -109,7 +109,7 @@ pub fn phrase(input: &[u8]) {
 pub fn cloud(input: &[u8]) {
     match read_cloud(input) {
         Ok(loaded) => {
-            let written = pcd::write(&loaded.cloud, pcd::Encoding::Binary);
+            let written = pcd::write(&loaded.cloud, pcd::PcdEncoding::Binary);
             let again = read_cloud(&written).expect("what was written is read");
             assert_eq!(again.cloud.points.len(), loaded.cloud.points.len());
         }

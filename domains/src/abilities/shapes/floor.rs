@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use descry_perception::laser::{Alignment, Ignored, KnownShape, Outlook, PosedScan, Recognition, Verdict};
+use descry_perception::laser::{Alignment, Ignored, KnownShape, PosedScan, Recognition, ScanGain, Verdict};
 use descry_perception::nalgebra::{Point2, Vector2};
 
 use crate::abilities::shapes::unseen::UnseenFloor;
@@ -80,7 +80,7 @@ pub struct Outline {
     /// The scans brought together, in the map.
     pub alignment: Alignment,
     /// Expected gain of a scan from each viewpoint around the object.
-    pub outlook: Outlook,
+    pub outlook: ScanGain,
 }
 
 impl Floor {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use descry_memory::{Meta, RecordId};
 use descry_perception::laser::{
-    Alignment, Cluster, FitOptions, NextOptions, Objective, ObserveError, ObserveOptions, Occupancy, Outlook,
-    RecogniseOptions, Recognition, Scan, SolverOptions, Space, Verdict, align_consistent, observe,
+    Alignment, Cluster, FitOptions, NextOptions, Objective, ObserveError, ObserveOptions, Occupancy,
+    RecogniseOptions, Recognition, Scan, ScanGain, SolverOptions, Space, Verdict, align_consistent, observe,
     recognise_scans, things,
 };
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
@@ -185,7 +185,7 @@ fn bring_together(mind: &mut Mind, eyes: Eyes<'_>, index: usize) {
             Place::Station(_) => None,
         })
         .collect();
-    let outlook = Outlook::new(&alignment.model, &lasers, &NextOptions::default());
+    let outlook = ScanGain::new(&alignment.model, &lasers, &NextOptions::default());
     let thing = &mut mind.known.floor_mut().things[index];
     thing.outline = Some(Arc::new(Outline { alignment, outlook }));
 }

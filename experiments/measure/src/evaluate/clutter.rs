@@ -1,6 +1,6 @@
 //! Piles of labelled objects: choice of the table surface, and segmentation of each object.
 
-use super::mosd::{Tally, labelled_objects, overlap};
+use super::mosd::{SegmentTally, labelled_objects, overlap};
 use super::tabletop::pile::Pile;
 use super::tabletop::{Draws, TABLE_M};
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -17,7 +17,7 @@ pub fn run(count: u64, first: u64, out: Option<&Path>) -> Result<(), String> {
     if let Some(dir) = out {
         std::fs::create_dir_all(dir).map_err(|e| format!("{}: {e}", dir.display()))?;
     }
-    let mut tally = Tally::default();
+    let mut tally = SegmentTally::default();
     let (mut other, mut none, mut lost) = (0, 0, 0);
     for seed in first..first + count {
         let mut draws = Draws(seed);

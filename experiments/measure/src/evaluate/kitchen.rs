@@ -33,15 +33,15 @@ pub fn mug() -> ObjectModel {
 }
 
 /// Reference data of the table and the objects on it.
-pub struct Table {
+pub struct ReferenceTable {
     up: Unit<Vector3<f64>>,
     /// Height along `up`, metres.
     height: f64,
     objects: Vec<Reference>,
 }
 
-impl Table {
-    pub fn read(dir: &Path) -> Result<Table, String> {
+impl ReferenceTable {
+    pub fn read(dir: &Path) -> Result<ReferenceTable, String> {
         let text = std::fs::read_to_string(dir.join("objects.json")).map_err(|e| e.to_string())?;
         let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
         let three = |v: &serde_json::Value| Vector3::from([0, 1, 2].map(|k| v[k].as_f64().unwrap_or(0.0)));
@@ -51,7 +51,7 @@ impl Table {
             Reference { is_mug: name.contains("mug"), name, place: Point3::from(three(&o["centroid"])) }
         };
         let objects = json["objects"].as_array().into_iter().flatten().map(reference).collect();
-        Ok(Table { up, height: up.dot(&three(&json["table_point"])), objects })
+        Ok(ReferenceTable { up, height: up.dot(&three(&json["table_point"])), objects })
     }
 
     /// Surface options for the table's height, within a decimetre.
@@ -82,7 +82,7 @@ impl Table {
 /// Scores random draws of 1, 2, 3, 5 and 8 frames that see the table.
 pub fn run(dir: &Path) -> Result<(), String> {
     let frames = frames(dir)?;
-    let table = Table::read(dir)?;
+    let table = ReferenceTable::read(dir)?;
     let on_table: Vec<usize> = (0..frames.len()).filter(|&i| table.is_seen_by(&frames[i].1)).collect();
     println!("frames that see the table: {:?}", on_table.iter().map(|&i| &frames[i].0).collect::<Vec<_>>());
     println!(
@@ -119,7 +119,7 @@ pub fn run(dir: &Path) -> Result<(), String> {
 /// Merges a set of views and scores each recogniser on it.
 fn score(
     set: &[View],
-    table: &Table,
+    table: &ReferenceTable,
     recognisers: &[&dyn Recogniser],
     tallies: &mut [Tally],
 ) -> Result<(), String> {

@@ -28,7 +28,7 @@ pub fn cup() -> ObjectModel {
 }
 
 #[derive(Default)]
-pub struct Tally {
+pub struct SegmentTally {
     pub found: usize,
     pub objects: usize,
     pub split: usize,
@@ -52,7 +52,7 @@ pub fn run(dir: &Path, out: Option<&Path>) -> Result<(), String> {
     scenes.sort();
     let recognisers: [&dyn Recogniser; 2] = [&Published::default(), &Descry::default()];
     let mut hits = vec![Hits::default(); recognisers.len()];
-    let mut tally = Tally::default();
+    let mut tally = SegmentTally::default();
     for path in scenes {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let (view, labels) = labelled(&path, &name)?;
@@ -188,7 +188,7 @@ pub fn overlap(
     cloud: &descry_perception::Cloud,
     labels: &[u32],
     truth: &[u32],
-    tally: &mut Tally,
+    tally: &mut SegmentTally,
 ) -> Vec<Option<u32>> {
     let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
     for (label, p) in labels.iter().zip(&cloud.points) {

@@ -1,8 +1,8 @@
 //! Time from one view to its percepts, by stage, with a digest of the results to detect changes.
 
-use super::kitchen::{self, Table};
+use super::kitchen::{self, ReferenceTable};
 use super::{mosd, table};
-use descry_perception::files::pcd::{Encoding, write};
+use descry_perception::files::pcd::{PcdEncoding, write};
 use descry_perception::files::{FileError, Loaded, read_cloud};
 use descry_perception::merge::merge;
 use descry_perception::recognise::{Descry, Recogniser};
@@ -64,7 +64,7 @@ fn merged(repetitions: usize) -> Result<(), String> {
     println!("{:>6} {:>8} {:>8} {:>9}   ms, least of {repetitions}", "table", "read", "merge", "recognise");
     for seed in 1..=4 {
         let views = table::views(seed);
-        let files: Vec<Vec<u8>> = views.iter().map(|view| write(&view.cloud, Encoding::Binary)).collect();
+        let files: Vec<Vec<u8>> = views.iter().map(|view| write(&view.cloud, PcdEncoding::Binary)).collect();
         let mut least_ms = [f64::INFINITY; 3];
         let mut digest = 0;
         for _ in 0..repetitions.max(1) {
@@ -158,7 +158,7 @@ fn clouds(dir: &Path) -> Result<Vec<Case>, String> {
 }
 
 fn frames(dir: &Path) -> Result<Vec<Case>, String> {
-    let table = Table::read(dir)?;
+    let table = ReferenceTable::read(dir)?;
     let case = |(name, view)| {
         let options = SceneOptions { surface: table.surface(), ..SceneOptions::default() };
         Case { name, view, options, models: vec![kitchen::mug()] }

@@ -4,13 +4,13 @@
 use crate::household::{Room, bodies};
 use crate::knowing::{Model, Scene, Tally, is_right, learned_steps, library, offline, options, scene, some};
 use crate::measure::{median, spread};
-use crate::page::{Page, Table};
-use crate::plot::{BLUE, GREEN, Line, ORANGE, Panel, panels, sheet};
+use crate::page::{Page, PageTable};
+use crate::plot::{BLUE, GREEN, Line, LinePlot, ORANGE, panels, sheet};
 use crate::runs::RunOptions;
 use crate::tabletop::Draws;
 use descry_perception::Cloud;
 use descry_perception::calibration::{Claim, reliability};
-use descry_perception::learning::{Candidate, choose};
+use descry_perception::learning::{Hypothesis, choose};
 use descry_perception::voxel;
 use std::time::Instant;
 
@@ -141,7 +141,7 @@ pub fn print(seed: u64, objects: usize, scenes: usize, page: &mut Page) -> Resul
 fn look_for(
     variant: usize,
     variants: &[Variant],
-    found: &[Candidate],
+    found: &[Hypothesis],
     scene: &Scene,
     surfaces: &[Cloud],
     tally: &mut Tally,
@@ -177,8 +177,8 @@ fn seconds(models: &[&Model], seed: u64) -> Result<f64, String> {
 
 fn tables(variants: &[Variant], tallies: &[Tally], page: &mut Page) {
     let names = bodies();
-    let mut means = Table::new(&["models, all looks", "coverage", "f-score", "right", "wrong", "missed"]);
-    let mut table = Table::new(&["object", "model", "coverage", "f-score", "right", "wrong", "missed"]);
+    let mut means = PageTable::new(&["models, all looks", "coverage", "f-score", "right", "wrong", "missed"]);
+    let mut table = PageTable::new(&["object", "model", "coverage", "f-score", "right", "wrong", "missed"]);
     for (kind, name, ..) in KINDS {
         let of_kind = || variants.iter().zip(tallies).filter(|(v, _)| v.kind == kind && v.whole);
         let mean =
@@ -209,7 +209,7 @@ fn tables(variants: &[Variant], tallies: &[Tally], page: &mut Page) {
 }
 
 fn plot(variants: &[Variant], tallies: &[Tally], page: &mut Page) -> Result<(), String> {
-    let all: Vec<Panel> = bodies()
+    let all: Vec<LinePlot> = bodies()
         .iter()
         .enumerate()
         .filter(|(i, _)| variants.iter().any(|v| v.model.body == *i && v.kind != Kind::Perfect))
@@ -218,7 +218,7 @@ fn plot(variants: &[Variant], tallies: &[Tally], page: &mut Page) -> Result<(), 
                 let own = variants.iter().zip(tallies).filter(|(v, _)| v.kind == kind && v.model.body == i);
                 Line { dashed, colour, points: own.map(|(v, t)| (v.coverage, t.f_score())).collect() }
             };
-            Panel { name: body.name.to_owned(), lines: KINDS.map(line).into() }
+            LinePlot { name: body.name.to_owned(), lines: KINDS.map(line).into() }
         })
         .collect();
     panels(&all, ("coverage", "f-score"), &page.file("coverage.svg"))?;

@@ -2,13 +2,13 @@
 
 use crate::household::{Body, Room, made::made};
 use crate::knowing::{Model, is_right, learned_steps, library, offline, options, scene_among, some};
-use crate::page::{Page, Table};
-use crate::plot::{BLUE, Line, ORANGE, Panel, panels};
+use crate::page::{Page, PageTable};
+use crate::plot::{BLUE, Line, LinePlot, ORANGE, panels};
 use crate::runs::RunOptions;
 use crate::tabletop::Draws;
 use descry_perception::Cloud;
 use descry_perception::calibration::{Claim, reliability};
-use descry_perception::learning::{Evidence, Judge, KnowOptions, WEIGHTS};
+use descry_perception::learning::{Judge, KnowOptions, PoseEvidence, WEIGHTS};
 use descry_perception::nalgebra::{SMatrix, SVector};
 
 const ROUNDS: usize = 30;
@@ -47,7 +47,7 @@ fn models(bodies: &[Body], seed: u64) -> Vec<Model> {
 }
 
 /// A claim as a line of CSV.
-pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
+pub fn line(scene: usize, model: usize, right: bool, e: &PoseEvidence) -> String {
     format!(
         "{scene},{model},{},{},{},{},{},{:.4},{:.4},{:.4},{:.4},{}",
         u8::from(right),
@@ -65,7 +65,7 @@ pub fn line(scene: usize, model: usize, right: bool, e: &Evidence) -> String {
 
 /// Fits a judge and prints it; the training data is written to the page's folder.
 pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
-    let mut claims: Vec<(Evidence, bool)> = Vec::new();
+    let mut claims: Vec<(PoseEvidence, bool)> = Vec::new();
     let mut lines = Vec::new();
     let path = page.file("claims.csv");
     for first in (0..scenes).step_by(SCENES) {
@@ -91,7 +91,10 @@ pub fn fit(seed: u64, scenes: usize, page: &mut Page) -> Result<(), String> {
 
 /// Claims in scenes with a set of objects, half of them known: scene, model, evidence, and true if the claim
 /// is right.
-fn judged(set: u64, scenes: std::ops::Range<usize>) -> Result<Vec<(usize, usize, Evidence, bool)>, String> {
+fn judged(
+    set: u64,
+    scenes: std::ops::Range<usize>,
+) -> Result<Vec<(usize, usize, PoseEvidence, bool)>, String> {
     let bodies: Vec<Body> = (0..2 * KNOWN as u64).map(|k| made(set * 1000 + k)).collect();
     let surfaces: Vec<Cloud> = bodies.iter().map(|b| Room::surface(b, 0.004)).collect();
     let models = models(&bodies, set);
@@ -119,7 +122,7 @@ fn judged(set: u64, scenes: std::ops::Range<usize>) -> Result<Vec<(usize, usize,
 /// Prints stated against true shares of correct answers.
 pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), String> {
     page.heading("Confidence against truth");
-    let mut table = Table::new(&[
+    let mut table = PageTable::new(&[
         "answers of",
         "stated",
         "answers",
@@ -153,14 +156,14 @@ pub fn print(claims: &[(&str, Vec<Claim>)], page: &mut Page) -> Result<(), Strin
         colour: "#999",
         points: vec![(0.0, 0.0), (1.0, 1.0)],
     }]);
-    let panel = Panel { name: "reliability".to_owned(), lines: lines.collect() };
+    let panel = LinePlot { name: "reliability".to_owned(), lines: lines.collect() };
     panels(&[panel], ("stated", "right"), &page.file("confidence.svg"))?;
     page.figure("confidence.svg", "Share of right answers against what was stated");
     Ok(())
 }
 
 /// Fits the regression by Newton's method.
-fn regression(claims: &[(Evidence, bool)]) -> Judge {
+fn regression(claims: &[(PoseEvidence, bool)]) -> Judge {
     let mut judge = Judge { weights: [0.0; WEIGHTS] };
     for _ in 0..ROUNDS {
         let mut hessian = SMatrix::<f64, WEIGHTS, WEIGHTS>::identity() * RIDGE;

@@ -3,7 +3,7 @@
 use crate::household::{Body, Room, bodies, made::made};
 use crate::knowing::{Model, Scene, is_right, learned_steps, library, options, scene, some};
 use crate::measure::median;
-use crate::page::{Page, Table};
+use crate::page::{Page, PageTable};
 use crate::plot::{heat, sheet};
 use crate::runs::{RunOptions, radius_m};
 use crate::tabletop::Draws;
@@ -47,8 +47,14 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
     let mut sums: [Said; KNOWN.len()] = Default::default();
     let mut confusion = vec![vec![0; most + 1]; most + 1];
     let mut claims = Vec::new();
-    let mut wrong =
-        Table::new(&["scene", "said", "confidence", "stands there", "off its place", "what speaks for it"]);
+    let mut wrong = PageTable::new(&[
+        "scene",
+        "said",
+        "confidence",
+        "stands there",
+        "off its place",
+        "what speaks for it",
+    ]);
     let scenes: Vec<Scene> = (0..scenes)
         .map(|k| {
             let mut things = some(&mut draws, most, THINGS - 1);
@@ -87,8 +93,8 @@ pub fn print(seed: u64, known: usize, scenes: usize, page: &mut Page) -> Result<
 }
 
 /// Table of scores and recognition time, for each number of known models.
-fn counted(learned: &[Model], sums: &[Said], scenes: &[Scene]) -> Result<Table, String> {
-    let mut table = Table::new(&[
+fn counted(learned: &[Model], sums: &[Said], scenes: &[Scene]) -> Result<PageTable, String> {
+    let mut table = PageTable::new(&[
         "models known",
         "named rightly",
         "askew by 1 cm or more",

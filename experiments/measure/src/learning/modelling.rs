@@ -2,7 +2,7 @@
 
 use crate::household::bodies;
 use crate::measure::{Score, aligned, doubled, median, pair, score, spread};
-use crate::page::{Page, Table};
+use crate::page::{Page, PageTable};
 use crate::plot::{Slice, slices};
 use crate::runs::{Run, RunOptions, Way, modelled, run, truth};
 
@@ -86,7 +86,7 @@ pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
         "{objects} objects a row. Recall and precision as the paper takes them, within 2 cm (means and spreads), and within 6 mm; keyframes: how far the \
          used ones are off among each other."
     ));
-    let mut table = Table::new(&[
+    let mut table = PageTable::new(&[
         "setting",
         "O_0 recall",
         "O_0 precision",
@@ -114,7 +114,8 @@ pub fn print(seed: u64, objects: usize, page: &mut Page) -> Result<(), String> {
     tuw.push("39".to_owned());
     table.row(willow);
     table.row(tuw);
-    let mut walls = Table::new(&["setting", "model", "point distance, mm", "95 % within, mm", "doubled, %"]);
+    let mut walls =
+        PageTable::new(&["setting", "model", "point distance, mm", "95 % within, mm", "doubled, %"]);
     let mut failed = Vec::new();
     for place in PLACES {
         for noise in NOISES {

@@ -4,14 +4,14 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Table with a header.
-pub struct Table {
+pub struct PageTable {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
-    pub fn new(head: &[&str]) -> Table {
-        Table { head: head.iter().map(|&cell| cell.to_owned()).collect(), rows: Vec::new() }
+impl PageTable {
+    pub fn new(head: &[&str]) -> PageTable {
+        PageTable { head: head.iter().map(|&cell| cell.to_owned()).collect(), rows: Vec::new() }
     }
 
     pub fn row(&mut self, cells: Vec<String>) {
@@ -63,7 +63,7 @@ impl Page {
     }
 
     /// Adds a table; rows that begin with "paper" are highlighted.
-    pub fn table(&mut self, table: &Table) {
+    pub fn table(&mut self, table: &PageTable) {
         table.print();
         let cells = |row: &[String], kind: &str| -> String {
             let class = if row[0].starts_with("paper") { " class=\"paper\"" } else { "" };

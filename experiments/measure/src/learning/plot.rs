@@ -109,7 +109,7 @@ pub struct Line {
 }
 
 /// A plot with a name.
-pub struct Panel {
+pub struct LinePlot {
     pub name: String,
     pub lines: Vec<Line>,
 }
@@ -122,7 +122,7 @@ pub const GREEN: &str = "#009E73";
 const OPEN: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" font-family="sans-serif" font-size="11""#;
 
 /// Writes panels side by side, both axes from 0 to 1.
-pub fn panels(panels: &[Panel], axes: (&str, &str), path: &Path) -> Result<(), String> {
+pub fn panels(panels: &[LinePlot], axes: (&str, &str), path: &Path) -> Result<(), String> {
     const COLUMNS: usize = 5;
     let (side, left, top, gap) = (160.0, 46.0, 24.0, (56.0, 62.0));
     let (columns, rows) = (panels.len().min(COLUMNS), panels.len().div_ceil(COLUMNS));

@@ -3,7 +3,7 @@
 
 use crate::frames::frames;
 use crate::judge::line;
-use crate::page::{Page, Table};
+use crate::page::{Page, PageTable};
 use crate::plot::{picture, said};
 use descry_perception::files::read_cloud;
 use descry_perception::learning::{
@@ -70,7 +70,7 @@ fn milk(shared: &Path, page: &mut Page) -> Result<(), String> {
     let milk = outward(&bare).map_err(|e| e.to_string())?;
     library.add(&milk, &options).map_err(|e| e.to_string())?;
     page.say("The milk carton of the Point Cloud Library in its scene, and in scenes without it");
-    let mut table = Table::new(&["scene", "found", "the most confidence in any pose", "s"]);
+    let mut table = PageTable::new(&["scene", "found", "the most confidence in any pose", "s"]);
     let mut scenes = vec![shared.join("pcl/milk_cartoon_all_small_clorox.pcd")];
     scenes.extend(files(&shared.join("mosd"), "pcd"));
     for (k, path) in scenes.iter().enumerate() {
@@ -202,7 +202,7 @@ fn found_again(
     options: &KnowOptions,
     page: &mut Page,
 ) -> Result<(), String> {
-    let mut answers = Table::new(&["frame", "in the image", "found", "the most confidence in each", "s"]);
+    let mut answers = PageTable::new(&["frame", "in the image", "found", "the most confidence in each", "s"]);
     let mut counts = vec![[0_usize; 3]; known.len()];
     let off_m = |f: &Recognised| {
         let truly = known[f.model].1.world_from_model.translation.vector;
@@ -257,7 +257,7 @@ fn found_again(
         answers.row(vec![(2 * k + begin).to_string(), there, told, most.join(", "), format!("{seconds:.1}")]);
     }
     let mut table =
-        Table::new(&["thing", "frames with it in the image, in range", "found there", "said elsewhere"]);
+        PageTable::new(&["thing", "frames with it in the image, in range", "found there", "said elsewhere"]);
     for ((thing, _), count) in known.iter().zip(&counts) {
         let mut row = vec![thing.name.clone()];
         row.extend(count.map(|c| c.to_string()));

@@ -40,7 +40,7 @@ pub fn export(seed: u64, dir: &Path) -> Result<(), String> {
     let mut poses = String::new();
     for (i, station) in stations.iter().enumerate() {
         let cloud = Cloud::from_points(station.points.clone());
-        save(&format!("{i:03}.pcd"), &pcd::write(&cloud, pcd::Encoding::Binary))?;
+        save(&format!("{i:03}.pcd"), &pcd::write(&cloud, pcd::PcdEncoding::Binary))?;
         for pose in [&station.odom_from_level, &truths[i], &chain[i], &settled.poses[i]] {
             let _ = write!(poses, "{} {} {} ", pose.translation.x, pose.translation.y, pose.rotation.angle());
         }

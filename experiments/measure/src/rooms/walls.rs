@@ -4,7 +4,9 @@ use super::corridor::measure::{MAP_FAR_M, on_truth, score, survey};
 use super::corridor::{Building, Rig, around};
 use super::plot::{Sheet, write};
 use super::poses::{LONG_M, SHORT_M, again, options, steps};
-use descry_perception::mapping::{Fit, FuseOptions, MapOptions, Matcher, Station, chained, correct_drive};
+use descry_perception::mapping::{
+    FuseOptions, MapOptions, Matcher, PlaneEstimator, Station, chained, correct_drive,
+};
 use descry_perception::nalgebra::Isometry2;
 use std::path::Path;
 
@@ -17,12 +19,12 @@ pub fn ways() -> [(&'static str, MapOptions); 6] {
         ..MapOptions::default()
     };
     [
-        ("median, patches", with(Fit::Median, false, false)),
-        ("median, joined", with(Fit::Median, false, true)),
-        ("median, joined, constrained", with(Fit::Median, true, true)),
-        ("least squares, patches", with(Fit::LeastSquares, false, false)),
-        ("least squares, joined", with(Fit::LeastSquares, false, true)),
-        ("l. squares, joined, constr.", with(Fit::LeastSquares, true, true)),
+        ("median, patches", with(PlaneEstimator::Median, false, false)),
+        ("median, joined", with(PlaneEstimator::Median, false, true)),
+        ("median, joined, constrained", with(PlaneEstimator::Median, true, true)),
+        ("least squares, patches", with(PlaneEstimator::LeastSquares, false, false)),
+        ("least squares, joined", with(PlaneEstimator::LeastSquares, false, true)),
+        ("l. squares, joined, constr.", with(PlaneEstimator::LeastSquares, true, true)),
     ]
 }
 

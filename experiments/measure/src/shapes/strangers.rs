@@ -5,7 +5,7 @@ use super::scanning::{MOST, Policy, next_bearing};
 use super::tabletop::Draws;
 use super::variations::CONTRADICTS_M;
 use descry_perception::laser::{
-    Alignment, KnownShape, NextOptions, Objective, Occupancy, Outlook, PosedScan, RecogniseOptions,
+    Alignment, KnownShape, NextOptions, Objective, Occupancy, PosedScan, RecogniseOptions, ScanGain,
     SolverOptions, Verdict, align_consistent, recognise_scans,
 };
 use std::f64::consts::TAU;
@@ -110,7 +110,7 @@ fn scan_after_scan(
         let sweep = [(lab.sweep(&truth, &stated, draws), truth)];
         scans.extend(observed(&lab, &sweep, map, &run, draws).scans);
         let Ok(alignment) = align_consistent(&scans, CONTRADICTS_M, &solver) else { continue };
-        let loose_m = Outlook::new(&alignment.model, &[], &NextOptions::default()).looseness_m(&[]);
+        let loose_m = ScanGain::new(&alignment.model, &[], &NextOptions::default()).looseness_m(&[]);
         let verdicts = SAME_M.map(|same_m| verdict(&alignment, loose_m, name, known, same_m));
         all.push(Told { loose_m, verdicts });
         bearing = next_bearing(Policy::Settling, bearing, bearing, &alignment, &lab, draws);

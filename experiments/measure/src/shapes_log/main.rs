@@ -10,7 +10,7 @@ mod draw;
 mod things;
 
 use descry_perception::laser::{
-    Alignment, FitOptions, NextOptions, Outlook, PosedScan, SolverOptions, align_consistent, fit,
+    Alignment, FitOptions, NextOptions, PosedScan, ScanGain, SolverOptions, align_consistent, fit,
 };
 use std::path::Path;
 use std::process::ExitCode;
@@ -60,7 +60,7 @@ fn table(seen: &[Seen]) {
     for thing in seen {
         let a = &thing.models[0];
         let f = a.model.features();
-        let loose_m = Outlook::new(&a.model, &[], &NextOptions::default()).looseness_m(&[]);
+        let loose_m = ScanGain::new(&a.model, &[], &NextOptions::default()).looseness_m(&[]);
         println!(
             "   ({:>7.2}, {:>7.2})  {:>4}  {:>8.4}  {:>8.6}   {:>5.1} -> {:>4.2}  {:>6}  {:>3}  {:>9.0}  {:>10.1}  {:>9.1}{}",
             f.centre.x,

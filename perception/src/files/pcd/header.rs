@@ -4,10 +4,14 @@ use crate::files::error::{FileError, Place};
 use crate::files::loaded::is_padding;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
+/// Encoding of the points: the header's DATA.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub enum PcdEncoding {
+    /// Text, one point a line.
     Ascii,
+    /// Point after point, little endian.
     Binary,
+    /// Field after field, LZF.
     BinaryCompressed,
 }
 
@@ -69,7 +73,7 @@ pub(super) struct Header {
     pub height: usize,
     pub points: usize,
     pub viewpoint: Isometry3<f64>,
-    pub encoding: Encoding,
+    pub encoding: PcdEncoding,
     /// Offset of the first byte of data.
     pub data_at: usize,
     /// Line of the first byte of data.
@@ -191,11 +195,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, FileError> {
     Err(FileError::new(Place::Line(number + 1), "a line DATA", "the end of the file", "the header is cut"))
 }
 
-fn encoding(rest: &[&str], place: Place) -> Result<Encoding, FileError> {
+fn encoding(rest: &[&str], place: Place) -> Result<PcdEncoding, FileError> {
     match rest.first().map(|w| w.to_ascii_lowercase()).as_deref() {
-        Some("ascii") => Ok(Encoding::Ascii),
-        Some("binary") => Ok(Encoding::Binary),
-        Some("binary_compressed") => Ok(Encoding::BinaryCompressed),
+        Some("ascii") => Ok(PcdEncoding::Ascii),
+        Some("binary") => Ok(PcdEncoding::Binary),
+        Some("binary_compressed") => Ok(PcdEncoding::BinaryCompressed),
         other => Err(FileError::new(
             place,
             "DATA ascii, binary or binary_compressed",
@@ -206,7 +210,7 @@ fn encoding(rest: &[&str], place: Place) -> Result<Encoding, FileError> {
 }
 
 impl Said<'_> {
-    fn header(self, encoding: Encoding, data_at: usize, data_line: usize) -> Result<Header, FileError> {
+    fn header(self, encoding: PcdEncoding, data_at: usize, data_line: usize) -> Result<Header, FileError> {
         let last = Place::Line(data_line - 1);
         let missing = |name: &str| {
             FileError::new(last, format!("a line {name} before DATA"), "none", "complete the header")

@@ -1,7 +1,7 @@
 //! Evidence for a model at a pose: the camera ray of each model point ends at the point, in front
 //! of it, or behind it.
 
-use super::scene::Seen;
+use super::scene::SceneView;
 use super::skin::{Skin, across};
 use crate::noise::frontal_sigma_m;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// Evidence for a model at a pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Evidence {
+pub struct PoseEvidence {
     /// Model points facing the camera, plus back-facing ones without a front: points of a visible
     /// side that was never learned.
     pub facing: usize,
@@ -46,16 +46,14 @@ pub struct Judge {
 }
 
 impl Default for Judge {
-    /// Weights in the order of [`Evidence::measures`], fitted by part `judge` of
-    /// `experiments/measure/src/learning` (seed 501, 80 scenes) on generated objects that no
-    /// evaluation uses: half known from all sides, half from one or two views, among furniture and
-    /// leaflets without a model.
+    /// Weights in the order of [`PoseEvidence::measures`], as part `judge` of `experiments/measure/src/learning` with seed 501 and 80 scenes fits them to drawn objects that
+    /// no evaluation knows, half of them known from all sides and half from one or two looks, among furniture and leaflets that no model is of.
     fn default() -> Self {
         Judge { weights: [8.30, 8.01, 1.52, -15.86, 1.41, -4.78, -2.84, -9.09, -7.26] }
     }
 }
 
-impl Evidence {
+impl PoseEvidence {
     /// Features of a [`Judge`]: explained share of visible points; colour likeness, and its
     /// absence; continuation beyond the border; votes; hidden share of the model's side;
     /// seen-through share of visible points; normal deviation; and a constant one.
@@ -84,9 +82,9 @@ impl Evidence {
     }
 
     /// Scales the counts of points by a factor.
-    pub(super) fn times(self, factor: f64) -> Evidence {
+    pub(super) fn times(self, factor: f64) -> PoseEvidence {
         let times = |count: usize| (count as f64 * factor).round() as usize;
-        Evidence {
+        PoseEvidence {
             facing: times(self.facing),
             explained: times(self.explained),
             through: times(self.through),
@@ -98,7 +96,7 @@ impl Evidence {
 
 impl Judge {
     /// Probability that a model with this evidence is at its pose.
-    pub fn confidence(&self, evidence: &Evidence) -> f64 {
+    pub fn confidence(&self, evidence: &PoseEvidence) -> f64 {
         let sum: f64 = self.weights.iter().zip(evidence.measures()).map(|(w, m)| w * m).sum();
         1.0 / (1.0 + (-sum).exp())
     }
@@ -121,13 +119,13 @@ const LEAST_BORDER: usize = 10;
 
 /// Evidence, and the scene's points that are explained.
 pub struct Verified {
-    pub evidence: Evidence,
+    pub evidence: PoseEvidence,
     /// Indices in the scene's skin, ascending.
     pub claims: Vec<u32>,
 }
 
 /// Verifies the pose of a model's skin against a scene.
-pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, votes: usize) -> Verified {
+pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView, votes: usize) -> Verified {
     let Rays { mut evidence, pairs, seen } = rays(model, camera_from_model, scene);
     evidence.votes = votes;
     add_backs(&mut evidence, model, camera_from_model, scene, &seen);
@@ -143,21 +141,21 @@ pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, vo
 pub(super) fn unbounded(
     model: &Skin,
     camera_from_model: &Isometry3<f64>,
-    scene: &Seen,
+    scene: &SceneView,
     votes: usize,
-) -> Evidence {
-    Evidence { votes, ..rays(model, camera_from_model, scene).evidence }
+) -> PoseEvidence {
+    PoseEvidence { votes, ..rays(model, camera_from_model, scene).evidence }
 }
 
 /// First score of a pose: share of the visible points that are explained, and similarity of colour.
-pub(super) fn first_sight(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> f64 {
+pub(super) fn first_sight(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> f64 {
     let evidence = rays(model, camera_from_model, scene).evidence;
     evidence.explained_share() * (0.5 + evidence.colour.unwrap_or(0.5))
 }
 
 /// Evidence of the rays alone, which points of the model (first) explain which of the scene, and which face the camera.
 struct Rays {
-    evidence: Evidence,
+    evidence: PoseEvidence,
     pairs: Vec<(usize, usize)>,
     seen: Vec<u32>,
 }
@@ -180,10 +178,10 @@ fn sees_through(z_m: f32, nearest_m: f32) -> bool {
 
 /// Adds the evidence of visible but never learned sides: seen through, or without information.
 fn add_backs(
-    evidence: &mut Evidence,
+    evidence: &mut PoseEvidence,
     model: &Skin,
     camera_from_model: &Isometry3<f64>,
-    scene: &Seen,
+    scene: &SceneView,
     seen: &[u32],
 ) {
     for i in model.backs_from(&towards_camera(camera_from_model), seen) {
@@ -195,8 +193,8 @@ fn add_backs(
     }
 }
 
-fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen) -> Rays {
-    let mut e = Evidence::default();
+fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> Rays {
+    let mut e = PoseEvidence::default();
     let (mut pairs, mut off, mut turned_rad) = (Vec::new(), 0.0, 0.0);
     let seen = model.seen_from(&towards_camera(camera_from_model));
     for &i in &seen {
@@ -248,7 +246,7 @@ fn likeness(model: &Skin, scene: &Skin, pairs: &[(usize, usize)]) -> Option<f64>
 
 /// Share of border positions where the scene continues the model's surface, without occluded
 /// positions and missing returns. Any patch fits a larger wall, so wide planes count too.
-pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, claims: &[u32]) -> f64 {
+pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView, claims: &[u32]) -> f64 {
     let model_from_camera = camera_from_model.inverse();
     let (mut carried, mut asked) = (0_usize, 0_usize);
     for &claim in claims {
@@ -269,7 +267,7 @@ pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &Seen, cl
 }
 
 /// Tests if a surface with that normal is measured at a place; `None` if the place cannot be seen.
-fn carries_on(scene: &Seen, q: &Point3<f64>, normal: &Vector3<f32>) -> Option<bool> {
+fn carries_on(scene: &SceneView, q: &Point3<f64>, normal: &Vector3<f32>) -> Option<bool> {
     let off = scene.around(q)?.0 - q.z as f32;
     let tolerance = tolerance_m(q.z as f32);
     let smooth = || {

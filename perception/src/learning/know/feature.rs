@@ -20,9 +20,9 @@ const COARSE: u16 = 4;
 
 /// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
 #[derive(Clone, Debug)]
-pub struct Features {
+pub struct Descriptors {
     pub all: Vec<Feature>,
-    kind: Kind,
+    kind: DescriptorKind,
     pub blocks: Vec<[u8; BLOCK]>,
     /// Quantised sums of groups of descriptor bytes: similar descriptors have similar codes, of a
     /// quarter of the size or less.
@@ -39,27 +39,27 @@ pub struct Alike {
 
 /// Kind of descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum DescriptorKind {
     /// Spread of the normals around a place.
     Shape,
     /// The colours around a place, in the tangent plane.
     Pattern,
 }
 
-impl Kind {
+impl DescriptorKind {
     /// Length of a descriptor and of its code, bytes.
     pub const fn lengths(self) -> (usize, usize) {
         match self {
-            Kind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
-            Kind::Pattern => (3 * CELLS * CELLS, 48),
+            DescriptorKind::Shape => (SECTORS[0] * SECTORS[1] * SECTORS[2] * SECTORS[3], 32),
+            DescriptorKind::Pattern => (3 * CELLS * CELLS, 48),
         }
     }
 
     /// The byte of the code that a byte goes into: shapes' by sector, whatever the angle between normals, patterns' by squares of four cells.
     const fn sum_of(self, byte: usize) -> usize {
         match self {
-            Kind::Shape => byte / SECTORS[3],
-            Kind::Pattern => {
+            DescriptorKind::Shape => byte / SECTORS[3],
+            DescriptorKind::Pattern => {
                 let (channel, row, column) = (byte / (CELLS * CELLS), byte / CELLS % CELLS, byte % CELLS);
                 (channel * CELLS / 2 + row / 2) * (CELLS / 2) + column / 2
             }
@@ -67,24 +67,24 @@ impl Kind {
     }
 }
 
-impl Features {
+impl Descriptors {
     /// An empty set of features of a kind.
-    pub fn none(kind: Kind) -> Features {
-        Features { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
+    pub fn none(kind: DescriptorKind) -> Descriptors {
+        Descriptors { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }
 
     /// Features at some points of a surfel cloud; points without enough neighbours have none.
-    pub fn of(skin: &Skin, keypoints: &[u32], kind: Kind) -> Features {
+    pub fn of(skin: &Skin, keypoints: &[u32], kind: DescriptorKind) -> Descriptors {
         let describe = |&i: &u32| {
             let descriptor = match kind {
-                Kind::Shape => shape(skin, i as usize),
-                Kind::Pattern => pattern(skin, i as usize),
+                DescriptorKind::Shape => shape(skin, i as usize),
+                DescriptorKind::Pattern => pattern(skin, i as usize),
             }?;
             Some((Feature { at: skin.points[i as usize], normal: skin.normals[i as usize] }, descriptor))
         };
         let described: Vec<(Feature, Box<[u8]>)> =
             pool::filter(keypoints.len(), 1, |n| describe(&keypoints[n]));
-        let mut features = Features::none(kind);
+        let mut features = Descriptors::none(kind);
         described.iter().for_each(|(feature, descriptor)| features.push(*feature, descriptor));
         features
     }
@@ -118,7 +118,7 @@ impl Features {
 
     /// Adds another view's features of the same object that are new: at another place, or with
     /// another descriptor.
-    pub fn add_new(&mut self, more: &Features) {
+    pub fn add_new(&mut self, more: &Descriptors) {
         let before = self.all.len();
         for (k, feature) in more.all.iter().enumerate() {
             let descriptor = more.descriptor(k);
@@ -136,7 +136,7 @@ impl Features {
 
     /// At most `most` features with the most similar partners of the same kind, best first, and the
     /// median distance of all features to their best partners. Codes preselect the compared pairs.
-    pub fn most_alike(&self, others: &Features, most: usize) -> (Vec<Alike>, u32) {
+    pub fn most_alike(&self, others: &Descriptors, most: usize) -> (Vec<Alike>, u32) {
         /// Number of candidates with full comparison, in multiples of the wanted number, and number
         /// of partners compared with each. In generated scenes recognition then equals that of full
         /// comparison; a factor of two gave more false answers.

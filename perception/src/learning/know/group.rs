@@ -1,13 +1,13 @@
 //! Geometric-consistency grouping of correspondences (Chen and Bhanu 2007), and the pose of each
 //! group.
 
-use super::feature::{Feature, Features};
+use super::feature::{Descriptors, Feature};
 use crate::register::rigid;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// A place of the model and one of the scene that look alike.
 #[derive(Clone, Copy, Debug)]
-pub struct Match<'a> {
+pub struct Correspondence<'a> {
     pub model: &'a Feature,
     pub scene: &'a Feature,
     /// Descriptor distance in units of the median of all matches of the same kind.
@@ -28,10 +28,10 @@ const FEWEST: usize = 3;
 const OUT_M: f64 = 0.02;
 
 /// Features of the scene with the most alike of the model's, best first.
-pub fn matches<'a>(scene: &'a Features, model: &'a Features) -> Vec<Match<'a>> {
+pub fn matches<'a>(scene: &'a Descriptors, model: &'a Descriptors) -> Vec<Correspondence<'a>> {
     let (alike, median) = scene.most_alike(model, MATCHES);
     let median = median.max(1) as f32;
-    let found = alike.into_iter().map(|alike| Match {
+    let found = alike.into_iter().map(|alike| Correspondence {
         model: &model.all[alike.other],
         scene: &scene.all[alike.own],
         off: alike.off as f32 / median,
@@ -47,7 +47,7 @@ pub struct Vote {
 }
 
 /// Poses of consistent groups of matches, by decreasing number of matches.
-pub(super) fn votes(matches: &mut [Match]) -> Vec<Vote> {
+pub(super) fn votes(matches: &mut [Correspondence]) -> Vec<Vote> {
     matches.sort_by(|a, b| a.off.total_cmp(&b.off));
     let n = matches.len();
     let mut used = vec![0_u8; n];
@@ -66,7 +66,7 @@ pub(super) fn votes(matches: &mut [Match]) -> Vec<Vote> {
             continue;
         }
         group.iter().for_each(|&g| used[g] += 1);
-        let members: Vec<Match> = group.iter().map(|&g| matches[g]).collect();
+        let members: Vec<Correspondence> = group.iter().map(|&g| matches[g]).collect();
         votes.extend(pose(&members).map(|p| Vote { scene_from_model: p, matches: group.len() }));
     }
     votes.sort_by_key(|v| std::cmp::Reverse(v.matches));
@@ -81,7 +81,7 @@ const ONE: (f64, f64) = (0.02, 0.26);
 /// Upright poses of an object, by decreasing number of supporting matches. With a known up
 /// direction, place and normal of one match determine the pose, so that small smooth objects get
 /// poses without consistent groups. `up`: up direction in model and scene.
-pub fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
+pub fn standing(matches: &[Correspondence], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
     let poses: Vec<Isometry3<f64>> = matches.iter().filter_map(|m| stood(m, up)).collect();
     let is_one = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
         (a.translation.vector - b.translation.vector).norm_squared() < ONE.0 * ONE.0
@@ -103,7 +103,7 @@ pub fn standing(matches: &[Match], up: &[Vector3<f64>; 2], most: usize) -> Vec<V
 }
 
 /// Upright pose from one match; `None` if the normal is steep, or has another slope in the scene.
-fn stood(m: &Match, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
+fn stood(m: &Correspondence, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
     let (of_model, of_scene) = (m.model.normal.cast::<f64>(), m.scene.normal.cast::<f64>());
     let rises = (of_model.dot(&up[0]), of_scene.dot(&up[1]));
     if (rises.0 - rises.1).abs() >= f64::from(AGREE_COS) {
@@ -118,7 +118,7 @@ fn stood(m: &Match, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
     Some(Isometry3::from_parts(shift.into(), UnitQuaternion::from_rotation_matrix(&turn)))
 }
 
-fn agree(a: &Match, b: &Match) -> bool {
+fn agree(a: &Correspondence, b: &Correspondence) -> bool {
     let (m, s) = (b.model.at - a.model.at, b.scene.at - a.scene.at);
     let (in_model, in_scene) = (m.norm(), s.norm());
     in_model > APART_M
@@ -129,12 +129,12 @@ fn agree(a: &Match, b: &Match) -> bool {
 }
 
 /// The pose of least squares of the places and of points out along the normals.
-pub fn pose(group: &[Match]) -> Option<Isometry3<f64>> {
+pub fn pose(group: &[Correspondence]) -> Option<Isometry3<f64>> {
     let out = |f: &Feature| -> [Point3<f64>; 2] {
         let at = f.at.cast::<f64>();
         [at, at + f.normal.cast::<f64>() * OUT_M]
     };
-    let both = |m: &Match| {
+    let both = |m: &Correspondence| {
         let (model, scene) = (out(m.model), out(m.scene));
         [(model[0], scene[0]), (model[1], scene[1])]
     };

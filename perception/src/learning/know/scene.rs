@@ -13,7 +13,7 @@ use crate::visibility::DepthMap;
 use nalgebra::{Isometry3, Point3};
 
 /// A camera's view of a scene, in the camera frame.
-pub struct Seen {
+pub struct SceneView {
     pub skin: Skin,
     /// True for points of planes that are wider than any model.
     pub wide: Vec<bool>,
@@ -32,9 +32,9 @@ const PLANE_M: f32 = 0.012;
 /// Minimum cosine between the normals of a point and of its wide plane.
 const LEVEL: f32 = 0.85;
 
-impl Seen {
+impl SceneView {
     /// Prepares the returns within `range_m`; planes larger than `widest_m2` belong to no object.
-    pub fn new(view: &View, range_m: f64, widest_m2: f64) -> Result<Seen, KnowError> {
+    pub fn new(view: &View, range_m: f64, widest_m2: f64) -> Result<SceneView, KnowError> {
         let map = DepthMap::from_view(view, &Isometry3::identity()).ok_or(KnowError::NoCamera)?;
         let near = |p: &Point3<f32>| is_finite(p) && f64::from(p.z) <= range_m;
         let cloud = match view.cloud.grid {
@@ -47,7 +47,7 @@ impl Seen {
         let skin = Skin::of(&Cloud { normals: cloud, ..view.cloud.clone() }.filter(near))?;
         let target = Prepared::with_normals(&skin.points, NEIGHBOURS)?;
         let wide = wide(&skin, widest_m2);
-        Ok(Seen { skin, wide, target, map })
+        Ok(SceneView { skin, wide, target, map })
     }
 
     /// Depth at the pixel of a point, and the minimum around it, metres; `None` outside the image

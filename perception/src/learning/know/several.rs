@@ -1,8 +1,8 @@
 //! Recognition from several looks: candidates of each look are tested against all others.
 
 use super::error::KnowError;
-use super::evidence::{Evidence, verify};
-use super::scene::Seen;
+use super::evidence::{PoseEvidence, verify};
+use super::scene::SceneView;
 use super::stood::stands;
 use super::{KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
@@ -15,7 +15,7 @@ const FEWEST: usize = 40;
 
 /// Prepared view, with its recognition candidates.
 pub struct Glance {
-    scene: Seen,
+    scene: SceneView,
     /// Candidate models, most confident first, possibly overlapping.
     pub guesses: Vec<Guess>,
 }
@@ -39,7 +39,7 @@ pub struct Judged {
     /// Pose in the world, from the view that shows most of the model.
     pub world_from_model: Isometry3<f64>,
     /// Evidence of all looks.
-    pub evidence: Evidence,
+    pub evidence: PoseEvidence,
     /// Probability of this object at this pose.
     pub confidence: f64,
     /// Number of views in which the model could be visible.
@@ -81,7 +81,7 @@ impl Library {
         options: &KnowOptions,
     ) -> Result<Option<Judged>, KnowError> {
         let Some(known) = self.models.get(guess.model) else { return Ok(None) };
-        let mut told: Vec<(Evidence, Isometry3<f64>, bool)> = Vec::new();
+        let mut told: Vec<(PoseEvidence, Isometry3<f64>, bool)> = Vec::new();
         for (glance, world_from_camera) in looks {
             let stated = world_from_camera.inverse() * world_from_model;
             let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
@@ -98,7 +98,7 @@ impl Library {
             told.push((evidence, world_from_camera * pose, stands));
         }
         let Some(most) = told.iter().max_by_key(|(e, ..)| e.explained) else { return Ok(None) };
-        let evidence = Evidence::of_several(&told.iter().map(|(e, ..)| *e).collect::<Vec<_>>());
+        let evidence = PoseEvidence::of_several(&told.iter().map(|(e, ..)| *e).collect::<Vec<_>>());
         Ok(Some(Judged {
             world_from_model: most.1,
             confidence: options.confidence(&evidence, most.2),
@@ -108,18 +108,19 @@ impl Library {
     }
 }
 
-impl Evidence {
+impl PoseEvidence {
     /// Combines the evidence of several looks: free space in one counts against matches in others.
     /// Errors of looks are correlated, so n looks count as √n.
-    fn of_several(all: &[Evidence]) -> Evidence {
+    fn of_several(all: &[PoseEvidence]) -> PoseEvidence {
         let root = (all.len().max(1) as f64).sqrt();
-        let sum =
-            |of: fn(&Evidence) -> usize| (all.iter().map(of).sum::<usize>() as f64 / root).round() as usize;
+        let sum = |of: fn(&PoseEvidence) -> usize| {
+            (all.iter().map(of).sum::<usize>() as f64 / root).round() as usize
+        };
         let explained: usize = all.iter().map(|e| e.explained).sum();
-        let mean = |of: &dyn Fn(&Evidence) -> f64| {
+        let mean = |of: &dyn Fn(&PoseEvidence) -> f64| {
             all.iter().map(|e| of(e) * e.explained as f64).sum::<f64>() / explained.max(1) as f64
         };
-        Evidence {
+        PoseEvidence {
             facing: sum(|e| e.facing),
             explained: sum(|e| e.explained),
             through: sum(|e| e.through),

@@ -1,7 +1,7 @@
 //! Resting-pose prior: an object stands as it stood when it was learned, upright and on something.
 
 use super::evidence::tolerance_m;
-use super::scene::Seen;
+use super::scene::SceneView;
 use super::skin::{Skin, across};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;
@@ -29,7 +29,7 @@ const FLOATS: usize = 2;
 pub fn stands(
     model: &Skin,
     camera_from_model: &Isometry3<f64>,
-    scene: &Seen,
+    scene: &SceneView,
     up: &[Vector3<f64>; 2],
 ) -> bool {
     if (camera_from_model.rotation * up[0]).angle(&up[1]) > TILTED_RAD {

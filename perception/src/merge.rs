@@ -4,7 +4,6 @@
 //! nothing drifts and the merged frame stays the average of what localisation said. A view that cannot be placed is left out and says so.
 
 mod align;
-mod bricks;
 mod check;
 mod error;
 mod further;
@@ -17,6 +16,7 @@ mod prepare;
 mod returns;
 mod search;
 mod settle;
+mod voxel_blocks;
 
 use crate::pool;
 use crate::view::View;

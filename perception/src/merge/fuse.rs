@@ -4,12 +4,12 @@
 //! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
 
 use super::align::Aligned;
-use super::bricks::{Bricks, Grid};
 use super::options::MergeOptions;
 use super::parts::Plane;
 use super::prepare::Prepared;
 use super::returns::{Looked, Return};
 use super::settle::Before;
+use super::voxel_blocks::{Grid, VoxelBlocks};
 use crate::cloud::Cloud;
 use crate::pool;
 use crate::view::View;
@@ -64,7 +64,7 @@ pub(super) struct Gathered {
     pub axes_from_world: UnitQuaternion<f64>,
     /// True if the voxels are columns along z.
     pub flat: bool,
-    pub bricks: Bricks<Cell>,
+    pub blocks: VoxelBlocks<Cell>,
     /// Weighted colour sums of each cell, if coloured.
     pub colours: Vec<Vector3<f32>>,
     pub returns: usize,
@@ -127,7 +127,7 @@ pub(super) fn gather(
             gathered.sort();
             gathered.settle(&gazes);
         });
-        let cells: usize = all.iter().map(|gathered| gathered.bricks.occupied).sum();
+        let cells: usize = all.iter().map(|gathered| gathered.blocks.occupied).sum();
         if cells <= options.most_points {
             return all;
         }
@@ -148,7 +148,7 @@ pub(super) fn gather_further(
     seen: &Visibility,
     options: &MergeOptions,
 ) -> bool {
-    let cells: usize = all.iter().map(|gathered| gathered.bricks.occupied).sum();
+    let cells: usize = all.iter().map(|gathered| gathered.blocks.occupied).sum();
     let coloured = !all[0].colours.is_empty();
     let Ok(number) = u16::try_from(number) else { return false };
     if cells + view.cloud.len() > options.most_points || coloured != view.cloud.colours.is_some() {
@@ -234,9 +234,9 @@ impl Scale {
 }
 
 impl Gathered {
-    /// Puts the cells in the order of their bricks.
+    /// Puts the cells in the order of their blocks.
     fn sort(&mut self) {
-        let Some(former) = self.bricks.sort() else { return };
+        let Some(former) = self.blocks.sort() else { return };
         if !self.colours.is_empty() {
             self.colours = former.iter().map(|&number| self.colours[number as usize]).collect();
         }
@@ -259,8 +259,8 @@ impl Gathered {
         let reach = Vector3::repeat(options.range_m + voxel_m);
         let grid = Grid::over(&(low - reach), &(high + reach), voxel_m);
         let flat = on.is_some();
-        let (bricks, before) = (Bricks::new(flat, Cell::EMPTY), Before::default());
-        Gathered { grid, axes_from_world, flat, bricks, colours: Vec::new(), returns: 0, before }
+        let (blocks, before) = (VoxelBlocks::new(flat, Cell::EMPTY), Before::default());
+        Gathered { grid, axes_from_world, flat, blocks, colours: Vec::new(), returns: 0, before }
     }
 
     /// Adds returns, in separate passes for each dependent memory access, so that cache misses
@@ -272,13 +272,13 @@ impl Gathered {
         for returns in returns.chunks(SOME) {
             for (place, r) in places.iter_mut().zip(returns) {
                 let at = scale.at(r);
-                *place = (self.bricks.cell(at.as_ref()), at);
+                *place = (self.blocks.cell(at.as_ref()), at);
             }
             for (&(cell, at), r) in places.iter().zip(returns) {
-                self.bricks.cells[cell as usize].add(at, scale.normal(r), r.weight, view);
+                self.blocks.cells[cell as usize].add(at, scale.normal(r), r.weight, view);
             }
             if let Some(colours) = colours {
-                self.colours.resize(self.bricks.cells.len(), Vector3::zeros());
+                self.colours.resize(self.blocks.cells.len(), Vector3::zeros());
                 for (&(cell, _), r) in places.iter().zip(returns) {
                     if let Some(colour) = colours.get(r.pixel as usize) {
                         self.colours[cell as usize] += Vector3::from(colour.map(f32::from)) * r.weight;

@@ -4,10 +4,10 @@
 //! normal onto that of the columns beside it. What a single view claims and another looked through is left out. Of a further look only what it
 //! touched is settled anew; the rest is held against the new view alone.
 
-use super::bricks::{Beside, Bricks, Mask, NONE, SIDE, WIDE, is_in};
 use super::check;
 use super::fuse::{Cell, Fused, Gathered};
 use super::merged::{Merged, Step, ViewFit};
+use super::voxel_blocks::{Beside, Mask, NONE, SIDE, VoxelBlocks, WIDE, is_in};
 use crate::cloud::{Cloud, is_finite};
 use crate::pool;
 use crate::visibility::{Gaze, Visibility};
@@ -25,7 +25,7 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
-/// Bricks that one thread settles in a row. From: work.
+/// VoxelBlocks that one thread settles in a row. From: work.
 const TOGETHER: usize = 64;
 
 /// A fused point, world frame.
@@ -46,7 +46,7 @@ struct Settled {
 pub(super) struct Before {
     /// Means of the voxels; empty for columns.
     means: Vec<Cell>,
-    /// The settled cells of some bricks in a row, cell by cell.
+    /// The settled cells of some blocks in a row, cell by cell.
     rows: Vec<Vec<Settled>>,
     /// Number of views that the state was checked against.
     gazes: usize,
@@ -54,7 +54,7 @@ pub(super) struct Before {
 
 /// One cloud of all settled cells.
 fn fused(all: &[Gathered]) -> Fused {
-    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.bricks.cells.len());
+    let coloured = all.iter().all(|gathered| gathered.colours.len() == gathered.blocks.cells.len());
     let rows: Vec<&[Settled]> =
         all.iter().flat_map(|gathered| gathered.before.rows.iter().map(Vec::as_slice)).collect();
     let ((points, normals), (views_per_point, colours)) = pool::join(
@@ -99,16 +99,16 @@ impl Gathered {
         let Before { means, mut rows, gazes: known } = std::mem::take(&mut self.before);
         let is_first = rows.is_empty();
         let means = self.means(means);
-        rows.resize_with(self.bricks.len().div_ceil(TOGETHER), Vec::new);
+        rows.resize_with(self.blocks.len().div_ceil(TOGETHER), Vec::new);
         let settle_row = |row: &mut Vec<Settled>, number: usize, before: &mut Vec<Settled>| {
             row.clear();
             let mut known_cells = before.iter().peekable();
-            for brick in (number * TOGETHER..self.bricks.len()).take(TOGETHER) {
-                let mask = if is_first { [u64::MAX; SIDE] } else { self.bricks.touched[brick] };
+            for block in (number * TOGETHER..self.blocks.len()).take(TOGETHER) {
+                let mask = if is_first { [u64::MAX; SIDE] } else { self.blocks.touched[block] };
                 if mask == Mask::default() {
-                    row.extend(self.bricks.cells_of(brick).filter_map(|cell| stays(&mut known_cells, cell)));
+                    row.extend(self.blocks.cells_of(block).filter_map(|cell| stays(&mut known_cells, cell)));
                 } else {
-                    self.settle_brick(brick, &mask, &means, &mut known_cells, row);
+                    self.settle_block(block, &mask, &means, &mut known_cells, row);
                 }
             }
             drop_looked_through(row, gazes, known);
@@ -117,7 +117,7 @@ impl Gathered {
         };
         pool::for_each(&mut rows, 1, Vec::new, settle_row);
         self.before = Before { means, rows, gazes: gazes.len() };
-        self.bricks.touched.fill(Mask::default());
+        self.blocks.touched.fill(Mask::default());
     }
 
     /// Means of all voxels, reusing earlier ones. Voxel means are needed by all neighbours, column
@@ -125,7 +125,7 @@ impl Gathered {
     fn means(&self, before: Vec<Cell>) -> Vec<Cell> {
         /// Cells that one thread takes in a row. From: work.
         const SOME: usize = 4096;
-        let cells = if self.flat { &[][..] } else { &self.bricks.cells };
+        let cells = if self.flat { &[][..] } else { &self.blocks.cells };
         let mut means = before;
         if means.is_empty() {
             // With room for those of further looks.
@@ -133,23 +133,22 @@ impl Gathered {
             means.extend(pool::map(cells, SOME, Cell::mean));
         } else {
             means.extend_from_slice(&cells[means.len()..]);
-            self.bricks.visit_touched(|number| means[number] = cells[number].mean());
+            self.blocks.visit_touched(|number| means[number] = cells[number].mean());
         }
         means
     }
 
-    /// Adds the settled state of a brick's cells: new for cells in the mask, unchanged for the
-    /// others.
-    fn settle_brick(
+    /// Adds what the cells of a block are settled to: those of the mask anew, of the others what was settled before.
+    fn settle_block(
         &self,
-        brick: usize,
+        block: usize,
         mask: &Mask,
         means: &[Cell],
         before: &mut Peekable<Iter<Settled>>,
         settled: &mut Vec<Settled>,
     ) {
-        let Gathered { grid, axes_from_world, flat, bricks, colours: sums, .. } = self;
-        let beside = &bricks.beside(brick);
+        let Gathered { grid, axes_from_world, flat, blocks, colours: sums, .. } = self;
+        let beside = &blocks.beside(block);
         let world_from_axes = axes_from_world.inverse().to_rotation_matrix();
         let turn = world_from_axes.cast::<f32>();
         let colour = |number: usize, cell: &Cell| {
@@ -167,10 +166,10 @@ impl Gathered {
             settled.push(Settled { at: at.cast(), normal, colour, views, cell: number as u32, anew: true });
         };
         match flat {
-            true => level(bricks, beside, mask, |number, anew| {
+            true => level(blocks, beside, mask, |number, anew| {
                 keep(number, anew.as_ref().map(|(cell, at)| (cell, *at)));
             }),
-            false => bricks.visit(beside, mask, |number, around| {
+            false => blocks.visit(beside, mask, |number, around| {
                 let mean = &means[number];
                 let smoothed = |around: &[u32]| smoothed(mean, around, means, grid.voxel_m as f32);
                 keep(number, around.map(|around| (mean, smoothed(around))));
@@ -223,20 +222,20 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
     if weight > 0.0 { own.at + own.normal * (offset / weight) } else { own.at }
 }
 
-/// Calls `found` for each column of the middle brick with its number and, if the mask holds it, its
-/// mean and the same point moved along z to the mean of the surrounding columns.
+/// Calls `found` for each column of the middle block with its number and, if the mask holds it, its
+/// mean and the same point moved along z to the mean of the columns around it.
 fn level(
-    bricks: &Bricks<Cell>,
+    blocks: &VoxelBlocks<Cell>,
     beside: &Beside,
     mask: &Mask,
     mut found: impl FnMut(usize, Option<(Cell, Vector3<f32>)>),
 ) {
-    let numbers = bricks.wide_columns(beside);
+    let numbers = blocks.wide_columns(beside);
     // Weight and weighted height: of the columns, then of three beside each other.
     let mut sums = [[[0.0_f32; WIDE]; WIDE]; 2];
     for (y, row) in numbers.iter().enumerate() {
         for (x, &number) in row.iter().enumerate().filter(|(_, number)| **number != NONE) {
-            let cell = &bricks.cells[number as usize];
+            let cell = &blocks.cells[number as usize];
             sums[0][y][x] = cell.weight;
             sums[1][y][x] = cell.weight * (cell.at.z / cell.weight);
         }
@@ -252,7 +251,7 @@ fn level(
             let number = numbers[y + 1][x + 1];
             if number != NONE {
                 let anew = is_in(mask, [x + 1, y + 1, 1]).then(|| {
-                    let own = bricks.cells[number as usize].mean();
+                    let own = blocks.cells[number as usize].mean();
                     (own, Vector3::new(own.at.x, own.at.y, heights[x] / weights[x]))
                 });
                 found(number as usize, anew);

@@ -1,13 +1,13 @@
-//! Sparse grid of voxels in bricks of 8 × 8 × 8, or of 8 × 8 columns: a surface occupies few
-//! bricks, each with many neighbouring voxels. A brick of columns has a cell for every column.
+//! A sparse grid of voxels in blocks of 8 × 8 × 8, or 8 × 8 columns: a surface fills few blocks, and in each many voxels beside each other.
+//! Of columns it fills most: a block of columns has a cell for each.
 
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Voxels along a side of a brick, and along a side with a margin of one voxel. From: work.
+/// Voxels along a side of a block, and along that of a block with a layer of its neighbours' voxels around. From: work.
 pub(super) const SIDE: usize = 8;
 pub(super) const WIDE: usize = SIDE + 2;
-/// Mark of an absent cell or brick. From: mark.
+/// Mark of no cell, or no block. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
 /// Maximum number of voxels along an axis: single precision then resolves a sixteenth of a voxel.
 /// From: derived, single precision has 24 bits.
@@ -34,44 +34,44 @@ impl Grid {
     }
 }
 
-/// The position of a brick, in bricks: 20 bits per axis.
+/// The position of a block, in blocks: 20 bits per axis.
 type Place = u64;
 /// Bits of a place along an axis. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
 
-/// Some voxels of a brick: a bit for each of a layer, x fastest.
+/// Some voxels of a block: a bit for each of a layer, x fastest.
 pub(super) type Mask = [u64; SIDE];
 
-/// Numbers of the 27 bricks around one, itself in the middle.
+/// Numbers of the 27 blocks around one, itself in the middle.
 pub(super) type Beside = [Option<u32>; 27];
 
 /// Cells of occupied voxels.
-pub(super) struct Bricks<C> {
+pub(super) struct VoxelBlocks<C> {
     numbers: FxHashMap<Place, u32>,
     places: Vec<Place>,
-    /// Number of the cell of each voxel, brick by brick, x fastest.
+    /// Number of the cell of each voxel, block by block, x fastest.
     slots: Vec<u32>,
-    /// Layers of voxels in a brick, along z.
+    /// Layers of voxels in a block, along z.
     layers: usize,
     /// Cells; a column has its `empty` cell before it is occupied.
     pub cells: Vec<C>,
     empty: C,
     /// The number of occupied cells.
     pub occupied: usize,
-    /// The voxels of each brick that were asked for.
+    /// The voxels of each block that were asked for.
     pub touched: Vec<Mask>,
-    /// Bricks that were asked for of late, by the last bits of their place.
+    /// VoxelBlocks that were asked for of late, by the last bits of their place.
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
 
-/// Size of the cache `recent` along each axis, bricks. From: work.
+/// VoxelBlocks along each axis of which one may be in `recent`. From: work.
 const RECENT: usize = 4;
 
-impl<C: Copy> Bricks<C> {
-    /// An empty grid of bricks, whose cells begin as `empty`. Voxels that are columns along z make bricks of
+impl<C: Copy> VoxelBlocks<C> {
+    /// An empty grid of blocks, whose cells begin as `empty`. Voxels that are columns along z make blocks of
     /// one layer.
-    pub fn new(columns: bool, empty: C) -> Bricks<C> {
-        Bricks {
+    pub fn new(columns: bool, empty: C) -> VoxelBlocks<C> {
+        VoxelBlocks {
             numbers: FxHashMap::default(),
             places: Vec::new(),
             slots: Vec::new(),
@@ -101,13 +101,13 @@ impl<C: Copy> Bricks<C> {
         let [x, y, z] = voxel.map(|c| c / SIDE as u32);
         let place = Place::from(x) | Place::from(y) << PLACE_BITS | Place::from(z) << (2 * PLACE_BITS);
         let recent = [x, y, z].iter().fold(0, |at, c| at * RECENT + *c as usize % RECENT);
-        let brick = match self.recent[recent] {
-            (known, brick) if known == place => brick as usize,
-            _ => self.brick(place, recent),
+        let block = match self.recent[recent] {
+            (known, block) if known == place => block as usize,
+            _ => self.block(place, recent),
         };
         let [x, y, z] = voxel.map(|c| c as usize % SIDE);
-        self.touched[brick][z] |= 1 << (y * SIDE + x);
-        let at = brick * self.voxels() + (z * SIDE + y) * SIDE + x;
+        self.touched[block][z] |= 1 << (y * SIDE + x);
+        let at = block * self.voxels() + (z * SIDE + y) * SIDE + x;
         let slot = &mut self.slots[at];
         let is_new = *slot == NONE;
         self.occupied += usize::from(is_new);
@@ -121,8 +121,8 @@ impl<C: Copy> Bricks<C> {
         *slot
     }
 
-    /// Sorts the cells by brick, so that neighbours in space are neighbours in memory; returns
-    /// their former numbers. `None` for columns, which already are in order.
+    /// Puts the cells into the order of the blocks, so that those beside each other in space are so in memory; gives their former numbers.
+    /// Columns are in that order: `None`.
     pub fn sort(&mut self) -> Option<Vec<u32>> {
         if self.are_columns() {
             return None;
@@ -140,10 +140,10 @@ impl<C: Copy> Bricks<C> {
     }
 
     #[inline(never)]
-    fn brick(&mut self, place: Place, recent: usize) -> usize {
+    fn block(&mut self, place: Place, recent: usize) -> usize {
         let next = self.places.len();
-        let brick = *self.numbers.entry(place).or_insert(next as u32) as usize;
-        if brick == next {
+        let block = *self.numbers.entry(place).or_insert(next as u32) as usize;
+        if block == next {
             self.places.push(place);
             self.touched.push(Mask::default());
             self.slots.resize(self.slots.len() + self.voxels(), NONE);
@@ -151,11 +151,11 @@ impl<C: Copy> Bricks<C> {
                 self.cells.resize(self.slots.len(), self.empty);
             }
         }
-        self.recent[recent] = (place, brick as u32);
-        brick
+        self.recent[recent] = (place, block as u32);
+        block
     }
 
-    /// Number of bricks that hold a cell.
+    /// Number of blocks that hold a cell.
     pub fn len(&self) -> usize {
         self.places.len()
     }
@@ -172,14 +172,14 @@ impl<C: Copy> Bricks<C> {
         }
     }
 
-    /// Numbers of the cells of a brick.
-    pub fn cells_of(&self, brick: usize) -> impl Iterator<Item = usize> {
-        let slots = self.slots[brick * self.voxels()..].iter().take(self.voxels());
+    /// Numbers of the cells of a block.
+    pub fn cells_of(&self, block: usize) -> impl Iterator<Item = usize> {
+        let slots = self.slots[block * self.voxels()..].iter().take(self.voxels());
         slots.filter(|slot| **slot != NONE).map(|slot| *slot as usize)
     }
 
-    /// Calls `found` for each cell of the middle brick with its number and, if the mask holds it,
-    /// the cell numbers in the 27 voxels around it, its own included.
+    /// Calls `found` for each cell of the block in the middle with its number and, if it is of the mask, those of the cells in the 27 voxels
+    /// around it, itself among them.
     pub fn visit(&self, beside: &Beside, mask: &Mask, mut found: impl FnMut(usize, Option<&[u32]>)) {
         let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
         self.wide(beside, &mut wide);
@@ -214,12 +214,12 @@ impl<C: Copy> Bricks<C> {
         }
     }
 
-    /// Cell numbers of the middle brick of columns with a margin of one cell, by y, x.
+    /// Numbers of the cells of the block of columns in the middle and of a layer of those around: by y, x.
     pub fn wide_columns(&self, beside: &Beside) -> [[u32; WIDE]; WIDE] {
         std::array::from_fn(|y| self.wide_row(beside, 1, y))
     }
 
-    /// Cell numbers of a brick and of the layer of voxels around it, indexed by z, y, x.
+    /// Cell numbers of a block and of the layer of voxels around it, indexed by z, y, x.
     fn wide(&self, beside: &Beside, wide: &mut [[[u32; WIDE]; WIDE]; WIDE]) {
         for (z, layer) in wide.iter_mut().enumerate() {
             for (y, row) in layer.iter_mut().enumerate() {
@@ -228,28 +228,28 @@ impl<C: Copy> Bricks<C> {
         }
     }
 
-    /// Numbers of the 27 bricks around one, itself in the middle.
-    pub fn beside(&self, brick: usize) -> Beside {
-        let place = self.places[brick];
+    /// Numbers of the 27 blocks around one, itself in the middle.
+    pub fn beside(&self, block: usize) -> Beside {
+        let place = self.places[block];
         // Columns have nothing above and below them.
         let mut beside = [None; 27];
         for part in if self.are_columns() { 9..18 } else { 0..27 } {
             let step = |by: usize, bits: u32| (by as Place).wrapping_sub(1) << bits;
-            // Beyond the lowest lies a place that is beyond the highest as well: no brick.
+            // Beyond the lowest lies a place that is beyond the highest as well: no block.
             let next = place
                 .wrapping_add(step(part % 3, 0))
                 .wrapping_add(step(part / 3 % 3, PLACE_BITS))
                 .wrapping_add(step(part / 9, 2 * PLACE_BITS));
-            beside[part] = if next == place { Some(brick as u32) } else { self.numbers.get(&next).copied() };
+            beside[part] = if next == place { Some(block as u32) } else { self.numbers.get(&next).copied() };
         }
         beside
     }
 
-    /// One row of a brick extended by one voxel on each side; the outer voxels come from the
-    /// neighbouring bricks.
+    /// One row of a block extended by one voxel on each side; the outer voxels come from the
+    /// neighbouring blocks.
     #[inline(always)]
     fn wide_row(&self, beside: &Beside, z: usize, y: usize) -> [u32; WIDE] {
-        let ((above, z), (behind, y)) = (in_brick(z), in_brick(y));
+        let ((above, z), (behind, y)) = (in_block(z), in_block(y));
         let of = |aside: usize| {
             let first = beside[(above * 3 + behind) * 3 + aside]? as usize * self.voxels();
             self.slots[first + (z * SIDE + y) * SIDE..].first_chunk::<SIDE>()
@@ -264,14 +264,14 @@ impl<C: Copy> Bricks<C> {
     }
 }
 
-/// Along one axis of a brick with a margin of one voxel: the brick that holds the voxel (0
+/// Along one axis of a block with a margin of one voxel: the block that holds the voxel (0
 /// previous, 1 this, 2 next), and the voxel's index there.
 #[inline(always)]
-fn in_brick(wide: usize) -> (usize, usize) {
+fn in_block(wide: usize) -> (usize, usize) {
     (wide.div_ceil(SIDE), (wide + SIDE - 1) % SIDE)
 }
 
-/// True if a voxel of a wide brick is of a mask.
+/// True if a voxel of a wide block is of a mask.
 #[inline(always)]
 pub(super) fn is_in(mask: &Mask, [x, y, z]: [usize; 3]) -> bool {
     mask[z - 1] >> ((y - 1) * SIDE + x - 1) & 1 == 1

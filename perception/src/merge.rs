@@ -6,8 +6,8 @@
 mod align;
 mod check;
 mod error;
-mod further;
 mod fuse;
+mod incremental;
 mod joint;
 mod merged;
 mod options;
@@ -22,7 +22,7 @@ use crate::pool;
 use crate::view::View;
 use align::{fits, place, visibility};
 pub use error::MergeError;
-pub use further::Merger;
+pub use incremental::Merger;
 pub use merged::{Merged, Step, ViewFit};
 pub use options::MergeOptions;
 use prepare::{Ready, filter_and_thin};

@@ -96,7 +96,7 @@ fn planner_and_perception_know_no_clock_no_files_no_threads_of_a_runtime() {
     check_absent("perception/src", &words, &[]);
     // Threads of their own are started at two places: searches beside each other, and merging ahead of the next look.
     check_absent("planner/src", &["std::thread"], &["planner/src/search/abreast.rs"]);
-    check_absent("perception/src", &["std::thread"], &["perception/src/merge/further.rs"]);
+    check_absent("perception/src", &["std::thread"], &["perception/src/merge/incremental.rs"]);
 }
 
 #[test]

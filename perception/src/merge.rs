@@ -5,6 +5,7 @@
 
 mod align;
 mod check;
+mod depth_samples;
 mod error;
 mod fuse;
 mod incremental;
@@ -13,7 +14,6 @@ mod merged;
 mod options;
 mod parts;
 mod prepare;
-mod returns;
 mod search;
 mod settle;
 mod voxel_blocks;

@@ -4,10 +4,10 @@
 //! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
 
 use super::align::Aligned;
+use super::depth_samples::{DepthSample, Looked};
 use super::options::MergeOptions;
 use super::parts::Plane;
 use super::prepare::Prepared;
-use super::returns::{Looked, Return};
 use super::settle::Before;
 use super::voxel_blocks::{Grid, VoxelBlocks};
 use crate::cloud::Cloud;
@@ -212,7 +212,7 @@ impl Scale {
     }
 
     /// True if no return lies below the lowest voxel or beyond the resolvable range.
-    fn holds(&self, returns: &[Return]) -> bool {
+    fn holds(&self, returns: &[DepthSample]) -> bool {
         let most = (1 << 19) as f32;
         returns.iter().all(|r| {
             let at = self.at(r);
@@ -222,13 +222,13 @@ impl Scale {
 
     /// Voxels from the grid's lowest corner.
     #[inline(always)]
-    fn at(&self, of: &Return) -> Vector3<f32> {
+    fn at(&self, of: &DepthSample) -> Vector3<f32> {
         self.turn * of.at + self.shift
     }
 
     /// Zero if unknown.
     #[inline(always)]
-    fn normal(&self, of: &Return) -> Vector3<f32> {
+    fn normal(&self, of: &DepthSample) -> Vector3<f32> {
         if of.normal.x.is_finite() { self.axes * of.normal } else { Vector3::zeros() }
     }
 }
@@ -265,7 +265,7 @@ impl Gathered {
 
     /// Adds returns, in separate passes for each dependent memory access, so that cache misses
     /// overlap.
-    fn add(&mut self, returns: &[Return], scale: &Scale, view: u16, colours: Option<&[[u8; 3]]>) {
+    fn add(&mut self, returns: &[DepthSample], scale: &Scale, view: u16, colours: Option<&[[u8; 3]]>) {
         /// Returns that are added together. From: work.
         const SOME: usize = 512;
         let mut places = [(0, Vector3::zeros()); SOME];

@@ -11,6 +11,7 @@ use super::align::{
     Aligned, FIRST, Objects, SECOND, WIDE, as_stated, fit, fits, objects, only_levelled, place, visibility,
 };
 use super::check::{belongs, misfit};
+use super::depth_samples::Looked;
 use super::error::MergeError;
 use super::fuse::{Gathered, gather, gather_further};
 use super::joint::{self, Found, Round};
@@ -18,7 +19,6 @@ use super::merged::{Merged, Step, ViewFit};
 use super::options::MergeOptions;
 use super::parts::{Part, level_again};
 use super::prepare::{Prepared, Ready, departure, filter_and_thin};
-use super::returns::Looked;
 use super::search::{PERHAPS_SHARE, SURE_SHARE};
 use super::settle::merged;
 use crate::cloud::Cloud;

@@ -40,7 +40,7 @@ const THING: u32 = u32::MAX - 1;
 
 /// A return that is fused.
 #[derive(Clone, Copy)]
-pub(super) struct Return {
+pub(super) struct DepthSample {
     /// Camera frame, metres.
     pub at: Vector3<f32>,
     /// Camera frame; not finite if unknown.
@@ -51,7 +51,7 @@ pub(super) struct Return {
 }
 
 /// Fused returns of a view, by groups of rows: those off the planes, then those on each plane.
-pub(super) struct Looked(Vec<Vec<Vec<Return>>>);
+pub(super) struct Looked(Vec<Vec<Vec<DepthSample>>>);
 
 impl Looked {
     /// Returns of a view at its corrected pose, assigned to these planes.
@@ -64,7 +64,7 @@ impl Looked {
     ) -> Looked {
         /// Rows that one thread looks through. From: work.
         const ROWS: usize = 16;
-        let returns = Returns::of(view, prepared, world_from_camera, planes, options);
+        let returns = DepthSamples::of(view, prepared, world_from_camera, planes, options);
         let rows = returns.view.cloud.len().div_ceil(returns.width);
         let look = |first: usize| {
             let mut found = vec![Vec::new(); 1 + planes.len()];
@@ -80,13 +80,13 @@ impl Looked {
     }
 
     /// Returns off the planes (0), or on the plane with this number, from 1.
-    pub fn of_grid(&self, grid: usize) -> impl Iterator<Item = &[Return]> {
+    pub fn of_grid(&self, grid: usize) -> impl Iterator<Item = &[DepthSample]> {
         self.0.iter().map(move |found| found[grid].as_slice())
     }
 }
 
 /// Selector of a view's returns at its corrected pose.
-struct Returns<'a> {
+struct DepthSamples<'a> {
     view: &'a View,
     within: Within,
     organised: bool,
@@ -145,14 +145,14 @@ impl<'a> Facing<'a> {
     }
 }
 
-impl<'a> Returns<'a> {
+impl<'a> DepthSamples<'a> {
     fn of(
         view: &'a View,
         prepared: &'a Prepared,
         world_from_camera: &Isometry3<f64>,
         planes: &[Plane],
         options: &MergeOptions,
-    ) -> Returns<'a> {
+    ) -> DepthSamples<'a> {
         let within = Within::of_fused(world_from_camera, options);
         let cloud = prepared.coarse.as_ref().unwrap_or(&view.cloud);
         let normals = Cow::Borrowed(cloud.normals.as_deref().unwrap_or_default());
@@ -164,7 +164,7 @@ impl<'a> Returns<'a> {
         let planes: Vec<InCamera> = planes.iter().map(in_camera).collect();
         let on = lying_on(cloud, &coarse.normals, &within, &planes);
         let things = things(view, &within, &coarse, &on);
-        Returns {
+        DepthSamples {
             view,
             within,
             organised: view.cloud.grid.is_some(),
@@ -184,7 +184,7 @@ impl<'a> Returns<'a> {
 
     /// Calls `found` for the returns of some rows in range, height band and region, without mixed
     /// pixels, each with its plane number plus one, or zero.
-    fn visit(&self, rows: Range<usize>, mut found: impl FnMut(usize, Return)) {
+    fn visit(&self, rows: Range<usize>, mut found: impl FnMut(usize, DepthSample)) {
         let mut lines: [Line; 3] = std::array::from_fn(|_| Line::of(self.width));
         if let Some(before) = rows.start.checked_sub(1) {
             lines[1].fill(self.line(before));
@@ -198,7 +198,7 @@ impl<'a> Returns<'a> {
                 for (lane, &on) in block.on.iter().enumerate().filter(|(_, on)| **on != DROPPED) {
                     let column = first + lane;
                     let thing = on == THING;
-                    let found_one = Return {
+                    let found_one = DepthSample {
                         at: Vector3::from(block.at.map(|axis| axis[lane])),
                         normal: if thing { &self.things } else { &self.coarse }.normal(row, column),
                         weight: block.weight[lane],

@@ -7,6 +7,7 @@
 //! ([`LearnedModel`]); and known again, with a pose and a confidence ([`Library`]). What a later meeting shows is added ([`united`]).
 
 mod around;
+mod change_detection;
 mod error;
 mod frame;
 mod fuse;
@@ -16,7 +17,6 @@ pub mod know;
 #[doc(hidden)]
 pub mod mask;
 mod model;
-mod notice;
 mod planes;
 mod register;
 mod supervoxel;
@@ -24,11 +24,11 @@ mod texture;
 mod unite;
 
 pub use around::{AroundOptions, nearest, stands, trajectories};
+pub use change_detection::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use error::LearningError;
 pub use know::evidence::{Judge, PoseEvidence, WEIGHTS};
 pub use know::several::{Glance, Guess, Judged};
 pub use know::{Hypothesis, KnowError, KnowOptions, Library, Recognised, choose, outward};
 pub use model::{LearnOptions, LearnedModel, Used, learn};
-pub use notice::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use register::{Keyframe, keyframes, register};
 pub use unite::{United, united};

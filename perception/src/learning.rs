@@ -13,11 +13,11 @@ mod frame;
 mod fuse;
 mod grow;
 #[doc(hidden)]
-pub mod know;
-#[doc(hidden)]
 pub mod mask;
 mod model;
 mod planes;
+#[doc(hidden)]
+pub mod recognition;
 mod register;
 mod supervoxel;
 mod texture;
@@ -26,9 +26,9 @@ mod unite;
 pub use around::{AroundOptions, nearest, stands, trajectories};
 pub use change_detection::{Appeared, MetaRoom, NoticeOptions, Visit};
 pub use error::LearningError;
-pub use know::evidence::{Judge, PoseEvidence, WEIGHTS};
-pub use know::several::{Glance, Guess, Judged};
-pub use know::{Hypothesis, KnowError, KnowOptions, Library, Recognised, choose, outward};
 pub use model::{LearnOptions, LearnedModel, Used, learn};
+pub use recognition::evidence::{Judge, PoseEvidence, WEIGHTS};
+pub use recognition::several::{Glance, Guess, Judged};
+pub use recognition::{Hypothesis, KnowError, KnowOptions, Library, Recognised, choose, outward};
 pub use register::{Keyframe, keyframes, register};
 pub use unite::{United, united};

@@ -1,7 +1,7 @@
-//! Tests of `learning::know::feature`.
+//! Tests of `learning::recognition::feature`.
 
 use descry_perception::draw::Draws;
-use descry_perception::learning::know::feature::*;
+use descry_perception::learning::recognition::feature::*;
 use nalgebra::{Point3, Vector3};
 
 /// Features that are drawn, every third near to the one before.

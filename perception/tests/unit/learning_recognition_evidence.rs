@@ -1,11 +1,11 @@
-//! Tests of `learning::know::evidence`.
+//! Tests of `learning::recognition::evidence`.
 
 use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
-use descry_perception::learning::know::KnowOptions;
-use descry_perception::learning::know::evidence::*;
-use descry_perception::learning::know::scene::SceneView;
-use descry_perception::learning::know::skin::Skin;
+use descry_perception::learning::recognition::KnowOptions;
+use descry_perception::learning::recognition::evidence::*;
+use descry_perception::learning::recognition::scene::SceneView;
+use descry_perception::learning::recognition::skin::Skin;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 

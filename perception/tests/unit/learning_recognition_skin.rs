@@ -1,6 +1,6 @@
-//! Tests of `learning::know::skin`.
+//! Tests of `learning::recognition::skin`.
 
-use descry_perception::learning::know::skin::*;
+use descry_perception::learning::recognition::skin::*;
 
 #[test]
 fn colours_as_the_standard_says() {

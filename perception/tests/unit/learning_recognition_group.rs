@@ -1,7 +1,7 @@
-//! Tests of `learning::know::group`.
+//! Tests of `learning::recognition::group`.
 
-use descry_perception::learning::know::feature::Feature;
-use descry_perception::learning::know::group::*;
+use descry_perception::learning::recognition::feature::Feature;
+use descry_perception::learning::recognition::group::*;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 #[test]

@@ -1,10 +1,10 @@
-//! Tests of `learning::know::stood`.
+//! Tests of `learning::recognition::stood`.
 
 use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
-use descry_perception::learning::know::scene::SceneView;
-use descry_perception::learning::know::skin::Skin;
-use descry_perception::learning::know::stood::*;
+use descry_perception::learning::recognition::scene::SceneView;
+use descry_perception::learning::recognition::skin::Skin;
+use descry_perception::learning::recognition::stood::*;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;

@@ -13,9 +13,9 @@ pub mod group;
 pub mod scene;
 pub mod several;
 #[doc(hidden)]
-pub mod skin;
-#[doc(hidden)]
 pub mod stood;
+#[doc(hidden)]
+pub mod surfels;
 
 use crate::cloud::Cloud;
 use crate::pool;
@@ -28,8 +28,8 @@ use group::{Vote, matches, standing, votes};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use scene::SceneView;
 use serde::{Deserialize, Serialize};
-use skin::Skin;
-pub use skin::outward;
+use surfels::Surfels;
+pub use surfels::outward;
 
 /// Options for recognising learned objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,9 +84,9 @@ pub struct Library {
 }
 
 struct Known {
-    skin: Skin,
+    surfels: Surfels,
     /// Stride through the points for a first, coarse check.
-    coarse: Skin,
+    coarse: Surfels,
     features: [Descriptors; 2],
     /// Largest extent, metres.
     size_m: f64,
@@ -129,22 +129,22 @@ impl Library {
     /// # Errors
     /// If it has next to no points with normals.
     pub fn add(&mut self, cloud: &Cloud, options: &KnowOptions) -> Result<usize, KnowError> {
-        let skin = Skin::of(cloud)?;
-        if skin.points.len() < LEAST_POINTS {
-            return Err(KnowError::Model { points: skin.points.len() });
+        let surfels = Surfels::of(cloud)?;
+        if surfels.points.len() < LEAST_POINTS {
+            return Err(KnowError::Model { points: surfels.points.len() });
         }
         let mut all = KINDS.map(Descriptors::none);
         for away in directions() {
-            let part = skin.part(&skin.seen_from(&away))?;
+            let part = surfels.part(&surfels.seen_from(&away))?;
             let keypoints = part.keypoints(options.keypoint_m, |_| true);
             for (features_of, kind) in all.iter_mut().zip(KINDS) {
                 features_of.add_new(&Descriptors::of(&part, &keypoints, kind));
             }
         }
-        let few: Vec<u32> = skin.keypoints(COARSE_M, |_| true);
-        let coarse = skin.part(&few)?;
+        let few: Vec<u32> = surfels.keypoints(COARSE_M, |_| true);
+        let coarse = surfels.part(&few)?;
         let size_m = cloud.bounds().map_or(0.0, |(low, high)| f64::from((high - low).norm()));
-        self.models.push(Known { skin, coarse, features: all, size_m });
+        self.models.push(Known { surfels, coarse, features: all, size_m });
         Ok(self.models.len() - 1)
     }
 
@@ -188,8 +188,8 @@ impl Library {
         world_from_camera: &Isometry3<f64>,
         options: &KnowOptions,
     ) -> Result<Vec<Hypothesis>, KnowError> {
-        let keypoints = scene.skin.keypoints(options.keypoint_m, |i| !scene.wide[i]);
-        let described = KINDS.map(|kind| Descriptors::of(&scene.skin, &keypoints, kind));
+        let keypoints = scene.surfels.keypoints(options.keypoint_m, |i| !scene.wide[i]);
+        let described = KINDS.map(|kind| Descriptors::of(&scene.surfels, &keypoints, kind));
         let of_model = |(number, model): (usize, &Known)| {
             model.find(number, &described, scene, world_from_camera, options)
         };
@@ -239,9 +239,9 @@ impl Known {
         let up = options.up.map(|up| [*up, world_from_camera.rotation.inverse() * *up]);
         let mut judged = Vec::new();
         for vote in self.promising(described, scene, up.as_ref(), options)? {
-            let pose = refined(&self.skin, &vote.scene_from_model, scene, &SETTLED_WITHIN_M)?;
-            let Verified { evidence, claims } = verify(&self.skin, &pose, scene, vote.matches);
-            let stands = up.is_none_or(|up| stood::stands(&self.skin, &pose, scene, &up));
+            let pose = refined(&self.surfels, &vote.scene_from_model, scene, &SETTLED_WITHIN_M)?;
+            let Verified { evidence, claims } = verify(&self.surfels, &pose, scene, vote.matches);
+            let stands = up.is_none_or(|up| stood::stands(&self.surfels, &pose, scene, &up));
             let confidence = options.confidence(&evidence, stands);
             let world_from_model = world_from_camera * pose;
             let recognised = Recognised { model: number, world_from_model, confidence, evidence };
@@ -292,7 +292,7 @@ impl Known {
     /// Upper bound of the confidence over some poses, from a few model points; 1 if too few are
     /// visible.
     fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &SceneView, judge: &Judge) -> f64 {
-        let by_points = self.skin.points.len() as f64 / self.coarse.points.len().max(1) as f64;
+        let by_points = self.surfels.points.len() as f64 / self.coarse.points.len().max(1) as f64;
         let mut most = 0.0_f64;
         for pose in poses {
             let few = unbounded(&self.coarse, pose, scene, votes);
@@ -314,10 +314,9 @@ impl KnowOptions {
     }
 }
 
-/// Pose of a skin after ICP of its visible side with the scene, with decreasing search radii,
-/// metres.
+/// The pose of surfels after their visible side was brought onto the scene's surface, looked for within these distances (metres) one after the other.
 fn refined(
-    skin: &Skin,
+    surfels: &Surfels,
     start: &Isometry3<f64>,
     scene: &SceneView,
     within_m: &[f32],
@@ -325,8 +324,8 @@ fn refined(
     let mut pose = *start;
     for &within_m in within_m {
         let eye = pose.inverse() * Point3::origin();
-        let seen = skin.seen_from(&eye.coords.cast().normalize());
-        let points: Vec<Point3<f32>> = seen.iter().map(|&i| skin.points[i as usize]).collect();
+        let seen = surfels.seen_from(&eye.coords.cast().normalize());
+        let points: Vec<Point3<f32>> = seen.iter().map(|&i| surfels.points[i as usize]).collect();
         if points.len() < LEAST_POINTS / 2 {
             return Ok(pose);
         }

@@ -5,7 +5,7 @@ use descry_perception::cloud::Cloud;
 use descry_perception::learning::recognition::KnowOptions;
 use descry_perception::learning::recognition::evidence::*;
 use descry_perception::learning::recognition::scene::SceneView;
-use descry_perception::learning::recognition::skin::Skin;
+use descry_perception::learning::recognition::surfels::Surfels;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -27,11 +27,11 @@ fn wall(plate_before_m: f32) -> SceneView {
 }
 
 /// A square plate that faces the camera.
-fn plate() -> Skin {
+fn plate() -> Surfels {
     let at = |k: usize| (k as f32 / 24.0 - 0.5) * PLATE_M;
     let points: Vec<Point3<f32>> = (0..25 * 25).map(|k| Point3::new(at(k % 25), at(k / 25), 0.0)).collect();
     let normals = Some(vec![-Vector3::z(); points.len()]);
-    Skin::of(&Cloud { points, normals, ..Cloud::default() }).expect("few points")
+    Surfels::of(&Cloud { points, normals, ..Cloud::default() }).expect("few points")
 }
 
 #[test]
@@ -68,9 +68,11 @@ fn a_side_of_which_nothing_was_learned_is_not_known() {
     let mut normals = strip.normals.clone();
     points.extend(plate().points.iter().map(|p| p + Vector3::z() * 0.03));
     normals.resize(points.len(), Vector3::z());
-    let shell = Skin::of(&Cloud { points, normals: Some(normals), ..Cloud::default() }).expect("few points");
-    let at =
-        |skin: &Skin, z: f64| verify(skin, &Isometry3::translation(0.0, 0.0, z), &wall(0.1), 10).evidence;
+    let shell =
+        Surfels::of(&Cloud { points, normals: Some(normals), ..Cloud::default() }).expect("few points");
+    let at = |surfels: &Surfels, z: f64| {
+        verify(surfels, &Isometry3::translation(0.0, 0.0, z), &wall(0.1), 10).evidence
+    };
     let (alone, shell_there) = (at(&strip, 0.9), at(&shell, 0.9));
     assert_eq!((alone.explained, alone.hidden), (shell_there.explained, 0));
     assert!(shell_there.hidden > 2 * alone.facing, "{shell_there:?}");

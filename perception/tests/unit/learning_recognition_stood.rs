@@ -3,8 +3,8 @@
 use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
 use descry_perception::learning::recognition::scene::SceneView;
-use descry_perception::learning::recognition::skin::Skin;
 use descry_perception::learning::recognition::stood::*;
+use descry_perception::learning::recognition::surfels::Surfels;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;
@@ -26,14 +26,14 @@ fn table() -> SceneView {
 }
 
 /// A post of 6 cm across and 10 cm high on the origin, z up.
-fn post() -> Skin {
+fn post() -> Surfels {
     let at = |k: usize| {
         let (turn, up) = ((k % 40) as f32 * TAU / 40.0, (k / 40) as f32 * 0.004);
         (Vector3::new(turn.cos(), turn.sin(), 0.0), up)
     };
     let normals: Vec<Vector3<f32>> = (0..40 * 26).map(|k| at(k).0).collect();
     let points = (0..40 * 26).map(|k| Point3::from(at(k).0 * 0.03 + Vector3::z() * at(k).1)).collect();
-    Skin::of(&Cloud { points, normals: Some(normals), ..Cloud::default() }).expect("few points")
+    Surfels::of(&Cloud { points, normals: Some(normals), ..Cloud::default() }).expect("few points")
 }
 
 #[test]

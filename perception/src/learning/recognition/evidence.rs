@@ -2,7 +2,7 @@
 //! of it, or behind it.
 
 use super::scene::SceneView;
-use super::skin::{Skin, across};
+use super::surfels::{Surfels, across};
 use crate::noise::frontal_sigma_m;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -120,12 +120,17 @@ const LEAST_BORDER: usize = 10;
 /// Evidence, and the scene's points that are explained.
 pub struct Verified {
     pub evidence: PoseEvidence,
-    /// Indices in the scene's skin, ascending.
+    /// Indices in the scene's surfels, ascending.
     pub claims: Vec<u32>,
 }
 
-/// Verifies the pose of a model's skin against a scene.
-pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView, votes: usize) -> Verified {
+/// Verifies the pose of a model's surfels against a scene.
+pub fn verify(
+    model: &Surfels,
+    camera_from_model: &Isometry3<f64>,
+    scene: &SceneView,
+    votes: usize,
+) -> Verified {
     let Rays { mut evidence, pairs, seen } = rays(model, camera_from_model, scene);
     evidence.votes = votes;
     add_backs(&mut evidence, model, camera_from_model, scene, &seen);
@@ -139,7 +144,7 @@ pub fn verify(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneVie
 /// Evidence as if the scene did not continue beyond the model and each side of the model had been
 /// learned.
 pub(super) fn unbounded(
-    model: &Skin,
+    model: &Surfels,
     camera_from_model: &Isometry3<f64>,
     scene: &SceneView,
     votes: usize,
@@ -148,7 +153,7 @@ pub(super) fn unbounded(
 }
 
 /// First score of a pose: share of the visible points that are explained, and similarity of colour.
-pub(super) fn first_sight(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> f64 {
+pub(super) fn first_sight(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> f64 {
     let evidence = rays(model, camera_from_model, scene).evidence;
     evidence.explained_share() * (0.5 + evidence.colour.unwrap_or(0.5))
 }
@@ -179,7 +184,7 @@ fn sees_through(z_m: f32, nearest_m: f32) -> bool {
 /// Adds the evidence of visible but never learned sides: seen through, or without information.
 fn add_backs(
     evidence: &mut PoseEvidence,
-    model: &Skin,
+    model: &Surfels,
     camera_from_model: &Isometry3<f64>,
     scene: &SceneView,
     seen: &[u32],
@@ -193,7 +198,7 @@ fn add_backs(
     }
 }
 
-fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> Rays {
+fn rays(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> Rays {
     let mut e = PoseEvidence::default();
     let (mut pairs, mut off, mut turned_rad) = (Vec::new(), 0.0, 0.0);
     let seen = model.seen_from(&towards_camera(camera_from_model));
@@ -212,8 +217,8 @@ fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> 
             e.hidden += 1;
         } else if (depth - p.z as f32).abs() <= tolerance {
             let normal = (camera_from_model.rotation * model.normals[i as usize].cast::<f64>()).cast::<f32>();
-            let near = scene.skin.tree.nearest(&p.cast(), NEAR_M).map(|n| n.index as usize);
-            let alike = near.map(|k| (k, scene.skin.normals[k].dot(&normal)));
+            let near = scene.surfels.tree.nearest(&p.cast(), NEAR_M).map(|n| n.index as usize);
+            let alike = near.map(|k| (k, scene.surfels.normals[k].dot(&normal)));
             let Some((k, alike)) = alike.filter(|(_, alike)| *alike >= TURNED_AS) else { continue };
             e.explained += 1;
             turned_rad += f64::from(alike.min(1.0).acos());
@@ -223,12 +228,12 @@ fn rays(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> 
     }
     e.off_sigmas = off / e.explained.max(1) as f64;
     e.turned_rad = turned_rad / e.explained.max(1) as f64;
-    e.colour = likeness(model, &scene.skin, &pairs);
+    e.colour = likeness(model, &scene.surfels, &pairs);
     Rays { evidence: e, pairs, seen }
 }
 
 /// Mean likeness of colours of pairs (model, scene), after the lightness of the one is brought to that of the other.
-fn likeness(model: &Skin, scene: &Skin, pairs: &[(usize, usize)]) -> Option<f64> {
+fn likeness(model: &Surfels, scene: &Surfels, pairs: &[(usize, usize)]) -> Option<f64> {
     let (a, b) = (model.lab.as_ref()?, scene.lab.as_ref()?);
     if pairs.is_empty() {
         return Some(0.0);
@@ -246,11 +251,11 @@ fn likeness(model: &Skin, scene: &Skin, pairs: &[(usize, usize)]) -> Option<f64>
 
 /// Share of border positions where the scene continues the model's surface, without occluded
 /// positions and missing returns. Any patch fits a larger wall, so wide planes count too.
-pub fn beyond(model: &Skin, camera_from_model: &Isometry3<f64>, scene: &SceneView, claims: &[u32]) -> f64 {
+pub fn beyond(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView, claims: &[u32]) -> f64 {
     let model_from_camera = camera_from_model.inverse();
     let (mut carried, mut asked) = (0_usize, 0_usize);
     for &claim in claims {
-        let (at, normal) = (scene.skin.points[claim as usize], scene.skin.normals[claim as usize]);
+        let (at, normal) = (scene.surfels.points[claim as usize], scene.surfels.normals[claim as usize]);
         let right = across(&normal);
         let up = normal.cross(&right);
         for side in [right, up, -right, -up] {
@@ -271,8 +276,8 @@ fn carries_on(scene: &SceneView, q: &Point3<f64>, normal: &Vector3<f32>) -> Opti
     let off = scene.around(q)?.0 - q.z as f32;
     let tolerance = tolerance_m(q.z as f32);
     let smooth = || {
-        let near = scene.skin.tree.nearest(&q.cast(), NEAR_M)?;
-        Some(scene.skin.normals[near.index as usize].dot(normal) > SMOOTH)
+        let near = scene.surfels.tree.nearest(&q.cast(), NEAR_M)?;
+        Some(scene.surfels.normals[near.index as usize].dot(normal) > SMOOTH)
     };
     (off >= -tolerance).then(|| off <= tolerance && smooth().unwrap_or(false))
 }

@@ -1,7 +1,7 @@
 //! Local features: shape where the surface bends (SHOT: Tombari, Salti, Di Stefano 2010), and
 //! printed pattern where it is coloured.
 
-use super::skin::{Skin, across};
+use super::surfels::{Surfels, across};
 use crate::pool;
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
@@ -74,13 +74,16 @@ impl Descriptors {
     }
 
     /// Features at some points of a surfel cloud; points without enough neighbours have none.
-    pub fn of(skin: &Skin, keypoints: &[u32], kind: DescriptorKind) -> Descriptors {
+    pub fn of(surfels: &Surfels, keypoints: &[u32], kind: DescriptorKind) -> Descriptors {
         let describe = |&i: &u32| {
             let descriptor = match kind {
-                DescriptorKind::Shape => shape(skin, i as usize),
-                DescriptorKind::Pattern => pattern(skin, i as usize),
+                DescriptorKind::Shape => shape(surfels, i as usize),
+                DescriptorKind::Pattern => pattern(surfels, i as usize),
             }?;
-            Some((Feature { at: skin.points[i as usize], normal: skin.normals[i as usize] }, descriptor))
+            Some((
+                Feature { at: surfels.points[i as usize], normal: surfels.normals[i as usize] },
+                descriptor,
+            ))
         };
         let described: Vec<(Feature, Box<[u8]>)> =
             pool::filter(keypoints.len(), 1, |n| describe(&keypoints[n]));
@@ -203,19 +206,19 @@ const SECTORS: [usize; 4] = [8, 2, 2, 11];
 const FLAT: f32 = 0.04;
 const FEWEST: usize = 20;
 
-fn shape(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
-    let at = skin.points[centre];
+fn shape(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
+    let at = surfels.points[centre];
     let mut near: Vec<(usize, f32)> = Vec::new();
-    skin.tree.within(&at, SHAPE_M, |n| near.push((n.index as usize, n.distance_sq.sqrt())));
-    let mean: Vector3<f32> = near.iter().map(|(k, _)| skin.normals[*k]).sum();
+    surfels.tree.within(&at, SHAPE_M, |n| near.push((n.index as usize, n.distance_sq.sqrt())));
+    let mean: Vector3<f32> = near.iter().map(|(k, _)| surfels.normals[*k]).sum();
     if near.len() < FEWEST || 1.0 - mean.norm() / (near.len() as f32) < FLAT {
         return None;
     }
-    let axes = local_frame(skin, &at, &skin.normals[centre], &near)?;
+    let axes = local_frame(surfels, &at, &surfels.normals[centre], &near)?;
     let mut bins = vec![0.0_f32; SECTORS.iter().product()];
     for &(k, distance) in near.iter().filter(|n| n.1 > 1e-6) {
-        let local = axes * (skin.points[k] - at);
-        let cosine = axes.row(2).transpose().dot(&skin.normals[k]);
+        let local = axes * (surfels.points[k] - at);
+        let cosine = axes.row(2).transpose().dot(&surfels.normals[k]);
         let azimuth = local.y.atan2(local.x) / std::f32::consts::TAU + 0.5;
         let places = [
             azimuth * SECTORS[0] as f32 - 0.5,
@@ -249,14 +252,14 @@ fn spread(bins: &mut [f32], places: [f32; 4]) {
 /// Rows are the axes of the local reference frame: by the spread of the neighbours weighed by nearness, z to the side of the normal, x to
 /// where most neighbours lie.
 fn local_frame(
-    skin: &Skin,
+    surfels: &Surfels,
     at: &Point3<f32>,
     normal: &Vector3<f32>,
     near: &[(usize, f32)],
 ) -> Option<Matrix3<f32>> {
     let mut scatter = Matrix3::zeros();
     for &(k, distance) in near {
-        let d = skin.points[k] - at;
+        let d = surfels.points[k] - at;
         scatter += d * d.transpose() * (SHAPE_M - distance);
     }
     let eigen = SymmetricEigen::new(scatter);
@@ -265,7 +268,7 @@ fn local_frame(
     let column = |k: usize| eigen.eigenvectors.column(order[k]).into_owned();
     let (z, x) = (column(0), column(2));
     let z = if z.dot(normal) < 0.0 { -z } else { z };
-    let before = near.iter().filter(|(k, _)| (skin.points[*k] - at).dot(&x) >= 0.0).count();
+    let before = near.iter().filter(|(k, _)| (surfels.points[*k] - at).dot(&x) >= 0.0).count();
     let x = if 2 * before < near.len() { -x } else { x };
     let y = z.cross(&x);
     let frame = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
@@ -285,17 +288,17 @@ const SCALES: [f32; 2] = [40.0, 2.0];
 
 /// Contrast-normalised lightness and colour on a square of the tangent plane, oriented by the
 /// lightness gradient, as in Brown, Szeliski and Winder (2005).
-fn pattern(skin: &Skin, centre: usize) -> Option<Box<[u8]>> {
-    let lab = skin.lab.as_ref()?;
-    let (at, normal) = (skin.points[centre], skin.normals[centre]);
+fn pattern(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
+    let lab = surfels.lab.as_ref()?;
+    let (at, normal) = (surfels.points[centre], surfels.normals[centre]);
     let reach_m = 0.5 * CELLS as f32 * CELL_M;
     let right = across(&normal);
     let up = normal.cross(&right);
     let mut near: Vec<(f32, f32, [f32; 3])> = Vec::new();
-    skin.tree.within(&at, reach_m * 1.45, |n| {
+    surfels.tree.within(&at, reach_m * 1.45, |n| {
         let k = n.index as usize;
-        let d = skin.points[k] - at;
-        if skin.normals[k].dot(&normal) > 0.7 && d.dot(&normal).abs() < 0.01 {
+        let d = surfels.points[k] - at;
+        if surfels.normals[k].dot(&normal) > 0.7 && d.dot(&normal).abs() < 0.01 {
             near.push((d.dot(&right), d.dot(&up), lab[k]));
         }
     });

@@ -1,7 +1,7 @@
 //! A look made ready to be recognised in.
 
 use super::error::KnowError;
-use super::skin::{STEP_M, Skin};
+use super::surfels::{STEP_M, Surfels};
 use crate::cloud::{Cloud, is_finite};
 use crate::draw::Draws;
 use crate::neighbours::Neighbours;
@@ -14,10 +14,10 @@ use nalgebra::{Isometry3, Point3};
 
 /// A camera's view of a scene, in the camera frame.
 pub struct SceneView {
-    pub skin: Skin,
+    pub surfels: Surfels,
     /// True for points of planes that are wider than any model.
     pub wide: Vec<bool>,
-    /// The skin, to be registered to.
+    /// The surfels, to be registered to.
     pub target: Prepared,
     map: DepthMap,
 }
@@ -44,10 +44,10 @@ impl SceneView {
                 Some(normals::estimate(&tree, NEIGHBOURS, &Point3::origin()).normals)
             }
         };
-        let skin = Skin::of(&Cloud { normals: cloud, ..view.cloud.clone() }.filter(near))?;
-        let target = Prepared::with_normals(&skin.points, NEIGHBOURS)?;
-        let wide = wide(&skin, widest_m2);
-        Ok(SceneView { skin, wide, target, map })
+        let surfels = Surfels::of(&Cloud { normals: cloud, ..view.cloud.clone() }.filter(near))?;
+        let target = Prepared::with_normals(&surfels.points, NEIGHBOURS)?;
+        let wide = wide(&surfels, widest_m2);
+        Ok(SceneView { surfels, wide, target, map })
     }
 
     /// Depth at the pixel of a point, and the minimum around it, metres; `None` outside the image
@@ -64,8 +64,8 @@ impl SceneView {
     }
 }
 
-fn wide(skin: &Skin, widest_m2: f64) -> Vec<bool> {
-    let mut wide = vec![false; skin.points.len()];
+fn wide(surfels: &Surfels, widest_m2: f64) -> Vec<bool> {
+    let mut wide = vec![false; surfels.points.len()];
     let least = (widest_m2 / f64::from(STEP_M * STEP_M)) as usize;
     let mut draws = Draws::new(0);
     for _ in 0..PLANES {
@@ -73,7 +73,7 @@ fn wide(skin: &Skin, widest_m2: f64) -> Vec<bool> {
         if open.len() < least.max(3) {
             break;
         }
-        let points: Vec<Point3<f32>> = open.iter().map(|&i| skin.points[i]).collect();
+        let points: Vec<Point3<f32>> = open.iter().map(|&i| surfels.points[i]).collect();
         let options =
             PlaneOptions { tolerance_m: PLANE_M, rounds: 300, seed: draws.next(), ..PlaneOptions::default() };
         let Ok(fit) = plane::find(&points, &options) else { break };
@@ -82,7 +82,7 @@ fn wide(skin: &Skin, widest_m2: f64) -> Vec<bool> {
             .inliers
             .iter()
             .map(|&i| open[i as usize])
-            .filter(|&i| skin.normals[i].dot(&normal) > LEVEL)
+            .filter(|&i| surfels.normals[i].dot(&normal) > LEVEL)
             .collect();
         if on.len() < least.max(3) {
             break;

@@ -84,8 +84,9 @@ impl Library {
         let mut told: Vec<(PoseEvidence, Isometry3<f64>, bool)> = Vec::new();
         for (glance, world_from_camera) in looks {
             let stated = world_from_camera.inverse() * world_from_model;
-            let of = |pose: &Isometry3<f64>| verify(&known.skin, pose, &glance.scene, guess.votes).evidence;
-            let refined = refined(&known.skin, &stated, &glance.scene, &WITHIN_M)?;
+            let of =
+                |pose: &Isometry3<f64>| verify(&known.surfels, pose, &glance.scene, guess.votes).evidence;
+            let refined = refined(&known.surfels, &stated, &glance.scene, &WITHIN_M)?;
             let best = [stated, refined]
                 .map(|pose| (of(&pose), pose))
                 .into_iter()
@@ -93,7 +94,7 @@ impl Library {
             let Some((evidence, pose)) = best.filter(|(e, _)| e.open() >= FEWEST) else { continue };
             let stands = options.up.is_none_or(|up| {
                 let up = [*up, world_from_camera.rotation.inverse() * *up];
-                stands(&known.skin, &pose, &glance.scene, &up)
+                stands(&known.surfels, &pose, &glance.scene, &up)
             });
             told.push((evidence, world_from_camera * pose, stands));
         }

@@ -2,7 +2,7 @@
 
 use super::evidence::tolerance_m;
 use super::scene::SceneView;
-use super::skin::{Skin, across};
+use super::surfels::{Surfels, across};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;
 
@@ -27,7 +27,7 @@ const FLOATS: usize = 2;
 /// False if a model is tilted, or hardly supported: the camera saw past the support height all
 /// around its foot. `up`: up direction in the model and in the camera frame.
 pub fn stands(
-    model: &Skin,
+    model: &Surfels,
     camera_from_model: &Isometry3<f64>,
     scene: &SceneView,
     up: &[Vector3<f64>; 2],
@@ -41,8 +41,8 @@ pub fn stands(
         let Some((depth, _)) = scene.around(&q) else { continue };
         let met = q * (f64::from(depth) / q.z);
         let is_level = || {
-            let near = scene.skin.tree.nearest(&met.cast(), super::evidence::NEAR_M);
-            near.is_some_and(|n| scene.skin.normals[n.index as usize].cast::<f64>().dot(&up[1]) > LEVEL)
+            let near = scene.surfels.tree.nearest(&met.cast(), super::evidence::NEAR_M);
+            near.is_some_and(|n| scene.surfels.normals[n.index as usize].cast::<f64>().dot(&up[1]) > LEVEL)
         };
         if (met - q).dot(&up[1]).abs() < STEP_M && is_level() {
             carried += 1;
@@ -54,7 +54,7 @@ pub fn stands(
 }
 
 /// Points around the foot of a model, at its height.
-fn beside_foot(model: &Skin, up: &Vector3<f32>) -> Vec<Point3<f32>> {
+fn beside_foot(model: &Surfels, up: &Vector3<f32>) -> Vec<Point3<f32>> {
     let height = |p: &Point3<f32>| up.dot(&p.coords);
     let low = model.points.iter().map(height).fold(f32::INFINITY, f32::min);
     let foot: Vec<&Point3<f32>> = model.points.iter().filter(|p| height(p) < low + FOOT_M).collect();

@@ -1,6 +1,6 @@
-//! Tests of `learning::recognition::skin`.
+//! Tests of `learning::recognition::surfels`.
 
-use descry_perception::learning::recognition::skin::*;
+use descry_perception::learning::recognition::surfels::*;
 
 #[test]
 fn colours_as_the_standard_says() {

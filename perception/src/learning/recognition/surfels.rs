@@ -22,7 +22,7 @@ pub fn across(along: &Vector3<f32>) -> Vector3<f32> {
 }
 
 /// Points about `STEP_M` apart, with normals towards the viewers.
-pub struct Skin {
+pub struct Surfels {
     pub points: Vec<Point3<f32>>,
     pub normals: Vec<Vector3<f32>>,
     /// CIE L*, a*, b*; none if the cloud has no colours.
@@ -30,13 +30,13 @@ pub struct Skin {
     pub tree: Neighbours,
 }
 
-impl Skin {
-    /// The skin of a cloud with normals.
-    pub fn of(cloud: &Cloud) -> Result<Skin, super::error::KnowError> {
-        Ok(Skin::gathered(&voxel::downsample(cloud, STEP_M)?)?)
+impl Surfels {
+    /// The surfels of a cloud with normals.
+    pub fn of(cloud: &Cloud) -> Result<Surfels, super::error::KnowError> {
+        Ok(Surfels::gathered(&voxel::downsample(cloud, STEP_M)?)?)
     }
 
-    fn gathered(cloud: &Cloud) -> Result<Skin, CloudError> {
+    fn gathered(cloud: &Cloud) -> Result<Surfels, CloudError> {
         let none = Vec::new();
         let normals = cloud.normals.as_ref().unwrap_or(&none);
         let kept: Vec<u32> = (0..normals.len())
@@ -46,7 +46,7 @@ impl Skin {
         let kept = cloud.select(&kept);
         let tree = Neighbours::new(&kept.points)?;
         let lab = kept.colours.map(|c| c.into_iter().map(lab).collect());
-        Ok(Skin { points: kept.points, normals: kept.normals.unwrap_or_default(), lab, tree })
+        Ok(Surfels { points: kept.points, normals: kept.normals.unwrap_or_default(), lab, tree })
     }
 
     /// Indices of the points that can be seen from far away in a direction (unit length, from the object).
@@ -71,10 +71,10 @@ impl Skin {
         (0..self.points.len() as u32).filter(back).collect()
     }
 
-    /// The skin of some of the points.
-    pub fn part(&self, indices: &[u32]) -> Result<Skin, CloudError> {
+    /// The surfels of some of the points.
+    pub fn part(&self, indices: &[u32]) -> Result<Surfels, CloudError> {
         let points: Vec<Point3<f32>> = indices.iter().map(|&i| self.points[i as usize]).collect();
-        Ok(Skin {
+        Ok(Surfels {
             tree: Neighbours::new(&points)?,
             points,
             normals: indices.iter().map(|&i| self.normals[i as usize]).collect(),
@@ -113,11 +113,11 @@ struct Front {
 }
 
 impl Front {
-    fn of(skin: &Skin, away: &Vector3<f32>) -> Front {
+    fn of(surfels: &Surfels, away: &Vector3<f32>) -> Front {
         let right = across(away);
         let mut front =
             Front { away: *away, axes: [right, away.cross(&right)], heights: FxHashMap::default() };
-        for p in &skin.points {
+        for p in &surfels.points {
             let height = away.dot(&p.coords);
             let best = front.heights.entry(front.cell(p)).or_insert(height);
             *best = height.max(*best);
@@ -130,7 +130,7 @@ impl Front {
         (at(&self.axes[0]), at(&self.axes[1]))
     }
 
-    /// True if no part of the skin occludes the point.
+    /// True if nothing lies before a point of the surfels.
     fn has(&self, p: &Point3<f32>) -> bool {
         self.away.dot(&p.coords) > self.heights[&self.cell(p)] - BEHIND_M
     }

@@ -10,10 +10,10 @@ pub mod feature;
 #[doc(hidden)]
 pub mod group;
 #[doc(hidden)]
+pub mod resting_pose;
+#[doc(hidden)]
 pub mod scene;
 pub mod several;
-#[doc(hidden)]
-pub mod stood;
 #[doc(hidden)]
 pub mod surfels;
 
@@ -241,7 +241,7 @@ impl Known {
         for vote in self.promising(described, scene, up.as_ref(), options)? {
             let pose = refined(&self.surfels, &vote.scene_from_model, scene, &SETTLED_WITHIN_M)?;
             let Verified { evidence, claims } = verify(&self.surfels, &pose, scene, vote.matches);
-            let stands = up.is_none_or(|up| stood::stands(&self.surfels, &pose, scene, &up));
+            let stands = up.is_none_or(|up| resting_pose::stands(&self.surfels, &pose, scene, &up));
             let confidence = options.confidence(&evidence, stands);
             let world_from_model = world_from_camera * pose;
             let recognised = Recognised { model: number, world_from_model, confidence, evidence };

@@ -11,7 +11,7 @@ mod learning_mask;
 mod learning_recognition_evidence;
 mod learning_recognition_feature;
 mod learning_recognition_group;
-mod learning_recognition_stood;
+mod learning_recognition_resting_pose;
 mod learning_recognition_surfels;
 mod locate;
 mod mapping_frontier;

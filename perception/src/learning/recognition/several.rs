@@ -2,8 +2,8 @@
 
 use super::error::KnowError;
 use super::evidence::{PoseEvidence, verify};
+use super::resting_pose::stands;
 use super::scene::SceneView;
-use super::stood::stands;
 use super::{KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
 use nalgebra::Isometry3;

@@ -1,9 +1,9 @@
-//! Tests of `learning::recognition::stood`.
+//! Tests of `learning::recognition::resting_pose`.
 
 use descry_perception::camera::Intrinsics;
 use descry_perception::cloud::Cloud;
+use descry_perception::learning::recognition::resting_pose::*;
 use descry_perception::learning::recognition::scene::SceneView;
-use descry_perception::learning::recognition::stood::*;
 use descry_perception::learning::recognition::surfels::Surfels;
 use descry_perception::view::View;
 use nalgebra::{Isometry3, Point3, Vector3};

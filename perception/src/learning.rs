@@ -15,12 +15,12 @@ mod grow;
 #[doc(hidden)]
 pub mod mask;
 mod model;
+mod photometric;
 mod planes;
 #[doc(hidden)]
 pub mod recognition;
 mod register;
 mod supervoxel;
-mod texture;
 mod unite;
 
 pub use around::{AroundOptions, nearest, stands, trajectories};

@@ -5,7 +5,7 @@
 //! printed on things brings together what surfaces leave loose, and they are aligned once more from there.
 
 use super::error::LearningError;
-use super::texture;
+use super::photometric;
 use crate::merge::{self, MergeOptions};
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -47,7 +47,7 @@ pub fn register(
     let fits = merge::align_views(views, &options)?;
     let poses: Vec<Isometry3<f64>> = fits.iter().map(|f| f.world_from_camera).collect();
     let used: Vec<bool> = fits.iter().map(|f| f.used).collect();
-    let by_texture = texture::refined(views, &poses, &used, range_m);
+    let by_texture = photometric::refined(views, &poses, &used, range_m);
     // Surfaces have the last word where they say anything; where they let looks slide, these stay as texture has them.
     let stated = |(view, pose): (&View, &Isometry3<f64>)| View { world_from_camera: *pose, ..view.clone() };
     let again: Vec<View> = views.iter().zip(&by_texture).map(stated).collect();

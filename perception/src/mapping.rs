@@ -21,9 +21,9 @@ mod grid;
 #[doc(hidden)]
 pub mod orientation;
 mod outlook;
-mod pair;
 mod patch;
 mod room;
+mod scan_matching;
 #[doc(hidden)]
 pub mod station;
 
@@ -36,7 +36,7 @@ pub use fuse::FuseOptions;
 pub use graph::{Edge, GraphError, PoseGraph, Settled};
 pub use orientation::{OrientationOptions, Orientations, orientations};
 pub use outlook::{Outlook, Unseen, nearest_frontier, outlooks};
-pub use pair::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
 pub use patch::{Constraints, PlaneEstimator};
 pub use room::{Level, MapOptions, RoomMap, Survey, Wall};
+pub use scan_matching::{Matcher, PairFit, RectifyOptions, chained, rectify_drive, rectify_pair};
 pub use station::{FieldOfView, Station, StationError};

@@ -3,7 +3,7 @@
 use super::error::{MappingError, check, check_pose};
 use super::field::Field;
 use super::graph::{Edge, GraphError, PoseGraph, Settled};
-use super::pair::{PairFit, Prior, RectifyOptions, chained, fit_cut};
+use super::scan_matching::{PairFit, Prior, RectifyOptions, chained, fit_cut};
 use super::station::{FieldOfView, Spot, Station, thinned};
 use crate::pool;
 use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};

@@ -11,13 +11,13 @@ mod cells;
 mod closure;
 mod cylinder;
 mod error;
-mod field;
 #[doc(hidden)]
 pub mod frontier;
 mod fuse;
 #[doc(hidden)]
 pub mod graph;
 mod grid;
+mod likelihood_field;
 #[doc(hidden)]
 pub mod orientation;
 mod outlook;

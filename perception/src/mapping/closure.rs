@@ -1,8 +1,8 @@
 //! Loop closure and pose graph, the global correction that the paper leaves open (Fig. 9).
 
 use super::error::{MappingError, check, check_pose};
-use super::field::Field;
 use super::graph::{Edge, GraphError, PoseGraph, Settled};
+use super::likelihood_field::Field;
 use super::scan_matching::{PairFit, Prior, RectifyOptions, chained, fit_cut};
 use super::station::{FieldOfView, Spot, Station, thinned};
 use crate::pool;

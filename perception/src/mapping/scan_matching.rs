@@ -9,7 +9,7 @@
 //! heading first and then finds rotation and translation together for the same expectations.
 
 use super::error::{MappingError, check, check_pose};
-use super::field::{Field, OUTLIERS, REACH};
+use super::likelihood_field::{Field, OUTLIERS, REACH};
 use super::station::{FieldOfView, Spot, Station, shared};
 use crate::pool;
 use crate::register::{self, Method, Prepared, RegisterOptions};

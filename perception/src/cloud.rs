@@ -1,5 +1,6 @@
 //! Point clouds, the data type that all steps of perception share.
 
+use crate::quantile::median;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -210,7 +211,7 @@ impl Cloud {
         if near > all / 2 || all == 0 {
             return None;
         }
-        let far_m = median(ranges().collect());
+        let far_m = median(ranges());
         let half = format!("half of the points lie more than {far_m:.0} m from the sensor");
         if far_m > FARTHEST_ON_EARTH_M {
             return Some(
@@ -254,8 +255,8 @@ impl Cloud {
     fn within_of_middle_m(&self) -> Option<f64> {
         let finite = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>());
         finite().next()?;
-        let middle = Point3::from([0, 1, 2].map(|axis| median(finite().map(|p| p[axis]).collect())));
-        Some(median(finite().map(|p| (p - middle).norm()).collect()))
+        let middle = Point3::from([0, 1, 2].map(|axis| median(finite().map(|p| p[axis]))));
+        Some(median(finite().map(|p| (p - middle).norm())))
     }
 
     /// Note on coordinates so far from the origin that single precision blurs them; `None` if near
@@ -284,13 +285,4 @@ impl Cloud {
 pub fn is_finite(p: &Point3<f32>) -> bool {
     // What is not finite times nothing is NaN: one comparison in place of three.
     p.x * 0.0 + p.y * 0.0 + p.z * 0.0 == 0.0
-}
-
-/// The value in the middle; not a number of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return f64::NAN;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -1,6 +1,7 @@
 //! The convex hull of points in a plane.
 
 use crate::plane::Plane;
+use crate::polygon::convex_hull;
 use crate::spread::tangents;
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
@@ -102,30 +103,8 @@ impl Hull {
     }
 }
 
-/// Corners of the convex hull, anticlockwise, without collinear points (Andrew 1979).
-pub fn convex(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-    points.retain(|p| p.x.is_finite() && p.y.is_finite());
-    points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    points.dedup();
-    if points.len() < 3 {
-        return points;
-    }
-    let mut corners: Vec<Point2<f64>> = Vec::new();
-    let mut chain = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
-        let base = corners.len();
-        for p in points {
-            while corners.len() >= base + 2 {
-                let (a, b) = (corners[corners.len() - 2], corners[corners.len() - 1]);
-                if (b - a).perp(&(p - a)) > 0.0 {
-                    break;
-                }
-                corners.pop();
-            }
-            corners.push(*p);
-        }
-        corners.pop();
-    };
-    chain(&mut points.iter());
-    chain(&mut points.iter().rev());
-    corners
+/// Corners of the convex hull of the finite points, anticlockwise, without points on its edges.
+pub fn convex(points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    let finite = points.iter().filter(|p| p.x.is_finite() && p.y.is_finite());
+    convex_hull(finite.map(|p| [p.x, p.y]).collect()).into_iter().map(Point2::from).collect()
 }

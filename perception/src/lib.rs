@@ -26,7 +26,11 @@ pub mod outline;
 pub mod picture;
 pub mod plane;
 #[doc(hidden)]
+pub mod polygon;
+#[doc(hidden)]
 pub mod pool;
+#[doc(hidden)]
+pub mod quantile;
 pub mod recognise;
 pub mod register;
 #[doc(hidden)]

@@ -6,6 +6,7 @@ pub mod lying;
 pub mod side;
 
 use crate::draw::Draws;
+use crate::quantile::quantile;
 use crate::scale::{EDGE_M, PLACE_M};
 use nalgebra::{Point3, Vector4};
 use side::{SidePoints, Sums};
@@ -206,11 +207,10 @@ impl Round {
             (across.abs() < r).then(|| along - (r * r - across * across).sqrt())
         });
         let mut shifts: Vec<f64> = side.collect();
-        let half = shifts.len() / 2;
         if shifts.len() < FEWEST.1 {
             return None;
         }
-        let shift_m = *shifts.select_nth_unstable_by(half, f64::total_cmp).1;
+        let shift_m = quantile(&mut shifts, 0.5);
         Some(Round { x: self.x + shift_m * to_x, y: self.y + shift_m * to_y, ..*self })
     }
 

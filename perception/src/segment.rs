@@ -9,8 +9,6 @@ mod hidden;
 mod join;
 mod mend;
 mod patches;
-#[doc(hidden)]
-pub mod quantile;
 mod rounds;
 mod scene;
 #[doc(hidden)]
@@ -22,13 +20,13 @@ pub mod votes;
 
 use crate::cloud::Cloud;
 use crate::pool;
+pub(crate) use crate::quantile::VOXEL_ENDS;
+pub use crate::quantile::{POINT_ENDS, end, quantile};
 use crate::surface::{Rows, Surface, SurfaceError, find_surface};
 use crate::visibility::Visibility;
 pub use footprint::{OUTSIDE, bounds, hull_from_above, middle, most_within};
 use nalgebra::Point3;
 use patches::Voxels;
-pub(crate) use quantile::VOXEL_ENDS;
-pub use quantile::{POINT_ENDS, end, quantile};
 pub use scene::{Scene, SceneOptions, Segment, top_m};
 use std::ops::Range;
 

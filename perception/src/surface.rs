@@ -1,11 +1,11 @@
 //! Level surfaces in view, floor and supports: plane and convex hull of each (paper 004, section
 //! V).
 
+#[doc(hidden)]
+pub mod connected;
 mod error;
 mod extent;
 mod face;
-#[doc(hidden)]
-pub mod hull;
 pub(crate) mod level;
 mod options;
 #[doc(hidden)]
@@ -24,9 +24,9 @@ pub(crate) use crate::scale::floor;
 use crate::visibility::Visibility;
 use std::sync::mpsc;
 
+pub use connected::largest_part;
 pub use error::SurfaceError;
 pub(crate) use extent::TALLEST_M;
-pub use hull::{convex_hull, largest_part};
 use level::THINGS_M;
 pub use level::{Overhang, Role, Sign, Surface};
 pub use options::{Region, SurfaceOptions};

@@ -4,7 +4,7 @@
 
 use crate::camera::Intrinsics;
 use crate::cloud::{Cloud, is_finite};
-use crate::segment::quantile;
+use crate::quantile::quantile;
 use crate::spread::tangents;
 use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};

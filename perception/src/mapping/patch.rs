@@ -2,6 +2,7 @@
 
 use super::cells::Facet;
 use crate::plane::{self, Plane};
+use crate::quantile::median;
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 use std::f64::consts::FRAC_PI_2;
@@ -128,7 +129,7 @@ pub(super) fn through(
     let middle = Point3::from(of().map(|f| f.at.coords).sum::<Vector3<f64>>() / members.len().max(1) as f64);
     let side = of().map(|f| f.normal).sum::<Vector3<f64>>();
     let normal = match fit {
-        PlaneEstimator::Median => median(&members, |m| facets[m as usize].normal),
+        PlaneEstimator::Median => median_direction(&members, |m| facets[m as usize].normal),
         PlaneEstimator::LeastSquares if constraints.upright => least_upright(of(), &middle),
         PlaneEstimator::LeastSquares => {
             let points: Vec<Point3<f32>> = of().map(|f| f.at.cast()).collect();
@@ -166,12 +167,8 @@ pub(super) fn placed(
 }
 
 /// The median of each coordinate, as a direction.
-fn median(members: &[u32], normal: impl Fn(u32) -> Vector3<f64>) -> Option<Vector3<f64>> {
-    let axis = |k: usize| {
-        let mut values: Vec<f64> = members.iter().map(|&m| normal(m)[k]).collect();
-        let at = values.len() / 2;
-        *values.select_nth_unstable_by(at, f64::total_cmp).1
-    };
+fn median_direction(members: &[u32], normal: impl Fn(u32) -> Vector3<f64>) -> Option<Vector3<f64>> {
+    let axis = |k: usize| median(members.iter().map(|&m| normal(m)[k]));
     Vector3::new(axis(0), axis(1), axis(2)).try_normalize(1e-6)
 }
 

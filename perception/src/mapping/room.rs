@@ -12,6 +12,8 @@ use super::station::{Station, shared};
 use crate::hull::convex;
 use crate::occupancy::{Occupancy, Space};
 use crate::plane::Plane;
+use crate::polygon::holds;
+use crate::quantile::median;
 use nalgebra::{Isometry2, Point2, Vector2, Vector3};
 use rustc_hash::FxHashSet;
 use serde::{Deserialize, Serialize};
@@ -162,7 +164,7 @@ impl RoomMap {
         for (index, cell) in grid.cells.iter_mut().enumerate() {
             let corner = Vector2::new((index % grid.width) as f64, (index / grid.width) as f64) * grid.cell_m;
             let middle = grid.origin + corner + off;
-            if tables.iter().any(|t| holds(&t.outline, &middle)) {
+            if tables.iter().any(|t| holds(&t.outline, middle)) {
                 *cell = Space::Occupied;
             }
             let here = |p: &Isometry2<f64>| (p.translation.vector - middle.coords).norm() < radius_m;
@@ -172,12 +174,6 @@ impl RoomMap {
         }
         Some(grid)
     }
-}
-
-/// True if a convex outline, anticlockwise, holds a place.
-fn holds(outline: &[Point2<f64>], place: &Point2<f64>) -> bool {
-    let n = outline.len();
-    n >= 3 && (0..n).all(|i| (outline[(i + 1) % n] - outline[i]).perp(&(place - outline[i])) >= 0.0)
 }
 
 /// Greatest height of the floor, metres.
@@ -396,9 +392,7 @@ fn levels(facets: &[Facet], options: &MapOptions, edge_m: f64) -> Vec<Level> {
                 .collect();
             let area_m2 = squares.len() as f64 * edge_m * edge_m;
             if area_m2 >= options.least_level_m2 {
-                let mut heights: Vec<f64> = patch.iter().map(|&m| facets[m as usize].at.z).collect();
-                let middle = heights.len() / 2;
-                let height_m = *heights.select_nth_unstable_by(middle, f64::total_cmp).1;
+                let height_m = median(patch.iter().map(|&m| facets[m as usize].at.z));
                 found.push(Level { height_m, faces_up, outline: convex(places), area_m2 });
             }
         }

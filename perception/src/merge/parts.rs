@@ -2,6 +2,7 @@
 
 use super::merged::Step;
 use super::prepare::{Prepared, in_world};
+use crate::polygon::convex_hull;
 use crate::spread::{self, Moments, tangents};
 use crate::surface::{self, Outline};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -198,8 +199,7 @@ impl Standing {
         }
         let part = surface::largest_part(cells.into_iter().collect());
         let corners = part.iter().flat_map(|&[x, y]| [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
-        let hull =
-            surface::convex_hull(corners.map(|corner| corner.map(|c| f64::from(c) * CELL_M)).collect());
+        let hull = convex_hull(corners.map(|corner| corner.map(|c| f64::from(c) * CELL_M)).collect());
         let corner = |&[x, y]: &[f64; 2]| Point3::from(across * x + along * y + up * offset_m);
         let hull: Vec<Point3<f64>> = hull.iter().map(corner).collect();
         Some(Standing { up, offset_m, outline: Outline::of(&hull, &up) })

@@ -2,6 +2,7 @@
 
 use super::Sensor;
 use crate::pool;
+use crate::quantile::quantile;
 use crate::surface::level::Surface;
 use crate::surface::outline::Outline;
 use crate::visibility::DepthMap;
@@ -73,7 +74,7 @@ impl Residuals {
         }
         let mut times: Vec<f64> =
             self.blocks.iter().map(|b| b.sigma_m / assumed.frontal_sigma_m(b.depth_m)).collect();
-        let times = middle(&mut times).clamp(BETWEEN.0, BETWEEN.1);
+        let times = quantile(&mut times, 0.5).clamp(BETWEEN.0, BETWEEN.1);
         // Both terms at once; where all lies at one depth their proportion stays.
         let prior = Vector2::new(assumed.axial_m, assumed.growth_per_m) * times;
         let scale = Vector2::new(1.0 / prior.x, 1.0 / prior.y);
@@ -90,7 +91,7 @@ impl Residuals {
         Sensor {
             axial_m: found.x.max(LEAST * prior.x),
             growth_per_m: found.y.max(LEAST * prior.y),
-            looks: middle(&mut looks).clamp(1.0, (CELL_PX * CELL_PX) as f64),
+            looks: quantile(&mut looks, 0.5).clamp(1.0, (CELL_PX * CELL_PX) as f64),
             ..*assumed
         }
     }
@@ -168,9 +169,4 @@ fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], 
     // A plane was fitted to as few cells: three of them are not free.
     let squares: f64 = sums.iter().filter(|s| s.1 > 0.0).map(|(sum, n)| (sum / n).powi(2)).sum();
     sigma * sigma / (squares / (CELLS as f64 - PLANE)).max(f64::MIN_POSITIVE)
-}
-
-fn middle(values: &mut [f64]) -> f64 {
-    let half = values.len() / 2;
-    *values.select_nth_unstable_by(half, f64::total_cmp).1
 }

@@ -2,8 +2,8 @@
 
 use super::{NO_CIRCLE, Round, SEED, side_band};
 use crate::outline::Rectangle;
+use crate::quantile::{POINT_ENDS, end};
 use crate::scale::{APART_M, PLACE_M};
-use crate::segment::quantile::{POINT_ENDS, end};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Turns of the trial axes from the sides of the bounding rectangle seen from above, radians. From: chosen.

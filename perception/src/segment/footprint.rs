@@ -1,6 +1,6 @@
 //! Extent and outline of points as seen from above.
 
-use crate::surface::convex_hull;
+use crate::polygon::{convex_hull, holds};
 use nalgebra::Point3;
 
 /// Maximum share, as a fraction, of places outside an enclosing outline. From: chosen.
@@ -36,15 +36,4 @@ pub fn most_within<T>(hull: &[[f64; 2]], of: &[T], place: impl Fn(&T) -> [f64; 2
     let outside = of.iter().filter(|p| !holds(hull, place(p)));
     // The first that is too many settles it.
     outside.take(of.len() * OUTSIDE.0 / OUTSIDE.1 + 1).count() * OUTSIDE.1 <= of.len() * OUTSIDE.0
-}
-
-/// True if a convex anticlockwise outline holds the place.
-fn holds(hull: &[[f64; 2]], p: [f64; 2]) -> bool {
-    let n = hull.len();
-    n >= 3
-        && (0..n).all(|i| {
-            let (a, b) = (hull[i], hull[(i + 1) % n]);
-            let (x, y) = (b[0] - a[0], b[1] - a[1]);
-            x * (p[1] - a[1]) - y * (p[0] - a[0]) >= 0.0
-        })
 }

@@ -1,8 +1,8 @@
 //! Bodies split by an occluder: two ends of one face, with the gap hidden in all views.
 
 use super::patches::{SIDE_VOXELS, Voxels, is_upright, members};
-use super::quantile::{VOXEL_ENDS, quantile};
 use crate::pool;
+use crate::quantile::{VOXEL_ENDS, quantile};
 use crate::scale::PLACE_M;
 use crate::surface::Surface;
 use crate::visibility::{Seen, Visibility};

@@ -3,10 +3,10 @@
 use super::footprint::most_within;
 use super::join::{Border, Piece, Union};
 use super::patches::SOME;
-use super::quantile::VOXEL_ENDS;
+use crate::polygon::convex_hull;
 use crate::pool;
+use crate::quantile::VOXEL_ENDS;
 use crate::scale::PLACE_M;
-use crate::surface::convex_hull;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;

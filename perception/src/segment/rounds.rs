@@ -5,11 +5,11 @@
 //! agree, a body is fitted, and parted off if what is left is more than a handle.
 
 use super::patches::{SIDE_VOXELS, Voxels, is_upright, members, take_away};
-use super::quantile::{VOXEL_ENDS, quantile};
 use super::vessels::round_body;
 use super::votes::{RADII, Votes};
 use crate::outline;
 use crate::pool;
+use crate::quantile::{VOXEL_ENDS, quantile};
 use crate::round::{SECTORS, distance, sector};
 use crate::scale::{APART_M, PLACE_M};
 use crate::surface::floor;

@@ -1,6 +1,6 @@
 //! A surface with the objects on it, and the options of parting them.
 
-use super::quantile::{POINT_ENDS, end};
+use crate::quantile::{POINT_ENDS, end};
 use crate::surface::{Surface, SurfaceOptions, TALLEST_M};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,9 @@
 //! Support of each object: the surface, another object, or the bottom of a vessel around it.
 
 use super::footprint::{bounds, hull_from_above, middle};
-use super::quantile::{POINT_ENDS, end, quantile};
 use super::scene::{Segment, top_m};
 use crate::pool;
+use crate::quantile::{POINT_ENDS, end, quantile};
 use crate::round::{SECTORS, sector};
 use crate::scale::{APART_M, PLACE_M};
 use crate::surface::Outline;

@@ -1,10 +1,10 @@
 //! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
 
 use super::footprint::{OUTSIDE, bounds, hull_from_above, middle, most_within};
-use super::quantile::{POINT_ENDS, end};
 use super::scene::{Segment, top_m};
 use crate::outline;
 use crate::pool;
+use crate::quantile::{POINT_ENDS, end};
 use crate::round::lying::{self, LyingRound};
 use crate::round::{self, Round, SECTORS, STEEPEST, distance, sector};
 use crate::scale::{APART_M, HANDLE_M, HANDLE_WIDTH_M, PLACE_M, SHAPE_M};

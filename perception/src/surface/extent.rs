@@ -1,14 +1,15 @@
 //! Extent of a plane under objects that hide it: it continues from its visible part as long as no
 //! camera saw its absence.
 
+use super::connected::parts;
 use super::face::Grid;
-use super::hull::{area, convex_hull, parts};
 use super::level::Surface;
 use super::planes::Plane;
 use super::sample::Sample;
 use super::tiles::Tiles;
 use crate::camera::Intrinsics;
 use crate::noise::range_sigma_m;
+use crate::polygon::{area, convex_hull};
 use crate::pool;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};

@@ -1,12 +1,13 @@
 //! Connected parts of a plane, each with its convex hull.
 
+use super::connected::parts;
 use super::extent::{Hiding, Owner, Owners, around};
-use super::hull::{area, convex_hull, parts};
 use super::level::{Role, Sign, Surface};
 use super::planes::{FEWEST, Plane, least_squares};
 use super::sample::Sample;
 use super::tiles::Tiles;
 use crate::cloud::Cloud;
+use crate::polygon::{area, convex_hull};
 use crate::scale::{APART_M, SHAPE_M, floor};
 use crate::visibility::Visibility;
 use nalgebra::{Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};

@@ -1,7 +1,7 @@
 //! A level surface: its plane, its outline, and its role.
 
-use super::hull::{self, convex_hull};
 use super::outline::Outline;
+use crate::polygon::{self, convex_hull};
 use crate::scale::APART_M;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -198,8 +198,8 @@ impl Surface {
     pub(super) fn cuts(&self, other: &Surface) -> bool {
         let heights = self.hull.iter().map(|p| other.height_m(p));
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
-        let common = || hull::clip(convex_hull(other.flat(&self.hull)), &other.flat(&other.hull), 0.0);
-        low < APART_M && high > -APART_M && hull::area(&common()) > COMMON * self.area_m2
+        let common = || polygon::clip(convex_hull(other.flat(&self.hull)), &other.flat(&other.hull), 0.0);
+        low < APART_M && high > -APART_M && polygon::area(&common()) > COMMON * self.area_m2
     }
 
     /// The surface in another frame.

@@ -1,7 +1,7 @@
 //! Options of the search for a surface: what is wanted, and where.
 
-use super::hull::{self, convex_hull};
 use super::level::Surface;
+use crate::polygon::{self, convex_hull};
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -81,14 +81,14 @@ pub struct Region {
 impl Region {
     /// True if most of the surface or of the region lies in both.
     fn holds(&self, surface: &Surface) -> bool {
-        let own_m2 = hull::area(&convex_hull(surface.flat(&self.corners)));
-        let both_m2 = hull::area(&self.common(surface));
+        let own_m2 = polygon::area(&convex_hull(surface.flat(&self.corners)));
+        let both_m2 = polygon::area(&self.common(surface));
         both_m2 >= 0.5 * surface.area_m2.min(own_m2) && both_m2 > 0.0
     }
 
     /// The part of the surface's outline in the widened region, in the surface's frame.
     fn common(&self, surface: &Surface) -> Vec<[f64; 2]> {
-        hull::clip(surface.flat(&surface.hull), &convex_hull(surface.flat(&self.corners)), self.margin_m)
+        polygon::clip(surface.flat(&surface.hull), &convex_hull(surface.flat(&self.corners)), self.margin_m)
     }
 
     /// Unit vectors across `up` into the region, with the edges' offsets along them, metres; empty
@@ -109,6 +109,6 @@ impl Region {
         let common = self.common(&surface);
         let world_from_surface = surface.surface_from_world.inverse();
         let hull = common.iter().map(|&[x, y]| world_from_surface * Point3::new(x, y, 0.0)).collect();
-        Surface { hull, area_m2: hull::area(&common), ..surface }
+        Surface { hull, area_m2: polygon::area(&common), ..surface }
     }
 }

@@ -6,11 +6,11 @@
 //! them stands on level ones. A wall seen head-on and a floor seen from straight above are told apart by no more than that; where that is not
 //! enough, nothing is said.
 
-use super::hull::convex_hull;
 use super::level::{SURE, THINGS_M};
 use super::outline::Outline;
 use super::planes::{Plane, face_up, large_planes};
 use super::sample::Sample;
+use crate::polygon::convex_hull;
 use crate::pool;
 use crate::scale::floor;
 use crate::spread::tangents;

@@ -9,7 +9,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Files and folders of `src` whose constants have to say so.
-pub const PARTS: [&str; 7] = ["scale", "noise", "segment", "recognise", "round", "surface", "merge"];
+pub const PARTS: [&str; 9] =
+    ["scale", "quantile", "polygon", "noise", "segment", "recognise", "round", "surface", "merge"];
 
 /// The kinds of sources of a value, and whether each needs further words.
 const KINDS: [(&str, bool); 8] = [

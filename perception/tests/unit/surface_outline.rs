@@ -13,7 +13,7 @@ proptest! {
         places in prop::collection::vec((-0.9..0.9_f64, -0.6..0.6_f64), 1..400),
         turn in prop::array::uniform3(-3.0..3.0_f64),
     ) {
-        let hull = descry_perception::surface::convex_hull(corners.iter().map(|c| [c.0, c.1]).collect());
+        let hull = descry_perception::polygon::convex_hull(corners.iter().map(|c| [c.0, c.1]).collect());
         let world_from_surface = Isometry3::new(Vector3::new(0.3, -0.2, 0.7), Vector3::from(turn));
         let surface = Surface {
             up: Unit::new_normalize(world_from_surface * Vector3::z()),

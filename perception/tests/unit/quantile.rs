@@ -1,6 +1,6 @@
-//! Tests of `segment::quantile`.
+//! Tests of `quantile`.
 
-use descry_perception::segment::quantile::*;
+use descry_perception::quantile::*;
 use proptest::prelude::*;
 
 proptest! {

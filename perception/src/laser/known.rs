@@ -165,9 +165,9 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     decide(candidates, known, options)
 }
 
-/// Classifies several scans, perhaps all from one side. `loose_m` is the mean distance by which the
-/// object may extend beyond the measured hull ([`super::ScanGain::looseness_m`]): if it is small,
-/// the features of the hull are compared, else only the width in each scan.
+/// Classifies several scans, possibly from one side. `loose_m`: mean distance by which the object
+/// may extend beyond the measured hull ([`super::ScanGain::looseness_m`]); if small, hull features
+/// are compared, else only the width in each scan.
 pub fn recognise_scans(
     scans: &ShapeModel,
     loose_m: f64,

@@ -314,7 +314,8 @@ impl KnowOptions {
     }
 }
 
-/// The pose of surfels after their visible side was brought onto the scene's surface, looked for within these distances (metres) one after the other.
+/// Pose of surfels after ICP of their visible side with the scene, with decreasing search radii,
+/// metres.
 fn refined(
     surfels: &Surfels,
     start: &Isometry3<f64>,

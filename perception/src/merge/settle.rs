@@ -25,7 +25,7 @@ const VOXEL_SPREAD_M: f32 = 0.003;
 /// as where views are held against each other.
 const CARVE_M: f64 = check::CLEAR_M;
 
-/// VoxelBlocks that one thread settles in a row. From: work.
+/// Blocks that one thread settles in a row. From: work.
 const TOGETHER: usize = 64;
 
 /// A fused point, world frame.
@@ -138,7 +138,8 @@ impl Gathered {
         means
     }
 
-    /// Adds what the cells of a block are settled to: those of the mask anew, of the others what was settled before.
+    /// Adds the settled state of a block's cells: new for cells in the mask, unchanged for the
+    /// others.
     fn settle_block(
         &self,
         block: usize,
@@ -223,7 +224,7 @@ fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3
 }
 
 /// Calls `found` for each column of the middle block with its number and, if the mask holds it, its
-/// mean and the same point moved along z to the mean of the columns around it.
+/// mean and the same point moved along z to the mean of the surrounding columns.
 fn level(
     blocks: &VoxelBlocks<Cell>,
     beside: &Beside,

@@ -1,13 +1,13 @@
-//! A sparse grid of voxels in blocks of 8 × 8 × 8, or 8 × 8 columns: a surface fills few blocks, and in each many voxels beside each other.
-//! Of columns it fills most: a block of columns has a cell for each.
+//! Sparse grid of voxels in blocks of 8 × 8 × 8, or of 8 × 8 columns: a surface occupies few
+//! blocks, each with many neighbouring voxels. A block of columns has a cell for every column.
 
 use nalgebra::{Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Voxels along a side of a block, and along that of a block with a layer of its neighbours' voxels around. From: work.
+/// Voxels along a side of a block, and along a side with a margin of one voxel. From: work.
 pub(super) const SIDE: usize = 8;
 pub(super) const WIDE: usize = SIDE + 2;
-/// Mark of no cell, or no block. From: mark.
+/// Mark of an absent cell or block. From: mark.
 pub(super) const NONE: u32 = u32::MAX;
 /// Maximum number of voxels along an axis: single precision then resolves a sixteenth of a voxel.
 /// From: derived, single precision has 24 bits.
@@ -60,11 +60,11 @@ pub(super) struct VoxelBlocks<C> {
     pub occupied: usize,
     /// The voxels of each block that were asked for.
     pub touched: Vec<Mask>,
-    /// VoxelBlocks that were asked for of late, by the last bits of their place.
+    /// Blocks that were asked for of late, by the last bits of their place.
     recent: [(Place, u32); RECENT * RECENT * RECENT],
 }
 
-/// VoxelBlocks along each axis of which one may be in `recent`. From: work.
+/// Size of the cache `recent` along each axis, blocks. From: work.
 const RECENT: usize = 4;
 
 impl<C: Copy> VoxelBlocks<C> {
@@ -121,8 +121,8 @@ impl<C: Copy> VoxelBlocks<C> {
         *slot
     }
 
-    /// Puts the cells into the order of the blocks, so that those beside each other in space are so in memory; gives their former numbers.
-    /// Columns are in that order: `None`.
+    /// Sorts the cells by block, so that neighbours in space are neighbours in memory; returns
+    /// their former numbers. `None` for columns, which already are in order.
     pub fn sort(&mut self) -> Option<Vec<u32>> {
         if self.are_columns() {
             return None;
@@ -178,8 +178,8 @@ impl<C: Copy> VoxelBlocks<C> {
         slots.filter(|slot| **slot != NONE).map(|slot| *slot as usize)
     }
 
-    /// Calls `found` for each cell of the block in the middle with its number and, if it is of the mask, those of the cells in the 27 voxels
-    /// around it, itself among them.
+    /// Calls `found` for each cell of the middle block with its number and, if the mask holds it,
+    /// the cell numbers in the 27 voxels around it, its own included.
     pub fn visit(&self, beside: &Beside, mask: &Mask, mut found: impl FnMut(usize, Option<&[u32]>)) {
         let mut wide = [[[NONE; WIDE]; WIDE]; WIDE];
         self.wide(beside, &mut wide);
@@ -214,7 +214,7 @@ impl<C: Copy> VoxelBlocks<C> {
         }
     }
 
-    /// Numbers of the cells of the block of columns in the middle and of a layer of those around: by y, x.
+    /// Cell numbers of the middle block of columns with a margin of one cell, by y, x.
     pub fn wide_columns(&self, beside: &Beside) -> [[u32; WIDE]; WIDE] {
         std::array::from_fn(|y| self.wide_row(beside, 1, y))
     }

@@ -1,4 +1,4 @@
-//! Sets of cells in a plane that hang together.
+//! Connected sets of cells in a plane.
 
 /// The largest set of cells that hang together, up to two cells apart (shadows of objects); ties go to the first in order. Each cell
 /// is named once.

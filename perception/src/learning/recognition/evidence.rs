@@ -46,8 +46,10 @@ pub struct Judge {
 }
 
 impl Default for Judge {
-    /// Weights in the order of [`PoseEvidence::measures`], as part `judge` of `experiments/measure/src/learning` with seed 501 and 80 scenes fits them to drawn objects that
-    /// no evaluation knows, half of them known from all sides and half from one or two looks, among furniture and leaflets that no model is of.
+    /// Weights in the order of [`PoseEvidence::measures`], fitted by part `judge` of
+    /// `experiments/measure/src/learning` (seed 501, 80 scenes) on generated objects that no
+    /// evaluation uses: half known from all sides, half from one or two views, among furniture and
+    /// leaflets without a model.
     fn default() -> Self {
         Judge { weights: [8.30, 8.01, 1.52, -15.86, 1.41, -4.78, -2.84, -9.09, -7.26] }
     }

@@ -130,7 +130,7 @@ impl Front {
         (at(&self.axes[0]), at(&self.axes[1]))
     }
 
-    /// True if nothing lies before a point of the surfels.
+    /// True if no part of the surfels occludes the point.
     fn has(&self, p: &Point3<f32>) -> bool {
         self.away.dot(&p.coords) > self.heights[&self.cell(p)] - BEHIND_M
     }

@@ -114,6 +114,11 @@ impl<'a> Agent<'a> {
     /// One iteration of the loop. Returns the reason the run ends here, if it does.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
+            if let Some(late_s) = round.situation.time_left_s.map(|left_s| -left_s).filter(|s| *s > 0.0) {
+                return Ok(Some(Ended::Limit(format!(
+                    "the goal was reached {late_s:.1} s after the deadline"
+                ))));
+            }
             let reason = Reason::of(Trigger::NotDenied);
             match self.take_up(world, round, &reason, Vec::new(), World::before_denying)? {
                 Taken::Up => world.planned(),
@@ -167,12 +172,21 @@ impl<'a> Agent<'a> {
             Taken::Nothing(why) => return Ok(Some(Ended::Undecided(why))),
             Taken::LeftToPlanner => {}
         }
+        let left_s = round.situation.time_left_s;
         match self.plan(world, &round.task, round)? {
             Planned::Unsolvable { why, statistics } => {
-                let reason = Reason { is_late: round.situation.time_left_s.is_some(), ..reason };
+                let reason = Reason { is_late: left_s.is_some(), ..reason };
                 match self.take_up(world, round, &reason, asked_of(&statistics), World::in_time)? {
                     Taken::Up => {}
                     _ => return Ok(Some(Ended::NoPlan(world.reasons(round, why.reasons())))),
+                }
+            }
+            // A domain need not have a word for the deadline.
+            Planned::Solved { plan, statistics } if ends_late(&plan, left_s) => {
+                let reason = Reason { is_late: true, ..reason };
+                match self.take_up(world, round, &reason, asked_of(&statistics), World::in_time)? {
+                    Taken::Up => {}
+                    _ => return Ok(Some(Ended::Undecided(too_long(&plan, left_s)))),
                 }
             }
             Planned::Solved { plan, statistics } => self.adopt(round, plan, &statistics, &reason)?,
@@ -512,6 +526,16 @@ impl<'a> Agent<'a> {
         let draft = Draft { meta, blobs, ..Draft::new("event", stamp_ns) };
         self.record.put(draft).map_err(CommandError::broken)
     }
+}
+
+/// True if a plan takes longer than is left until the deadline.
+fn ends_late(plan: &Plan, left_s: Option<f64>) -> bool {
+    left_s.is_some_and(|left_s| plan.makespan_s().unwrap_or(0.0) > left_s)
+}
+
+fn too_long(plan: &Plan, left_s: Option<f64>) -> String {
+    let (takes_s, left_s) = (plan.makespan_s().unwrap_or(0.0), left_s.unwrap_or(0.0).max(0.0));
+    format!("the plan that was found takes {takes_s:.1} s, and {left_s:.1} s are left until the deadline")
 }
 
 /// Does the goal hold now, with nothing more to do?

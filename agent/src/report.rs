@@ -298,14 +298,14 @@ impl fmt::Display for Report {
         writeln!(f, "\n{first}: {}", self.why)?;
         let is_held = self.objects.iter().any(|o| o.asked && o.position_m.is_none());
         if let Some(object) = self.object.as_ref().filter(|_| is_held) {
-            writeln!(f, "  {object} in the hand, confidence {:.2}", self.confidence)?;
+            writeln!(f, "  {object} in the hand, {} sure", english::percent(self.confidence))?;
         } else if let (Some(object), Some(at)) = (&self.object, self.position_m.map(english::position)) {
             let on = self.on.as_ref().map(|on| format!(" on the {on}")).unwrap_or_default();
             let give = self
                 .position_sigma_m
                 .map(|sigma_m| format!(" give or take {:.0} cm", (1e2 * sigma_m).max(1.0)));
             let give = give.unwrap_or_default();
-            writeln!(f, "  {object}{on} at {at}{give}, confidence {:.2}", self.confidence)?;
+            writeln!(f, "  {object}{on} at {at}{give}, {} sure", english::percent(self.confidence))?;
         }
         if let Some(at) = self.true_position_m.map(english::position) {
             writeln!(f, "  in truth at {at}")?;
@@ -321,11 +321,11 @@ impl fmt::Display for Report {
                 Some(at) => format!("at {at}{on}"),
                 None => "in the hand".into(),
             };
-            writeln!(f, "  {name:16} {:.2} {at}", o.confidence)?;
+            writeln!(f, "  {name:16} {:>6} sure {at}", english::percent(o.confidence))?;
         }
         writeln!(
             f,
-            "  {}, {}, {:.1} m and {:.0} s on the body's clock, {:.1} s on the wall",
+            "  {}, {}, {:.1} m driven; {:.0} s of the robot's time, {:.1} s of yours",
             count(self.views, "view"),
             count(self.replans, "replan"),
             self.distance_m,
@@ -334,7 +334,7 @@ impl fmt::Display for Report {
         )?;
         if self.planning_s > 0.0 {
             let [plan, geometry] = [self.planning_s, self.geometry_s].map(brief);
-            writeln!(f, "  at most {plan} to plan and {geometry} for its questions to geometry")?;
+            writeln!(f, "  slowest plan: {plan}, and {geometry} for its calls of geometry")?;
         }
         write!(f, "  record: {}", self.run)
     }

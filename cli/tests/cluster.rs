@@ -47,6 +47,23 @@ fn run(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) {
 }
 
 #[test]
+fn the_files_of_an_array_can_be_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    std::fs::write(folder.join("batch.toml"), BATCH).expect("the folder is writable");
+    let write = ["experiment", "batch.toml", "--out", "by slurm", "--shards", "3"];
+    let written =
+        outcome(folder, &[&write[..], &["--slurm", "batch.sh", "--kubernetes", "batch.yaml"]].concat());
+    assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+    run(folder, &["bash", "-n", "batch.sh"], &[]);
+    let yaml = std::fs::read_to_string(folder.join("batch.yaml")).expect("it is written");
+    let text = yaml.lines().find_map(|line| line.trim().strip_prefix("\"batch.toml\": "));
+    let text: String = serde_json::from_str(text.expect("the key is there")).expect("it is JSON");
+    assert_eq!(text, BATCH);
+}
+
+#[test]
+#[ignore = "slow: three batches, one of them in shards"]
 fn an_array_of_shards_gives_what_one_batch_gives() {
     let folder = tempfile::tempdir().expect("a folder");
     // A shell would read it as two words, and as the home of somebody.

@@ -139,6 +139,7 @@ fn what_is_not_there_is_not_found() {
 }
 
 #[test]
+#[ignore = "slow: a search behind boxes"]
 fn what_hides_the_goal_is_pushed_aside() {
     let (_, err) = check(&["find", "cup A", "--scene", "ring-of-boxes"], 0, &["achieved"]);
     assert!(err.contains("pushing "), "a push was planned: {err}");

@@ -322,6 +322,7 @@ fn an_answer_is_explained_as_one() {
 }
 
 #[test]
+#[ignore = "slow: a search behind boxes"]
 fn what_is_nearly_hidden_is_pushed_for_and_what_a_slip_leaves_is_said() {
     check(
         &["find", "cup A", "--seed", "17", "--scene", "ring-of-boxes"],
@@ -513,6 +514,7 @@ fn what_lies_behind_shut_doors_is_gone_for_when_the_planner_finds_nothing() {
 }
 
 #[test]
+#[ignore = "slow: a door and a slip in the home"]
 fn failures_are_named_as_the_causes_of_new_plans() {
     let (told, said) = faulty(
         "pick up cup A",

@@ -26,6 +26,7 @@ fn achieved(goal: &str, seed: u64, faults: &str) -> String {
 }
 
 #[test]
+#[ignore = "slow: a drop in the home"]
 fn what_was_lost_out_of_the_hand_is_not_said_not_to_be_there() {
     let faults = "[[fault]]\nkind = \"object_dropped\"\nchance = 1.0\n";
     let (code, said) = pursued("bring cup A to the desk", 92002, faults);
@@ -52,6 +53,7 @@ fn what_is_in_the_hand_is_said_to_be_there_and_nowhere_else() {
 }
 
 #[test]
+#[ignore = "slow: a slip in the home"]
 fn what_slid_out_of_the_hand_is_looked_for_where_it_did() {
     let said = achieved("bring cup A to the desk", 93014, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
     let (_, after) = said.split_once("it slid out of the hand").expect("it slips once");
@@ -60,6 +62,7 @@ fn what_slid_out_of_the_hand_is_looked_for_where_it_did() {
 }
 
 #[test]
+#[ignore = "slow: a slip in the home"]
 fn what_was_found_is_not_looked_for_elsewhere() {
     let said = achieved("bring cup A to the desk", 91004, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
     let taken = said.find("the hand is closed to").expect("it was taken");

@@ -207,6 +207,7 @@ truly = "found"
 "#;
 
 #[test]
+#[ignore = "slow: two batches"]
 fn a_batch_is_shown_while_it_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

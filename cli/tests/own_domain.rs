@@ -110,7 +110,7 @@ fn a_new_domain_has_no_finding_and_runs() {
     let (out, err) = shown(&checked);
     assert_eq!((checked.status.code(), err.trim()), (Some(0), "no finding"), "{out}");
     assert!(out.contains("(confidence thing)"), "{out}");
-    let said = pursued(&folder, "find the mug", 0, &["achieved: mug stands on the table"], &[]);
+    let said = pursued(&folder, "find the mug", 0, &["achieved: the mug stands on the table"], &[]);
     assert_eq!((said["verdict"].as_str(), said["on"].as_str()), (Some("achieved"), Some("table")), "{said}");
 }
 
@@ -157,7 +157,7 @@ fn a_phrase_with_two_slots_of_a_type_answers_with_both() {
             "[[goal]]\nsay = \"find both <thing> and <thing>\"\nmeans = \"(and (>= (confidence <thing>) <threshold>) (>= (confidence <thing>) <threshold>))\"",
         ),
     ]);
-    let words = ["mug stands on the table; tin stands on the table"];
+    let words = ["the mug stands on the table; the tin stands on the table"];
     let said = pursued(&folder, "find both mug for one and all and tin", 0, &words, &[]);
     assert!(said["object"].is_null(), "two things are no object: {said}");
     let asked: Vec<&str> = said["objects"]
@@ -441,4 +441,56 @@ fn a_number_that_forbids_every_drive_is_the_reason() {
     // So where it has no value at all, which the check of the domain finds, too.
     let unset = charge("scene = \"default\"");
     check(&unset, "look from there", 1, &["no drive can be taken: (charge) has no value"], &never);
+}
+
+/// A word `wet` that a program states once the sensing action `probe` has been taken, and questions about it.
+fn probes(stated: &str) -> Vec<Edit> {
+    let done = "touch probed; ".to_string() + &answers("\"value\":\"done\"");
+    let wet = format!(
+        "if [ -e probed ]; then {}; else {}; fi",
+        answers(&format!("\"value\":{stated}")),
+        answers("\"value\":[]")
+    );
+    let phrase =
+        |say: &str, means: &str| format!("[[goal]]\nsay = \"{say}\"\nmeans = \"{means}\"\nquestion = true\n");
+    vec![
+        replace("domain.pddl", "(:predicates", "(:predicates\n    (wet ?on - surface)"),
+        action(
+            "  (:durative-action probe :parameters (?from - pose ?on - surface) :duration (= ?duration 1)\n    :condition (and (over all (at ?from)) (at start ([can-see ?from ?on])))\n    :effect (at end (wet ?on)))\n",
+        ),
+        program("probe.sh", &done),
+        program("wet.sh", &wet),
+        append("domain.toml", &phrase("is <surface> wet", "(wet <surface>)")),
+        append("domain.toml", &phrase("is <surface> dry", "(not (wet <surface>))")),
+        append(
+            "domain.toml",
+            "[action.probe]\nprogram = [\"sh\", \"probe.sh\"]\nkind = \"sensing\"\n\n[word.wet]\nprogram = [\"sh\", \"wet.sh\"]",
+        ),
+    ]
+}
+
+#[test]
+fn a_question_takes_the_sensing_action_that_answers_it() {
+    let asked = |stated: &str, goal: &str, exit: i32, answer: &str| {
+        let report = check(&probes(stated), goal, exit, &["(probe "], &[]);
+        assert_eq!(report["answer"], answer, "{goal} {stated}: {report}");
+    };
+    asked("[\"(wet table)\"]", "is the table wet", 0, "yes");
+    asked("[]", "is the table wet", 1, "no");
+    asked("[\"(wet table)\"]", "is the table dry", 1, "no");
+    asked("[]", "is the table dry", 0, "yes");
+}
+
+#[test]
+fn a_deadline_holds_in_a_domain_without_a_word_for_it() {
+    let ring = || rings(&answers("\"value\":\"ding\""), "");
+    let slow = || {
+        let mut edits = ring();
+        edits.push(replace("domain.pddl", "() :duration (= ?duration 1)", "() :duration (= ?duration 40)"));
+        edits
+    };
+    check(&ring(), "ring within 5 s", 0, &["it rang"], &[]);
+    let words = ["takes 40.0 s, and 5.0 s are left until the deadline"];
+    check(&slow(), "ring within 5 s", 1, &words, &["it rang"]);
+    check(&slow(), "ring within 60 s", 0, &["it rang"], &[]);
 }

@@ -199,7 +199,7 @@ fn a_room_is_mapped_and_all_of_a_kind_are_found_in_it() {
     let folder = tempfile::tempdir().unwrap();
     let (report, _) = run("map the room and find all cups", "one-room", 1, folder.path(), None);
     assert_eq!(report["verdict"], "achieved", "{report}");
-    assert!(report["why"].as_str().unwrap().contains("all cups are found: 2, "), "{report}");
+    assert!(report["why"].as_str().unwrap().contains("found all 2 cups: "), "{report}");
 }
 
 #[test]

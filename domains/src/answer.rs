@@ -15,7 +15,7 @@ pub use self::own::changes;
 use crate::belief::adrift;
 use crate::belief::doubt::Doubt;
 use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
-use crate::english::{one, plural};
+use crate::english::{one, percent, plural, the};
 use crate::judge::{Judgement, Truth};
 use crate::known::{Thing, is_alike};
 use crate::lexicon::Lexicon;
@@ -42,7 +42,10 @@ pub(crate) fn conclude(asker: &Asker<'_>, ended: &Ended) -> Conclusion {
         Ended::Limit(why) => (Verdict::CannotTell, format!("it cannot be told: {why}")),
         Ended::Failed(why) => (Verdict::Failed, why.clone()),
     };
-    let why = asker.worded(verdict).unwrap_or(why);
+    // A reason that nobody would guess is said with the phrase's own words, too.
+    let reason = || asker.no_drive().filter(|_| verdict == Verdict::CannotTell);
+    let with_reason = |own: String| reason().map_or(own.clone(), |reason| format!("{own}: {reason}"));
+    let why = asker.worded(verdict).map_or(why, with_reason);
     let own = s.things.iter().filter(|t| t.track.is_none()).count();
     let confidence = match (own, s.kinds.is_empty(), s.asked.first()) {
         (1.., _, _) => (0..own).map(|n| s.confidence(n)).fold(1.0, f64::min),
@@ -131,15 +134,16 @@ impl Asker<'_> {
             said.push(match members.len() {
                 0 => format!("there is no {}{}", kind.name, reasons::in_room(s, kind)),
                 n => {
-                    let place = reasons::in_room(s, kind);
-                    let all = if is_known { "all " } else { "" };
-                    format!("{all}{}{place} are found: {n}, {}", plural(&kind.name), members.join("; "))
+                    let (place, all) = (reasons::in_room(s, kind), if is_known { "all " } else { "" });
+                    let of = if n == 1 { kind.name.clone() } else { plural(&kind.name) };
+                    let count = if n == 1 && is_known { "the only".into() } else { format!("{all}{n}") };
+                    format!("found {count} {of}{place}: {}", members.join("; "))
                 }
             });
             // As sure as was asked for is not sure.
             let hidden = s.doubt_of(of).hidden;
             if is_known && hidden >= reasons::WORTH_SAYING {
-                said.push(format!("where nothing was seen there may be another ({hidden:.2})"));
+                said.push(format!("where nothing was seen there may be another ({})", percent(hidden)));
             }
         }
         for &on in &s.asked {
@@ -206,13 +210,17 @@ impl Asker<'_> {
         ))
     }
 
+    /// The reason no drive can be taken; none if one can.
+    fn no_drive(&self) -> Option<String> {
+        let culprit = culprit::of_drives(self.domain, self.round)?;
+        Some(format!("no drive can be taken: {}", culprit::told(&culprit, &|t| self.saying.say(t))))
+    }
+
     /// Answer when no plan is left: the knowledge about the goal, and the reason for what is
     /// missing.
     fn gave_up(&self, planner_says: &str, is_proven: bool) -> (Verdict, String) {
         let s = self.s;
-        let culprit = culprit::of_drives(self.domain, self.round);
-        let culprit =
-            culprit.map(|c| format!("no drive can be taken: {}", culprit::told(&c, &|t| self.saying.say(t))));
+        let culprit = self.no_drive();
         let says = match culprit.as_deref().unwrap_or(planner_says) {
             "" => String::new(),
             says => format!(": {says}"),
@@ -250,7 +258,8 @@ impl Asker<'_> {
         if let Some((n, doubt)) = open {
             let asked = self.where_asked(&s.things[n]);
             let closed = self.closed().or(culprit).map(|closed| format!(", {closed}")).unwrap_or_default();
-            let text = format!("it cannot be told whether {} is {asked}, {doubt}{closed}", s.things[n].name);
+            let text =
+                format!("it cannot be told whether {} is {asked}, {doubt}{closed}", the(&s.things[n].name));
             return (Verdict::CannotTell, format!("{text}; {}", self.looks()));
         }
         if let Some(&n) = missing.first().filter(|_| !self.goal.question || value == Truth::False) {
@@ -258,7 +267,7 @@ impl Asker<'_> {
             let elsewhere = self.elsewhere(thing).map(|w| format!(", it {w}")).unwrap_or_default();
             let asked = self.where_asked(thing);
             let seen = self.seen_of(s.doubt_about(n), s.chance_there(n));
-            return (Verdict::NotFound, format!("{} is not {asked}{elsewhere}: {seen}", thing.name));
+            return (Verdict::NotFound, format!("{} is not {asked}{elsewhere}: {seen}", the(&thing.name)));
         }
         if let Some(unknown) = self.nowhere() {
             return (Verdict::CannotTell, unknown);
@@ -341,7 +350,7 @@ impl Asker<'_> {
         };
         self.own()
             .filter(|(n, _)| is_sure(*n))
-            .map(|(_, t)| format!("{} {}", t.name, self.stands(t)))
+            .map(|(_, t)| format!("{} {}", the(&t.name), self.stands(t)))
             .collect()
     }
 
@@ -407,7 +416,7 @@ impl Asker<'_> {
 
     fn members(&self, kind: &Thing) -> Vec<String> {
         let is = |t: &&Track| kind.probability(t, &self.s.surfaces) > 0.5;
-        let named = |t: &Track| format!("{} {}", t.label().unwrap_or(&kind.name), self.standing(t));
+        let named = |t: &Track| format!("{} {}", the(t.label().unwrap_or(&kind.name)), self.standing(t));
         self.s.belief.tracks.iter().filter(is).map(named).collect()
     }
 
@@ -417,7 +426,7 @@ impl Asker<'_> {
         let is_open = |&n: &usize| s.completeness(n) < s.wanted_of(n);
         let named = |kind: &Thing, t: &Track| {
             let label = t.label().filter(|label| t.probability_of(label) >= s.thresholds.confidence);
-            format!("{} {}", label.unwrap_or(&kind.name), self.standing(t))
+            format!("{} {}", the(label.unwrap_or(&kind.name)), self.standing(t))
         };
         let of_kind = |n: usize| {
             let (kind, tracks) = (&s.kinds[n], s.belief.tracks.iter());

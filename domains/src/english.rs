@@ -246,10 +246,40 @@ pub(crate) fn without_article(name: &str) -> &str {
     ["the ", "any ", "an ", "a "].iter().find_map(|article| name.strip_prefix(article)).unwrap_or(name)
 }
 
+/// The known name that a misspelt one is nearest to; none if all are far.
+pub fn nearest<'n>(found: &str, names: &[&'n str]) -> Option<&'n str> {
+    let distance = |name: &&'n str| strsim::levenshtein(name, found);
+    let nearest = names.iter().copied().min_by_key(distance)?;
+    (distance(&nearest) <= 3.min(found.len() / 2)).then_some(nearest)
+}
+
 /// Position for people, to the centimetre, without negative zeros.
 pub fn position(metres: [f64; 3]) -> String {
     let [x, y, z] = metres.map(|m| (m * 100.0).round() / 100.0 + 0.0);
     format!("({x:.2}, {y:.2}, {z:.2}) m")
+}
+
+/// A probability in percent, never more than it is: whole percents, tenths near 0 and 1.
+pub fn percent(p: f64) -> String {
+    let tenths = (p * 1000.0 + 1e-9).floor().max(0.0) + 0.0;
+    match tenths {
+        0.0 if p > 0.0 => "less than 0.1 %".into(),
+        0.0 => "0 %".into(),
+        10.0..=990.0 | 1000.0 => format!("{:.0} %", (tenths / 10.0).floor()),
+        _ => format!("{:.1} %", tenths / 10.0),
+    }
+}
+
+/// A number to two places behind the point, without zeros at its end.
+pub fn number(n: f64) -> String {
+    let digits = format!("{:.2}", n + 0.0);
+    digits.trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
+/// A name with its article: the mug, the dell box; proper names, which have a capital or a digit, have none: cup A.
+pub fn the(name: &str) -> String {
+    let is_proper = |c: char| c.is_uppercase() || c.is_numeric();
+    if name.contains(is_proper) { name.to_string() } else { format!("the {name}") }
 }
 
 /// Name with its indefinite article: a cup, an apple.

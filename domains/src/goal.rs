@@ -88,7 +88,7 @@ pub enum GoalError {
     },
     /// A word negates the request, and no phrase of the domain has that word.
     #[error(
-        "\"{said}\" says by \"{word}\" what is not to be\n  expected what is to be found, known or brought about; a run is stopped with Ctrl-C\n{suggestions}"
+        "\"{word}\" in \"{said}\" rules something out, and goals say what to find, know or bring about (Ctrl-C stops a run)\n{suggestions}"
     )]
     Denied {
         /// The words as they were given.

@@ -1,7 +1,7 @@
 //! Three-valued truth of a goal under the belief: unobserved facts are unknown.
 //!
 //! A word is known or lies in a [`Range`]: facts about seen objects are bounded by what looks have left open; what a program or the
-//! body states is known; a remembered word is known where only looking and moving set it, where `init` speaks of it, and where an
+//! body states is known, unless a sensing action reveals it that was not taken yet; a remembered word is known where only looking and moving set it, where `init` speaks of it, and where an
 //! action or a failure of this run has said so. Quantified things include one that nobody has seen.
 
 use std::cmp::Ordering;
@@ -380,13 +380,12 @@ impl<'a> Judge<'a> {
     /// True if a word that is not stated to hold is known to be false.
     fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
-        if !matches!(origin::of(self.domain, word), Origin::Remembered) {
-            return true;
-        }
         let objects: Option<Vec<String>> = arguments.iter().map(|held| self.shown(held)).collect();
-        is_own(self.domain, name)
-            || self.words.is_spoken_of(name)
-            || objects.is_some_and(|objects| self.words.is_told(name, &objects))
+        let is_told = objects.is_some_and(|objects| self.words.is_told(name, &objects));
+        match origin::of(self.domain, word) {
+            Origin::Remembered => is_told || is_own(self.domain, name) || self.words.is_spoken_of(name),
+            _ => is_told || !origin::is_revealed(self.domain, word),
+        }
     }
 
     fn range(&self, bounds: Bounds, arguments: &[Held<'a>]) -> Range {

@@ -18,6 +18,7 @@ pub use program_texts::program_texts;
 use serde::Deserialize;
 
 use crate::config::{self, Config};
+use crate::english;
 use crate::function::Functions;
 use crate::load::error::LoadError;
 use crate::program::Tape;
@@ -76,10 +77,10 @@ impl Domain {
         }
         let folder = Path::new(name_or_folder);
         if !folder.is_dir() {
-            return Err(LoadError::NoDomain {
-                name: name_or_folder.into(),
-                known: BUILT_IN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", "),
-            });
+            let known: Vec<&str> = BUILT_IN.iter().map(|(name, _)| *name).collect();
+            let near = english::nearest(name_or_folder, &known);
+            let near = near.map(|near| format!(": did you mean `{near}`?")).unwrap_or_default();
+            return Err(LoadError::NoDomain { name: name_or_folder.into(), known: known.join(", "), near });
         }
         from_files(on_disk(folder)?, Some(folder.to_path_buf()))
     }

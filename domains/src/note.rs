@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::english;
+use crate::english::{self, percent};
 
 /// Something that was learned.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -141,7 +141,7 @@ impl fmt::Display for BeliefChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             BeliefChange::Confidence { of, before, after } => {
-                write!(f, "confidence in {of}: {before:.2} -> {after:.2}")
+                write!(f, "confidence in {of}: {} -> {}", percent(*before), percent(*after))
             }
             BeliefChange::Said(text) => f.write_str(text),
         }
@@ -227,7 +227,8 @@ impl fmt::Display for Note {
                 let round = and_round(*cylinders);
                 write!(
                     f,
-                    "{walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; the body stood {cm:.1} cm and {degrees:.1}° from where it believed"
+                    "{walls} walls of {walls_m:.1} m{round}, {open_m2:.1} m² open, {unseen_m2:.1} m² to be seen; the body stood {cm:.1} cm and {:.1}° from where it believed",
+                    degrees.abs()
                 )?;
                 surfaces.iter().try_for_each(|text| write!(f, "\n{text}"))
             }
@@ -239,7 +240,7 @@ impl fmt::Display for Note {
                     (_, n, false) => write!(f, "{waypoint}, {n} times so far")?,
                 }
                 let (cm, degrees) = (1e2 * moved_m, turned_rad.to_degrees());
-                write!(f, "; the body stood {cm:.1} cm and {degrees:.1}° from where it believed")?;
+                write!(f, "; the body stood {cm:.1} cm and {:.1}° from where it believed", degrees.abs())?;
                 came.iter().try_for_each(|text| write!(f, "\ncame: {text}"))?;
                 gone.iter().try_for_each(|text| write!(f, "\ngone: {text}"))
             }

@@ -2,7 +2,8 @@
 
 use crate::abilities;
 use crate::ability::Fact;
-use crate::config::Source as Kept;
+use crate::actions;
+use crate::config::{ActionKind, Source as Kept};
 use crate::load::Domain;
 use crate::vocabulary::Word;
 
@@ -51,6 +52,13 @@ pub fn remembered(domain: &Domain) -> Vec<String> {
     let vocabulary = &domain.vocabulary;
     let is_remembered = |w: &Word| matches!(of(domain, w), Origin::Remembered);
     vocabulary.words().into_iter().filter(is_remembered).map(|w| w.name).collect()
+}
+
+/// True if a program states the value of a word once a sensing action has been taken that sets it: until then nobody knows it.
+pub fn is_revealed(domain: &Domain, word: &Word) -> bool {
+    let senses = |action: &str| actions::kind(&domain.config, action) == ActionKind::Sensing;
+    matches!(of(domain, word), Origin::SensedByProgram)
+        && domain.vocabulary.changers(&word.name).into_iter().any(senses)
 }
 
 /// True if an ability or a program states the value of a word.

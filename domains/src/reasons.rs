@@ -4,7 +4,7 @@ use descry_memory::belief::Track;
 use descry_perception::nalgebra::{self, Point3, Vector3};
 
 use crate::belief::doubt::Doubt;
-use crate::english::plural;
+use crate::english::{percent, plural};
 use crate::known::Thing;
 use crate::situation::Situation;
 use crate::surface::KnownSurface;
@@ -20,8 +20,8 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     let p = |t: &Track| thing.probability(t, &s.surfaces);
     let best = s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b)));
     if let Some(track) = best.filter(|t| p(t) > 1.0 - s.thresholds.confidence) {
-        let (at, p) = (place(&track.position_m), floored(p(track)));
-        return Some(format!("what stands at {at} may be it ({p:.2}{})", rather(track, thing)));
+        let (at, p) = (place(&track.position_m), percent(p(track)));
+        return Some(format!("what stands at {at} may be it ({p}{})", rather(track, thing)));
     }
     if s.chance_lost(what) > s.thresholds.not_there {
         return Some("it was lost out of the hand, and where it lies was not seen".into());
@@ -36,23 +36,18 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
     let (left, t) = (doubt.hidden, &s.thresholds);
     let unsettled = || {
         let text = "there is room for it where looks promised to settle that, and did not";
-        (left > t.remaining + t.out_of_sight).then(|| format!("{text} ({left:.2})"))
+        (left > t.remaining + t.out_of_sight).then(|| format!("{text} ({})", percent(left)))
     };
     let in_all = || {
         let there = s.chance_there(what);
         let most = best.filter(|track| p(track) > left);
         let text = most.map_or("there is room for it".into(), |track| {
             let (at, rather) = (place(&track.position_m), rather(track, thing));
-            format!("what stands at {at} is hardly it ({:.2}{rather}), but may be", p(track))
+            format!("what stands at {at} is hardly it ({}{rather}), but may be", percent(p(track)))
         });
-        (there > t.not_there).then(|| format!("{text}; {there:.2} is left in all"))
+        (there > t.not_there).then(|| format!("{text}; {} is left in all", percent(there)))
     };
     out_of_sight(s, doubt, "it").or_else(unsettled).or_else(in_all)
-}
-
-/// Probability rounded down, so that it never seems to reach a threshold just above.
-fn floored(p: f64) -> f64 {
-    (p * 100.0).floor() / 100.0
 }
 
 /// Known object that a track more likely is, with its probability; empty if there is none.
@@ -65,7 +60,7 @@ pub fn rather(track: &Track, thing: &Thing) -> String {
 pub fn likelier(probabilities: &[(String, f64)], than: f64, is_it: impl Fn(&str) -> bool) -> String {
     let others = probabilities.iter().filter(|(name, p)| !is_it(name) && *p > than);
     let most = others.max_by(|a, b| a.1.total_cmp(&b.1));
-    most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {:.2}", floored(*p)))
+    most.map_or_else(String::new, |(name, p)| format!("; rather {name}, {}", percent(*p)))
 }
 
 /// Sentence about a searched surface that may not be a supporting surface.
@@ -117,23 +112,26 @@ fn left_of_kinds(s: &Situation) -> Option<String> {
     let open = open_kind(s)?;
     let kind = &s.kinds[open];
     let is_one = |(track, p): (&Track, f64)| {
-        format!(", what stands at {} is one with {p:.2}", place(&track.position_m))
+        format!(", what stands at {} is one with {}", place(&track.position_m), percent(p))
     };
     let hidden = s.doubt_of(open).hidden;
     let least = least_sure(s, open).map(is_one);
     let all = s.completeness(open);
     let together = if hidden < 1.0 { all / (1.0 - hidden) } else { 1.0 };
     let about = about(least, together, hidden, 1.0 - s.threshold, s.belief.tracks.is_empty());
-    let (all, place) = (floored(all), in_room(s, kind));
+    let place = in_room(s, kind);
     let advice = if s.can_be_complete(open) { String::new() } else { at_most(s.most_complete(open), all) };
-    Some(format!("all {}{place} are found with {all:.2} only{about}{advice}", plural(&kind.name)))
+    Some(format!(
+        "only {} sure that all {}{place} are found{about}{advice}",
+        percent(all),
+        plural(&kind.name)
+    ))
 }
 
 /// Advice when looks cannot reach the requested confidence: `most` is reachable, `now` is reached.
 pub fn at_most(most: f64, now: f64) -> String {
-    let said =
-        if now > 0.5 { format!("; with a confidence of {now:.2} it could be said") } else { String::new() };
-    format!(", and what was seen from all sides leaves no more than {:.2}{said}", floored(most))
+    let said = if now > 0.5 { format!("; at {} it could be said", percent(now)) } else { String::new() };
+    format!(", and no look can raise that above {}{said}", percent(most))
 }
 
 /// Subject of the doubt about a kind: the least certain object, or all objects if each is certain
@@ -142,12 +140,13 @@ pub fn at_most(most: f64, now: f64) -> String {
 pub fn about(least: Option<String>, together: f64, hidden: f64, allowed: f64, is_bare: bool) -> String {
     let says_hidden = is_bare || hidden >= WORTH_SAYING && (hidden > allowed || least.is_none());
     let hidden = hidden.max(0.0);
-    let more = says_hidden.then(|| format!(", there may be more where nothing was seen ({hidden:.2})"));
+    let more =
+        says_hidden.then(|| format!(", there may be more where nothing was seen ({})", percent(hidden)));
     let all_seen = || {
         let is_most = more.is_none() || (!is_bare && 1.0 - together > hidden);
         let of_all = format!(
-            ", each object that was seen is sure enough, all together are not ({:.2})",
-            floored(together)
+            ", each object that was seen is sure enough, all together are not ({})",
+            percent(together)
         );
         is_most.then_some(of_all)
     };
@@ -170,9 +169,6 @@ fn out_of_time(s: &Situation) -> Option<String> {
         .then(|| "there is no time left for the looks that would settle it".into())
 }
 
-/// Smallest probability reported; smaller ones count as none.
-const LEAST_SAID: f64 = 0.001;
-
 /// Coverage of a thing's possible places: seen share and viewpoints of each surface, and the
 /// remaining probability `left` that the thing is there; `looks`: number of looks at each surface.
 pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) -> usize) -> String {
@@ -187,8 +183,7 @@ pub fn seen_of(s: &Situation, doubt: &Doubt, left: f64, looks: impl Fn(usize) ->
         })
     };
     let parts: Vec<String> = s.surfaces.iter().enumerate().filter_map(|(on, k)| of(on, k)).collect();
-    let left = if left < LEAST_SAID { format!("less than {LEAST_SAID}") } else { format!("{left:.3}") };
-    format!("{}; a chance of {left} is left", parts.join(", "))
+    format!("{}; a chance of {} is left", parts.join(", "), percent(left))
 }
 
 /// Sentence about possible places that no look can show; `None` if negligible.
@@ -199,8 +194,9 @@ fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     let first = places
         .iter()
         .min_by(|a, b| nalgebra::distance(a, &middle).total_cmp(&nalgebra::distance(b, &middle)))?;
-    (hidden > s.thresholds.out_of_sight)
-        .then(|| format!("there is room for {what} out of sight, near {} ({hidden:.2})", place(first)))
+    (hidden > s.thresholds.out_of_sight).then(|| {
+        format!("there is room for {what} out of sight, near {} ({})", place(first), percent(hidden))
+    })
 }
 
 /// A place in words.

@@ -59,6 +59,11 @@ impl Words {
         };
     }
 
+    /// Takes in that an action has revealed if an atom holds, which a program states.
+    pub fn reveal(&mut self, name: &str, arguments: Vec<String>) {
+        self.told.insert((name.into(), arguments));
+    }
+
     /// Makes an atom true that is written in PDDL.
     ///
     /// # Errors

@@ -436,7 +436,10 @@ impl<'a> World<'a> {
         let before = self.mind.words.clone();
         let steps = Plan { steps: done.iter().map(|d| d.step.clone()).collect(), ..Plan::default() };
         match after(&round.task, &round.attachments, &steps, &names) {
-            Ok(readings) => self.mind.words.take_over(&initial(round, &names), &readings),
+            Ok(readings) => {
+                self.mind.words.take_over(&initial(round, &names), &readings);
+                self.reveal(round, &steps);
+            }
             // A policy may look where nothing is promised: what was seen is believed all the same.
             Err(_) if self.takes_steps_unasked() => {}
             Err(broken) => {
@@ -464,6 +467,20 @@ impl<'a> World<'a> {
             self.mind.attend();
         }
         Ok(unmet)
+    }
+
+    /// Takes in what carried-out steps have revealed: the words stated by programs that their effects set.
+    fn reveal(&mut self, round: &Round, steps: &Plan) {
+        let domain = self.setting.domain;
+        let words = domain.vocabulary.words();
+        let revealed = words.iter().filter(|word| origin::is_revealed(domain, word));
+        let names: Vec<&str> = revealed.map(|word| word.name.as_str()).collect();
+        let before = initial(round, &names);
+        let set = after(&round.task, &round.attachments, steps, &names).unwrap_or_default();
+        for reading in set.iter().filter(|reading| !before.contains(reading)) {
+            let arguments = reading.arguments.iter().map(ToString::to_string).collect();
+            self.mind.words.reveal(&reading.symbol, arguments);
+        }
     }
 
     /// True if a condition holds under the current belief.

@@ -22,7 +22,8 @@
     (at ?where - pose)                          ; where the robot stands
     (out-of-reach ?where - pose)                ; a drive there has failed for good
     (observed ?from - pose ?on - surface)       ; this look has been taken
-    (on ?what - thing ?on - surface))           ; it surely stands there
+    (on ?what - thing ?on - surface)            ; it surely stands there
+    (time-left))                                ; the deadline of the goal, if it has one, has not passed
 
   (:functions
     (confidence ?what - thing))                 ; how sure it is where the thing stands, 0 to 1
@@ -33,7 +34,8 @@
     :condition (and
       (at start (at ?from))
       (at start (not (= ?from ?to)))
-      (at start (not (out-of-reach ?to))))
+      (at start (not (out-of-reach ?to)))
+      (over all (time-left)))
     :effect (and
       (at start (not (at ?from)))
       (at end (at ?to))))
@@ -46,7 +48,8 @@
       (at start (at ?from))
       (at start (not (observed ?from ?on)))
       (at start ([can-see ?from ?on]))
-      (at start ([worth-a-look ?from ?on])))
+      (at start ([worth-a-look ?from ?on]))
+      (over all (time-left)))
     :effect (and
       (at start (not (at ?from)))
       (at end (at ?from))

@@ -42,7 +42,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
         format!("By another way, with a step more: {}{against}.", figures(way, asked))
     });
     let said = match (weighed.others.is_empty(), by_the_end(chapter, weighed, chosen, asked)) {
-        (true, _) => vec![format!("{} was the only way known to get further.", steps(chosen, asked))],
+        (true, _) => vec![format!("{} was the only next step known.", steps(chosen, asked))],
         (false, Some(said)) => said,
         (false, None) => by_the_second(chapter, weighed, chosen, asked),
     };

@@ -4,14 +4,14 @@ use descry_agent::report::{self, Report};
 use descry_agent::run::Header;
 use descry_agent::standing::{InDoubt, Of};
 use descry_domains::conclusion::{Believed, Verdict};
-use descry_domains::english::plural;
+use descry_domains::english::{percent, plural};
 use descry_domains::note::Note;
 use descry_domains::saying::Saying;
 
 use super::chapters::{Chapter, Deed};
 use super::looks;
 use super::standings::Standing;
-use super::wording::{count, listed, place, share, share_of};
+use super::wording::{count, listed, place};
 
 /// Maximum number of failures listed by name; the rest are counted.
 const MOST_FAILURES: usize = 4;
@@ -25,8 +25,7 @@ pub fn of(
     saying: &Saying,
 ) -> Vec<String> {
     let last = chapters.iter().flat_map(Chapter::stood).last();
-    let rests = report
-        .and_then(|report| last.and_then(|last| rests(report, last, saying)).or_else(|| said_of(report)));
+    let rests = report.and_then(|report| last.and_then(|last| rests(report, last, saying)));
     let mut said = vec![asked(header), answer(report, chapters.len())];
     said.extend(rests);
     let is_absent = report.is_some_and(|report| report.verdict == Verdict::NotFound);
@@ -58,14 +57,8 @@ fn answer(report: Option<&Report>, plans: usize) -> String {
         count(report.views, "look"),
         report.distance_m,
         report.sim_time_s,
-        report.why.split([';', ':']).next().unwrap_or_default()
+        report.why
     )
-}
-
-/// The evidence as stated in the answer itself.
-fn said_of(report: &Report) -> Option<String> {
-    let (_, more) = report.why.split_once("; ")?;
-    Some(format!("It rests on this: {more}."))
 }
 
 /// Evidence behind the answer, for the first thing asked for.
@@ -90,7 +83,7 @@ fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
             format!(
                 "what {on} is {} with a probability of {}; {:.0} % of its outside was seen",
                 doubt.about,
-                share(p),
+                percent(p),
                 track.seen_fraction * 100.0
             )
         }
@@ -98,19 +91,19 @@ fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
             looks::may_be(doubt, last, saying).unwrap_or_else(|| looks::none_may_be(doubt, last))
         }
         (Of::Kind, _) => format!(
-            "{objects}, and it is certain with {} which of them are {} and that there are no more",
-            share_of(doubt.sure?, doubt.wanted),
+            "{objects}; it is {} sure which of them are {} and that there are no more",
+            percent(doubt.sure?),
             plural(&doubt.about)
         ),
         (Of::Surface, _) => {
             format!(
-                "{objects}, and of what kind the least sure one is, and that there are no more, is certain with {}",
-                share_of(doubt.sure?, doubt.wanted)
+                "{objects}; it is {} sure of what kind each of them is and that there are no more",
+                percent(doubt.sure?)
             )
         }
     };
     let left = match report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
-        Some(left) => format!("; the probability that it is there after all is {}", share(left)),
+        Some(left) => format!("; the probability that it is there after all is {}", percent(left)),
         None => String::new(),
     };
     let seen = if seen.is_empty() {

@@ -24,12 +24,12 @@ fn what_is_in_the_hand_stands_nowhere() {
         };
         let said = report.to_string();
         assert!(said.contains(expected), "{expected}: {said}");
-        assert_eq!(said.contains(" m, confidence"), said.contains(" at ("), "{said}");
+        assert_eq!(said.contains(" m, 97 %"), said.contains(" at ("), "{said}");
     };
     let one = Some("the red one");
-    check(one, None, "  the red one in the hand, confidence 0.97\n");
-    check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.00, 2.00, 0.80) m, confidence 0.97\n");
-    check(None, None, "  the red one      0.97 in the hand\n");
+    check(one, None, "  the red one in the hand, 97 % sure\n");
+    check(one, Some([1.0, 2.0, 0.8]), "  the red one at (1.00, 2.00, 0.80) m, 97 % sure\n");
+    check(None, None, "  the red one        97 % sure in the hand\n");
 }
 
 #[test]

@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use descry_agent::numbers::count;
+
 use crate::commands::input;
 use descry_agent::exit::{CommandError, Exit};
 use descry_agent::keeping::{self, RECORD};
@@ -42,7 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, CommandError> {
 fn table(runs: &[Value]) -> String {
     let text = |run: &Value, key: &str| run[key].as_str().unwrap_or("?").to_string();
     let row = |run: &Value| {
-        let views = run["views"].as_u64().map_or(String::new(), |n| format!("{n} views"));
+        let views = run["views"].as_u64().map_or(String::new(), |n| count(n as usize, "view"));
         let started = run["started_unix_s"].as_u64().map_or("?".into(), date);
         [started, text(run, "run"), text(run, "verdict"), views, text(run, "goal")]
     };

@@ -5,7 +5,7 @@ use descry_memory::belief::Track;
 
 use super::Asker;
 use crate::conclusion::Verdict;
-use crate::english::plural;
+use crate::english::{percent, plural, the};
 use crate::judge::{Decisive, Judge, Judgement, Truth};
 use crate::known::Thing;
 use crate::origin::{self, Origin};
@@ -36,7 +36,7 @@ impl Asker<'_> {
             if let Some(on) = surface.or_else(|| asked.into_iter().find(may_be)) {
                 return self.open_on(what, on);
             }
-            let name = &s.things[what].name;
+            let name = the(&s.things[what].name);
             return format!("it cannot be told where {name} is: no surface is known");
         }
         if let Some(of) = self.kind_of(word) {
@@ -57,9 +57,9 @@ impl Asker<'_> {
 
     fn open_on(&self, what: usize, on: usize) -> String {
         let s = self.s;
-        let (thing, surface) = (&s.things[what].name, &s.surfaces[on].name);
+        let (thing, surface) = (the(&s.things[what].name), &s.surfaces[on].name);
         let chance = s.chance_on(what, on);
-        let left = || format!("a chance of {chance:.2} is left that it is");
+        let left = || format!("a chance of {} is left that it is", percent(chance));
         let why = self.why_open(on).unwrap_or_else(left);
         format!("it cannot be told that {thing} is not on the {surface}: {why}")
     }
@@ -169,11 +169,11 @@ impl Asker<'_> {
                     None => t.probability_of(&thing.name) >= s.threshold,
                 };
                 let track = s.belief.tracks.iter().filter(is_there).find(is_it)?;
-                Some(format!("{} {}", thing.name, self.standing(track)))
+                Some(format!("{} {}", the(&thing.name), self.standing(track)))
             }
             None => {
                 let track = s.strangers().find(is_there)?;
-                let name = track.label().or_else(|| track.kind()).unwrap_or("something unknown");
+                let name = track.label().or_else(|| track.kind()).map_or("something unknown".into(), the);
                 Some(format!("{name} {}", self.standing(track)))
             }
         }
@@ -203,8 +203,9 @@ impl Asker<'_> {
         let (what, on) = places
             .find(|&(what, on)| !is_known(what, on) && s.chance_on(what, on) > s.thresholds.not_there)
             .filter(|_| !said.is_empty() && !self.goal.asked.more)?;
-        let (thing, surface, chance) = (&s.things[what].name, &s.surfaces[on].name, s.chance_on(what, on));
-        let left = format!("a chance of {chance:.2} is left that there is another {thing} on the {surface}");
+        let (thing, surface) = (&s.things[what].name, &s.surfaces[on].name);
+        let chance = percent(s.chance_on(what, on));
+        let left = format!("a chance of {chance} is left that there is another {thing} on the {surface}");
         Some(format!("{}; it cannot be told more, {left}; {}", said.join("; "), self.looks()))
     }
 }

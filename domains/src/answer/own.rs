@@ -10,7 +10,7 @@ use descry_planner::{FactValue, Plan, after};
 use super::{Asker, CHANGES};
 use crate::conclusion::Verdict;
 use crate::config::Answers;
-use crate::english::plural;
+use crate::english::{self, plural};
 use crate::reasons;
 use crate::symbol::symbol;
 
@@ -77,7 +77,7 @@ impl Asker<'_> {
         let mut told: BTreeSet<u64> = BTreeSet::new();
         for reading in fitting {
             match (&reading.value, arguments.iter().position(|a| a == "?")) {
-                (FactValue::Number(n), None) => return format!("{n:.2}"),
+                (FactValue::Number(n), None) => return english::number(*n),
                 (_, Some(at)) => {
                     let symbol = &reading.arguments[at];
                     match self.listed.and_then(|listed| listed.things.get(symbol.as_ref())) {

@@ -12,6 +12,7 @@ mod words;
 use descry_planner::{Diagnostic, Findings, Severity, Span};
 
 use crate::abilities;
+use crate::english;
 use crate::lexicon::{Lexicon, Places};
 use crate::load::Domain;
 use crate::origin::{self, Origin};
@@ -57,7 +58,7 @@ pub fn grounding(domain: &Domain) -> Vec<String> {
             Origin::Sensed(fact) => format!("sensed: {}", fact.about),
             Origin::SensedByProgram => "sensed: by a program".into(),
             Origin::Remembered => "remembered: changes as carried-out actions say".into(),
-            Origin::Fixed => "fixed: as domain.toml says in init".into(),
+            Origin::Fixed => "fixed: as `init` of domain.toml says, false where it says nothing".into(),
             Origin::Planned => "planned: changes within a plan alone".into(),
             Origin::Derived => "derived by the domain's rules".into(),
         };
@@ -108,9 +109,9 @@ impl Check<'_> {
     /// Suggestion for an unknown name: the nearest known name, and all known names.
     fn known<'n>(&self, found: &str, names: impl IntoIterator<Item = &'n str>) -> String {
         let names: Vec<&str> = names.into_iter().collect();
-        let near = |name: &&&str| strsim::levenshtein(name, found) <= 3.min(found.len() / 2);
-        let nearest = names.iter().filter(near).min_by_key(|name| strsim::levenshtein(name, found));
-        let hint = nearest.map(|name| format!("did you mean `{name}`? ")).unwrap_or_default();
+        let hint = english::nearest(found, &names)
+            .map(|name| format!("did you mean `{name}`? "))
+            .unwrap_or_default();
         format!("{hint}known: {}", if names.is_empty() { "none".into() } else { names.join(", ") })
     }
 

@@ -7,13 +7,15 @@ use descry_planner::Findings;
 pub enum LoadError {
     /// Neither a built-in name nor a folder.
     #[error(
-        "there is no domain \"{name}\"\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
+        "there is no domain \"{name}\"{near}\n  expected a folder that holds domain.pddl and domain.toml, or a built-in domain: {known}"
     )]
     NoDomain {
         /// The requested domain.
         name: String,
         /// The built-in domains.
         known: String,
+        /// A question about the nearest of them, or nothing.
+        near: String,
     },
     /// A file could not be read.
     #[error("{path}: {because}\n  expected: {expected}")]

@@ -43,6 +43,9 @@ impl World<'_> {
                 limits.seconds
             )));
         }
+        if self.setting.goal.deadline_s.is_some_and(|deadline_s| gone_s >= deadline_s) {
+            return Some(Ended::Undecided("the time that was given is over".into()));
+        }
         // A failure that is tried again is progress of a kind: it is counted elsewhere.
         let tries: usize = self.tries.values().sum();
         let times = self.seen_before.entry(format!("{tries} {}", round.problem.text)).or_insert(0);

@@ -1,14 +1,15 @@
 //! Fallback steps where the planner has no plan.
 
-use descry_planner::NoPlan;
+use descry_planner::{NoPlan, Plan};
 
 use super::{Choice, NOTHING_LEFT, World};
 use crate::abilities::searching::policies::{self, Look};
+use crate::ability::Deed;
 use crate::error::WorldError;
-use crate::judge::{Judge, Judgement};
+use crate::judge::{Decisive, Judge, Judgement, Truth};
 use crate::looking::looks;
 use crate::round::Round;
-use crate::{abilities, culprit};
+use crate::{abilities, actions, culprit, origin, words};
 
 impl World<'_> {
     /// Certainly useful step after the planner has hit its state limit, or else a look behind a
@@ -62,10 +63,34 @@ impl World<'_> {
         self.judgement(round).is_some_and(|judged| judged.is_open_to_looks())
     }
 
-    /// True if the goal is a question that depends on a word of which no look tells.
+    /// True if the goal is a question that depends on a word of which neither looks nor other sensing actions tell.
     pub(super) fn is_beyond_looks(&self, round: &Round) -> bool {
-        let of_no_look = |judged: Judgement| judged.word.is_some_and(|word| !word.is_seen);
+        let of_no_look = |judged: Judgement| {
+            let is_open = judged.value == Truth::Unknown;
+            judged.word.is_some_and(|word| !(word.is_seen || is_open && self.is_revealed(&word)))
+        };
         self.setting.goal.question && self.judgement(round).is_some_and(of_no_look)
+    }
+
+    /// True if a sensing action can still tell the value of a word that a program states.
+    fn is_revealed(&self, word: &Decisive) -> bool {
+        let domain = self.setting.domain;
+        domain.vocabulary.word(&word.word).is_some_and(|word| origin::is_revealed(domain, &word))
+    }
+
+    /// Plan for the sensing actions that reveal the word that leaves the goal open; none if no such action is left to try.
+    fn reveals(&mut self, round: &Round) -> Option<Choice> {
+        let judged = self.judgement(round).filter(|judged| judged.value == Truth::Unknown)?;
+        let word = judged.word.filter(|word| !word.is_number && self.is_revealed(word))?;
+        let (pddl, goal) = (word.pddl()?, self.goal_now(&round.situation));
+        let aim = Deed::new("reveal", [pddl.clone()]);
+        if self.barred.contains(&aim) {
+            return None;
+        }
+        let mut task = words::with_goal(self.setting.domain, &round.problem, &goal, &pddl).ok()?;
+        actions::only_looking(&self.setting.domain.config, &mut task);
+        self.heading_for = Some(aim);
+        Some(Choice::Towards { task: Box::new(task), then: Plan::default() })
     }
 
     /// Look to take before accepting a goal that holds by absence of evidence: the one that settles
@@ -76,6 +101,9 @@ impl World<'_> {
     pub fn before_denying(&mut self, round: &Round) -> Result<Choice, WorldError> {
         let s = &round.situation;
         (self.heading_for, self.is_unasked) = (None, false);
+        if let Some(choice) = self.reveals(round) {
+            return Ok(choice);
+        }
         if s.held.is_some() || !self.is_open_to_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }

@@ -1,5 +1,6 @@
 //! Tests of `reasons`.
 
+use descry_domains::english::percent;
 use descry_domains::reasons::*;
 
 #[test]
@@ -11,9 +12,10 @@ fn doubt_about_all_of_a_kind_is_about_something() {
             "{least:?} {hidden}"
         );
     };
-    let one = ", what stands at (0.10, 0.20) m is one with 0.60";
-    let hides = |p: f64| format!(", there may be more where nothing was seen ({p:.2})");
-    let seen = |p: f64| format!(", each object that was seen is sure enough, all together are not ({p:.2})");
+    let one = ", what stands at (0.10, 0.20) m is one with 60 %";
+    let hides = |p: f64| format!(", there may be more where nothing was seen ({})", percent(p));
+    let seen =
+        |p: f64| format!(", each object that was seen is sure enough, all together are not ({})", percent(p));
     check(Some(one), 0.6, 0.05, false, one);
     check(Some(one), 0.6, 0.2, false, &format!("{one}{}", hides(0.2)));
     check(None, 0.96, 0.05, false, &hides(0.05));
@@ -33,7 +35,7 @@ fn what_may_be_it_is_named_as_what_it_is_rather() {
             "{own:?} {cup_a} {other}"
         );
     };
-    check(&["other cup"], 0.869, 0.12, 0.12, "; rather cup A, 0.86");
+    check(&["other cup"], 0.869, 0.12, 0.12, "; rather cup A, 86 %");
     check(&["other cup"], 0.3, 0.4, 0.4, "");
     check(&["other cup"], 0.0, 0.1, 0.1, "");
     check(&["cup A", "other cup"], 0.5, 0.2, 0.7, "");

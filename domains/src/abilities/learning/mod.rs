@@ -55,7 +55,10 @@ pub const ABILITY: Ability = Ability {
                 Ok(Box::new(Observe { at: s.surfaces[on].centre() }))
             },
             because: |s, arguments| match s.news().places.iter().find(|p| p.waypoint == arguments[0]) {
-                Some(Place { room: Some(room), .. }) => format!("{} visits are remembered", room.visits),
+                Some(Place { room: Some(room), .. }) => match room.visits {
+                    1 => "one visit is remembered".into(),
+                    visits => format!("{visits} visits are remembered"),
+                },
                 _ => "no visit is remembered".into(),
             },
             learn: patrolled,

@@ -5,6 +5,7 @@ use super::news::{DIRECTIONS, Fate, Novelty, Place};
 use super::taken::size;
 use crate::abilities::learning::news::Difference;
 use crate::conclusion::{Believed, Conclusion, Ended, Verdict};
+use crate::english::percent;
 use crate::mind::Mind;
 use crate::objective::Goal;
 use crate::situation::Situation;
@@ -118,7 +119,7 @@ fn fate(mind: &Mind, n: &Novelty, is_to_learn: bool) -> String {
         }
         Fate::Known { name, confidence, model } => {
             let model = model.as_ref().map(|model| format!(", {model}")).unwrap_or_default();
-            format!("{name} stands{on} {at} ({confidence:.2}){model}")
+            format!("{name} stands{on} {at} ({} sure){model}", percent(*confidence))
         }
         Fate::GivenUp(because) => format!("something new{on} {at} could not be learned: {because}"),
         Fate::Open if is_to_learn => {

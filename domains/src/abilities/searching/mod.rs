@@ -12,6 +12,7 @@ use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
 use crate::ability::{Ability, ActionKind, OBSERVE, SkillWord, Trace};
 use crate::belief::doubt::{Doubt, Taken};
 use crate::belief::obstacle;
+use crate::english::{percent, plural, the};
 use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::looking::{perceive, recording};
@@ -147,20 +148,20 @@ fn push_failed(
 /// Expected gain of a look, in words.
 fn hope(s: &Situation, from: usize, on: usize) -> String {
     let own = s.things.iter().enumerate().filter(|(_, t)| t.track.is_none());
-    let own = own.map(|(what, t)| (t.name.as_str(), s.doubt_about(what)));
-    let kinds = s.kinds.iter().enumerate().map(|(of, kind)| (kind.name.as_str(), s.doubt_of(of)));
-    let surface = |on: usize| (s.surfaces[on].name.as_str(), s.doubt_on(on));
-    let mut doubts: Vec<(&str, &Doubt)> =
+    let own = own.map(|(what, t)| (the(&t.name), s.doubt_about(what)));
+    let kinds = s.kinds.iter().enumerate().map(|(of, kind)| (plural(&kind.name), s.doubt_of(of)));
+    let surface = |on: usize| (format!("what is on the {}", s.surfaces[on].name), s.doubt_on(on));
+    let mut doubts: Vec<(String, &Doubt)> =
         own.chain(kinds).chain(s.asked.iter().map(|&on| surface(on))).collect();
     if doubts.is_empty() {
         doubts = (0..s.surfaces.len()).map(surface).collect();
     }
-    let said = |(name, doubt): (&str, &Doubt)| {
+    let said = |(name, doubt): (String, &Doubt)| {
         if doubt.anywhere {
             return format!("nothing is known yet of where {name} could be");
         }
-        let share = doubt.share_settled(s, (from, on), Taken::default()) * 100.0;
-        format!("would settle {share:.0} % of the doubt about {name} ({:.2} left)", doubt.remaining())
+        let share = doubt.share_settled(s, (from, on), Taken::default());
+        format!("would settle {} of the doubt about {name}", percent(share))
     };
     doubts.into_iter().map(said).collect::<Vec<_>>().join(", ")
 }

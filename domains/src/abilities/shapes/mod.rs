@@ -21,6 +21,7 @@ use unseen::UnseenFloor;
 
 use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord, Trace};
 use crate::drive;
+use crate::english::percent;
 use crate::error::WorldError;
 use crate::eyes::Eyes;
 use crate::load::Domain;
@@ -58,7 +59,10 @@ pub const ABILITY: Ability = Ability {
             types: &["pose"],
             about: "sweeps the laser over floor that was not seen yet",
             ground: |_, _| Ok(Box::new(Scan)),
-            because: |s, _| format!("there are {} places left where it may stand", s.floor().room.len()),
+            because: |s, _| match s.floor().room.len() {
+                1 => "there is one place left where it may stand".into(),
+                places => format!("there are {places} places left where it may stand"),
+            },
             learn: scanned,
             failed: NOTHING_MORE,
         },
@@ -69,6 +73,7 @@ pub const ABILITY: Ability = Ability {
             about: "drives around it from one pose to another",
             ground: |s, arguments| Ok(Box::new(Circle { way: way(s, arguments)? })),
             because: |s, arguments| match way(s, arguments) {
+                Ok(way) if way.len() == 1 => format!("around {}, by one of the poses there", arguments[2]),
                 Ok(way) => format!("around {}, by {} of the poses there", arguments[2], way.len()),
                 Err(because) => because,
             },
@@ -212,7 +217,7 @@ fn aligned(
     }
     thing.taken_for = Some(Arc::new(recognition));
     let contradict = taken::contradict(alignment);
-    Ok(format!("{said}: {:.2} sure{contradict}", thing.sureness(known)))
+    Ok(format!("{said}: {} sure{contradict}", percent(thing.sureness(known))))
 }
 
 /// Outcome of learning: the aligned shape, stored under a name.

@@ -123,7 +123,10 @@ impl World<'_> {
         (self.heading_for, self.is_unasked) = (None, false);
         let is_searching = self.setting.domain.config.uses.iter().any(|ability| ability == "searching");
         let is_asked = self.setting.goal.question && self.is_open_to_looks(round);
-        let may_look = (s.time_left_s.is_some() || is_asked) && s.held.is_none() && is_searching;
+        let is_of_objects =
+            s.things.iter().any(|t| t.track.is_none()) || !(s.kinds.is_empty() && s.asked.is_empty());
+        let is_late = s.time_left_s.is_some() && is_of_objects;
+        let may_look = (is_late || is_asked) && s.held.is_none() && is_searching;
         let looks = if may_look { looks::look_deeds(s) } else { Vec::new() };
         Ok(self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into())))
     }

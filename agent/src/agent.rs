@@ -1,5 +1,6 @@
-//! The continual loop (paper 004, sections III to V): estimate, monitor, replan only if the plan is broken, execute,
-//! record, perceive, believe. What the words of a domain mean, its [`World`] knows; the loop knows none of them.
+//! The continual loop (paper 004, sections III to V): estimate, monitor, replan only if the plan is
+//! broken, execute, record, perceive, believe. The loop knows no word of a domain; the [`World`]
+//! holds their meanings.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -33,8 +34,8 @@ pub struct Agent<'a> {
     /// The call that failed and left no plan.
     failed: Option<Call>,
     totals: Totals,
-    /// Goal, in PDDL, by which plans are compared; `None` if the domain has attachments, as that would call
-    /// programs.
+    /// Goal in PDDL for the comparison of plans; `None` if the domain has attachments, as the
+    /// comparison would call programs.
     weighed_by: Option<String>,
 }
 
@@ -57,17 +58,18 @@ pub struct Totals {
 enum Taken {
     /// The world's choice is the plan now.
     Up,
-    /// There is nothing to choose, and why.
+    /// Nothing is left to choose, with the reason.
     Nothing(String),
-    /// The planner is to say.
+    /// The choice is the planner's.
     LeftToPlanner,
 }
 
-/// Result of a call: the part of it that was reached, and how that part ended.
+/// Result of a call: number of the last started part, and how that part ended.
 type Performed = (usize, Result<(), SkillFailure>);
 
 impl<'a> Agent<'a> {
-    /// An agent with a body and a record. `tell` hears of everything that happens; `stop` ends it, the body first.
+    /// Agent with a body and a record; `tell` receives every event, `stop` ends the run, the body
+    /// first.
     pub fn new(
         robot: Arc<dyn Robot>,
         record: &'a Record,
@@ -78,7 +80,7 @@ impl<'a> Agent<'a> {
         Self { robot, record, stop, tell, plan: None, failed: None, totals, weighed_by: None }
     }
 
-    /// Pursues a goal until it is achieved, until nothing can help any more, or until a limit is reached.
+    /// Pursues a goal until it is achieved, until nothing can help, or until a limit is reached.
     ///
     /// # Errors
     /// [`CommandError`] if the body or the store fails for good, or the domain cannot be used.
@@ -159,7 +161,7 @@ impl<'a> Agent<'a> {
         })
     }
 
-    /// Makes a new plan. Returns how it ends if there is none.
+    /// Makes a new plan; returns how the run ends if there is none.
     fn replan(
         &mut self,
         world: &mut World<'_>,
@@ -212,7 +214,7 @@ impl<'a> Agent<'a> {
         Ok(None)
     }
 
-    /// Takes up what the world chooses.
+    /// Adopts the world's choice of steps.
     fn take_up<'w>(
         &mut self,
         world: &mut World<'w>,
@@ -240,7 +242,8 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Asks the planner, with more viewpoints as long as there is no plan, and notes how long it took.
+    /// Calls the planner, with more viewpoints as long as no plan is found, and records the
+    /// planning time.
     fn plan(&mut self, world: &World<'_>, task: &Task, round: &Round) -> Result<Planned, CommandError> {
         let mut statistics = Statistics::default();
         for stage in 0.. {
@@ -321,8 +324,9 @@ impl<'a> Agent<'a> {
         self.plan.clone().unwrap_or_default()
     }
 
-    /// Takes the next steps off the plan: the first, and those that begin before any of them has ended. There is one: where
-    /// nothing is left to do, the goal holds. Their times count from the first one's start, and those of what is left from the next.
+    /// Removes the next steps from the plan: the first, and those that start before any of these
+    /// ends (at least one, as an empty plan means that the goal holds). Times become relative to
+    /// the first step's start; those of the remainder, to its own first step.
     fn next_steps(&mut self) -> Vec<Step> {
         let plan = self.plan.get_or_insert_with(Plan::default);
         let first_s = plan.steps.first().and_then(|s| s.start_s).unwrap_or(0.0);
@@ -347,7 +351,7 @@ impl<'a> Agent<'a> {
         steps
     }
 
-    /// Carries steps out, together if they are several, and takes in what came of each.
+    /// Executes steps, concurrently if several, and learns from each outcome.
     async fn act(
         &mut self,
         world: &mut World<'_>,
@@ -382,7 +386,7 @@ impl<'a> Agent<'a> {
         Ok(())
     }
 
-    /// Carries a call out, part after part, and takes in what each part brings about.
+    /// Executes the parts of a call in order, and learns from the outcome of each.
     async fn perform(&mut self, world: &mut World<'_>, call: &Call) -> Result<Performed, CommandError> {
         for part in 0.. {
             let Some(job) = world.ground(call, part)? else { return Ok((part, Ok(()))) };
@@ -394,8 +398,8 @@ impl<'a> Agent<'a> {
         Ok((0, Ok(())))
     }
 
-    /// Carries several calls out at the same time. Each has one part at a time under way; what ends is taken in in the order of
-    /// the plan, so that a run comes out the same again.
+    /// Executes several calls concurrently, one part of each at a time; outcomes are processed in
+    /// plan order, so that a run is reproducible.
     async fn perform_together(
         &mut self,
         world: &mut World<'_>,
@@ -490,7 +494,7 @@ impl<'a> Agent<'a> {
         self.say(&Event::Failed { call, because, unkept, therefore, lesson: Some(lesson) }).map(|_| ())
     }
 
-    /// Ends the run where somebody wants it to stop: the body stands by now, and nothing more is asked of it.
+    /// Ends the run if a stop was requested; the body is idle by now and gets no more requests.
     fn check_stopped(&self) -> Result<(), CommandError> {
         match self.stop.is_asked() {
             true => Err(CommandError::Stopped { said: "stopped".into(), signal: self.stop.signal() }),
@@ -498,7 +502,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Records what the end of a run rests on.
+    /// Records the belief on which the end of a run rests.
     fn rest_on(&mut self, round: &Round, ended: &Ended) -> Result<(), CommandError> {
         let body = serde_json::to_value(standing::rests(round, ended))
             .map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -507,12 +511,12 @@ impl<'a> Agent<'a> {
         self.record.put(draft).map(|_| ()).map_err(CommandError::broken)
     }
 
-    /// Tells of an event, and records it.
+    /// Reports an event and records it.
     fn say(&mut self, event: &Event) -> Result<RecordId, CommandError> {
         self.say_with(event, Vec::new())
     }
 
-    /// The same with something more beside it.
+    /// Reports an event and records it with further blobs.
     fn say_with(&mut self, event: &Event, more: Vec<Blob<'static>>) -> Result<RecordId, CommandError> {
         (self.tell)(event);
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -538,7 +542,7 @@ fn too_long(plan: &Plan, left_s: Option<f64>) -> String {
     format!("the plan that was found takes {takes_s:.1} s, and {left_s:.1} s are left until the deadline")
 }
 
-/// Does the goal hold now, with nothing more to do?
+/// True if the goal holds now and no step is left.
 fn reached(round: &Round) -> bool {
     descry_planner::monitor(&round.task, &round.attachments, &Plan::default()).is_ok()
 }

@@ -20,7 +20,7 @@ pub mod tape;
 pub struct Body {
     /// Robot, as the agent sees it.
     pub robot: Arc<dyn Robot>,
-    /// Name and text of the scene that it stands in, if it was read from one.
+    /// Name and text of the scene that the body was made from, if any.
     pub scene: Option<(String, String)>,
     truth: Option<Told>,
 }
@@ -34,9 +34,9 @@ enum Told {
 /// True place of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruePlace {
-    /// The middle of its body, in the map, metres.
+    /// Centre of the object's body, in the map, metres.
     pub position_m: [f64; 3],
-    /// The surface that it stands on; none in the hand.
+    /// Surface that the object stands on; `None` in the hand.
     pub on: Option<String>,
     /// The room that this is in.
     pub room: Option<String>,
@@ -53,8 +53,7 @@ impl Body {
         Self { truth: Some(Told::Simulator(Arc::clone(&robot))), ..Self::new(robot) }
     }
 
-    /// True state of the scene now, for reports; none for a body that is no simulation or does not
-    /// state it.
+    /// Ground truth of the scene now, for reports; `None` without a simulator that states it.
     ///
     /// # Errors
     /// If what a program wrote of it cannot be read.
@@ -66,8 +65,8 @@ impl Body {
         }
     }
 
-    /// True place of an object of that name or kind, the one nearest to the believed place if there
-    /// are several. None without a simulation, or if it is absent.
+    /// True place of an object of that name or kind, the nearest to the believed place; `None`
+    /// without a simulation, or if the object is absent.
     pub fn true_place(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<TruePlace> {
         let truth = self.truth().ok().flatten()?;
         let distance = |at: &[f64; 3]| {
@@ -142,7 +141,7 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
     }
 }
 
-/// A simulated body in one arrangement of a scene; what goes wrong in the scene comes before what else shall.
+/// Simulated body in one arrangement of a scene; the scene's own faults come before the given ones.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the scene cannot be arranged.
@@ -152,7 +151,7 @@ pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, 
     Ok(Body::simulated(Arc::new(SimRobot::new(scene, options))))
 }
 
-/// A scene of the domain by its name, or any from a file.
+/// Scene of the domain by name, or any scene from a file.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names the scenes that there are, or the mistake in the file.

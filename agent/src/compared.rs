@@ -7,15 +7,15 @@ pub struct Compared<'c> {
     pub word: &'c str,
     /// Function and its arguments; variables begin with `?`.
     pub of: Vec<&'c str>,
-    /// Right side, if it is a number.
+    /// Right-hand side, if it is a number.
     pub wanted: Option<f64>,
     /// True if less is wanted, not more.
     pub less: bool,
-    /// True if it must hold for all values of its variables, not for one.
+    /// True if the comparison must hold for all values of its variables.
     pub of_all: bool,
 }
 
-/// All numbers that a condition compares, as it writes them.
+/// All numeric comparisons in a condition, as written.
 pub fn all(condition: &str) -> impl Iterator<Item = Compared<'_>> {
     const SIGNS: [&str; 5] = ["(>= (", "(<= (", "(> (", "(< (", "(= ("];
     condition.match_indices('(').filter_map(move |(at, _)| {
@@ -29,18 +29,18 @@ pub fn all(condition: &str) -> impl Iterator<Item = Compared<'_>> {
     })
 }
 
-/// Value that a goal demands of a number, if it compares the number with one.
+/// Bound of a goal on a number, if the goal compares the number with a constant.
 pub fn wanted(goal: &str, number: &str) -> Option<f64> {
     all(goal).filter(|compared| compared.fits(number)).find_map(|compared| compared.wanted)
 }
 
-/// The words of a number as it is written in PDDL.
+/// Words of a number as written in PDDL.
 pub fn words(number: &str) -> impl Iterator<Item = &str> {
     number.trim_matches(['(', ')']).split_whitespace()
 }
 
 impl Compared<'_> {
-    /// True if it is about the given number; a comparison of a variable fits any object.
+    /// True if the comparison is about the given number; a variable matches any object.
     pub fn fits(&self, number: &str) -> bool {
         let mut own = words(number);
         let is_word = own.next() == Some(self.word);

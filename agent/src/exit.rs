@@ -23,7 +23,7 @@ pub enum Exit {
     HungUp = 129,
     /// Stopped by Ctrl-C.
     Interrupted = 130,
-    /// The program was told to end.
+    /// Terminated by a signal.
     Terminated = 143,
     /// A bug of descry.
     Bug = 70,
@@ -58,9 +58,9 @@ pub enum CommandError {
     /// The run was stopped; the text says how to go on.
     #[error("{said}")]
     Stopped {
-        /// Kept results, and the way to go on.
+        /// Message about kept results, and how to resume.
         said: String,
-        /// The signal that stopped it.
+        /// Signal that stopped the run.
         signal: u8,
     },
     /// A fault of descry itself.
@@ -69,12 +69,12 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// An input that cannot be used, from the error that says so.
+    /// Error of unusable input.
     pub fn bad_input(error: impl std::fmt::Display) -> Self {
         Self::BadInput(error.to_string())
     }
 
-    /// A robot or store that failed for good, from the error that says so.
+    /// Error of a robot or store that failed for good.
     pub fn broken(error: impl std::fmt::Display) -> Self {
         Self::Broken(error.to_string())
     }

@@ -17,11 +17,12 @@ use crate::exit::CommandError;
 pub struct Keeping {
     /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: the run's folder.
     pub memory: Option<String>,
-    /// Durability of the record; none: data counts as recorded once it is on the disk.
+    /// Durability of the record; `None`: data counts as recorded once on the disk.
     pub durability: Option<Kept>,
-    /// Greatest size of the record, bytes; what is over goes oldest first, unless a belief or a plan rests on it.
+    /// Maximum size of the record, bytes; the oldest excess is pruned, unless a belief or a plan
+    /// rests on it.
     pub max_bytes: Option<u64>,
-    /// Greatest age of what is recorded, seconds on the body's clock.
+    /// Maximum age of recorded data, seconds on the body's clock.
     pub max_age: Option<f64>,
     /// Least room to be left on the disk, bytes.
     pub min_free: Option<u64>,
@@ -62,7 +63,7 @@ impl Keeping {
         self.memory.as_deref().map(Address::read).transpose()
     }
 
-    /// The same with the name under which a new run is in its store, which must be free there.
+    /// Options with the name of a new run in its store, where that name must be free.
     ///
     /// # Errors
     /// [`CommandError::BadInput`] for an address that cannot be used, or where less room is left already than is to be left;
@@ -101,7 +102,8 @@ impl Keeping {
         }
     }
 
-    /// The record of a run that is to go on; a new one if the run was cut off before it had one.
+    /// Opens the record of a run to be resumed; creates one if the run was cut off before it had
+    /// one.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be opened, or is being written.
@@ -120,7 +122,7 @@ impl Keeping {
     }
 }
 
-/// Opens a record to be read: that of a run, a folder by itself, or what is at an address.
+/// Opens a record for reading: that of a run, a bare record folder, or one at an address.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if there is none; [`CommandError::Broken`] if it cannot be opened.
@@ -132,8 +134,8 @@ pub fn open(place: &Path) -> Result<Record, CommandError> {
     Ok(record)
 }
 
-/// Opens the record of a run that is being written. What is written later is read too: there is an index on the disk as soon as
-/// anything is recorded.
+/// Opens the record of a running run for reading; later writes become visible, as the index exists
+/// from the first record on.
 ///
 /// # Errors
 /// As [`open`], also if the run has not written anything yet.
@@ -160,7 +162,7 @@ fn found(place: &Path) -> Result<Record, CommandError> {
     })
 }
 
-/// The same, of which nothing is lost as far as can be told without reading all of it.
+/// Opens a record for reading; fails if a loss is visible without reading all data.
 ///
 /// # Errors
 /// As [`open`], or [`CommandError::Broken`] that says what is lost.
@@ -172,5 +174,5 @@ pub fn open_whole(place: &Path) -> Result<Record, CommandError> {
     }
 }
 
-/// The folder of the record in that of its run.
+/// Name of the record's folder inside its run's folder.
 pub const RECORD: &str = "record";

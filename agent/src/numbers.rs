@@ -18,7 +18,7 @@ pub fn share(value: f64) -> String {
     format!("{value:.4}").trim_end_matches('0').to_string()
 }
 
-/// A share where another is wanted: with more digits where it is less and would read the same.
+/// Share for people next to a wanted one, with more digits if it is smaller and would look equal.
 pub fn share_of(value: f64, wanted: f64) -> String {
     let said = share(value);
     if value < wanted && said == share(wanted) { below(value) } else { said }
@@ -29,7 +29,7 @@ fn below(value: f64) -> String {
     format!("{:.4}", (value * 1e4).floor() / 1e4)
 }
 
-/// True if a number reads as a share: it lies strictly between 0 and 1.
+/// True if a number is displayed as a share: strictly between 0 and 1.
 pub fn is_share(value: f64) -> bool {
     value > 0.0 && value < 1.0
 }

@@ -1,5 +1,5 @@
-//! Reasons of plans and failures, with the values that decide them. The record keeps them as values; sentences are made of them
-//! where people read.
+//! Reasons of plans and failures, with the values that decide them. Records keep the values;
+//! sentences are made for readers.
 
 use std::fmt;
 
@@ -18,7 +18,8 @@ use crate::written;
 pub struct Reason {
     /// The event that made the plan necessary.
     pub trigger: Trigger,
-    /// States after which the planner's search was ended without a proof; none: the search ended by itself.
+    /// Number of states after which the search was cut off without a proof; `None`: it ended by
+    /// itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search_ended_after: Option<u64>,
     /// True if no plan reaches the goal in the time that is left.
@@ -40,7 +41,7 @@ pub enum Trigger {
     },
     /// The rest of the plan no longer reaches the goal.
     Broken(Break),
-    /// The goal holds, but too little was seen to rely on it.
+    /// The goal holds, but on too few observations to rely on absence.
     NotDenied,
 }
 
@@ -50,10 +51,10 @@ pub struct Break {
     /// The step at fault; none: the goal is missed.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "written::maybe")]
     pub step: Option<Call>,
-    /// True if other steps come before: the values are then those expected after these steps.
+    /// True if other steps precede; the values are then those expected after these steps.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_expected: bool,
-    /// The cause, with the values that decide it.
+    /// Cause with the deciding values.
     pub cause: Cause,
 }
 
@@ -92,7 +93,7 @@ impl Break {
         }
     }
 
-    /// The step that counts for more or fewer seconds than in its plan, with those of the plan and those of now.
+    /// Step whose duration has changed, with its planned and its present duration, seconds.
     pub fn reckoned(&self) -> Option<(&Call, f64, f64)> {
         match (&self.step, &self.cause) {
             (Some(call), Cause::Duration { planned_s, asked_s }) => Some((call, *planned_s, *asked_s)),
@@ -100,7 +101,7 @@ impl Break {
         }
     }
 
-    /// The goal, or the part of it, that is missed.
+    /// Goal, or part of the goal, that is missed.
     pub fn missed_goal(&self) -> Option<&Unmet> {
         match &self.cause {
             Cause::Goal(unmet) => Some(unmet),
@@ -108,7 +109,7 @@ impl Break {
         }
     }
 
-    /// True if a number is too small for what is left to do.
+    /// True if a number is too small for the remaining steps.
     pub(crate) fn is_of_too_little(&self) -> bool {
         let (Cause::Goal(unmet) | Cause::Condition { unmet, .. }) = &self.cause else { return false };
         unmet.compared.as_ref().is_some_and(|compared| compared.comparison == Comparison::GreaterOrEqual)
@@ -119,12 +120,12 @@ impl Break {
         self.sentence(if self.is_expected { "would be only" } else { "is" }, saying)
     }
 
-    /// The break of steps that nobody intends to do, in a sentence.
+    /// Sentence about a break of hypothetical steps.
     pub fn would_be(&self, saying: &Saying) -> String {
         self.sentence("would be", saying)
     }
 
-    /// The break in a sentence; `is` stands between a number and its value.
+    /// Sentence about the break; `is` stands between a number and its value.
     fn sentence(&self, is: &str, saying: &Saying) -> String {
         let call = self.step.as_ref().map(|call| saying.say(&call.to_string()));
         match (&self.cause, call) {
@@ -162,7 +163,7 @@ fn missed(unmet: &Unmet, is: &str, saying: &Saying) -> String {
     }
 }
 
-/// Sentence about a condition that a step needs and that does not hold.
+/// Sentence about an unmet condition of a step.
 fn needs(call: &str, when: Moment, unmet: &Unmet, is: &str, saying: &Saying) -> String {
     if let (Some(compared), false) = (&unmet.compared, when == Moment::OverAll) {
         let (number, found) = found(compared, saying);
@@ -176,7 +177,7 @@ fn needs(call: &str, when: Moment, unmet: &Unmet, is: &str, saying: &Saying) -> 
     }
 }
 
-/// The number that a comparison is about, said, and its value, said unlike what is wanted.
+/// Number of a comparison in words, and its value, worded to differ from the bound.
 fn found(compared: &Compared, saying: &Saying) -> (String, String) {
     let value = match (compared.left_value, compared.right_value) {
         (None, _) => "unknown".to_string(),
@@ -186,7 +187,7 @@ fn found(compared: &Compared, saying: &Saying) -> (String, String) {
     (saying.say(&compared.left), value)
 }
 
-/// The bound that a comparison sets for its number, as read aloud: `at least 0.80`.
+/// Bound of a comparison in words: `at least 0.80`.
 fn wanted(compared: &Compared, saying: &Saying) -> String {
     let sign = match compared.comparison {
         Comparison::Less => "less than ",

@@ -1,4 +1,4 @@
-//! Living through a run again from its record, and whether it comes out the same.
+//! Replay of a run from its record, and comparison of the results.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ pub struct Replayed {
     pub same: bool,
     /// Documents that are the same, by kind.
     pub compared: Vec<(&'static str, usize)>,
-    /// The verdict that it came to, if it came to one.
+    /// Recorded verdict, if the run reached one.
     pub verdict: Option<Value>,
     /// Place where the run was cut off.
     pub cut_off: Option<String>,
@@ -45,13 +45,13 @@ pub struct Replayed {
 pub struct Replay<'a> {
     /// The run's folder.
     pub run: &'a Path,
-    /// Seconds of the body's clock that pass in one second; none: as fast as it goes.
+    /// Replay speed, seconds of the body's clock per second; `None`: unlimited.
     pub speed: Option<f64>,
-    /// The folder that keeps what comes about as a run, if any is to.
+    /// Folder for the replayed run, if it is to be kept.
     pub out: Option<&'a Path>,
 }
 
-/// Lives through a run again from its record, unless that is damaged.
+/// Replays a run from its record, unless the record is damaged.
 ///
 /// # Errors
 /// [`CommandError`] if there is no run, if its record does not say what it began with, or if living through it fails.
@@ -110,7 +110,7 @@ async fn live_through(
     Ok(replayed)
 }
 
-/// The body of the run, as its record has it.
+/// Body of the run as recorded.
 fn robot(source: &Arc<Record>, into: &Arc<Record>, asked: Replay<'_>) -> Result<TapedRobot, CommandError> {
     let Some(known) = tape::known(source)? else {
         let text = format!(
@@ -124,7 +124,7 @@ fn robot(source: &Arc<Record>, into: &Arc<Record>, asked: Replay<'_>) -> Result<
     Ok(TapedRobot::replay(known, tape, entries, asked.speed))
 }
 
-/// Holds what came about again against what was recorded: all of it, what of it was kept, or up to where the record ends.
+/// Compares the replayed events with the recorded ones, as far as these are kept and complete.
 fn compare(
     source: &Record,
     again: &Record,
@@ -161,7 +161,7 @@ fn compare(
     Ok(replayed)
 }
 
-/// The place where two texts part, with a little of what stands there.
+/// First difference between two texts, with some context.
 fn difference(kind: &str, number: usize, recorded: &str, found: &str) -> String {
     const SHOWN: usize = 60;
     let common = recorded.chars().zip(found.chars()).take_while(|(a, b)| a == b).count();

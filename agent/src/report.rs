@@ -1,4 +1,4 @@
-//! Reports of a run: events as they happen, for people and for the record, and the result at the end.
+//! Reports of a run: events as they happen, for people and for the record, and the final result.
 
 use std::fmt;
 
@@ -16,13 +16,13 @@ use crate::numbers::count;
 use crate::reason::Reason;
 use crate::written;
 
-/// Something that happened in a run, with its reason.
+/// Event of a run, with its reason.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "event")]
 pub enum Event {
     /// The goal was understood.
     Goal {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
         /// The goal in PDDL.
         pddl: String,
@@ -37,7 +37,7 @@ pub enum Event {
         round: usize,
         /// The reason the previous plan no longer works, in a sentence.
         because: String,
-        /// The reason with its values; absent in records of earlier versions.
+        /// Reason with its values; absent in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<Reason>,
         /// The steps.
@@ -76,7 +76,7 @@ pub enum Event {
         call: Call,
         /// The error that the body reported.
         because: String,
-        /// The condition in PDDL that should have held until the end, if that is what failed.
+        /// Violated invariant in PDDL, if that is the failure.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unkept: Option<String>,
         /// The conclusion drawn from the failure, in a sentence.
@@ -91,7 +91,8 @@ pub enum Event {
 }
 
 impl Event {
-    /// A word for what the event is about and what is said of it, in lines; conditions and steps as a domain says them.
+    /// Heading word of the event, and its text in lines, with conditions and steps in the domain's
+    /// wording.
     pub fn parts(&self, saying: &Saying) -> (String, String) {
         let said = |call: &Call| saying.say(&call.to_string());
         match self {
@@ -126,7 +127,7 @@ impl Event {
         }
     }
 
-    /// The event in lines, behind a column for the word that it is about.
+    /// Event in lines, after a column with its heading word.
     pub fn told(&self, saying: &Saying) -> String {
         let (head, text) = self.parts(saying);
         let line =
@@ -141,7 +142,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// A step of a plan: when it begins, what it is, how long it takes.
+/// Step of a plan: start, wording, duration.
 pub fn timed(step: &Step, saying: &Saying) -> String {
     let call = saying.say(&written::call_of(step).to_string());
     match step.start_s {
@@ -160,16 +161,16 @@ pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
     }
 }
 
-/// The result of a run: what `--json` prints.
+/// Result of a run, as printed by `--json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// The words as they were given.
+    /// Words as given.
     pub goal: String,
     /// The goal in PDDL.
     pub pddl_goal: String,
     /// The verdict at the end of the run.
     pub verdict: Verdict,
-    /// "yes", "no" or "cannot tell", if the goal was a question.
+    /// "yes", "no" or "cannot tell", for a question.
     pub answer: Option<String>,
     /// The reason for the verdict, in a sentence.
     pub why: String,
@@ -179,19 +180,19 @@ pub struct Report {
     pub confidence: f64,
     /// Confidence that was required, 0 to 1.
     pub threshold: f64,
-    /// Probability that what was looked for is there after all.
+    /// Probability that the sought object is there after all.
     pub remaining: Option<f64>,
-    /// Believed position of the requested object: the centre of its body in the map frame; none while the
-    /// robot holds it.
+    /// Believed position of the requested object: centre of its body in the map frame; `None` in
+    /// the hand.
     pub position_m: Option<[f64; 3]>,
-    /// Standard deviation of that, in the direction in which it is known worst.
+    /// Standard deviation of the position in its least certain direction.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
     /// True position of the requested object; simulation only.
     pub true_position_m: Option<[f64; 3]>,
-    /// Surface that the object is believed to stand on, as people call it.
+    /// Spoken name of the surface that the object is believed to stand on.
     pub on: Option<String>,
-    /// The surface that it stands on; simulation only.
+    /// True surface of the object; simulation only.
     pub true_on: Option<String>,
     /// Room that the object is believed to be in.
     #[serde(rename = "in")]
@@ -211,8 +212,8 @@ pub struct Report {
     pub sim_time_s: f64,
     /// Duration of the run on the wall clock, seconds.
     pub wall_s: f64,
-    /// Longest planning call on the wall clock, without the time of attachments, seconds; 0 if
-    /// nothing was planned or the time is unknown.
+    /// Longest planning call on the wall clock, without attachments, seconds; 0 if nothing was
+    /// planned or the time is unknown.
     #[serde(default)]
     pub planning_s: f64,
     /// The longest time that the attachments of one planning call took, seconds.
@@ -223,8 +224,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The report without values that differ between repetitions of the run, and without those known only to
-    /// a simulation.
+    /// Report without values that differ between repetitions, and without ground truth.
     pub(crate) fn as_recorded(&self) -> Self {
         Self {
             true_position_m: None,
@@ -279,7 +279,7 @@ pub fn brief(time_s: f64) -> String {
     }
 }
 
-/// A verdict as people read it.
+/// Verdict in words.
 pub fn words(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Achieved => "achieved",

@@ -1,4 +1,4 @@
-//! One run from beginning to end: its folder, its record, its report.
+//! A run from beginning to end: folder, record, report.
 
 mod beginning;
 pub(crate) mod files;
@@ -43,7 +43,7 @@ use crate::stop::Stop;
 /// The task of a run.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
-    /// The domain: its vocabulary and actions.
+    /// Domain: vocabulary and actions.
     pub domain: &'a Domain,
     /// The goal that is pursued.
     pub goal: &'a Goal,
@@ -53,14 +53,14 @@ pub struct Task<'a> {
 
 /// Observer of a run.
 pub struct Watcher<'a> {
-    /// Ends it, the body first.
+    /// Stop signal; ends the body first.
     pub stop: &'a Stop,
     /// Hears of everything that happens.
     pub tell: &'a mut dyn FnMut(&Event),
 }
 
-/// Pursues a goal and reports. Planning and perception go on on the thread that awaits it: give it one of its own, as a
-/// current-thread runtime does.
+/// Pursues a goal and reports. Planning and perception block the awaiting thread: use a thread of
+/// its own, as with a current-thread runtime.
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
@@ -100,7 +100,7 @@ pub async fn pursue(
     Ok(report)
 }
 
-/// A goal in the words of a domain, of the places that a body knows and of what is remembered of earlier runs.
+/// Parses a goal with the words of a domain, the places of a body, and remembered names.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] that says what could have been said.
@@ -126,7 +126,7 @@ fn now_unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
 }
 
-/// Keeps what is to be remembered of a run that has ended, if its settings say where.
+/// Writes the persistent belief of a finished run, if its settings name a store.
 fn remember(
     settings: &Settings,
     past: Option<&Past>,
@@ -144,7 +144,7 @@ fn remember(
     })
 }
 
-/// Goes on with a run that was cut off: its agent lives through what the record holds once more, and then goes on with the body.
+/// Resumes an interrupted run: the agent replays the record, and then continues with the body.
 ///
 /// # Errors
 /// [`CommandError`] as for [`pursue`], or if the body is not the one of that run.
@@ -205,8 +205,8 @@ pub async fn live_through(
     Ok((report, remembered))
 }
 
-/// Says of a run that was stopped, or that the body or the record has failed, how it goes on. A record that is at its bound cannot:
-/// the bound stays what the run was started with.
+/// Adds to the error of a stopped or failed run how to resume it. A record at its size limit cannot
+/// be resumed, as the limit is fixed at the start of the run.
 pub fn how_to_go_on(error: CommandError, folder: &Path, is_at_bound: bool) -> CommandError {
     let folder = folder.display().to_string();
     let resume = format!("descry do --resume {}", shell::word(&folder));
@@ -240,7 +240,7 @@ fn answer(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Fills a report in. Returns what is to be remembered.
+/// Completes a report; returns the belief to remember.
 fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<Remembered> {
     report.verdict = conclusion.verdict;
     report.why = conclusion.why;
@@ -260,7 +260,7 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<R
     conclusion.remembered
 }
 
-/// The events of a run in their order, from its record, and what of them is lost.
+/// Events of a run in order, from its record, with the losses.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.

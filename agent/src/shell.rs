@@ -1,6 +1,6 @@
-//! Command lines that people are told to run, and those that are run here.
+//! Shell command lines, for display and for execution.
 
-/// A text as one word of the shell: in quotes where it needs them.
+/// Text as a shell word, quoted if needed.
 pub fn word(text: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./:@%+=,".contains(c);
     match !text.is_empty() && text.chars().all(is_plain) {
@@ -9,7 +9,7 @@ pub fn word(text: &str) -> String {
     }
 }
 
-/// A text as one word of the shell, in quotes whatever it is.
+/// Text as a quoted shell word.
 pub fn quoted(text: &str) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }

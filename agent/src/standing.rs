@@ -1,6 +1,6 @@
-//! State of belief in a run: confidence about what was asked for, coverage of the places where it may be, and
-//! the probability that is still undecided. It is recorded with every plan, made or kept, so that the gain of
-//! each look can be told later.
+//! Belief report of a run: confidence in the requested objects, coverage of their possible places,
+//! and open probability. Recorded with every plan, made or kept, so that the gain of each look can
+//! be explained later.
 
 pub use descry_domains::abilities::searching::FirstLook;
 use descry_domains::belief::doubt::Doubt;
@@ -24,11 +24,12 @@ pub const RESTS: &str = "rests-on";
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InDoubt {
-    /// The object, kind or surface that is in doubt, as people call it.
+    /// Spoken name of the doubtful object, kind or surface.
     pub about: String,
     /// The type of the doubt.
     pub of: Of,
-    /// For a kind: the rooms the question is restricted to, as in " in the kitchen"; empty: no restriction.
+    /// For a kind: rooms that restrict the question, as in " in the kitchen"; empty: no
+    /// restriction.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub within: String,
     /// Confidence reached so far, 0 to 1; records of earlier versions do not say.
@@ -37,9 +38,10 @@ pub struct InDoubt {
     pub wanted: f64,
     /// Probability that is still unsettled, 0 to 1.
     pub left: f64,
-    /// The part of that for which it is where nothing was seen.
+    /// Part of the open probability at unseen places.
     pub hidden: f64,
-    /// The part of that for which it was lost out of the hand, and no look at a surface shows it.
+    /// Part of the open probability of having been lost out of the hand, where no look at a surface
+    /// shows it.
     pub lost: f64,
     /// Coverage of each place where the object may be.
     pub seen: Vec<Seen>,
@@ -61,17 +63,17 @@ pub enum Of {
 /// Coverage of one place.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
-    /// The place, as people call it.
+    /// Spoken name of the place.
     pub on: String,
-    /// Share of the place where nothing could be hidden, 0 to 1; none while the place is unknown.
+    /// Share of the place where nothing can be hidden, 0 to 1; `None` for an unknown place.
     pub share: Option<f64>,
-    /// The number of places from which it was seen, by views that still hold.
+    /// Number of viewpoints of the place's valid views.
     pub places: usize,
     /// Probability that the object is in an unseen part of this place, 0 to 1; absent in records of
     /// earlier versions.
     #[serde(default)]
     pub hidden: f64,
-    /// The part of that where something was measured that no object explains.
+    /// Part of the hidden probability at unexplained measurements.
     #[serde(default)]
     pub measured: f64,
     /// Evidence for a first look at this place, where looks in vain are counted; records of earlier versions
@@ -87,7 +89,7 @@ pub struct Rests {
     pub ended: End,
     /// Message of the limit or failure; empty: none.
     pub said: String,
-    /// The reasons there is no plan.
+    /// Reasons for no plan.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_plan: Vec<NoPlan>,
     /// The doubts that remain at the end.
@@ -114,7 +116,7 @@ pub enum End {
     Failed,
 }
 
-/// Collects the facts on which the end of a run rests, as they are recorded.
+/// Collects the facts on which the end of a run rests, for the record.
 pub fn rests(round: &Round, of: &Ended) -> Rests {
     let (ended, said) = match of {
         Ended::Reached => (End::Reached, String::new()),
@@ -136,7 +138,7 @@ pub fn blob(round: &Round) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// The remaining doubts of a round about what was asked for.
+/// Remaining doubts of a round about the requested objects.
 fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let s = &round.situation;
     let places = |on: usize| s.spaces[on].seen_from().len();

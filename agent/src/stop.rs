@@ -1,11 +1,12 @@
-//! Stop signal. A listener (a signal handler, a button) asks once; everything that runs sees it soon.
+//! Stop signal, set once by a listener (signal handler, button) and observed by everything that
+//! runs.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use descry_robots::CancellationToken;
 
-/// Request to stop a run, with its signal. Clones share one state.
+/// Stop request with its signal; clones share one state.
 #[derive(Debug, Clone, Default)]
 pub struct Stop {
     token: CancellationToken,
@@ -24,7 +25,7 @@ impl Stop {
         self.token.is_cancelled()
     }
 
-    /// The signal by which it was asked for; 2, that of Ctrl-C, before.
+    /// Signal of the stop request; 2 (Ctrl-C) before any.
     pub fn signal(&self) -> u8 {
         match self.signal.load(Ordering::Relaxed) {
             0 => 2,

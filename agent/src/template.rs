@@ -6,7 +6,7 @@ use descry_domains::template;
 
 use crate::exit::CommandError;
 
-/// Writes a small domain that runs into a folder; returns its files.
+/// Writes a small working domain into a folder; returns its files.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the folder holds something already, or cannot be written.
@@ -25,7 +25,7 @@ pub fn write_domain(folder: &Path) -> Result<Vec<String>, CommandError> {
     Ok(written)
 }
 
-/// The folder is not there yet, or empty.
+/// Checks that the folder is missing or empty.
 fn free(folder: &Path) -> Result<(), CommandError> {
     let bad = |because: &str, mend: &str| {
         Err(CommandError::BadInput(format!("{}: {because}\n  {mend}", folder.display())))

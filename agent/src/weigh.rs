@@ -1,6 +1,6 @@
-//! Comparison of a plan with its alternatives: the same steps with other objects, with the duration and gain
-//! of each by the same attachment answers as the plan. It is recorded beside the plan, so that the choice can
-//! be explained later.
+//! Comparison of a plan with its alternatives: the same steps with other objects, each with
+//! duration and gain by the plan's own attachment answers. Recorded with the plan, so that the
+//! choice can be explained later.
 
 #[doc(hidden)]
 pub mod steps;
@@ -33,7 +33,7 @@ pub const MOST_KEPT: usize = 12;
 pub const MOST_STEPS: usize = 6;
 /// Durations that differ by less than this count as equal, seconds.
 const SHORTER_S: f64 = 0.05;
-/// Detours that take more than this many times as long as the step they replace are left out.
+/// Maximum duration of a detour, in multiples of the step it replaces.
 const FAR: f64 = 2.0;
 /// Gains below this count as none.
 const GAINED: f64 = 1e-6;
@@ -42,20 +42,21 @@ const GAINED: f64 = 1e-6;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// Numeric fluents that matter to the goal: value before the plan and expected value at its
-    /// end, or at its best moment if the plan uses them up again.
+    /// Numeric fluents in the goal: value before the plan, and expected value at its end (or best
+    /// moment, if the plan consumes them).
     pub numbers: Vec<Expected>,
-    /// The plan until it first gains something.
+    /// Plan up to its first gain.
     pub chosen: Option<Way>,
-    /// Others that could have been taken, those that gain most a second first.
+    /// Alternatives, by decreasing gain per second.
     pub others: Vec<Way>,
     /// Number of feasible alternatives, including the chosen plan and those not in `others`.
     pub open: usize,
-    /// The plan up to its first gain, with consecutive steps merged into one where possible.
+    /// Plan up to its first gain, with consecutive steps merged where possible.
     pub shorter: Option<Way>,
-    /// The quickest plan with one more step that shortens another one: a door opened on the way.
+    /// Quickest plan with one more step that shortens another one, such as opening a door on the
+    /// route.
     pub through: Option<Way>,
-    /// The remaining steps of the previous plan, where they differ from the new one.
+    /// Remaining steps of the previous plan, if different from the new one.
     pub left: Option<Way>,
     /// Values of the numbers that count after the rest of the previous plan, if all goes as expected.
     pub left_numbers: Vec<Expected>,
@@ -72,7 +73,7 @@ pub struct Expected {
     pub then: f64,
 }
 
-/// Steps, and what they bring.
+/// Steps with their duration and gain.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Way {
     /// The calls.
@@ -88,8 +89,8 @@ pub struct Way {
     /// True if the goal is expected to hold after the steps; records of earlier versions do not say.
     #[serde(default)]
     pub reaches: Option<bool>,
-    /// Totals with the rest of the plan appended; none where the rest cannot be done then, and in records of
-    /// earlier versions.
+    /// Totals with the rest of the plan appended; `None` if infeasible, or in records of earlier
+    /// versions.
     #[serde(default)]
     pub whole: Option<Whole>,
     /// The obstacle that keeps the rest of the plan from following, if any; records of earlier versions do
@@ -98,7 +99,7 @@ pub struct Way {
     pub blocked: Option<Break>,
 }
 
-/// A way to its end.
+/// Totals of a plan to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Whole {
     /// Cost of the steps in sequence by the plan metric, seconds.
@@ -130,7 +131,8 @@ pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// Weighs a plan against others, and what is left of the one before; `goal` says which numbers count.
+/// Compares a plan with alternatives and with the remainder of the previous plan; `goal` selects
+/// the numbers.
 pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
     let Some(scale) = Scale::new(round, plan, goal) else { return Weighed::default() };
     let weighed = scale.weigh(plan).unwrap_or_default();
@@ -145,7 +147,7 @@ struct Scale<'r> {
     state: State,
     /// Numeric functions that matter to the goal, each with true if less is better.
     counting: Vec<(FunctionId, bool)>,
-    /// Text of the goal, or else of the steps' conditions, that compares these numbers.
+    /// Text that compares these numbers: the goal, or else the steps' conditions.
     asked: String,
     /// Objects of the goal about which the steps that ask for these numbers make facts true; `None` if the
     /// goal itself names the numbers.
@@ -153,7 +155,7 @@ struct Scale<'r> {
 }
 
 impl<'r> Scale<'r> {
-    /// The numbers that the goal speaks of; else those that the steps ask for.
+    /// Scale of the numbers in the goal, or else in the steps' conditions.
     fn new(round: &'r Round, plan: &Plan, goal: &str) -> Option<Self> {
         let semantics = Semantics::new(&round.task, &round.attachments);
         let state = semantics.initial().ok()?;
@@ -204,7 +206,7 @@ impl<'r> Scale<'r> {
         self.counting.iter().flat_map(of).collect()
     }
 
-    /// The objects of a number that a step asks about: those that are not what it is done for may be others in another plan.
+    /// Object names of a number with those that may vary between plans replaced by variables.
     fn any<'o>(&self, of: Vec<&'o str>) -> Vec<&'o str> {
         let Some(aims) = &self.aims else { return of };
         let is_aim = |object: &&str| aims.iter().any(|aim| aim == object);
@@ -212,12 +214,12 @@ impl<'r> Scale<'r> {
         of.into_iter().map(|object| if !any_is || is_aim(&object) { object } else { "?" }).collect()
     }
 
-    /// Gain of a number: by how much it comes nearer to its bound.
+    /// Gain of a number: approach to its bound.
     fn gain(now: f64, then: f64, less: bool) -> f64 {
         (if less { now - then } else { then - now }).max(0.0)
     }
 
-    /// Steps, one after the other: what each takes, seconds, and the state then; none where they cannot be taken.
+    /// Durations of consecutive steps, seconds, and the resulting state; `None` if inapplicable.
     fn after(&self, steps: &[Step]) -> Option<(Vec<f64>, State)> {
         let mut state = self.state.clone();
         let each = steps.iter().map(|step| self.apply(&mut state, step)).collect::<Option<_>>()?;
@@ -232,7 +234,7 @@ impl<'r> Scale<'r> {
         self.semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())
     }
 
-    /// Applies a step; returns the seconds that it takes.
+    /// Applies a step; returns its duration, seconds.
     fn apply(&self, state: &mut State, step: &Step) -> Option<f64> {
         let semantics = &self.semantics;
         let (id, mut binding) = semantics.bind(step).ok()?;
@@ -251,7 +253,7 @@ impl<'r> Scale<'r> {
         Some(takes_s)
     }
 
-    /// Makes changes; none where they contradict each other.
+    /// Applies changes; `None` if they contradict each other.
     fn change(
         &self,
         state: &mut State,
@@ -277,7 +279,7 @@ impl<'r> Scale<'r> {
         Some(Way { steps, each_s, takes_s, gains, reaches, ..Way::default() })
     }
 
-    /// True if the goal holds in a state; none where its value is undefined.
+    /// True if the goal holds in a state; `None` if undefined.
     fn reaches(&self, state: &State) -> Option<bool> {
         let goal = &self.semantics.task.goal;
         self.semantics.holds(state, &goal.body, &mut Binding::new(goal.slots)).ok()
@@ -293,9 +295,8 @@ impl<'r> Scale<'r> {
         Some(Whole { takes_s: counted.unwrap_or(takes_s), steps: steps.len(), reaches })
     }
 
-    /// Totals of other steps followed by the rest of a plan, or by as much of it as is still needed: with
-    /// objects exchanged, or after one step that leads to where the rest begins. If that cannot be done, the
-    /// obstacle.
+    /// Totals of alternative steps followed by the needed rest of a plan: with objects exchanged,
+    /// or after one connecting step. If infeasible, the obstacle.
     fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<Break>) {
         let ends = self.ends(other, rest);
         let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
@@ -360,8 +361,8 @@ impl<'r> Scale<'r> {
         bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect()
     }
 
-    /// The obstacle to the rest of a plan after other steps: a number that is too small for all that remains
-    /// besides looking, or else the first obstacle in the whole rest.
+    /// Obstacle to the rest of a plan after alternative steps: a number too small for all remaining
+    /// steps other than looks, or else the first obstacle.
     fn short_of(&self, other: &Other, rest: &[Step]) -> Option<Break> {
         let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
         let looked = rest.iter().rposition(is_look);
@@ -375,7 +376,7 @@ impl<'r> Scale<'r> {
         by_number.or_else(|| stuck(&exchanged))
     }
 
-    /// True if the task has timed initial literals: something changes by itself, such as a deadline.
+    /// True if the task has timed initial literals, so that waiting changes the state.
     fn is_timed(&self) -> bool {
         !self.semantics.task.init.timed.is_empty()
     }
@@ -396,7 +397,7 @@ impl<'r> Scale<'r> {
         monitor(task, attachments, &plan).err().map(|broken| Break::of(&broken, &plan))
     }
 
-    /// The numbers that steps bring nearer to what is wanted.
+    /// Numbers that steps bring nearer to their bounds.
     fn expected(&self, steps: &[Step]) -> Vec<Expected> {
         let then = self.after(steps).map(|(_, state)| self.numbers(&state)).unwrap_or_default();
         let expected = |(name, (now, less)): (String, (f64, bool))| {
@@ -406,8 +407,7 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
-    /// Values that a plan expects of the numbers at its end, or at its best moment if it uses them
-    /// up again.
+    /// Expected numbers at a plan's end, or at its best moment if the plan consumes them.
     fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
         let whole = self.expected(steps);
         if !whole.is_empty() {
@@ -442,7 +442,7 @@ impl<'r> Scale<'r> {
         Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, ..Weighed::default() })
     }
 
-    /// The remaining steps of the previous plan, with their totals or the obstacle that rules them out.
+    /// Remaining steps of the previous plan, with totals or the obstacle.
     fn left(&self, plan: &Plan, left: &Plan) -> Option<Way> {
         let steps: Vec<Call> = left.steps.iter().map(call_of).collect();
         if steps.is_empty() || plan.steps.iter().map(call_of).eq(steps.iter().cloned()) {
@@ -453,8 +453,8 @@ impl<'r> Scale<'r> {
         Some(Way { steps, whole, blocked, ..Way::default() })
     }
 
-    /// The quickest of all ways to take steps with one more among them, after which one that leads from an object to another is
-    /// shorter from there than it was.
+    /// Quickest insertion of one more step into a plan that shortens a later step between two
+    /// objects.
     fn through(&self, steps: &[Step]) -> Option<Vec<Step>> {
         let task = self.semantics.task;
         let step = |action: &str, arguments: [&str; 2]| Step {
@@ -502,7 +502,8 @@ impl<'r> Scale<'r> {
         best.map(|(_, steps)| steps)
     }
 
-    /// The same steps with other objects, with what has to be done before. The last step that has a choice is varied.
+    /// Alternatives: the plan's last step that has a choice, with other objects and necessary
+    /// preceding steps.
     fn others(&self, steps: &[Step], chosen: &Way) -> Vec<Other> {
         let task = self.semantics.task;
         let choices = |step: &Step| -> Option<Vec<Arc<[ObjectId]>>> {
@@ -534,7 +535,8 @@ impl<'r> Scale<'r> {
         ways.filter(|other| other.way.gains > GAINED && other.way.steps != chosen.steps).collect()
     }
 
-    /// Steps with another in the place of one: at once, as the plan leads there, or by one step from where it begins.
+    /// Plan with one step replaced: directly, where the plan leads there, or after one connecting
+    /// step.
     fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Other> {
         let instead = Instead::of(&steps[at], other);
         let mut all: Vec<Step> = steps.iter().map(|step| instead.in_step(step)).collect();
@@ -546,7 +548,7 @@ impl<'r> Scale<'r> {
         Some(Other { steps, instead, way })
     }
 
-    /// Steps that may lead from an object to another, for what a step is about.
+    /// Steps that may lead from one object to another, for the purpose of a step.
     fn bridges(&self, from: &str, to: &str, step: &Step) -> Vec<Step> {
         let bridge = |action: &Action, more: &[&String]| {
             let arguments = [from, to].into_iter().chain(more.iter().map(|m| m.as_str()));
@@ -564,15 +566,15 @@ impl<'r> Scale<'r> {
     }
 }
 
-/// Other steps than those of a plan.
+/// Alternative to a plan's steps.
 struct Other {
     steps: Vec<Step>,
     instead: Instead,
     way: Way,
 }
 
-/// The alternatives to keep: those with the highest gain per second, and of the others the quickest, the one
-/// with the highest gain, and the best about each object.
+/// Alternatives to keep: those with the highest gain per second, and of the others the quickest,
+/// the one with the highest gain, and the best about each object.
 fn kept(mut all: Vec<Other>) -> Vec<Other> {
     let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
     all.sort_by(|a, b| rate(a, b).then_with(|| a.way.steps.cmp(&b.way.steps)));

@@ -10,15 +10,15 @@ use crate::exit::CommandError;
 /// Answer about an action.
 #[derive(Debug, Serialize)]
 pub struct Answer {
-    /// The action, as it is written in plans.
+    /// Action as written in plans.
     pub action: String,
-    /// True if the plan that was found has it.
+    /// True if the found plan contains the action.
     pub in_plan: bool,
-    /// The parts of its condition that do not hold at first.
+    /// Parts of the action's condition that do not hold initially.
     pub unmet: Vec<String>,
-    /// A plan that takes it, whatever the goal.
+    /// Plan that contains the action, without the goal.
     pub leads_to_it: Tried,
-    /// A plan that takes it and reaches the goal.
+    /// Plan that contains the action and reaches the goal.
     pub with_it: Tried,
 }
 
@@ -28,7 +28,7 @@ pub struct Answer {
 pub enum Tried {
     /// A plan was found.
     Found(Plan),
-    /// There is none, and why.
+    /// None exists, with the reason.
     None(String),
     /// The search came to no result.
     Open,
@@ -109,7 +109,8 @@ fn conjuncts<'t>(condition: &'t Condition, parts: &mut Vec<&'t Condition>) {
     }
 }
 
-/// Lets an action with these arguments leave a mark; returns the condition that the mark is there.
+/// Adds a marker effect to an action for these arguments; returns the condition that the marker is
+/// set.
 fn mark(task: &mut Task, action: usize, arguments: &[descry_planner::task::ObjectId]) -> Condition {
     let predicate = PredicateId(task.predicates.len() as u32);
     let name = "taken".to_string();

@@ -1,4 +1,4 @@
-//! Calls and steps as a record has them: text in PDDL and in the form of plans, which the planner reads.
+//! Calls and steps in recorded form: PDDL text and plan text, readable by the planner.
 
 use descry_planner::{Plan, Source, Step};
 use descry_skills::Call;
@@ -72,7 +72,7 @@ pub mod calls {
 pub mod steps {
     use super::*;
 
-    /// The steps as a plan writes them, one a line.
+    /// Steps in plan format, one per line.
     pub fn lines(steps: &[Step]) -> Vec<String> {
         let plan = Plan { steps: steps.to_vec(), cost: None };
         plan.to_string().lines().map(str::to_string).collect()

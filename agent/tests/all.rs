@@ -1,4 +1,4 @@
-//! Promises of the agent, tested from outside: one program, so that what all tests share is built and linked
+//! Tests of the agent's public interface, in one program, so that shared code is built and linked
 //! once.
 
 #[path = "../examples/own_body.rs"]

@@ -1,5 +1,6 @@
-//! Random goals over the words of a built-in domain, asked and pursued in a small simulated room: no answer without a look at what the
-//! goal speaks of, and none that the truth denies more often than the confidence says that it may.
+//! Random goals over the words of a built-in domain, asked and pursued in a small simulated room:
+//! no answer without a look at the subject of the goal, and no more false answers than the
+//! confidence allows.
 
 use descry_agent::body;
 use descry_agent::keeping::Keeping;
@@ -13,7 +14,7 @@ use descry_domains::vocabulary::Vocabulary;
 use descry_planner::Source;
 use descry_robots::truth::Truth;
 
-/// Things with their kinds and their shapes in a scene.
+/// Objects with their kinds and their shapes in a scene.
 const THINGS: [(&str, &str, &str); 3] = [
     ("cup-a", "cup", "name = \"cup A\"\nshape.cup = { diameter_m = 0.070, height_m = 0.104 }"),
     ("mug", "mug", "name = \"mug\"\nshape.mug = { diameter_m = 0.080, height_m = 0.095 }"),
@@ -46,13 +47,13 @@ impl Draws {
 
 /// A condition that the truth of a scene decides.
 enum Goal {
-    /// A thing stands on a surface, in one of several wordings.
+    /// An object stands on a surface, in one of several wordings.
     On {
         thing: usize,
         on: usize,
         wording: usize,
     },
-    /// It stands on neither surface, or somewhere.
+    /// The object stands on neither surface, or anywhere.
     Nowhere {
         thing: usize,
         wording: usize,
@@ -160,12 +161,12 @@ impl Goal {
     }
 }
 
-/// The kind of a true object: one that a scene names by itself has its name for its kind.
+/// Kind of a true object; an object with a name of its own has this name as kind.
 fn kind_of(kind: &str) -> &str {
     if kind == "cup A" { "cup" } else { kind }
 }
 
-/// The domain with derived words and one phrase, and a room with some of the things in it.
+/// Domain with derived words and one phrase, and a room with some of the objects.
 fn home(goal: &Goal, is_question: bool, draws: &mut Draws) -> Domain {
     let mut domain = Domain::load("home").expect("a built-in domain");
     let text = domain.pddl.text.replacen("(:durative-action move", DERIVED, 1);
@@ -233,7 +234,8 @@ fn pursued(seed: u64, is_question: bool) -> Fared {
     Fared { pddl: goal.pddl(), verdict: report.verdict, views: report.views, is_true, why: report.why }
 }
 
-/// Pursues goals by their seeds, each as a question or as a task; returns answers, wrong ones, and those that could not be told.
+/// Pursues goals by their seeds, each as a question or a task; returns the numbers of answers, of
+/// wrong ones, and of undecided ones.
 fn check(seeds: std::ops::Range<u64>) -> [usize; 3] {
     let [mut answered, mut wrong, mut open] = [0; 3];
     for seed in seeds {

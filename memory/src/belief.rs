@@ -24,11 +24,11 @@ pub struct Track {
     /// Symbol of the supporting surface; empty while in the hand.
     #[serde(default)]
     pub on: String,
-    /// Position: centre of its body's footprint, world frame, metres.
+    /// Position: centre of the body's footprint, world frame, metres.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate, metres.
     pub position_sigma_m: f64,
-    /// Longer and shorter side of its footprint and its height, metres.
+    /// Longer and shorter side of the footprint, and height, metres.
     pub size_m: [f64; 3],
     /// Convex hull of the measured points, seen from above, world frame, metres; empty if only the size is
     /// known.
@@ -42,7 +42,7 @@ pub struct Track {
     pub unknown: f64,
     /// Share of the visible hull that some view measured or looked past, 0 to 1.
     pub seen_fraction: f64,
-    /// Positions of the cameras that saw it, world frame, metres.
+    /// Positions of the cameras that saw the object, world frame, metres.
     pub viewpoints_m: Vec<Point3<f64>>,
     /// Evidence for and against, as of the last merge.
     pub evidence: Evidence,
@@ -54,12 +54,12 @@ pub struct Track {
     pub last_ns: i64,
 }
 
-/// A percept with the cameras that saw it.
+/// Percept with the cameras that saw it.
 #[derive(Debug, Clone, Copy)]
 pub struct Sighted<'a> {
     /// Percept.
     pub percept: &'a Percept,
-    /// Positions of the cameras that saw it, world frame, metres.
+    /// Positions of the cameras that saw the object, world frame, metres.
     pub viewpoints_m: &'a [Point3<f64>],
     /// Convex hull of the measured points, seen from above, world frame, metres.
     pub footprint_m: &'a [Point3<f64>],
@@ -99,8 +99,8 @@ impl Track {
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
-    /// True if a view may have blurred the object into another over its place: the object is known,
-    /// the other an unknown and much larger thing.
+    /// True if views may have blurred the object into another one over its place, a much larger
+    /// unknown object.
     pub fn may_be_blurred_into(&self, label: Option<&str>, size_m: &[f64; 3]) -> bool {
         let volume = |size_m: &[f64; 3]| size_m.iter().product::<f64>();
         self.label().is_some() && label.is_none() && volume(size_m) > MUCH_LARGER * volume(&self.size_m)
@@ -114,9 +114,9 @@ impl Track {
 }
 
 impl Belief {
-    /// Updates the tracks of a surface from the merge of all its views. Percepts are assigned to tracks at
-    /// the least sum of distances within the gate; tracks without a percept are gone. Tracks on other
-    /// surfaces stay unchanged.
+    /// Updates the tracks of a surface from the merge of all its views: percepts are assigned to
+    /// tracks by minimum total distance within the gate; unassigned tracks are gone. Tracks on
+    /// other surfaces stay unchanged.
     ///
     /// Percepts rest on every view of the surface so far, so their probabilities replace the earlier ones. A
     /// known object that a larger unknown one has absorbed, because the last view blurs the two, keeps its
@@ -159,7 +159,8 @@ impl Belief {
         }
     }
 
-    /// Marks a track as mislaid: the object was touched, so its position is unknown until it is seen again.
+    /// Marks a track as mislaid: the object was touched, so that its position is unknown until it
+    /// is seen again.
     pub fn mislay(&mut self, id: u64) {
         if let Some(at) = self.tracks.iter().position(|t| t.id == id) {
             self.mislaid.push(self.tracks.remove(at));
@@ -205,7 +206,7 @@ struct Association {
     new: Vec<usize>,
 }
 
-/// True if a percept is an unknown thing, much larger than a known object, over its place.
+/// True if a percept is a much larger unknown object over a known object's place.
 fn swallows(percept: &Percept, track: &Track) -> bool {
     let reach_m = percept.size_m[0].max(percept.size_m[1]) / 2.0;
     track.may_be_blurred_into(percept.label.as_deref(), &percept.size_m)

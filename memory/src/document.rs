@@ -54,7 +54,7 @@ pub struct Meta {
     pub body: Value,
 }
 
-/// The form of a blob; decides the schema under which viewers read it.
+/// Form of a blob, which determines the schema for viewers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
@@ -111,7 +111,7 @@ pub struct Document {
     /// The coordinate frame of the content; for transforms the child frame.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub frame: String,
-    /// Robot that recorded it, where several write into one store.
+    /// Robot of the record, in a store shared by several.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub robot: String,
     /// Position of the sensor, world frame, metres.
@@ -123,7 +123,7 @@ pub struct Document {
     /// Objects that the record mentions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<Sighting>,
-    /// True if it is never pruned, because the recording cannot be understood without it.
+    /// True if never pruned, because the recording cannot be understood without this record.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub kept: bool,
     /// Content.
@@ -264,7 +264,7 @@ pub struct Near {
     pub radius_m: f64,
 }
 
-/// The order of what is found; records of one stamp stand in the order of their numbers.
+/// Order of results; records with equal stamps are ordered by number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
     /// Oldest first.
@@ -281,7 +281,7 @@ pub struct Query {
     pub kind: Option<String>,
     /// Coordinate frame; none: any.
     pub frame: Option<String>,
-    /// Robot that recorded them.
+    /// Robot of the records.
     pub robot: Option<String>,
     /// Earliest stamp, nanoseconds; a span counts until its end.
     pub from_ns: Option<i64>,

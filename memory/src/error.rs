@@ -15,7 +15,7 @@ pub enum Error {
         /// The file that was being written.
         place: PathBuf,
     },
-    /// The data does not fit within the size limit of the record, since too little can be pruned. None of it
+    /// The data exceeds the size limit of the record, and too little can be pruned. Nothing of it
     /// was recorded.
     #[error(
         "{place} is bounded to {}, and {} more do not fit: {} are pinned{} or of this very moment; allow {} or more (`--max-bytes`), or pin less",
@@ -70,7 +70,7 @@ pub enum Error {
     Damaged {
         /// The file.
         place: PathBuf,
-        /// Offset in it.
+        /// Offset in the file.
         at: u64,
         /// Found and expected bytes.
         what: String,
@@ -129,7 +129,7 @@ pub enum Error {
         /// Blobs.
         has: String,
     },
-    /// Nothing near enough in time.
+    /// No record within the time tolerance.
     #[error("no {what} within {:.3} s of {stamp_ns} ns{}", *tolerance_ns as f64 * 1e-9, nearest_text(*nearest_ns, *stamp_ns))]
     NotNear {
         /// Subject of the search.
@@ -138,13 +138,13 @@ pub enum Error {
         stamp_ns: i64,
         /// Tolerance, nanoseconds.
         tolerance_ns: i64,
-        /// The stamp of the nearest there is, nanoseconds.
+        /// Stamp of the nearest record, nanoseconds.
         nearest_ns: Option<i64>,
     },
     /// The transform tree has no answer for that time.
     #[error(transparent)]
     Transform(#[from] crate::transforms::TransformError),
-    /// A write in the background failed earlier; what it held was not acknowledged.
+    /// An earlier background write failed; its data was not acknowledged.
     #[error("an earlier write of transforms failed: {because}")]
     Earlier {
         /// Message of that failure.

@@ -28,15 +28,15 @@ pub struct LearnedThing {
     pub name: String,
     /// Time of learning, seconds since 1970.
     pub learned_unix_s: f64,
-    /// Its surface, relative to its centre and upright as it stood, metres.
+    /// Surface points relative to the object's centre, upright as it stood, metres.
     #[serde(with = "packed")]
     pub cloud: Cloud,
-    /// Share of the directions around it from which it was seen, 0 to 1.
+    /// Share of the directions around the object from which it was seen, 0 to 1.
     pub sides: f64,
-    /// Bit set of these directions: 36 sectors, counted anticlockwise from its x axis.
+    /// Directions as a bit set: 36 sectors, counted anticlockwise from the object's x axis.
     #[serde(default)]
     pub directions: u64,
-    /// Number of encounters with views from all around; the cloud merges them.
+    /// Number of encounters with views from all around that the cloud merges.
     #[serde(default = "once")]
     pub meetings: u32,
     /// Place of the last sighting.

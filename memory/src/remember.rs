@@ -28,7 +28,7 @@ pub const MOST_GONE: usize = 500;
 pub struct Recollection {
     /// Time of the sighting, seconds since 1970.
     pub seen_unix_s: f64,
-    /// Belief about it at that time.
+    /// Belief about the object at that time.
     pub track: Track,
 }
 
@@ -102,8 +102,8 @@ impl Remembered {
         store.sync()
     }
 
-    /// Memory after a run: its belief about the surfaces that it looked at, and the earlier memory of all
-    /// others.
+    /// Memory after a run: the run's belief about the surfaces it looked at, and the earlier memory
+    /// of all others.
     pub fn after(self, belief: &Belief, looked_at: &[String], now_unix_s: f64) -> Self {
         let is_here = |r: &Recollection| looked_at.contains(&r.track.on);
         let (before, elsewhere): (Vec<_>, Vec<_>) = self.present.into_iter().partition(is_here);
@@ -171,8 +171,8 @@ impl Remembered {
         self.present.iter().map(aged).collect()
     }
 
-    /// Last sighting of a name, and true if the object was still there at the next look; none if it was never
-    /// seen.
+    /// Last sighting of a name, and true if the object was still there at the next look; `None` if
+    /// never seen.
     pub fn last_seen(&self, name: &str) -> Option<(&Recollection, bool)> {
         let is = |r: &&Recollection| r.track.probability_of(name) > 0.5;
         let newest = |list: &'_ [Recollection]| -> Option<usize> {

@@ -28,8 +28,8 @@ const NARROW: f64 = 0.01;
 /// centimetres. From: chosen.
 const LEAST_MILLIMETRES: f64 = 300.0;
 const MOST_CENTIMETRES: f64 = 800.0;
-/// Resolution of single-precision coordinates above which objects are blurred, metres. From:
-/// chosen.
+/// Resolution of single-precision coordinates above which objects are blurred, metres.
+/// From: chosen.
 const COARSEST_M: f64 = 1e-4;
 
 /// Points with optional attributes; each attribute that is present has one entry per point.

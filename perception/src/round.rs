@@ -20,8 +20,8 @@ const PROPOSALS: usize = 120;
 const JUDGES: usize = 160;
 /// Points that all steps of a fit but the last go by, at the most. From: chosen.
 const SCOUTS: usize = 800;
-/// Minimum number of side points to start a fit, and of points near the side to continue. From:
-/// chosen.
+/// Minimum number of side points to start a fit, and of points near the side to continue.
+/// From: chosen.
 const FEWEST: (usize, usize) = (20, 12);
 /// Gates of the first steps of a fit, in tolerances. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];

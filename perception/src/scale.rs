@@ -13,8 +13,8 @@ pub const EDGE_M: f64 = 0.5 * PLACE_M;
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
 /// Number of spreads of a measurement beyond which a deviation is more than noise. From: chosen.
 pub(crate) const SPREADS: f64 = 3.0;
-/// Minimum and maximum reach of a handle from the body, and its maximum width, metres. From:
-/// chosen.
+/// Minimum and maximum reach of a handle from the body, and its maximum width, metres.
+/// From: chosen.
 pub(crate) const HANDLE_M: (f64, f64) = (0.014, 0.06);
 pub(crate) const HANDLE_WIDTH_M: f64 = 0.035;
 

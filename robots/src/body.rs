@@ -28,7 +28,7 @@ pub struct SurfaceHint {
     pub outline_m: Vec<Point2<f64>>,
     /// Approximate height above the floor, metres.
     pub height_m: f64,
-    /// The room that contains it, if the map has rooms.
+    /// Room of the surface, if the map has rooms.
     #[serde(default)]
     pub room: Option<String>,
 }
@@ -38,7 +38,7 @@ pub struct SurfaceHint {
 pub struct Room {
     /// Name for people: `kitchen`.
     pub name: String,
-    /// Outline of its floor in the map, corners in order, metres.
+    /// Outline of the room's floor in the map, corners in order, metres.
     pub outline_m: Vec<Point2<f64>>,
 }
 
@@ -130,7 +130,7 @@ pub struct StampedTransform {
 pub struct Colour {
     /// The pixels.
     pub image: RgbImage,
-    /// True if its pixels are those of the depth image.
+    /// True if the colour pixels coincide with those of the depth image.
     pub registered: bool,
 }
 
@@ -200,7 +200,7 @@ pub struct Reading {
 pub struct Push {
     /// Centre of the object, map frame, metres.
     pub object: Point3<f64>,
-    /// Direction in the map frame; its length is ignored.
+    /// Direction in the map frame, of any length.
     pub direction: Vector2<f64>,
     /// Length of the push, metres.
     pub distance_m: f64,

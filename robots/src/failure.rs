@@ -13,7 +13,7 @@ pub enum Failure {
         /// Obstacle, or missing destination.
         because: String,
     },
-    /// An obstacle missing in the map blocked the way; another route or a later try may work.
+    /// An unmapped obstacle blocked the route; another route or a later try may work.
     #[error("blocked: {because}")]
     Blocked {
         /// Place and obstacle, as far as the body knows.
@@ -25,7 +25,7 @@ pub enum Failure {
     /// The time limit passed. The body stands still at its current place.
     #[error("timed out: {because}")]
     TimedOut {
-        /// Request and the time that it took.
+        /// Request and elapsed time.
         because: String,
     },
     /// The request was cancelled.
@@ -39,7 +39,7 @@ pub enum Failure {
     SensorDropped {
         /// Missing frame.
         because: String,
-        /// Time at which it was due, on the body's clock.
+        /// Due time, on the body's clock.
         stamp_ns: Stamp,
     },
     /// The body does not know where it is.
@@ -48,7 +48,7 @@ pub enum Failure {
         /// Sign of the lost localisation.
         because: String,
     },
-    /// The hand failed to do what was requested; the scene may have changed nevertheless.
+    /// The hand failed; the scene may have changed nevertheless.
     #[error("slipped: {because}")]
     Slipped {
         /// Description of the event, as felt by the body.
@@ -101,7 +101,7 @@ impl Failure {
         }
     }
 
-    /// True if the same call may work when it is tried again.
+    /// True if a retry may succeed.
     pub fn is_passing(&self) -> bool {
         matches!(
             self,

@@ -1,4 +1,4 @@
-//! A program as a body: what its command line leaves open is filled in when it is started.
+//! Program as a body: placeholders of the command line are filled at the start.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ pub const TRUTH: &str = "{truth}";
 /// commas between, as one word of the shell.
 pub const WITHOUT: &str = "{without}";
 
-/// A file that a program writes for reports. It is removed with its body.
+/// Temporary file to which a program writes ground truth for reports; removed with the body.
 pub struct TruthFile(PathBuf);
 
 impl TruthFile {

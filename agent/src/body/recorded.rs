@@ -1,4 +1,4 @@
-//! The record of a run as a body: it can stand where a cloud was taken, and looking returns that cloud.
+//! Record of a run as a body: it can stand where a cloud was taken, and looking returns that cloud.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -23,7 +23,8 @@ impl Footage for Clouds {
     }
 }
 
-/// Opens a record as a body. Clouds of another camera than the first one's, and those whose place is not known, are no stations.
+/// Opens a record as a body. Clouds with another camera than the first one's, and those without a
+/// known pose, are not stations.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if no cloud has a place; [`CommandError::Broken`] if the record cannot be read.
@@ -72,7 +73,7 @@ pub fn is_record(folder: &Path) -> bool {
         || [folder.to_owned(), folder.join("record")].iter().any(|f| f.join("segments").is_dir())
 }
 
-/// A station is called after the pose that the agent looked from; where it looked twice, with a number.
+/// Name of a station: the pose of the look, numbered if there were several looks.
 fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
     let from = document.body.get("from").and_then(|v| v.as_str()).unwrap_or("view");
     let numbered = (2..).map(|n| format!("{from}-{n}"));

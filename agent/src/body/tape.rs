@@ -18,7 +18,7 @@ pub const BODY: &str = "body";
 /// The blob that holds the map of the room.
 const MAP: &str = "map";
 
-/// Keeps a body's answers in a record, and has the frames of those that were kept.
+/// Tape that records a body's answers and returns the frames of recorded ones.
 pub struct RecordTape {
     /// Record that new answers go to.
     pub into: Arc<Record>,
@@ -51,7 +51,7 @@ impl Tape for RecordTape {
     }
 }
 
-/// Pixels of a recorded cloud's camera, with the colours of its time.
+/// Pixels of a recorded cloud's camera, with the colours of the same time.
 ///
 /// # Errors
 /// Why it cannot be read.
@@ -69,7 +69,7 @@ pub fn pixels(record: &Record, cloud: &descry_memory::Document) -> Result<Pixels
     Ok(Pixels { cloud: points, colour })
 }
 
-/// A colour image that was recorded with a view; none if it is another kind of image.
+/// Colour image recorded with a view; `None` for other images.
 fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<Colour>, String> {
     let Some(info) = document.blobs.iter().find(|b| b.form == Form::RawImage) else { return Ok(None) };
     let number = |key: &str| info.layout.get(key).and_then(Value::as_u64).and_then(|n| u32::try_from(n).ok());
@@ -79,7 +79,7 @@ fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<
     Ok(RgbImage::from_raw(width, height, data).map(|image| Colour { image, registered }))
 }
 
-/// Records what a body is.
+/// Records the description of a body.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be kept.
@@ -101,7 +101,7 @@ pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
 
-/// Body of a record; none if the record does not state it.
+/// Recorded description of a body, if any.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be read.
@@ -118,7 +118,7 @@ pub fn known(record: &Record) -> Result<Option<Known>, CommandError> {
     Ok(Some(known))
 }
 
-/// The answers in a record, in their order; not the last, if the pixels of its frame did not make it to the disk.
+/// Recorded answers in order, without a last frame whose pixels did not reach the disk.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if they cannot be read.

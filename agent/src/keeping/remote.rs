@@ -1,4 +1,5 @@
-//! Records in MongoDB, where descry was built with the feature `mongodb`; otherwise the words that say how to build it.
+//! Records in MongoDB, if built with the feature `mongodb`; otherwise an error that names the
+//! feature.
 
 use std::path::Path;
 
@@ -9,12 +10,12 @@ const SCHEME: &str = "mongodb://";
 /// The environment variable that holds name and password for a server, as `NAME:PASSWORD`.
 const LOGIN: &str = "DESCRY_MONGODB_LOGIN";
 
-/// A store in MongoDB, and whose records in it are meant.
+/// Address of a MongoDB store and of the records meant in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
-    /// Address of the server, as the driver takes it.
+    /// Address of the server in the driver's form.
     server: String,
-    /// The run's name in the store; none for everything there.
+    /// Name of the run in the store; `None` for all runs.
     pub run: Option<String>,
 }
 
@@ -37,7 +38,7 @@ impl Address {
         Ok(Address { server: server.into(), run: run.filter(|run| !run.is_empty()).map(str::to_owned) })
     }
 
-    /// This address in the name of a run: the one that it says, or that of the run's folder.
+    /// Address with a run's name: the stated one, or that of the run's folder.
     pub fn of_run(self, folder: &Path) -> Self {
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let name = whole.file_name().map(|n| n.to_string_lossy().into_owned());
@@ -71,7 +72,7 @@ mod driver {
     use crate::exit::CommandError;
 
     impl Address {
-        /// Opens the record of a run to write it.
+        /// Opens the record of a run for writing.
         ///
         /// # Errors
         /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] for a limit that it cannot keep.
@@ -81,7 +82,7 @@ mod driver {
             Ok(Record::on(Arc::new(store), options))
         }
 
-        /// Opens the record of a run, or everything in the store, to read it.
+        /// Opens the record of a run, or the whole store, for reading.
         ///
         /// # Errors
         /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] if there is no such run.

@@ -1,4 +1,4 @@
-//! Beginning of a run, as the first document of its record: all that a replay needs.
+//! Beginning of a run, the first document of its record, with everything a replay needs.
 
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ pub struct Beginning {
     pub scene: Option<(String, String)>,
 }
 
-/// The kind under which it is recorded.
+/// Record kind of the beginning.
 const RUN: &str = "run";
 
 impl Beginning {
@@ -36,7 +36,7 @@ impl Beginning {
         Beginning { header, files: domain.files.clone(), folder: domain.folder.clone(), past: None, scene }
     }
 
-    /// Records it, never to be pruned.
+    /// Records the beginning, never to be pruned.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be kept.
@@ -64,7 +64,7 @@ impl Beginning {
         Ok(Some(beginning))
     }
 
-    /// The domain as it was, and its scene under the name of that time.
+    /// Domain as recorded, with its scene under the recorded name.
     ///
     /// # Errors
     /// [`CommandError::BadInput`] if this version does not understand it.

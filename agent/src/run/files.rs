@@ -1,4 +1,4 @@
-//! Files beside the record of a run: its settings, and its report.
+//! Files beside the record of a run: settings and report.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ pub(super) const HEADER: &str = "run.json";
 const REPORT: &str = "report.json";
 /// The kind under which the report of a run is recorded.
 const REPORTED: &str = "report";
-/// Key of the checksum of all else in a file.
+/// Key of the checksum over the rest of a file.
 const CHECKSUM: &str = "crc32";
 
 /// Settings of a run from its folder, or from its record if the file is missing or damaged.
@@ -51,17 +51,17 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
     })
 }
 
-/// The record in a run's folder, if it is there and can be read.
+/// Record in a run's folder, if readable.
 fn recorded(folder: &Path) -> Option<Record> {
     Record::open_shared(&folder.join(RECORD)).ok()
 }
 
-/// Settings of a run from its record.
+/// Settings of a run, from its record.
 fn begun(record: &Record) -> Option<Header> {
     Beginning::of(record).ok().flatten().map(|beginning| beginning.header)
 }
 
-/// Settings of a run from its folder, if its record has no others.
+/// Settings of a run from its folder, unless its record has others.
 fn own_header(folder: &Path, begun: Option<&Header>) -> Result<Header, String> {
     let path = folder.join(HEADER);
     let header: Header = read_json(&path)?;
@@ -86,7 +86,7 @@ pub(super) fn is_run(folder: &Path) -> bool {
     [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
 }
 
-/// Loss through a missing or damaged settings file; the record has all else.
+/// Message about a missing or damaged settings file, if the record has the rest.
 pub fn lost_of_header(folder: &Path) -> Option<String> {
     let why = own_header(folder, recorded(folder).as_ref().and_then(begun).as_ref()).err()?;
     Some(format!("whether the run was cut off and gone on with: {why}"))
@@ -106,7 +106,7 @@ pub fn lost_of_record(folder: &Path, record: &Record) -> Result<Option<Fault>, C
     }))
 }
 
-/// Writes what a run was started with into its folder.
+/// Writes the settings of a run into its folder.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the folder cannot be written.
@@ -114,7 +114,8 @@ pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
     write_json(&folder.join(HEADER), header)
 }
 
-/// The report of a run: what its folder says, or its record where that is missing or damaged; none while it has not finished.
+/// Report of a run, from its folder or, if missing or damaged, from its record; `None` for an
+/// unfinished run.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if it is damaged, and the record has none.
@@ -146,7 +147,7 @@ pub fn has_ended(folder: &Path) -> bool {
     folder.join(REPORT).exists()
 }
 
-/// Records how a run ended: what is the same however often it is lived through.
+/// Records the end of a run, with the reproducible values only.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if it cannot be kept.
@@ -179,7 +180,7 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
 /// Maximum size of a run's file, bytes. From: chosen.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Reads a file of a run; an error if its content is not what was written.
+/// Reads a JSON file of a run and verifies its checksum.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
     let shown = path.display();
     let bytes = read_bytes(path, MOST_BYTES).map_err(|e| format!("{shown}: {e}"))?;

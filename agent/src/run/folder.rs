@@ -53,7 +53,7 @@ impl Folder {
         Ok(claimed)
     }
 
-    /// The folder of a run that is to go on.
+    /// Folder of a run to be resumed, locked.
     ///
     /// # Errors
     /// [`CommandError::BadInput`] if another process writes there, or if it cannot be written.
@@ -70,7 +70,7 @@ impl Folder {
         }
     }
 
-    /// The first folder that is not there yet: a process that makes it at the same time gets the next.
+    /// First free numbered folder; safe against concurrent creation.
     fn numbered(stem: &Path) -> Result<Self, CommandError> {
         let parent = stem.parent().unwrap_or(Path::new("."));
         create_dir_all(parent).map_err(|e| {

@@ -1,10 +1,10 @@
-//! Settings of a run, as its folder and its record hold them.
+//! Settings of a run, in its folder and its record.
 
 use serde::{Deserialize, Serialize};
 
 use crate::keeping::Keeping;
 
-/// Settings that a run was started with: enough to start it again.
+/// Settings of a run, sufficient to start it again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The body, as on the command line.
@@ -20,7 +20,7 @@ pub struct Settings {
     /// Storage options of the record.
     #[serde(default)]
     pub keeping: Keeping,
-    /// Store in which the last seen objects are remembered from run to run; none: nothing is remembered.
+    /// Store of the persistent belief; `None`: nothing is remembered.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remember: Option<String>,
 }
@@ -34,7 +34,7 @@ pub struct Header {
     pub goal: String,
     /// The goal in PDDL.
     pub pddl_goal: String,
-    /// Time at which it was started, seconds since 1970.
+    /// Start time, seconds since 1970.
     pub started_unix_s: u64,
     /// The interruptions after which the run was resumed, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -44,12 +44,12 @@ pub struct Header {
     pub settings: Settings,
 }
 
-/// Note that a run was cut off and gone on with. It stands beside the record, which is the same as
-/// without a cut.
+/// Note that a run was interrupted and resumed. It is kept outside the record, which equals that of
+/// an uninterrupted run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Resumed {
     /// When, seconds since 1970.
     pub unix_s: u64,
-    /// The last event that was recorded before, by its number; none: nothing had happened.
+    /// Number of the last event before the interruption; `None` without events.
     pub after: Option<u64>,
 }

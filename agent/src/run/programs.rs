@@ -16,7 +16,7 @@ use crate::exit::CommandError;
 /// Record kind of an exchange with a program.
 const PROGRAM: &str = "program";
 
-/// A question to a program, and what it said.
+/// Question to a program, with its answer.
 #[derive(Debug, Serialize, Deserialize)]
 struct Exchange {
     asked: Value,
@@ -42,8 +42,8 @@ pub struct OnRecord {
 }
 
 impl OnRecord {
-    /// Reason for which a replay could go no further: the record has no answer to a program's
-    /// question. None if it could.
+    /// Reason why a replay cannot continue: a program's question has no recorded answer; `None`
+    /// otherwise.
     pub fn ended(&self) -> Option<String> {
         self.programs.as_ref()?.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -88,8 +88,8 @@ impl Tape for Programs {
     }
 }
 
-/// The domain with its programs' answers kept in `into`; those of an earlier life come `from` the record of that. Programs are run
-/// for further questions only if `run`.
+/// Domain whose programs' answers are recorded in `into`, and replayed `from` the record of an
+/// earlier session; programs are run for further questions only if `run`.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if earlier answers cannot be read.

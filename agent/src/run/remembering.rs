@@ -1,4 +1,4 @@
-//! Persistent belief: read from its store when a run begins, written there when it ends.
+//! Persistent belief: read from its store at the beginning of a run, written back at the end.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
     Ok(Past { remembered: Arc::new(remembered), now_unix_s })
 }
 
-/// Makes sure, before a run begins in a folder, that what it sees can be kept.
+/// Checks before a run that its store is writable and distinct from the run's own folder.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if that is no place for a store, or none that can be written; else as [`recall`].
@@ -40,7 +40,7 @@ pub fn check(store: &str, run: &Path) -> Result<(), CommandError> {
     open(store).map(|_| ())
 }
 
-/// Writes what a run learned into a store, merged with what other runs have written since `began`.
+/// Writes what a run learned into a store, merged with what other runs wrote since `began`.
 ///
 /// # Errors
 /// As [`recall`].
@@ -51,7 +51,8 @@ pub fn keep(store: &str, began: &Past, left: Remembered, now_unix_s: f64) -> Res
     joined.keep(&store, now_unix_s).map_err(CommandError::broken)
 }
 
-/// The store in a folder or at an address, made if it is not there. Another process that keeps something there is waited for.
+/// Opens or creates the store in a folder or at an address; waits for another process that writes
+/// there.
 fn open(store: &str) -> Result<Record, CommandError> {
     let folder = Path::new(store);
     if is_address(folder) {

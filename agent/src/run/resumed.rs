@@ -23,7 +23,7 @@ pub struct GoingOn<'a> {
     pub folder: &'a Path,
     /// Expected goal, if the caller gave one.
     pub said: Option<&'a str>,
-    /// Address of the body now, if it has changed since the beginning.
+    /// Current address of the body, if changed since the beginning.
     pub robot: Option<&'a str>,
     /// True if the programs named by the record may be run.
     pub allow_programs: bool,
@@ -31,7 +31,8 @@ pub struct GoingOn<'a> {
     pub prepare: &'a Prepare<'a>,
 }
 
-/// Goes on with a run from its record to its end; goal and settings are those of that run. `begun` hears when it is claimed.
+/// Resumes a run from its record to its end, with the recorded goal and settings; `began` is called
+/// once the run is claimed.
 ///
 /// # Errors
 /// [`CommandError`] as for [`super::pursue`]; if the run has another goal, if another process writes it, if its record is damaged, or
@@ -97,7 +98,7 @@ pub async fn resume(
     Ok(report)
 }
 
-/// Writes into a run's folder that it is gone on with.
+/// Notes in a run's folder that the run was resumed.
 fn keep(folder: &Path, header: &Header, record: &Record) -> Result<(), CommandError> {
     let events = record.find(&record.own("event")).map_err(CommandError::broken)?;
     let after = events.last().map(|event| event.id.0);

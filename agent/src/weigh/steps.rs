@@ -1,24 +1,24 @@
-//! Steps with other objects in them, and steps that could be one.
+//! Steps with exchanged objects, and steps that can be merged.
 
 use descry_planner::task::{Change, Term};
 use descry_planner::{Semantics, Step};
 
-/// Objects, each with the one in its place.
+/// Substitution of objects.
 pub struct Instead(pub Vec<(String, String)>);
 
 impl Instead {
-    /// The objects of a step, and in their place those of another.
+    /// Substitution of one step's objects by another's.
     pub fn of(old: &Step, new: &Step) -> Self {
         let pairs = old.arguments.iter().zip(&new.arguments).filter(|(old, new)| old != new);
         Instead(pairs.map(|(old, new)| (old.clone(), new.clone())).collect())
     }
 
-    /// A step with the others in it.
+    /// Step with the substitution applied.
     pub fn in_step(&self, step: &Step) -> Step {
         self.put(step, |name| self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new))
     }
 
-    /// A step with the others in it, and those in the place of the others: what comes first otherwise comes later then.
+    /// Step with the substitution applied in both directions, for exchanged order.
     pub fn exchanged(&self, step: &Step) -> Step {
         let back = |name: &str| self.0.iter().find(|(_, new)| new == name).map(|(old, _)| old);
         self.put(step, |name| {
@@ -50,7 +50,7 @@ pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     (all.len() < steps.len()).then_some(all)
 }
 
-/// True unless a step has exactly two arguments and they are equal: it leads nowhere.
+/// True unless a step has exactly two arguments and they are equal, as it then leads nowhere.
 pub fn leads(step: &Step) -> bool {
     !matches!(step.arguments.as_slice(), [from, to] if from == to)
 }

@@ -1,5 +1,6 @@
-//! The store in MongoDB, as in paper 004 (section IV): a document for each record, found by its time, and what is large beside it
-//! in GridFS. Several robots write into one store, each under a name of its own; a database shards where one machine is not enough.
+//! Store in MongoDB, as in paper 004 (section IV): one document per record, found by time, with
+//! large data in GridFS. Several robots write into one store under names of their own; a database
+//! shards if one machine is not enough.
 //!
 //! | collection | holds |
 //! |---|---|
@@ -164,7 +165,7 @@ impl MongoStore {
         self.said(self.records.create_indexes(indexes).run()).map(|_| ())
     }
 
-    /// Translates errors of the driver into those of this crate.
+    /// Translates driver errors into those of this crate.
     fn said<T>(&self, answer: mongodb::error::Result<T>) -> Result<T, Error> {
         /// Error code `OutOfDiskSpace`.
         const NO_ROOM: i32 = 14031;

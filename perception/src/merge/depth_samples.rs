@@ -25,8 +25,8 @@ const PLANE_M: f32 = BAND.1 as f32;
 const PLANE_FACING: f32 = parts::PLANE_FACING as f32;
 /// Number of image columns from which normals of objects are computed. From: chosen.
 const COLUMNS: usize = 320;
-/// Normal estimation for objects, from small windows because they are finer than planes. From:
-/// chosen.
+/// Normal estimation for objects, from small windows because they are finer than planes.
+/// From: chosen.
 const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.02, base_m: 0.006, least: 5 };
 
 /// Returns that are taken together of a cloud without rows. From: work.

@@ -37,12 +37,12 @@ use std::thread::{self, JoinHandle};
 const TOGETHER: usize = 2;
 /// Number of earlier views up to which all are merged together. From: chosen.
 const FEW: usize = 6;
-/// Number of views up to which the earlier ones may move when a further one is aligned. From:
-/// chosen, fewer false names at twice the assumed noise.
+/// Number of views up to which the earlier ones may move when a further one is aligned.
+/// From: chosen, fewer false names at twice the assumed noise.
 const MOVABLE: usize = 4;
-/// Minimum relative motion of the earlier views from which they are fused again, metres. From:
-/// chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and four
-/// views, as with none.
+/// Minimum relative motion of the earlier views from which they are fused again, metres.
+/// From: chosen, with 2 mm there are twice as many false names at twice the assumed noise, three and
+/// four views, as with none.
 const MOVED_M: f64 = 0.001;
 
 /// Incremental merger of the growing set of views of one place.

@@ -54,8 +54,8 @@ fn sides(normal: &Vector3<f64>, least: f64) -> impl Iterator<Item = usize> {
 impl Cells {
     /// Cells around points, with room for `reach` cells to each side.
     fn new(points: &[Oriented], side_m: f64, reach: i32) -> Cells {
-        /// Minimum component of a normal along a side for a surface to face that side. From:
-        /// chosen.
+        /// Minimum component of a normal along a side for a surface to face that side.
+        /// From: chosen.
         const FACES: f64 = 0.3;
         let key = |p: &Point3<f64>| [p.x, p.y, p.z].map(|c| floor(c / side_m));
         let keys: Vec<[i32; 3]> = points.iter().map(|(p, _)| key(p)).collect();

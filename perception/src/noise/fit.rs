@@ -16,8 +16,8 @@ pub(crate) const CELL_PX: usize = 8;
 const BLOCKS: usize = 24;
 /// Minimum share of a block's pixels on the face. From: chosen.
 const COVERED: f64 = 0.8;
-/// Maximum distance of a return from its face, as a share of the depth, metres per metre. From:
-/// chosen.
+/// Maximum distance of a return from its face, as a share of the depth, metres per metre.
+/// From: chosen.
 const NEAR_SHARE: f64 = 0.012;
 /// A block is so far within the face, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;

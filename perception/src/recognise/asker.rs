@@ -6,8 +6,8 @@ use crate::surface::range_sigma_m;
 use crate::visibility::{DepthMap, Seen, Visibility};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 
-/// Minimum cosine between viewing directions of cameras that see the same side of an object. From:
-/// chosen.
+/// Minimum cosine between viewing directions of cameras that see the same side of an object.
+/// From: chosen.
 const SAME_SIDE: f64 = 0.9;
 /// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;

@@ -436,8 +436,8 @@ impl Sectors {
 
     /// Share of the directions in which a handle, about two sectors wide, could hide.
     fn unseen_share(&self) -> f64 {
-        /// Minimum seen-through share of possible handle positions that excludes a handle. From:
-        /// chosen.
+        /// Minimum seen-through share of possible handle positions that excludes a handle.
+        /// From: chosen.
         const FREE: f64 = 0.6;
         let hides = |i: usize| self.handle_free[i] < FREE && self.handle_free[(i + 1) % SECTORS] < FREE;
         (0..SECTORS).filter(|&i| hides(i)).count() as f64 / SECTORS as f64
@@ -491,8 +491,8 @@ impl Protrusion {
         const WINDOW: usize = 3;
         /// Fewest points. From: chosen.
         const FEWEST: usize = 3;
-        /// Quantiles of a protrusion's points that define its extent across and in height. From:
-        /// chosen.
+        /// Quantiles of a protrusion's points that define its extent across and in height.
+        /// From: chosen.
         const SPAN: (f64, f64) = (0.1, 0.9);
         let beside = |p: &&Point3<f64>| {
             let outside_m = round.outside_m(p);

@@ -235,8 +235,8 @@ pub(super) fn handle_log(handle: Handle, m: &Measured) -> f64 {
     const MISSED: f64 = 0.04;
     const FOUND: f64 = 0.9;
     const STRAY: f64 = 0.02;
-    /// Probabilities that no handle is found where there is none, and that one is found. From:
-    /// chosen.
+    /// Probabilities that no handle is found where there is none, and that one is found.
+    /// From: chosen.
     const NEITHER: (f64, f64) = (0.99, 0.01);
     let unseen = m.evidence.handle_unseen.clamp(0.0, 1.0);
     let sure = match m.evidence.handle {

@@ -20,8 +20,8 @@ use rustc_hash::FxHashMap;
 const MOST_M: f64 = 0.03;
 /// Maximum ratio of the side's spread after and before registration. From: chosen.
 const ROUNDER: f64 = 0.85;
-/// Maximum distance of used points from the side, metres, decreasing over the iterations. From:
-/// chosen, one a step.
+/// Maximum distance of used points from the side, metres, decreasing over the iterations.
+/// From: chosen, one a step.
 const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
 /// Number of points used of each view, and minimum number required. From: chosen.
 const ENOUGH: usize = 400;

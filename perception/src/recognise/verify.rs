@@ -16,8 +16,8 @@ const STEPS_M: [f64; 2] = [0.003, 0.0015];
 /// Maximum error of views that were aligned with each other, metres, and maximum number of tries of each
 /// step. From: derived, as exactly as an edge is known; work.
 const LAID: (f64, usize) = (EDGE_M, 2);
-/// Standard deviation and number of steps of the shift for views at their merged poses. From:
-/// derived, a place; work, so that they are moved up to 3 cm.
+/// Standard deviation and number of steps of the shift for views at their merged poses.
+/// From: derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
 /// Least radius of a round body, metres. From: rounding.

@@ -17,8 +17,8 @@ const FACES: usize = 2;
 const FLAT: f64 = 0.966;
 /// Widest part of a face that is taken to be hidden, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
-/// Step along a gap at which visibility is tested, metres, and at which shares of its height. From:
-/// work.
+/// Step along a gap at which visibility is tested, metres, and at which shares of its height.
+/// From: work.
 const STEP_M: f64 = 0.01;
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
 

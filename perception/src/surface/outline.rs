@@ -74,8 +74,8 @@ impl Rows {
 
 impl Row {
     fn of(flat: &Outline, ends_m: [f64; 2]) -> Row {
-        /// Maximum component of a normal along the row for an edge that runs along the row. From:
-        /// rounding.
+        /// Maximum component of a normal along the row for an edge that runs along the row.
+        /// From: rounding.
         const ALONG: f64 = 1e-9;
         let everywhere = (f64::NEG_INFINITY, f64::INFINITY);
         let mut row = Row { inside: everywhere, around: everywhere };

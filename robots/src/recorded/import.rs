@@ -1,4 +1,5 @@
-//! Import of recordings in published layouts: units settled, frames chosen, all of it as a body or in our own layout.
+//! Import of recordings in published layouts: resolves units, selects frames, and provides a body
+//! or our own layout.
 
 use crate::body::Colour;
 use crate::input::InputError;
@@ -17,11 +18,13 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-/// Distance between the frames that are kept where the user says nothing, metres. From: chosen.
+/// Default distance between selected frames, metres. From: chosen.
 pub const SPACING_M: f64 = 0.2;
-/// Distance that a turn of one radian counts as, metres: that of what is looked at. From: chosen.
+/// Lever arm that converts a camera rotation to a distance, metres: the distance of the scene.
+/// From: chosen.
 const LEVER_M: f64 = 0.6;
-/// Angle between up and the upper side of the images, on average, beyond which cameras are held against that up. From: chosen, that of perception.
+/// Mean angle between up and the images' upward direction, radians, beyond which the stated up
+/// contradicts the cameras' attitude. From: chosen, that of perception.
 const HELD_RAD: f64 = 1.2;
 /// Distance of the first pose from the origin beyond which positions are recentred, metres: single precision blurs farther ones. From: chosen.
 const FARTHEST_M: f64 = 100.0;
@@ -45,11 +48,11 @@ pub struct Imported {
     pub name: String,
     /// The layout.
     pub layout: &'static Layout,
-    /// Meaning of its numbers.
+    /// Conventions of the numbers.
     pub reading: Conventions,
     /// Frames that are kept.
     pub frames: Vec<ImportedFrame>,
-    /// The depth camera of all of them.
+    /// Depth camera of all frames.
     pub intrinsics: Intrinsics,
     /// Settings of our own layout.
     pub settings: Settings,
@@ -118,7 +121,7 @@ impl Imported {
         Ok(Imported { name, layout, reading, frames, intrinsics, settings, notes, stated })
     }
 
-    /// Depth image of a frame as the camera of all frames would have taken it, in the units of its files.
+    /// Depth image of a frame, resampled to the common camera, in file units.
     fn depth(&self, frame: &ImportedFrame) -> Result<RawDepth, InputError> {
         let depth = self.stated.images.depth(frame.index)?;
         let size = (self.intrinsics.width, self.intrinsics.height);
@@ -135,7 +138,7 @@ impl Imported {
         Ok(self.resampled(depth, &self.stated.frames[frame.index].camera))
     }
 
-    /// True if a frame's files can be copied as they are.
+    /// True if a frame's files can be copied unchanged.
     fn is_verbatim(&self, frame: &ImportedFrame) -> bool {
         Some(self.stated.frames[frame.index].camera) == self.settings.camera
     }
@@ -274,7 +277,7 @@ impl From<InputError> for Failed {
     }
 }
 
-/// Writes a depth image of 16 bits, its units changed from one scale to another.
+/// Writes a 16-bit depth image, converting units from one scale to another.
 fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Result<()> {
     let unit = |d: f32| match (f64::from(d) * to / from).round() {
         d if d >= 1.0 && d < f64::from(u16::MAX) => d as u16,
@@ -286,13 +289,13 @@ fn write_depth(path: &Path, depth: &RawDepth, from: f64, to: f64) -> std::io::Re
     image.save(path).map_err(std::io::Error::other)
 }
 
-/// True if cameras are held as people and robots hold them where this is up.
+/// True if cameras have a usual attitude under this up direction.
 fn are_held_upright(poses: &[Isometry3<f64>], up: &[f64; 3]) -> bool {
     let upper: Vector3<f64> = poses.iter().map(|pose| -(pose * Vector3::y())).sum();
     upper.angle(&Vector3::from(*up)) < HELD_RAD
 }
 
-/// Moves positions far from the origin to it by whole metres; says by how much.
+/// Moves positions far from the origin by whole metres; returns a note with the offset.
 fn recentre(poses: &mut [Isometry3<f64>]) -> Option<String> {
     let offset: Vector3<f64> = poses.first()?.translation.vector.map(f64::round);
     if offset.norm() <= FARTHEST_M {
@@ -302,7 +305,8 @@ fn recentre(poses: &mut [Isometry3<f64>]) -> Option<String> {
     Some(format!("positions are recentred: {} {} {} m is taken off each", offset.x, offset.y, offset.z))
 }
 
-/// Frames that are at least so far from all before them; a turn counts as the way of what is looked at.
+/// Frames at least `spacing_m` from all earlier selected ones; rotations count by the displacement
+/// of the scene.
 fn spaced(poses: &[Isometry3<f64>], spacing_m: f64) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     for (i, pose) in poses.iter().enumerate() {

@@ -11,13 +11,15 @@ use std::fmt;
 
 /// Tolerance on the depth of a point in another view, as a share of the depth: noise and slanted surfaces. From: chosen.
 const TOLERANCE: f64 = 0.02;
-/// Least share of the points that a right reading confirms: things move, and depth is noisy at edges. From: chosen.
+/// Minimum share of points that confirm a correct reading; objects move, and depth is noisy at
+/// edges. From: chosen.
 const LEAST_AGREEMENT: f64 = 0.6;
-/// Difference of two shares below which they say the same. From: chosen.
+/// Difference of two shares below which they count as equal. From: chosen.
 pub(crate) const MARGIN: f64 = 0.1;
 /// Least share of the points that must meet a measurement of the other view before a share says anything. From: chosen.
 const LEAST_OVERLAP: f64 = 0.05;
-/// Share of points that stay where they are from one view to the next, above which the two tell nothing of the motion. From: chosen.
+/// Share of points unchanged between two views, above which the pair is uninformative about motion.
+/// From: chosen.
 const STILL: f64 = 0.85;
 /// Typical depths of cameras in rooms, metres. From: chosen.
 const PLAUSIBLE_M: [f64; 2] = [0.15, 15.0];
@@ -176,7 +178,7 @@ impl Given {
     }
 }
 
-/// A view as it was stored.
+/// View as stored.
 #[derive(Clone, Debug)]
 pub struct StatedView {
     /// Stated pose.
@@ -238,7 +240,8 @@ impl Tally {
         self.agree as f64 / comparable
     }
 
-    /// Compares the points of one view with what another measured. Points behind its surface are hidden and say nothing.
+    /// Compares the points of one view with another's depth; points behind the measured surface are
+    /// occluded and ignored.
     fn compare(&mut self, from: &StatedView, to: &StatedView, to_from_from: &Isometry3<f64>, scale: f64) {
         let (camera, other) = (from.intrinsics(), to.intrinsics());
         for (column, row, depth) in from.sampled() {
@@ -261,7 +264,8 @@ impl Tally {
 pub struct Pair(pub StatedView, pub StatedView);
 
 impl Pair {
-    /// True if the camera moved so far that the pair tells readings apart: what one view shows is not at the same pixels in the other.
+    /// True if the camera moved enough to distinguish readings: the pixels of one view differ in
+    /// the other.
     pub fn tells(&self) -> bool {
         let mut tally = Tally::default();
         tally.compare(&self.0, &self.1, &Isometry3::identity(), 1.0);
@@ -270,7 +274,7 @@ impl Pair {
     }
 }
 
-/// Share of what one view shows that lies where the other measures it, over all pairs.
+/// Share of one view's points that the other confirms, over all pairs.
 pub(crate) fn agreement(reading: &Conventions, pairs: &[Pair]) -> f64 {
     let mut tally = Tally::default();
     for Pair(a, b) in pairs {
@@ -291,7 +295,7 @@ fn typical(pairs: &[Pair]) -> Option<f64> {
     depths.get(depths.len() / 2).copied()
 }
 
-/// All readings that keep what the user has said, the stated one first.
+/// All readings consistent with the user's statements, the stated one first.
 fn candidates(stated: &Conventions, given: &Given) -> Vec<Conventions> {
     fn one_or<T: Copy>(given: Option<T>, all: &[T]) -> Vec<T> {
         given.map_or(all.to_vec(), |g| vec![g])

@@ -1,4 +1,4 @@
-//! A recording as the files of its layout state it.
+//! Recording as stated by the files of its layout.
 
 use crate::input::InputError;
 use crate::recorded::picture::{self, RawDepth};
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Frames from which pairs of views are sought. From: chosen.
 const ANCHORS: usize = 24;
 
-/// Choices of the user about what a folder does not say.
+/// User's choices about what a folder does not state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Asked {
     /// Name of the layout.
@@ -22,7 +22,7 @@ pub struct Asked {
     pub topic: Option<String>,
 }
 
-/// A frame as its layout states it.
+/// Frame as stated by its layout.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StatedFrame {
     /// Name, for the station.
@@ -33,7 +33,7 @@ pub struct StatedFrame {
     pub pose: Isometry3<f64>,
 }
 
-/// A recording as its layout states it.
+/// Recording as stated by its layout.
 pub struct Stated {
     /// Frames whose pose is known, in their order.
     pub frames: Vec<StatedFrame>,

@@ -32,7 +32,7 @@ pub(crate) const BASE_FROM_HAND: Vector3<f64> = Vector3::new(0.35, 0.0, 0.9);
 /// Result of a grasp.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Taken {
-    /// There was no object.
+    /// No object there.
     Nothing,
     /// The object is wider than the hand opens.
     TooWide(usize),
@@ -90,11 +90,11 @@ fn slide(scene: &mut Scene, object: usize, rng: &mut ChaCha8Rng) {
 /// Reason for which an object cannot be placed.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoPlace {
-    /// There is no such surface.
+    /// No such surface.
     NoSurface,
     /// The surface ends too close.
     Edge(String),
-    /// Another surface is too low above it.
+    /// Another surface is too low above.
     Under(String),
     /// Another object is in the way.
     Taken,

@@ -190,8 +190,8 @@ impl Solid {
 
 /// Side of a table's legs, metres.
 const LEG_M: f64 = 0.05;
-/// Thickness of a shelf's uprights, metres, beside its boards and below their tops, so that boards end where
-/// the map shows it.
+/// Thickness of a shelf's uprights, metres; they stand beside the boards and end below their tops,
+/// so that boards end as mapped.
 const UPRIGHT_M: f64 = 0.02;
 /// Thickness of a door's panel, metres.
 const PANEL_M: f64 = 0.04;

@@ -1,4 +1,4 @@
-//! A folder of PCD files, each with the place of its sensor as `VIEWPOINT`.
+//! Folder of PCD files, each with its sensor pose as `VIEWPOINT`.
 
 use crate::input::{self, InputError};
 use crate::recorded::folder::{names, shown, stem};
@@ -22,7 +22,7 @@ const SIDE: [f64; 2] = [64.0, 320.0];
 /// Minimum number of cloud points for each image pixel; with fewer the image has holes.
 /// From: chosen.
 const POINTS_PER_PIXEL: f64 = 4.0;
-/// Share of the points that such an image shows, and the least and greatest half angle, as slopes. From: chosen.
+/// Share of the points in the virtual image, and limits of its half angle, as slopes. From: chosen.
 const IN_VIEW: f64 = 0.98;
 const NARROWEST: f64 = 0.05;
 const WIDEST: f64 = 2.0;
@@ -43,10 +43,10 @@ enum Points {
     InWorld,
 }
 
-/// Both frames, as the format defines it first.
+/// Both possible frames of the points, that of the format definition first.
 const FRAMES: [Points; 2] = [Points::InSensor, Points::InWorld];
 
-/// A file with the pose of its sensor, and the pose of its camera in the frame of its points.
+/// File with its sensor pose, and the pose of its camera in the points' frame.
 #[derive(Clone, Debug)]
 struct Seen {
     path: PathBuf,
@@ -54,7 +54,7 @@ struct Seen {
     points_from_camera: Isometry3<f64>,
 }
 
-/// The files as one camera sees them.
+/// Files as seen by one camera.
 #[derive(Clone, Debug)]
 struct Pcds {
     files: Vec<Seen>,
@@ -63,12 +63,12 @@ struct Pcds {
     coloured: bool,
 }
 
-/// Summary of a cloud that was read, for each frame that its points may be in.
+/// Summary of a cloud, for each possible frame of its points.
 struct Summary {
     path: PathBuf,
     viewpoint: Isometry3<f64>,
     coloured: bool,
-    /// The camera that explains its pixels, if one does.
+    /// Camera that explains the pixels, if any.
     cameras: [Option<Intrinsics>; 2],
     looks: [Look; 2],
 }
@@ -153,7 +153,7 @@ impl Points {
 }
 
 impl Summary {
-    /// Reads a file. `first` are the cameras of the first file; without them, its own are estimated.
+    /// Reads a file; `first`: cameras of the first file, estimated if absent.
     fn read(path: PathBuf, first: &[Option<Intrinsics>; 2]) -> Result<Summary, InputError> {
         let (cloud, viewpoint) = load(&path)?;
         let from_sensor = FRAMES.map(|points| points.pose_of_sensor(&viewpoint));
@@ -219,7 +219,7 @@ impl Pcds {
         Pcds { files: all.iter().map(seen).collect(), camera, organised: true, coloured }
     }
 
-    /// Clouds without pixels, as one camera sees them from each viewpoint.
+    /// Clouds without pixels, as seen by one virtual camera from each viewpoint.
     fn loose(all: &[Summary], points: Points) -> Pcds {
         let look = |s: &'_ Summary| -> (f64, usize, Seen) {
             let Look { points_from_camera, reach, points } = s.looks[usize::from(points == Points::InWorld)];

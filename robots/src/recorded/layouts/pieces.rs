@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 /// Endings of colour images.
 const COLOURS: [&str; 3] = ["png", "jpg", "jpeg"];
 
-/// Images in a folder by the number or stamp in their name, in natural order. A folder that is not there has none.
+/// Images in a folder with the number or stamp in their names, in natural order; empty for a
+/// missing folder.
 pub(super) fn images(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError> {
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -26,7 +27,7 @@ pub(super) fn images(folder: &Path) -> Result<Vec<(String, PathBuf)>, InputError
     Ok(found.map(|name| (stem(&name).to_string(), folder.join(name))).collect())
 }
 
-/// The first of several folders that is there.
+/// First existing folder of several.
 pub(super) fn either(folder: &Path, names: &[&str]) -> PathBuf {
     let found = names.iter().map(|name| folder.join(name)).find(|path| path.is_dir());
     found.unwrap_or_else(|| folder.join(names[0]))
@@ -53,7 +54,8 @@ pub(super) fn number(name: &str) -> Option<u64> {
     name[name.len() - digits..].parse().ok()
 }
 
-/// The camera that the user gave, or that of a file beside the frames, or the usual one of a data set for images of its size.
+/// Camera given by the user, or from a file beside the frames, or the data set's default for images
+/// of this size.
 pub(super) fn camera(
     folder: &Path,
     asked: &Asked,
@@ -114,7 +116,7 @@ pub(super) fn json<T: DeserializeOwned>(file: &Path) -> Result<T, InputError> {
     })
 }
 
-/// A pose of twelve or sixteen numbers, row by row; none if they are not finite.
+/// Pose from twelve or sixteen numbers, row by row; `None` if not finite.
 pub(super) fn pose_of(place: &str, rows: &[f64]) -> Result<Option<Isometry3<f64>>, InputError> {
     let text: Vec<String> = rows.chunks(4).map(|r| format!("{} {} {} {}", r[0], r[1], r[2], r[3])).collect();
     pose::matrix_pose(place, &text.join("\n"))
@@ -130,7 +132,7 @@ pub(super) struct Gathered {
 }
 
 impl Gathered {
-    /// Adds a frame; without a pose it is counted only.
+    /// Adds a frame; a frame without a pose is only counted.
     pub(super) fn add(
         &mut self,
         name: String,
@@ -147,7 +149,7 @@ impl Gathered {
         }
     }
 
-    /// Counts a frame for which there is no pose at all.
+    /// Counts a frame without a pose.
     pub(super) fn without_pose(&mut self) {
         self.unposed += 1;
     }

@@ -1,4 +1,4 @@
-//! TUM RGB-D: images with stamps for names, and a trajectory of its own stamps.
+//! TUM RGB-D: images named by stamps, and a trajectory with separate stamps.
 
 use super::pieces::{self, Gathered};
 use crate::input::InputError;
@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 const TRAJECTORY: &str = "groundtruth.txt";
 /// Units of a depth image in a metre. From: the data set's page on file formats.
 const DEPTH_SCALE: f64 = 5000.0;
-/// Greatest difference of the stamps of an image and of the colour image beside it, seconds. From: the data set's tool `associate.py`.
+/// Maximum difference between the stamps of depth and colour image, seconds. From: the data set's
+/// tool `associate.py`.
 const BESIDE_S: f64 = 0.02;
 /// Longest gap of the trajectory across which a pose is interpolated, seconds. From: chosen, ten poses of the slowest trajectory.
 const GAP_S: f64 = 0.1;
@@ -98,7 +99,8 @@ fn camera(
 
 type Stamped = Vec<(f64, PathBuf)>;
 
-/// Images with their stamps, in order of time: those that `NAME.txt` lists, or else the files of the folder `NAME`.
+/// Images with their stamps, in time order: those listed in `NAME.txt`, or else the files in folder
+/// `NAME`.
 fn stamped(folder: &Path, name: &str) -> Result<Stamped, InputError> {
     let list = folder.join(format!("{name}.txt"));
     let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! The way in: [`plan`] takes a task to a timed plan, or says why there is none.
+//! Entry point: [`plan`] turns a task into a timed plan, or explains why there is none.
 
 pub(crate) mod optimal;
 
@@ -45,7 +45,7 @@ pub fn plan(
     Ok(with_culprits(task, attachments, options, stop, outcome))
 }
 
-/// Narrows the reason of an unsolvable task down to the parts of its goal that are to blame.
+/// Narrows the explanation of an unsolvable task to the conflicting parts of its goal.
 fn with_culprits(
     task: &Task,
     attachments: &Attachments,
@@ -88,7 +88,7 @@ const FORMS: usize = 2;
 /// Evaluated states that a part of a goal may always take.
 const LEAST_EVALUATIONS: u64 = 1_000;
 
-/// Tells a goal out of reach from constraints on the way to it, where nothing was found.
+/// Distinguishes an unreachable goal from unsatisfiable constraints, after a search without a plan.
 fn on_the_way(
     task: &Task,
     attachments: &Attachments,
@@ -126,7 +126,7 @@ fn freed(task: &Task) -> Task {
     free
 }
 
-/// Searches for plans of a task without its preferences and constraints, where these are compiled away.
+/// Plans a task with its preferences and constraints compiled away.
 fn search(
     task: &Task,
     attachments: &Attachments,
@@ -145,7 +145,8 @@ fn search(
     Ok(outcome)
 }
 
-/// Searches for plans of `task`, which are valid plans of `original` once its bookkeeping is left out.
+/// Plans `task`, a compilation of `original`; its plans are valid for `original` without the
+/// bookkeeping actions.
 ///
 /// Where actions earn something, states in which more has been earned are better ones, and there are ever more of them: the
 /// first search looks away from that, for a plan or the proof that there is none, and a second one goes after what is to be earned.
@@ -188,7 +189,8 @@ fn search_on(
     })
 }
 
-/// One search; `keep_metric` makes what actions add to the metric a part of states. Tells besides whether actions earn something.
+/// Runs one search; `keep_metric` keeps the fluents of the metric in the state. Returns also
+/// whether actions may improve the metric.
 fn search_for(
     original: &Task,
     task: &Task,
@@ -248,7 +250,7 @@ fn search_for(
     Ok((found_at_least(outcome, unchecked.get()), earns))
 }
 
-/// The outcome with its proof withdrawn, if some plan was found and no time was left to validate it.
+/// Outcome with its proof withdrawn if some plan was found but not validated for lack of time.
 fn found_at_least(outcome: Outcome, unchecked: bool) -> Outcome {
     match outcome {
         Outcome::Unsolvable { statistics, .. } if unchecked => Outcome::OutOfTime { best: None, statistics },
@@ -367,7 +369,8 @@ fn grounding_ended(task: &Task, error: GroundError) -> Result<Outcome, PlanError
     }
 }
 
-/// Hands `:moduleoptions` to the attachments of those names; entries that name none are for another planner.
+/// Passes `:moduleoptions` to the attachments of the same names; other entries are for other
+/// planners.
 fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
     for option in &task.module_options {
         let name = option.function.split('@').next().unwrap_or_default();
@@ -390,8 +393,8 @@ fn measure(grounded: &GroundTask) -> Measure {
     }
 }
 
-/// Every plan that leaves this crate has passed the validator: none where that is stopped. No search looks at constraints that ask for
-/// times or attachments: a plan that breaks nothing else is refused.
+/// Validates every plan before it leaves this crate; no plan if the validator is stopped. Plans
+/// that violate only constraints on times or attachments, which no search supports, are refused.
 fn checked(
     task: &Task,
     attachments: &Attachments,
@@ -436,7 +439,7 @@ fn checked(
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
 }
 
-/// Finding about the longest action of a plan so long that `f64` cannot resolve times near its end.
+/// Finding about the longest action of a plan whose end times exceed the resolution of `f64`.
 fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
     let spacing_s = plan.makespan_s()? * f64::EPSILON;
     let longest = plan.steps.iter().max_by(|one, other| one.duration_s.total_cmp(&other.duration_s))?;

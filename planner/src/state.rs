@@ -1,10 +1,10 @@
-//! A state of the lifted task: what is true, what has which value.
+//! State of the lifted task: true facts and values.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::task::{Fact, FunctionId, GroundChange, GroundFluent, Init, ObjectId, PredicateId, Task};
 
-/// Facts, numbers and object values. What is not held is false or undefined.
+/// True facts, numbers and object values; absent ones are false or undefined.
 ///
 /// Derived facts are held too; [`Semantics`](crate::Semantics) keeps them up to date.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,7 +15,7 @@ pub struct State {
 }
 
 impl State {
-    /// The state of a task in which nothing is true and nothing has a value.
+    /// State without true facts and values.
     pub fn empty(task: &Task) -> State {
         State {
             facts: vec![FxHashSet::default(); task.predicates.len()],
@@ -64,7 +64,7 @@ impl State {
         }
     }
 
-    /// Gives a numeric function a value, or takes it away.
+    /// Sets a numeric function, or makes it undefined.
     pub fn set_number(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<f64>) {
         let numbers = &mut self.numbers[function.index()];
         match (value, numbers.get_mut(arguments)) {
@@ -78,7 +78,7 @@ impl State {
         }
     }
 
-    /// Gives an object function a value, or takes it away.
+    /// Sets an object function, or makes it undefined.
     pub fn set_object(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<ObjectId>) {
         let objects = &mut self.objects[function.index()];
         match value {
@@ -105,7 +105,7 @@ impl State {
         }
     }
 
-    /// The arguments of which a predicate is true, in no particular order.
+    /// Argument tuples of the true instances of a predicate, unordered.
     pub fn instances(&self, predicate: PredicateId) -> impl Iterator<Item = &[ObjectId]> {
         self.facts[predicate.index()].iter().map(|arguments| &**arguments)
     }
@@ -152,24 +152,25 @@ impl State {
 }
 
 impl Task {
-    /// The same task from another initial state. Timed changes are dropped: they counted from the old beginning.
+    /// Task with another initial state. Timed initial literals are dropped, because their times
+    /// refer to the former start.
     pub fn with_state(&self, state: &State) -> Task {
         Task { init: state.to_init(self), ..self.clone() }
     }
 
-    /// An object by its name, in any case.
+    /// Object by name, case-insensitive.
     pub fn find_object(&self, name: &str) -> Option<ObjectId> {
         let by_name = &self.objects_by_name;
         by_name.get(name).or_else(|| by_name.get(&name.to_ascii_lowercase())).copied()
     }
 
-    /// A predicate by its name, in any case.
+    /// Predicate by name, case-insensitive.
     pub fn find_predicate(&self, name: &str) -> Option<PredicateId> {
         let at = self.predicates.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
         Some(PredicateId(at as u32))
     }
 
-    /// A function by its name, in any case.
+    /// Function by name, case-insensitive.
     pub fn find_function(&self, name: &str) -> Option<FunctionId> {
         let at = self.functions.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
         Some(FunctionId(at as u32))

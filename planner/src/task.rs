@@ -19,7 +19,7 @@ macro_rules! identifiers {
         pub struct $name(pub u32);
 
         impl $name {
-            /// As an index into the task's list.
+            /// Index into the task's list.
             pub fn index(self) -> usize {
                 self.0 as usize
             }
@@ -42,7 +42,7 @@ identifiers! {
     ActionId
     /// Index into [`Task::preferences`].
     PreferenceId
-    /// A variable of an action, rule or formula: index into its binding.
+    /// Variable of an action, rule or formula: index into a binding.
     Slot
 }
 
@@ -75,7 +75,7 @@ pub struct Task {
     pub goal: Scoped<Condition>,
     /// Span of the goal.
     pub goal_span: Span,
-    /// Trajectory constraints; those that a preference stands before carry it.
+    /// Trajectory constraints; preferred ones refer to their preference.
     pub constraints: Vec<Trajectory>,
     /// Preferences, by name; several preferences may share a name, which then counts their violations.
     pub preferences: Vec<Preference>,
@@ -98,7 +98,7 @@ pub struct Type {
     pub parents: Vec<TypeId>,
     /// The type itself, then all its supertypes.
     pub ancestors: Vec<TypeId>,
-    /// Objects of this type and its subtypes, in rising order.
+    /// Objects of this type and its subtypes, ascending.
     pub objects: Vec<ObjectId>,
     /// Span of the declaration.
     pub span: Span,
@@ -109,13 +109,13 @@ pub struct Type {
 pub struct Object {
     /// Name, lower case.
     pub name: String,
-    /// Its declared types (more than one after `either`: it is of all of them).
+    /// Declared types; several (from `either`) mean that the object is of all of them.
     pub types: Vec<TypeId>,
     /// Span of the declaration.
     pub span: Span,
 }
 
-/// A variable with the alternatives of its type.
+/// Variable with the alternatives of its type.
 #[derive(Debug, Clone)]
 pub struct Parameter {
     /// Name, with the question mark.
@@ -135,7 +135,8 @@ pub struct Predicate {
     pub name: String,
     /// Parameters.
     pub parameters: Vec<Parameter>,
-    /// The stratum of its rules, if it is derived: rules of stratum `n` use negated derived atoms only of lower strata.
+    /// Stratum of the predicate's axioms, if derived: axioms of stratum `n` use negated derived
+    /// atoms of lower strata only.
     pub stratum: Option<u32>,
     /// Span of the declaration.
     pub span: Span,
@@ -148,7 +149,7 @@ pub struct Function {
     pub name: String,
     /// Parameters.
     pub parameters: Vec<Parameter>,
-    /// `None` for numbers, else the types of the objects that are its values.
+    /// Types of an object function's values; `None` for a numeric function.
     pub result: Option<Vec<TypeId>>,
     /// Span of the declaration.
     pub span: Span,
@@ -163,9 +164,9 @@ pub struct Module {
     pub kind: CallKind,
     /// Parameters: slots `0..parameters.len()` of `writes`.
     pub parameters: Vec<Parameter>,
-    /// Terms that an effect module writes, over its parameters, in the order of its answers.
+    /// Terms written by an effect module, over its parameters, in answer order.
     pub writes: Vec<Written>,
-    /// The token as it was written, `fn@lib.so`, case kept.
+    /// Binding as written, `fn@lib.so`, case kept.
     pub function: String,
     /// Span of the declaration.
     pub span: Span,
@@ -193,12 +194,12 @@ pub struct ModuleOption {
     pub span: Span,
 }
 
-/// Something over variables, and how many slots a binding for it has.
+/// Formula or expression with its number of slots.
 #[derive(Debug, Clone)]
 pub struct Scoped<T> {
     /// Number of slots.
     pub slots: usize,
-    /// The thing itself.
+    /// Formula or expression.
     pub body: T,
 }
 
@@ -209,7 +210,7 @@ pub enum Term {
     Variable(Slot),
     /// An object.
     Object(ObjectId),
-    /// The value of an object function; may be undefined, which equals nothing.
+    /// Value of an object function; may be undefined, which equals nothing.
     Function(Box<Fluent>),
 }
 
@@ -249,15 +250,15 @@ pub struct Call {
 /// A condition in negation normal form.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Condition {
-    /// All of them; empty is true.
+    /// Conjunction; empty is true.
     And(Vec<Condition>),
-    /// One of them; empty is false.
+    /// Disjunction; empty is false.
     Or(Vec<Condition>),
     /// Not the leaf inside: an `Atom`, `Same`, `Call`, or a `Compare` for equality.
     Not(Box<Condition>),
-    /// For all objects that fit the quantified variables.
+    /// Universal quantification.
     Forall(Vec<Quantified>, Box<Condition>),
-    /// For some objects that fit the quantified variables.
+    /// Existential quantification.
     Exists(Vec<Quantified>, Box<Condition>),
     /// A fact, basic or derived.
     Atom(Atom),
@@ -279,7 +280,7 @@ impl Condition {
     }
 }
 
-/// A quantified variable and its slot.
+/// Quantified variable with its slot.
 #[derive(Debug, Clone)]
 pub struct Quantified {
     /// Slot.
@@ -313,7 +314,8 @@ pub enum Expression {
     Negative(Box<Expression>),
     /// `?duration` of the action, in seconds.
     Duration,
-    /// Makespan of the plan, in seconds; in metrics alone. For a plan of instantaneous actions the number of its steps.
+    /// Makespan of the plan, seconds (metrics only); the number of steps for plans of instantaneous
+    /// actions.
     TotalTime,
     /// Number of violations of preferences of this name; in metrics alone.
     Violated(PreferenceId),
@@ -321,8 +323,8 @@ pub enum Expression {
     Call(Call),
 }
 
-/// Parts of an action at the start, through the inside, and at the end. An instantaneous action has
-/// all at its start.
+/// Parts of an action at start, over all and at end; an instantaneous action has everything at
+/// start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timed<T> {
     /// At start.
@@ -358,7 +360,7 @@ pub struct Action {
     pub continuous: Vec<Rate>,
     /// Calls of grounding modules that propose parameters.
     pub grounding: Vec<Call>,
-    /// Preferences over its conditions; a violation counts each time.
+    /// Preferences over the action's conditions; every violation counts.
     pub preferences: Vec<(PreferenceId, Timed<Condition>)>,
     /// Span of the name.
     pub span: Span,
@@ -376,7 +378,7 @@ impl Action {
 pub struct DurationBound {
     /// The time at which the bound is evaluated: start or end.
     pub when: When,
-    /// `?duration` stands on the left of it: `<=`, `=`, `>=`, `<` or `>`.
+    /// Comparison with `?duration` on the left-hand side: `<=`, `=`, `>=`, `<` or `>`.
     pub comparison: Comparison,
     /// The bound.
     pub value: Expression,
@@ -384,13 +386,13 @@ pub struct DurationBound {
     pub span: Span,
 }
 
-/// One change, for all objects of its quantified variables, where its condition holds.
+/// Conditional change, for all objects of its quantified variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
     /// Quantified variables.
     pub forall: Vec<Quantified>,
-    /// When it happens. For an effect at start only `start` may say something; for one at end `start` and `over_all`
-    /// are conditions on those earlier times.
+    /// Condition of the effect. An effect at start has a `start` condition only; for one at end,
+    /// `start` and `over_all` are conditions on those earlier times.
     pub when: Timed<Condition>,
     /// Change.
     pub change: Change,
@@ -407,9 +409,9 @@ pub enum Change {
     Delete(Atom),
     /// A number changes.
     Number(Assignment, Fluent, Expression),
-    /// An object function gets a value, or loses it.
+    /// Assigns an object function, or makes it undefined.
     Object(Fluent, Option<Term>),
-    /// An effect module writes its fluents.
+    /// Writes the fluents of an effect module.
     Call(Call),
 }
 
@@ -497,7 +499,7 @@ pub enum GroundChange {
 /// A modal constraint of PDDL3 on the trajectory of states.
 #[derive(Debug, Clone)]
 pub struct Trajectory {
-    /// It holds for all objects of these.
+    /// Quantified variables; the constraint holds for all their objects.
     pub forall: Vec<Quantified>,
     /// The operator.
     pub operator: Modal,
@@ -507,18 +509,19 @@ pub struct Trajectory {
     pub conditions: Vec<Condition>,
     /// Slots in all.
     pub slots: usize,
-    /// If it is only preferred: the preference, once for each binding of `forall`.
+    /// Preference of the constraint, counted per binding of `forall`; `None` for a hard constraint.
     pub preference: Option<PreferenceId>,
     /// Span.
     pub span: Span,
 }
 
-/// A named preference. Its goal conditions are here; those on trajectories and actions point to it.
+/// Named preference with its goal conditions; constraints and action conditions refer to it.
 #[derive(Debug, Clone)]
 pub struct Preference {
     /// Name.
     pub name: String,
-    /// Conditions on the last state: each counts one violation for each binding of its quantified variables.
+    /// Conditions on the final state; each counts one violation per binding of its quantified
+    /// variables.
     pub goals: Vec<PreferredGoal>,
 }
 
@@ -538,7 +541,7 @@ pub struct PreferredGoal {
 /// The metric.
 #[derive(Debug, Clone)]
 pub struct Metric {
-    /// True if it is minimised, false if it is maximised.
+    /// True to minimise, false to maximise.
     pub minimise: bool,
     /// Expression to minimise or maximise.
     pub value: Expression,
@@ -547,32 +550,32 @@ pub struct Metric {
 }
 
 impl Task {
-    /// A type by its index.
+    /// Type by index.
     pub fn type_of(&self, id: TypeId) -> &Type {
         &self.types[id.index()]
     }
 
-    /// An object by its index.
+    /// Object by index.
     pub fn object(&self, id: ObjectId) -> &Object {
         &self.objects[id.index()]
     }
 
-    /// A predicate by its index.
+    /// Predicate by index.
     pub fn predicate(&self, id: PredicateId) -> &Predicate {
         &self.predicates[id.index()]
     }
 
-    /// A function by its index.
+    /// Function by index.
     pub fn function(&self, id: FunctionId) -> &Function {
         &self.functions[id.index()]
     }
 
-    /// A module by its index.
+    /// Module by index.
     pub fn module(&self, id: ModuleId) -> &Module {
         &self.modules[id.index()]
     }
 
-    /// An action by its index.
+    /// Action by index.
     pub fn action(&self, id: ActionId) -> &Action {
         &self.actions[id.index()]
     }

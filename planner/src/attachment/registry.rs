@@ -1,4 +1,4 @@
-//! Attachments by name: the function that answers, its cached answers, and the number of calls.
+//! Registry of attachments: function, cached answers, and number of calls of each.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -122,7 +122,7 @@ impl Attachments {
         self.registered.insert(name.into(), registered);
     }
 
-    /// The registered name for a module, from its binding (`fn@lib.so` or `fn`) and its PDDL name.
+    /// Registered name for a module, from its binding (`fn@lib.so` or `fn`) and its PDDL name.
     ///
     /// The exact spelling of the binding is preferred, then its part before the `@`, then the PDDL name, then either
     /// without regard to case.

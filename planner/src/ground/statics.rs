@@ -25,7 +25,7 @@ pub(super) struct Statics<'a> {
     pub tries: Tries<'a>,
 }
 
-/// Objects that are tried for quantified variables, until it is asked to stop.
+/// Counter of objects tried for quantified variables, with a stop signal.
 pub(super) struct Tries<'a> {
     stop: &'a dyn Fn() -> bool,
     tried: Cell<u32>,

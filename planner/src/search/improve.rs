@@ -46,7 +46,7 @@ pub struct Improve<'a> {
 }
 
 impl<'a> Improve<'a> {
-    /// For a task.
+    /// Plan improver for a task.
     pub fn new(
         task: &'a Compiled,
         successors: &'a Successors,

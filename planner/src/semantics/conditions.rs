@@ -14,7 +14,7 @@ use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantifie
 /// The part of a condition that does not hold.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Why {
-    /// The part, with objects for its variables.
+    /// Condition part, with objects for its variables.
     pub condition: String,
     /// Both sides, if the part compares two numbers.
     pub compared: Option<Compared>,

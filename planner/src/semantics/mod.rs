@@ -40,7 +40,7 @@ pub struct Binding {
 }
 
 impl Binding {
-    /// A binding with nothing bound.
+    /// Binding with all slots unbound.
     pub fn new(slots: usize) -> Binding {
         Binding { objects: vec![UNBOUND; slots], duration_s: None, proposals: Vec::new() }
     }
@@ -111,8 +111,8 @@ impl<'a> Semantics<'a> {
         Self::until(task, attachments, &|| false)
     }
 
-    /// The same; once `stop` says true, no further objects are tried, and nothing that is said means anything
-    /// ([`Semantics::is_stopped`]).
+    /// Evaluator that stops trying objects once `stop` becomes true; answers are meaningless from
+    /// then on ([`Semantics::is_stopped`]).
     pub(crate) fn until(
         task: &'a Task,
         attachments: &'a Attachments,
@@ -134,12 +134,12 @@ impl<'a> Semantics<'a> {
         }
     }
 
-    /// True if it was asked to stop, and something may have been left out.
+    /// True if stopped, so that objects may have been skipped.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Counts one more object that is tried; `false` once nothing more is to be tried.
+    /// Counts one more tried object; `false` once stopped.
     fn go_on(&self) -> bool {
         let tried = self.tried.fetch_add(1, Ordering::Relaxed);
         if tried % TRIED_AT_ONCE == TRIED_AT_ONCE - 1 && (self.stop)() {
@@ -155,7 +155,7 @@ impl<'a> Semantics<'a> {
         Ok(state)
     }
 
-    /// The action that a step names, and its binding.
+    /// Action of a step, with its binding.
     pub fn bind(&self, step: &Step) -> Result<(ActionId, Binding), Misfit> {
         let task = self.task;
         let Some(at) = task.actions.iter().position(|action| action.name.eq_ignore_ascii_case(&step.action))

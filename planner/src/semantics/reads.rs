@@ -19,14 +19,15 @@ use crate::task::{
 pub struct Touched {
     facts: FxHashSet<Fact>,
     fluents: FxHashSet<GroundFluent>,
-    /// Predicates of which any instance may matter: those that a derived fact depends on.
+    /// Predicates of which any instance may matter, because a derived fact depends on them.
     predicates: FxHashSet<PredicateId>,
     /// Write set.
     pub changes: Changes,
 }
 
 impl Touched {
-    /// Resource that one of the two writes and the other reads, or writes in a conflicting way.
+    /// First resource on which the two conflict: written by one, and read or differently written by
+    /// the other.
     pub fn conflict(&self, other: &Touched, semantics: &Semantics<'_>) -> Option<String> {
         self.disturbs(other, semantics).or_else(|| other.disturbs(self, semantics))
     }
@@ -69,7 +70,7 @@ pub struct Together {
     added: FxHashSet<Fact>,
     deleted: FxHashSet<Fact>,
     written: FxHashSet<PredicateId>,
-    /// Numbers to which something is added, other writing of numbers and objects.
+    /// Numbers with increases or decreases, by whether numbers and objects are also assigned.
     moved: FxHashSet<GroundFluent>,
     set: FxHashSet<GroundFluent>,
 }
@@ -90,7 +91,7 @@ impl Together {
         self.set.extend(cleared.iter().chain(objects.iter().map(|(fluent, ..)| fluent)).cloned());
     }
 
-    /// True if one disturbs, or is disturbed by, any of those taken in ([`Touched::conflict`]); may be true
+    /// True if one access set conflicts with any recorded one ([`Touched::conflict`]); may be true
     /// too often.
     pub fn may_conflict(&self, touched: &Touched) -> bool {
         let Changes { added, deleted, numbers, cleared, objects } = &touched.changes;
@@ -119,7 +120,7 @@ fn is_additive(kind: Assignment) -> bool {
 }
 
 impl Semantics<'_> {
-    /// Notes what a condition reads.
+    /// Adds the read set of a condition.
     pub fn reads(
         &self,
         state: &State,
@@ -159,7 +160,7 @@ impl Semantics<'_> {
         Ok(())
     }
 
-    /// The truth of a condition that nothing ever changes; `None` if something may.
+    /// Truth of a static condition; `None` if it may change.
     fn constant(&self, state: &State, condition: &Condition, binding: &Binding) -> Option<bool> {
         match condition {
             Condition::And(parts) => {
@@ -187,7 +188,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// Notes what effects read: their conditions and values.
+    /// Adds the read set of effects: their conditions and values.
     pub fn effect_reads(
         &self,
         state: &State,
@@ -307,7 +308,7 @@ fn predicates_in(task: &Task, condition: &Condition, into: &mut FxHashSet<Predic
     }
 }
 
-/// For each predicate, true if an action, a rule, a module or a timed literal may change it.
+/// True, by predicate, if an action, axiom, module or timed literal may change it.
 pub(super) fn changing(task: &Task) -> Vec<bool> {
     let mut changing: Vec<bool> =
         task.predicates.iter().map(|predicate| predicate.stratum.is_some()).collect();

@@ -1,4 +1,4 @@
-//! Optimal planning for actions that take no time: a plan with the proof that none is cheaper, or none at all.
+//! Optimal planning for instantaneous actions: a plan with a proof of optimality, or no plan.
 
 use crate::attachment::Attachments;
 use crate::classical::compiled::{Compiled, is_classical};

@@ -12,7 +12,7 @@ use super::order::Access;
 use super::touch::{Touched, expression_touches};
 use super::world::{Act, Moment, Span, World};
 
-/// The part of an action that a step takes, or that a relaxed operator stands for.
+/// Snap action of a step or of a relaxed operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
     /// Start and end as one operator.
@@ -30,24 +30,24 @@ pub enum Part {
 pub struct Open {
     /// The action.
     pub act: u32,
-    /// The parameter that its grounding module proposed.
+    /// Parameter proposed by the grounding module.
     pub proposal: Option<Arc<str>>,
-    /// Duration that it may take, seconds.
+    /// Possible durations, seconds.
     pub span: Span,
     /// End effects that can still happen.
     pub gates: Gates,
 }
 
 impl Open {
-    /// A state while it goes on.
+    /// Evaluation context inside an action in progress.
     fn moment<'s>(&'s self, state: &'s Values) -> Moment<'s> {
         let proposal = self.proposal.as_ref();
         Moment { state, duration_s: self.span.least_s, proposal, level: Level::Exact }
     }
 }
 
-/// Conditional end effects of an action in progress: a bit for each whose conditions at the start or over all
-/// failed; no words where no effect has any.
+/// Conditional end effects of an action in progress: one bit for each whose start or over-all
+/// conditions failed; empty without such effects.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Gates(Vec<u64>);
 
@@ -92,16 +92,16 @@ pub struct Step {
     pub act: u32,
     /// Part; [`Part::Free`] is the next timed effect.
     pub part: Part,
-    /// The parameter that its grounding module proposed.
+    /// Parameter proposed by the grounding module.
     pub proposal: Option<Arc<str>>,
-    /// Duration chosen by the schedule, seconds, where it stretches the action.
+    /// Duration chosen by the schedule if it stretches the action, seconds.
     pub taken_s: Option<f64>,
     /// Duration that the action may take; filled in by [`World::advance`].
     pub span: Span,
 }
 
 impl Step {
-    /// An action from its start to its end, without a proposal.
+    /// Compressed action, without a proposal.
     pub fn whole(act: u32) -> Step {
         Step {
             act,
@@ -114,7 +114,7 @@ impl Step {
 }
 
 impl World<'_> {
-    /// The situation after a step, or `None` if it cannot be taken. Fills in the step's span.
+    /// State after a step, or `None` if the step is inapplicable; sets the step's span.
     pub fn advance(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
         match step.part {
             Part::Whole => self.whole(from, step),
@@ -222,8 +222,8 @@ impl World<'_> {
         Ok(gates)
     }
 
-    /// Applies the end of an action that is already removed from the running ones; `false` if it
-    /// cannot end now.
+    /// Applies the end of an action already removed from the running ones; `false` if it cannot end
+    /// now.
     fn finish(&self, own: &Open, situation: &mut Situation) -> Result<bool, Failure> {
         let act = &self.acts[own.act as usize];
         if !act.flow_effects.is_empty() {
@@ -244,8 +244,8 @@ impl World<'_> {
         self.apply(act.end_effects, &moment, &gate, state)
     }
 
-    /// The state right before the end of an action that changes numbers at a rate; `None` if it, or what else is open, cannot go
-    /// on all the time.
+    /// State just before the end of an action with continuous effects; `None` if an invariant of a
+    /// running action fails in between.
     fn flowed(&self, own: &Open, situation: &Situation) -> Result<Option<Values>, Failure> {
         let before = &situation.state;
         let mut last = before.clone();
@@ -309,7 +309,8 @@ impl World<'_> {
         Ok(true)
     }
 
-    /// The situation after the last timed effect, if nothing more is done; `None` while an action is in progress.
+    /// State after the last timed effect if nothing more is done; `None` while an action is in
+    /// progress.
     pub fn ended(&self, situation: &Situation) -> Result<Option<Situation>, Failure> {
         let mut ended = situation.clone();
         while ended.open.is_empty() && ended.timed < self.ground.timed.len() {
@@ -337,8 +338,8 @@ impl World<'_> {
         self.holds(&self.ground.goal, &moment)
     }
 
-    /// True if the plain facts of the goal hold after the last timed effect, each by the effect that sets it
-    /// last.
+    /// True if the plain facts of the goal hold after the last timed effect, each by the last timed
+    /// effect on it.
     fn keeps_goal(&self, situation: &Situation) -> bool {
         let at_end = |variable: u32| match self.last_given.get(&variable) {
             Some(&(timed, value)) if timed >= situation.timed => value,
@@ -350,11 +351,11 @@ impl World<'_> {
     }
 }
 
-/// Resources that an action accesses at its start and, if it is durative, at its end.
+/// Resources accessed by an action's start and, if durative, by its end.
 pub(crate) type Touches = (Access, Option<Access>);
 
-/// Resources accessed by the happenings of every action, derived variables traced back to the variables they
-/// are derived from.
+/// Resources accessed by the happenings of every action, with derived variables traced to their
+/// basic ones.
 pub struct Accesses<'w, 'a> {
     /// Resources accessed by each action, computed on demand: most actions of a large task never happen.
     acts: Vec<OnceCell<Touches>>,
@@ -385,7 +386,7 @@ impl<'w, 'a> Accesses<'w, 'a> {
     }
 }
 
-/// Notes what happenings touch, one after the other.
+/// Recorder of the resources that happenings access, one after the other.
 struct Watch<'w, 'a> {
     world: &'w World<'a>,
     /// Resources that each derived variable is derived from.
@@ -469,7 +470,7 @@ impl<'w, 'a> Watch<'w, 'a> {
         Access { reads, holds, writes, adds }
     }
 
-    /// The same with derived variables traced back.
+    /// Resources with derived variables traced to their basic ones.
     fn traced(&self, resources: Vec<u32>) -> Vec<u32> {
         if resources.iter().all(|&resource| self.roots_of(resource).is_none()) {
             return resources;

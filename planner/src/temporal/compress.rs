@@ -16,9 +16,9 @@ use super::advance::{Part, Step};
 use super::space::Space;
 use super::world::{Act, NOTHING, Span, World};
 
-/// A first plan by the classical search, with actions in one go, or with start and end apart where the space has them
-/// so; `None` where the task does not allow it, or where that search finds none; with the states evaluated and the work done. Durations are left out of it: what it
-/// finds may not fit in time.
+/// First plan by the classical search over compressed actions, or start and end snap actions where
+/// needed; `None` if the task does not allow this or the search fails. Also returns evaluated
+/// states and work. Durations are ignored, so the plan may not fit in time.
 pub fn classical_plan(
     space: &Space,
     memory: MemoryLimit,
@@ -56,13 +56,15 @@ pub fn classical_plan(
     Some((actions.iter().map(step).collect(), outcome.evaluated, outcome.work))
 }
 
-/// States that the classical search evaluates at most where its plan may not fit in time.
+/// Maximum number of states evaluated by the classical search, if its plan may not fit in time.
 const MOST_EVALUATED: u64 = 20_000;
-/// Actions with start and end apart, and conditions that keep what they hold while they run, at most.
+/// Maximum number of actions split into start and end, and of added conditions for their
+/// invariants.
 const MOST_APART: usize = 5_000;
 const MOST_GUARDS: usize = 2_000_000;
 
-/// The task with every action in one go, or as its start and its end; and by its actions the space's.
+/// Classical task with every action compressed or split, and the temporal action of each classical
+/// one.
 pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     let world = space.world;
     let apart: Vec<u32> = (0..world.acts.len() as u32).filter(|&act| space.open_act[act as usize]).collect();
@@ -95,10 +97,11 @@ pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     Some((task, parts))
 }
 
-/// The value of an action's own variable while it does not run.
+/// Value of an action's own variable while the action is not running.
 const IDLE: u32 = 1;
 
-/// Start and end of an action as actions; `running` is true in between. `None` if it can never run.
+/// Start and end snap actions of an action; `running` holds in between. `None` if the action can
+/// never run.
 fn halves(act: &Act, seconds: f64, running: Fact) -> Option<[Action; 2]> {
     let mut inside =
         in_one_go(&Act { at_end: &NOTHING, end_effects: &[], flow_effects: &[], ..act.clone() }, 0.0)?;
@@ -112,7 +115,8 @@ fn halves(act: &Act, seconds: f64, running: Fact) -> Option<[Action; 2]> {
     Some([inside, end])
 }
 
-/// Lets no action take away what another one needs while it runs; `None` where that would be too many conditions.
+/// Adds conditions so that no action deletes an invariant of a running one; `None` if there would
+/// be too many.
 fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<()> {
     let mut kept: FxHashMap<u32, Vec<(u32, u32, Fact)>> = FxHashMap::default();
     for (action, &(act, _)) in parts.iter().enumerate().filter(|(_, (_, part))| *part == Part::Start) {
@@ -159,7 +163,7 @@ fn seconds(act: &Act) -> Option<f64> {
     Some(least_s)
 }
 
-/// `None` if the action needs something inside that its own start takes away.
+/// Compressed action; `None` if its own start deletes one of its invariants.
 fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
     let after_start =
         |variable: u32| act.start_effects.iter().rev().filter_map(set).find(|fact| fact.variable == variable);

@@ -12,7 +12,7 @@ use super::world::World;
 pub(crate) struct Chance(u64);
 
 impl Chance {
-    /// From a seed.
+    /// Generator from a seed.
     pub fn new(seed: u64) -> Chance {
         Chance(seed)
     }
@@ -27,7 +27,7 @@ impl Chance {
     }
 }
 
-/// The number itself without a seed, else its place in a permutation (the finaliser of SplitMix64).
+/// Number itself without a seed, else its image under a permutation (the finaliser of SplitMix64).
 pub(super) fn shuffled(number: u64, seed: u64) -> u64 {
     if seed == 0 {
         return number;
@@ -59,8 +59,9 @@ impl Asked<'_, '_> {
     }
 }
 
-/// The steps of a sequence that a goal needs, found backwards from its end: those that write what is asked for last, and
-/// what those ask for. Derived facts, numbers and calls keep whoever may have a part in them.
+/// Steps of a sequence that a goal needs, by regression from the end: the last writers of the
+/// needed facts, and what these need. For derived facts, numbers and calls, all possible
+/// contributors stay.
 ///
 /// An action whose start and end are apart is kept or dropped as a whole: once its start is found useful, the walk begins
 /// anew with its end kept.
@@ -169,8 +170,7 @@ fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> V
     keep
 }
 
-/// Collects what the condition of an action needs before its start, except what its own start
-/// provides.
+/// Collects the condition of an action, except the part that its own start achieves.
 fn ask_but_for(asked: &mut Asked, condition: &Conjunction, start: &[crate::ground::Effect], whole: bool) {
     let given = |fact: &Fact| whole && start.iter().any(|effect| effect.outcome == Outcome::Set(*fact));
     let facts = condition.facts.iter().filter(|fact| !given(fact)).copied().collect();
@@ -209,7 +209,8 @@ fn spread_derived(supports: &[Option<Touched>], asked: &mut Asked) {
     spread.into_iter().for_each(|variable| asked.facts[variable] = None);
 }
 
-/// A part of a plan that may be kept while the rest is made anew: either its beginning, or what some of the goals need.
+/// Random part of a plan to keep while the rest is replanned: a prefix, or the steps for some
+/// goals.
 pub(crate) fn taken_apart(space: &Space, steps: &[Step], chance: &mut Chance) -> Vec<Step> {
     let goal = &space.world.ground.goal;
     let parts = goal.facts.len() + goal.comparisons.len() + goal.calls.len();

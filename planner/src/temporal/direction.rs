@@ -5,8 +5,8 @@ use crate::ground::{Change, ComparisonId, Expression, Outcome, Relation};
 use super::touch::{Touched, expression_touches};
 use super::world::World;
 
-/// True if effects that happen together may bring a numeric condition nearer to being true: not if they move
-/// a sum away from its bound, or leave it where it is, in every state.
+/// True if simultaneous effects may help a numeric condition; false if they move its sum away from
+/// the bound, or not at all, in every state.
 pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) -> bool {
     let comparison = &world.ground.comparisons[comparison as usize];
     let sign = match comparison.relation {
@@ -47,7 +47,8 @@ pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) 
     moved > 0.0
 }
 
-/// True if an expression is a weighted sum of numbers and of answers that do not depend on what changes.
+/// True if an expression is a weighted sum of numbers and of answers that do not depend on changed
+/// resources.
 fn is_sum(world: &World, expression: &Expression, changed: &Touched) -> bool {
     let holds = |part: &Expression| is_sum(world, part, changed);
     match expression {

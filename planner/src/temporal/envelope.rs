@@ -9,9 +9,8 @@ use crate::ground::{Change, Conjunction, Effect, Expression, Fact, NumericId, Ou
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// For each action, true if it makes something true (or larger) only while it runs that others need: a
-/// required-concurrency envelope. All other actions can be compressed in the search, as nothing needs what
-/// happens inside them.
+/// True, by action, if the action is an envelope (required concurrency): others need a fact or
+/// greater number that exists only while it runs. All other actions can be compressed.
 pub fn envelopes(world: &World) -> Vec<bool> {
     let wanted = Wanted::new(world);
     world
@@ -22,15 +21,14 @@ pub fn envelopes(world: &World) -> Vec<bool> {
         .collect()
 }
 
-/// For each action, true if it is durative: with all starts and ends separate, the search sees every
-/// interleaving.
+/// True, by action, if durative: splitting all starts and ends covers every interleaving.
 pub fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
-/// Actions that must not overlap themselves, if every plan can be rearranged into a sequence of compressed
-/// actions; else `None`. The condition: nothing is given from outside, and for every action, its start can
-/// wait until its end, or its end can follow its start at once, whatever happens in between (compare the
+/// Actions that must not overlap themselves, if every plan can be rearranged into a sequence of
+/// compressed actions; else `None`. The condition: no timed effects, and every action can delay its
+/// start until its end, or end right after its start, whatever happens in between (compare the
 /// compression-safe actions of Coles et al. 2009).
 pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     if !world.ground.timed.is_empty() {
@@ -73,7 +71,7 @@ pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     Some(alone_with_itself)
 }
 
-/// True if an action that can start can also start right before its end; `kept` tells the variables that no
+/// True if an action that can start can also start just before its end; `kept`: variables that no
 /// other action changes.
 fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
     let kept = |fact: &Fact| act.over_all.facts.contains(fact) || kept(fact.variable);
@@ -90,8 +88,8 @@ fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
             .all(|when| when.at_start.is_empty() && when.over_all.is_empty())
 }
 
-/// True if the end of an action may follow right after its start without loss, because the end only
-/// advances locked variables.
+/// True if an action may end right after its start without loss, as its end only affects locked
+/// variables.
 fn ends_early(locked: &[bool], act: &Act) -> bool {
     act.at_end.comparisons.is_empty()
         && act.at_end.calls.is_empty()
@@ -110,8 +108,8 @@ fn plain(effect: &Effect) -> Option<Fact> {
     }
 }
 
-/// True if one action at a time changes a variable: every action that changes it gives it the same value at
-/// its start, which nothing needs and from which no such action can start.
+/// True if only one action at a time changes a variable: every writer sets it at its start to the
+/// same value, which no condition needs and in which no writer can start.
 fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> bool {
     let between = |writer: &u32| {
         let act = &world.acts[*writer as usize];
@@ -144,7 +142,7 @@ pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
 struct Wanted {
     facts: FxHashSet<Fact>,
     numbers: FxHashSet<NumericId>,
-    /// For each variable, true if a call reads it.
+    /// True, by variable, if a call reads it.
     read: Vec<bool>,
 }
 

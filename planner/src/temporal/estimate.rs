@@ -27,7 +27,7 @@ pub(crate) struct Estimate {
     pub finish_s: f64,
     /// Operators of the relaxed plan that could be applied at once.
     pub preferred: Vec<(u32, Part)>,
-    /// Operators of the relaxed plan, in the order in which they could be applied.
+    /// Operators of the relaxed plan, in an applicable order.
     pub plan: Vec<(u32, Part)>,
 }
 
@@ -49,15 +49,15 @@ pub(super) struct Work {
     wanted: Vec<bool>,
     /// State of each operator that needs more than one proposition.
     waiting: Vec<Waiting>,
-    /// For each operator that was of use: the label of its preconditions, and its own cost.
+    /// Label of the preconditions and own cost of each used operator.
     fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
     evaluation: u32,
     goal: Vec<u32>,
-    /// The greatest label of the goal; to be computed again once one of them is `nearer`.
+    /// Maximum goal label; recomputed once a goal is `nearer`.
     latest: f64,
     nearer: bool,
-    /// Lower bound from each proposition to the goal: in costs, and in time; empty until it is asked for.
+    /// Lower bounds from each proposition to the goal, in costs and in time; empty until needed.
     remaining: [Vec<f64>; 2],
     /// The most seconds that any operator was found to take.
     dearest_s: f64,
@@ -93,8 +93,8 @@ impl Work {
         }
     }
 
-    /// Counts one more reached precondition of an operator with its label; returns the label of all
-    /// preconditions once the last is reached.
+    /// Records a reached precondition with its label; returns the combined label once all
+    /// preconditions are reached.
     fn meet(&mut self, operator: u32, needs: u32, label: f64, timed: bool) -> Option<f64> {
         if needs == 1 {
             return Some(label);
@@ -108,7 +108,7 @@ impl Work {
         (waiting.missing == 0).then_some(waiting.base)
     }
 
-    /// The greatest label of the goal: what comes later is of no use.
+    /// Maximum goal label; propositions beyond it are useless.
     fn latest(&mut self) -> f64 {
         if std::mem::take(&mut self.nearer) {
             let labels = self.goal.iter().map(|&need| self.labels[need as usize]);
@@ -138,7 +138,7 @@ impl Work {
     }
 }
 
-/// A label in a queue, or what is left.
+/// Label with a total order, for queues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Key(pub(super) f64);
 
@@ -154,11 +154,11 @@ impl Ord for Key {
     }
 }
 
-/// Stands for "perhaps, after other changes": how much dearer such support counts.
+/// Cost factor of uncertain support, which may need other changes first.
 const UNSURE: f64 = 3.0;
 
 impl Relaxed {
-    /// Estimates what is missing to the goal; `None` if it is out of reach.
+    /// Relaxed estimate of the distance to the goal; `None` if unreachable.
     pub fn estimate(&mut self, world: &World, from: &From) -> Result<Option<Estimate>, Failure> {
         for &call in &self.goal_gates {
             if !world.calls.agrees(call, None, from.state, Level::Relaxed)? {
@@ -296,7 +296,7 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Seconds that the operator takes at least, and is likely to take; `None` if it can never be applied.
+    /// Minimum and likely duration of an operator, seconds; `None` if it is never applicable.
     fn seconds(
         &mut self,
         world: &World,
@@ -339,8 +339,8 @@ impl Relaxed {
         }
     }
 
-    /// Repetitions of the operator from the state that make a test true by its own effects; `None` if it
-    /// cannot help.
+    /// Repetitions of the operator from the state until its own effects satisfy a test; `None` if
+    /// it cannot help.
     fn repetitions(
         &self,
         world: &World,
@@ -379,8 +379,8 @@ impl Relaxed {
         Ok((!hopeless).then_some(UNSURE))
     }
 
-    /// The state after what an operator does to what tests read, whatever it needs; `None` if that cannot be told from
-    /// this state.
+    /// State after the effects of an operator on the numbers of tests, ignoring its conditions;
+    /// `None` if unknown in this state.
     fn effects_alone(
         &self,
         world: &World,
@@ -469,7 +469,8 @@ fn changes_by_constants(world: &World, operator: &Operator) -> bool {
         })
 }
 
-/// The parameter with which the operator's own calls agree, `Some(None)` if it takes none; `None` if nothing suits.
+/// Proposed parameter accepted by the operator's own calls, `Some(None)` if it has none; `None` if
+/// nothing is accepted.
 fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<Option<Arc<str>>>, Failure> {
     let agree = |proposal: Option<&Arc<str>>| -> Result<bool, Failure> {
         for &call in &operator.gates {

@@ -1,4 +1,4 @@
-//! Anytime search: a first plan, and from there better ones.
+//! Anytime search: a first plan, then better ones.
 //!
 //! The first search is greedy. Then come searches from the start that weigh what a plan costs ever more against how far
 //! the goal seems (restarting weighted A*, Richter, Thayer and Ruml 2010), and then a large neighbourhood search: a part
@@ -44,25 +44,27 @@ pub(crate) struct Limits {
     pub seed: u64,
 }
 
-/// Progress of the search for plans, and the reason it ended.
+/// Progress of the search, and the reason for its end.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
-    /// The reason it ended.
+    /// Reason for the end.
     pub reason: Reason,
     /// Effort of the search.
     pub counts: Counts,
     /// The number of plans found.
     pub plans: u64,
-    /// Actions that it might help to start while they run, where every other possibility was seen.
+    /// Actions that might help if they overlap themselves, after exhausting every other
+    /// possibility.
     pub overlapping: Vec<u32>,
 }
 
 /// The reason a search for plans ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
-    /// Every possibility was seen: without a plan, there is none, unless actions overlap themselves that might.
+    /// Search space exhausted: without a plan, none exists, unless self-overlapping actions allow
+    /// one.
     Exhausted,
-    /// Nothing is left to look at, but not every possibility was seen: nothing is proven.
+    /// Open list empty, but parts of the space were pruned: nothing is proven.
     Unproven,
     /// The effort that was meant to be spent is spent.
     Enough,
@@ -72,14 +74,15 @@ pub(crate) enum Reason {
     Memory,
 }
 
-/// After a first plan without `anytime`: evaluated states times operators to spend on better plans, at least, as often
-/// again as the plan has so many steps, and evaluations as a multiple of those that the first plan took.
+/// Minimum work on improvement after a first plan without `anytime`, in evaluated states times
+/// operators.
 const IMPROVEMENT_WORK: u64 = 2_000_000;
 const STEPS_PER_SHARE: u64 = 16;
 const IMPROVEMENT_FACTOR: u64 = 20;
-/// Without `anytime`: work to spend on better plans is at most what the first plan took, or this.
+/// Minimum of the limit on improvement work without `anytime`, which otherwise is the work of the
+/// first plan.
 const LEAST_WORK: u64 = 150_000_000;
-/// Without `anytime`: repairs in a row that come to nothing before the plan is left as it is, for each of its steps.
+/// Maximum number of consecutive fruitless repairs per step of the plan, without `anytime`.
 const PATIENCE: u64 = 10;
 /// Weights of the heuristic in the searches that improve a plan.
 const WEIGHTS: [f64; 2] = [3.0, 1.0];
@@ -177,11 +180,11 @@ fn overlapped(
     Ok(())
 }
 
-/// One round of searching for plans and improving them.
+/// Pass of searching for plans and improving them.
 struct Pass {
-    /// For each action, true if its start and end are separate.
+    /// True, by action, if start and end are separate.
     apart: Vec<bool>,
-    /// True if nothing may be left out.
+    /// True if nothing may be pruned.
     exact: bool,
     /// The number of times one action may run at once.
     at_once: usize,
@@ -243,8 +246,9 @@ impl Pass {
         Ok(progress.reason != Reason::Unproven)
     }
 
-    /// True if plans of compressed actions stand for all; rearranged into one, a plan is still a plan, but it
-    /// may end later. Notes the actions for which that is known only where they do not overlap themselves.
+    /// True if plans of compressed actions cover all plans; rearranged into one, a plan stays
+    /// valid, but may end later. Records the actions for which this is known only without
+    /// self-overlap.
     fn all_in_one_go(&self, space: &Space, progress: &Progress, overlapping: &mut BTreeSet<u32>) -> bool {
         if self.apart.contains(&true) || progress.plans > 0 && space.timed_measure() {
             return false;
@@ -269,7 +273,7 @@ struct Run<'r, 'w, 'a> {
     limits: Limits,
     stop: &'r (dyn Fn() -> bool + Sync),
     progress: Progress,
-    /// Actions that the search that proved something could have started while they ran.
+    /// Actions that could have overlapped themselves in the search behind a proof.
     overlapping: BTreeSet<u32>,
     on_plan: &'r mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
     best: Option<Best>,
@@ -279,7 +283,7 @@ struct Run<'r, 'w, 'a> {
 /// The best plan so far.
 struct Best {
     measured: f64,
-    /// Sum of the times at which its goals are fulfilled.
+    /// Sum of the times at which the goals are achieved.
     slowness_s: f64,
     steps: Vec<Step>,
 }
@@ -364,8 +368,8 @@ impl Run<'_, '_, '_> {
         Ok(over)
     }
 
-    /// Keeps a plan if it is better than the best so far, without the steps that it does not need. Between plans that are
-    /// equally good, the one whose goals are fulfilled earlier in sum is nearer to a better one.
+    /// Adopts a plan if better than the best so far, without superfluous steps. Ties are broken by
+    /// the sum of goal achievement times, as earlier goals are closer to an improvement.
     fn take(&mut self, mut steps: Vec<Step>) -> Result<bool, Failure> {
         let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps, self.stop)? else {
             return Ok(false);
@@ -387,7 +391,7 @@ impl Run<'_, '_, '_> {
         self.keep(plan, found)
     }
 
-    /// Keeps a plan if it is better than the best so far; `found` is the same as the search has found it.
+    /// Adopts a plan if better than the best so far; `found`: the plan as found by the search.
     fn keep(&mut self, plan: Replayed, found: Vec<Step>) -> Result<bool, Failure> {
         let (measured, mut steps, base) = plan;
         let ready_s = base.track.order.ready_s();
@@ -425,7 +429,7 @@ impl Run<'_, '_, '_> {
         Ok(better)
     }
 
-    /// A plan with its tours in another order, where that is better.
+    /// Plan with its tours reordered, if better.
     fn rearranged(&self, plan: Replayed) -> Result<Replayed, Failure> {
         match self.tours.get_or_init(|| Tours::new(self.space.world)) {
             Some(tours) => tours.rearranged(self.space, plan, self.stop),
@@ -486,7 +490,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Takes the plan apart at random and mends it, until the budget is spent.
+    /// Large neighbourhood search: destroys and repairs the plan until the budget is spent.
     fn neighbourhoods(&mut self, budget: u64) -> Result<(), Failure> {
         let mut chance = Chance::new(self.limits.seed);
         let mut idle = 0;
@@ -548,8 +552,8 @@ fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
 }
 
-/// The steps in the order of their starts, so that a beginning of them is what happens until some time. Done in one go,
-/// a step that starts first may come to its end before what its end builds on: this order need not be a plan.
+/// Steps sorted by start, so that a prefix is what happens until some time. The order may be
+/// invalid as a sequence of compressed steps, because an early start may have a late end.
 fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
     let Ok(track) = space.track(steps) else { return steps.to_vec() };
     let mut starts: Vec<usize> = Vec::new();

@@ -1,4 +1,4 @@
-//! Independence of happenings: an action's end and its start, and starts or ends of several actions.
+//! Independence of happenings: an action's start and end, and snap actions of several actions.
 
 use crate::ground::Outcome;
 
@@ -8,13 +8,13 @@ use super::touch::{Touched, expression_touches};
 use super::world::{Act, World};
 
 impl World<'_> {
-    /// True if the steps of the search can make every plan: no action needs a duration that is chosen for its
-    /// effects, or a number while it flows, and none need start or end at the very same time.
+    /// True if the search's steps cover every plan: no durations chosen for effects, no reads of
+    /// continuously changing numbers, and no required simultaneous starts or ends.
     pub fn is_complete(&self) -> bool {
         *self.complete.get_or_init(|| !self.chooses_numbers() && !some_only_together(self))
     }
 
-    /// True if the end of an action may happen together with its start: neither changes what the other
+    /// True if an action's end is independent of its start: neither changes what the other
     /// accesses.
     pub(super) fn ends_freely(&self, act: &Act) -> bool {
         let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());

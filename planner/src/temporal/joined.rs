@@ -1,6 +1,6 @@
-//! Two steps of a plan by one, where the same action leads from where the first begins to where the second ends: `(move a b)`,
-//! `(move b c)` by `(move a c)`. A search that follows a relaxed plan takes what it needs one after the other, and nothing in it sees the
-//! detour.
+//! Shortcuts: replaces two steps of one action by one: `(move a b)`, `(move b c)` by `(move a c)`.
+//! A search that follows relaxed plans fetches one thing after another and does not see such
+//! detours.
 
 use crate::calls::Failure;
 use crate::ground::Outcome;
@@ -10,11 +10,12 @@ use super::schedule::Replayed;
 use super::space::Space;
 use super::world::{Act, World};
 
-/// Steps that are replayed, and actions that are looked at, at most for one plan.
+/// Maximum number of steps replayed, and of actions inspected, for one plan.
 const MOST_REPLAYED: usize = 20_000;
 const MOST_LOOKED_AT: usize = 20_000_000;
 
-/// The plan with pairs of steps done by one, or left out, as long as that makes it no worse; always replayed.
+/// Plan with pairs of steps replaced by one or removed while the plan gets no worse; always
+/// replayed.
 pub fn shortened(space: &Space, mut plan: Replayed, stop: &dyn Fn() -> bool) -> Result<Replayed, Failure> {
     let mut left = MOST_REPLAYED;
     let mut looks = MOST_LOOKED_AT / space.world.acts.len().max(1);
@@ -51,8 +52,8 @@ pub fn shortened(space: &Space, mut plan: Replayed, stop: &dyn Fn() -> bool) -> 
     }
 }
 
-/// Pairs of steps by the same action of which the second asks for what the first has brought about; once asked to stop,
-/// those found so far.
+/// Pairs of steps by one action, the second of which needs an effect of the first; incomplete once
+/// stopped.
 fn pairs(world: &World, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<(usize, usize)> {
     let act = |step: &Step| &world.acts[step.act as usize];
     let is_whole = |step: &Step| step.part == Part::Whole && step.proposal.is_none();

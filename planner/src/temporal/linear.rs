@@ -1,5 +1,6 @@
-//! Times, durations and numbers chosen together: a sequence of happenings is kept as long as the linear program of all
-//! that it asks for has a solution (COLIN; Coles, Coles, Fox and Long 2012).
+//! Search over happenings with linear programs (COLIN; Coles, Coles, Fox and Long 2012): times,
+//! durations and numbers are chosen together, and a sequence is kept while its linear program is
+//! feasible.
 //!
 //! Other searches try the ends of a range of durations, and look at numbers that flow only where an action ends. This one
 //! knows no more than a number's range: it is slower, and proves nothing.
@@ -24,9 +25,9 @@ use super::world::{Act, Span, World};
 
 /// States that are evaluated at most.
 const MOST_EVALUATED: u64 = 1_500;
-/// Numbers that depend on times, at most, of which the range is worked out for the heuristic.
+/// Maximum number of time-dependent numbers whose ranges are computed for the heuristic.
 const MOST_RANGES: usize = 8;
-/// Cost of a state from which no relaxed plan is known: its numbers may still come out otherwise.
+/// Cost of a state without a relaxed plan, which may still be feasible with other numbers.
 const FAR: f64 = 1e9;
 /// Squares of the comparisons of all programs, at most: some seconds.
 const MOST_WORK: u64 = 10_000_000;
@@ -36,18 +37,18 @@ const MOST_BYTES: u64 = 100 << 20;
 const MORE: u64 = 100;
 /// Least difference that counts as better.
 const TOLERANCE: f64 = 1e-6;
-/// Weight of the makespan beside a metric that does not count it.
+/// Weight of the makespan as a tie-breaker for a metric without it.
 const TIME_WEIGHT: f64 = 1e-4;
 
-/// True if the numbers of this task fit linear programs: no attachment is asked, and no rule compares
-/// numbers.
+/// True if the task's numbers fit linear programs: no attachments, and no axioms over numbers.
 pub(super) fn is_linear(world: &World) -> bool {
     world.ground.calls.is_empty()
         && !world.proposes
         && world.ground.axioms.iter().all(|axiom| axiom.body.comparisons.is_empty())
 }
 
-/// The best plan found by linear programs, with the states evaluated for it; below a bound of what plans are measured by.
+/// Best plan by linear programs with a measure below the bound, with the number of evaluated
+/// states.
 pub(super) fn linear_plan(
     space: &Space,
     relaxed: &mut Relaxed,
@@ -78,11 +79,11 @@ struct Running {
     act: u32,
     end: u32,
     duration: Linear,
-    /// Numbers that it changes now, with the change per second.
+    /// Numbers that the action changes continuously, with their rates per second.
     rates: Vec<(NumericId, f64)>,
 }
 
-/// A sequence of happenings and what it leads to.
+/// Sequence of happenings with the resulting state.
 #[derive(Debug, Clone)]
 struct Node {
     /// Facts; the numbers are in `numbers`.
@@ -159,7 +160,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok(best)
     }
 
-    /// Evaluates a node and puts it in the queue, unless its program has no solution or it is known.
+    /// Evaluates and enqueues a node, unless it is infeasible or known.
     fn keep(&mut self, node: Node, queue: &mut BinaryHeap<Reverse<(Key, u32)>>) -> Result<(), Failure> {
         self.evaluated += 1;
         self.work += (node.program.rows() as u64 + 1).pow(2);
@@ -197,7 +198,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         (0..node.open.len()).map(Next::End).chain(given).chain(starts.map(Next::Start)).collect()
     }
 
-    /// The node after a happening; `None` if it cannot happen, or is more than linear.
+    /// Node after a happening; `None` if inapplicable or nonlinear.
     fn after(&self, node: &Node, next: Next) -> Result<Option<Node>, Failure> {
         let mut made = node.clone();
         let happens = match next {
@@ -212,7 +213,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok(made.goes_on(self.space.world).then_some(made))
     }
 
-    /// The plan of a node, if its goal holds after the last timed effect.
+    /// Plan of a node, if the goal holds after the last timed effect.
     fn plan(&self, node: &Node) -> Result<Option<(f64, Vec<Timed>)>, Failure> {
         if !node.open.is_empty() {
             return Ok(None);
@@ -264,8 +265,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
     }
 }
 
-/// The earliest time of the last happening; and the state with its numbers as they are then, and where some depend on times, with these as small and as large as they can
-/// be; `None` if there is no solution.
+/// Earliest time of the last happening, with the state at that time, and with time-dependent
+/// numbers at their minimum and maximum; `None` if infeasible.
 fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
     let now = node.last.map_or(Linear::constant(0.0), Linear::variable);
     let solution = node.program.minimised(&now)?;
@@ -369,7 +370,7 @@ impl Node {
         })
     }
 
-    /// Asks a condition of the present state; whether it can hold, as far as that is seen.
+    /// Adds a condition on the present state; false if it is obviously infeasible.
     fn asks(&mut self, world: &World, condition: &Conjunction, duration: Option<&Linear>) -> bool {
         condition.calls.is_empty()
             && condition.facts.iter().all(|fact| self.state.values[fact.variable as usize] == fact.value)

@@ -9,12 +9,12 @@ use super::advance::Step;
 /// Options of a search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Manner {
-    /// Weight of the heuristic against what the plan costs so far; `None` for the heuristic alone.
+    /// Weight of the heuristic relative to path cost; `None`: heuristic alone.
     pub weight: Option<f64>,
     /// True if the heuristic counts time from when resources are free, instead of adding costs up.
     pub timed: bool,
-    /// True to follow the relaxed plan of every state, instead of only those nearer to the goal than any
-    /// before.
+    /// True to follow the relaxed plan of every state; false: only for states that improve on all
+    /// earlier ones.
     pub eager: bool,
     /// Only plans that cost less than this.
     pub bound: f64,
@@ -26,8 +26,8 @@ pub(crate) struct Manner {
     pub memory: MemoryLimit,
     /// Decides between entries that rank the same; 0 for the order of their making.
     pub shuffle: u64,
-    /// True to distinguish equal states wherever their times leave different possibilities: then nothing is
-    /// lost, and an exhausted search proves something.
+    /// True to distinguish equal states with different temporal options; then nothing is lost, and
+    /// exhaustion is a proof.
     pub exact: bool,
     /// The number of times one action may be in progress at once.
     pub at_once: usize,
@@ -38,12 +38,12 @@ pub(crate) struct Manner {
 pub(crate) enum End {
     /// Steps from the base to the goal.
     Found(Vec<Step>),
-    /// Nothing within the bound is left to look at.
+    /// Search space within the bound exhausted.
     Exhausted {
-        /// True if there is surely no plan within the bound: nothing was left out on the way, except starts
-        /// of actions in progress.
+        /// True if no plan within the bound exists, except with self-overlapping actions; nothing
+        /// else was pruned.
         proven: bool,
-        /// Actions that could have started while they were in progress.
+        /// Actions that could have overlapped themselves.
         overlapping: BTreeSet<u32>,
     },
     /// The budget of evaluations is used up.
@@ -61,6 +61,6 @@ pub(crate) struct Counts {
     pub evaluated: u64,
     /// States expanded.
     pub expanded: u64,
-    /// Work done: what was looked at in estimates, states and times.
+    /// Work done: units of estimates, states and times.
     pub work: u64,
 }

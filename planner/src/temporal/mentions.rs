@@ -26,16 +26,17 @@ const MOST_ROUNDS: usize = 100;
 /// Number of compared pairs of happenings between two queries of `stop`.
 const TOUCHES_A_LOOK: usize = 1024;
 
-/// A predicate or a function: whether it is a function, its number.
+/// Predicate or function: true for a function, and its number.
 type Place = (bool, u32);
-/// A ground atom, or a function's ground instance, by its name: whether it is a function, predicate or function, arguments.
+/// Ground atom or function instance: true for a function, number of predicate or function,
+/// arguments.
 type Name = (bool, u32, Vec<u32>);
 
-/// In place of arguments: all instances of a predicate or function.
+/// Stands for arguments: all instances of a predicate or function.
 const ALL: u32 = u32::MAX;
 /// Stands for the arguments of one instance that only the state determines.
 const SOME: u32 = u32::MAX - 1;
-/// In place of a step: a timed literal.
+/// Stands for a step: a timed literal.
 const GIVEN: usize = usize::MAX;
 
 /// A use of an atom or a number by a happening.
@@ -61,8 +62,7 @@ struct Touch {
     does: Use,
 }
 
-/// Separates simultaneous happenings of which one changes what the other reads. Returns false if
-/// `stop` ended it early.
+/// Separates simultaneous mutex happenings; false if stopped early.
 pub fn keep_apart(
     space: &Space,
     steps: &[Step],
@@ -100,7 +100,7 @@ pub fn keep_apart(
     Ok(true)
 }
 
-/// True if the start or the end of an action mentions or changes what the other changes.
+/// True if start and end of an action are mutex.
 pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
     let [at_start, at_end] = Named::new(world.task).uses(world, act);
     at_start.iter().any(|(name, does)| {
@@ -108,13 +108,13 @@ pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
     })
 }
 
-/// Two happenings, the one that shall come first before the other: what is given cannot be moved.
+/// Two happenings in order; timed literals cannot be moved.
 fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
     let key = |touch: &Touch| (touch.step != GIVEN, touch.happening);
     if key(one) < key(other) { (one.happening, other.happening) } else { (other.happening, one.happening) }
 }
 
-/// For each atom, the happenings that mention or change it, where they use it in different ways.
+/// Happenings that access each atom, for atoms accessed in different ways.
 fn touches(
     space: &Space,
     steps: &[Step],
@@ -158,9 +158,9 @@ fn touches(
     Ok(touches)
 }
 
-/// Names things that are mentioned and changed.
+/// Interner of accessed atoms and functions.
 struct Named {
-    /// For each derived predicate, the predicates that it depends on; empty for others.
+    /// Basic predicates of each derived predicate; empty for others.
     roots: Vec<Vec<u32>>,
     /// True if functions may have objects as values: the state then decides which object a term names.
     is_loose: bool,
@@ -230,7 +230,8 @@ impl Named {
         }
     }
 
-    /// Notes a change of an instance, and of all instances of its predicate or function where they are read as one.
+    /// Records a change of an instance, and of all instances of its predicate or function where
+    /// these are read as a whole.
     fn written(&self, (is_function, place): Place, arguments: Vec<u32>, does: Use, into: &mut Uses) {
         into.insert(((is_function, place, arguments), does));
         if self.is_loose || !is_function {
@@ -241,7 +242,7 @@ impl Named {
         }
     }
 
-    /// Notes that an instance is read, and what says which one.
+    /// Records a read of an instance, and of the fluents in its arguments.
     fn mentioned(&self, (is_function, place): Place, terms: &[Term], binding: &[u32], into: &mut Uses) {
         self.terms(terms, binding, into);
         let arguments = objects(terms, binding).unwrap_or_else(|| vec![ALL]);

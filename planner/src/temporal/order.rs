@@ -1,4 +1,5 @@
-//! The partial order that a sequence of happenings stands for, and its earliest schedule.
+//! Partial order behind a sequence of happenings (simple temporal network), and its earliest
+//! schedule.
 //!
 //! A happening reads and writes resources (variables and numbers). Two happenings that could disturb each other keep
 //! the order of the sequence, [`EPSILON_S`] apart; others are free, so the sequence only fixes what matters. What must
@@ -18,7 +19,8 @@ const ROUNDING_S: f64 = 1e-9;
 pub struct Access {
     /// Must not change between the happening before and this one.
     pub reads: Vec<u32>,
-    /// Must not change right after this one (a start), or right before it (an end), but may with it.
+    /// Resources that must not change right after this happening (a start) or right before it (an
+    /// end), but may change with it.
     pub holds: Vec<u32>,
     /// Get a new value.
     pub writes: Vec<u32>,
@@ -46,7 +48,7 @@ struct Tie {
 #[derive(Debug, Clone)]
 pub struct Order {
     earliest_s: Vec<f64>,
-    /// For each happening, the earlier ones that it must follow, with the least distance in seconds.
+    /// Predecessors of each happening, with the minimum distance, seconds.
     after: Vec<Vec<(u32, f64)>>,
     fixed: Vec<(u32, f64)>,
     ties: Vec<Tie>,
@@ -58,7 +60,7 @@ pub struct Order {
 pub struct Inconsistent;
 
 impl Order {
-    /// Nothing has happened yet.
+    /// Empty network.
     pub fn new(resources: usize) -> Order {
         Order {
             earliest_s: Vec::new(),
@@ -79,7 +81,7 @@ impl Order {
         self.earliest_s.len()
     }
 
-    /// For each resource, the latest of its last accesses by a value of happenings: write, read since,
+    /// For each resource, the latest of the last accesses under `value`: write, read since,
     /// addition since, hold since; -1 for none.
     pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 4]> {
         let latest =
@@ -90,7 +92,7 @@ impl Order {
         })
     }
 
-    /// Minimum delay of each happening from `first` on after `start`, seconds; minus infinity if it
+    /// Minimum delay after `start` of each happening from `first` on, seconds; minus infinity if it
     /// may come before.
     pub fn after_s(&self, start: u32, first: usize) -> Vec<f64> {
         let mut after_s = vec![f64::NEG_INFINITY; self.len() - first];
@@ -129,8 +131,8 @@ impl Order {
         self.fixed.iter().filter_map(bound).fold(f64::INFINITY, f64::min)
     }
 
-    /// Tells every distance of the network: from a happening to another (`None` for the beginning of the plan), in
-    /// seconds at least.
+    /// Calls `tell` for every distance of the network: from happening (`None`: start of the plan),
+    /// to happening, minimum seconds.
     pub fn distances(&self, mut tell: impl FnMut(Option<u32>, Option<u32>, f64)) {
         for (node, after) in self.after.iter().enumerate() {
             after.iter().for_each(|&(other, gap_s)| tell(Some(other), Some(node as u32), gap_s));
@@ -158,8 +160,7 @@ impl Order {
         own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))
     }
 
-    /// For each resource, the time at which its last write or addition is over, seconds; 0 if nothing has
-    /// accessed it.
+    /// For each resource, the end of its last write or addition, seconds; 0 without accesses.
     pub fn ready_s(&self) -> Vec<f64> {
         let last = |resource: &Resource| {
             let done = resource.writer.iter().chain(&resource.adders);
@@ -259,8 +260,8 @@ impl Order {
         }
     }
 
-    /// Raises earliest times until every distance holds (Bellman and Ford over the network, whose edges mostly follow
-    /// the sequence, so that each pass settles everything but what upper bounds push).
+    /// Raises earliest times until every distance holds (Bellman-Ford; most edges follow the
+    /// sequence, so a pass settles everything except the effects of upper bounds).
     fn propagate(&mut self) -> Result<(), Inconsistent> {
         for _ in 0..self.ties.len() + 2 {
             let mut pushed = false;
@@ -296,8 +297,8 @@ impl Order {
     }
 }
 
-/// The earliest schedule of actions that are done in one go, one after the other: what [`Order`] comes to where no upper
-/// bound ever shifts what was placed before, kept as four times a resource.
+/// Earliest schedule of consecutive compressed actions, equal to [`Order`]'s where no upper bound
+/// shifts earlier happenings; stored as four times per resource.
 #[derive(Debug, Clone)]
 pub struct Clock {
     /// Last write, last read since, last addition since, last hold since; negative for none.
@@ -308,7 +309,7 @@ pub struct Clock {
 const NEVER: f64 = -1.0;
 
 impl Clock {
-    /// Nothing has happened yet.
+    /// Empty schedule.
     pub fn new(resources: usize) -> Clock {
         Clock { last_s: vec![[NEVER; 4]; resources], latest_s: 0.0 }
     }
@@ -318,13 +319,12 @@ impl Clock {
         self.latest_s
     }
 
-    /// For each resource, the time at which its last write or addition is over, seconds; 0 if nothing has
-    /// accessed it.
+    /// For each resource, the end of its last write or addition, seconds; 0 without accesses.
     pub fn ready_s(&self) -> Vec<f64> {
         self.last_s.iter().map(|&[write_s, _, add_s, _]| write_s.max(add_s).max(0.0)).collect()
     }
 
-    /// The next action: its start, and its end if it takes time.
+    /// Appends an action: its start, and its end if durative.
     pub fn push(&mut self, start: &Access, end: Option<(&Access, Span)>) {
         let mut start_s = self.after(start);
         let Some((end, span)) = end else {

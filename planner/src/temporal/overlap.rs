@@ -17,7 +17,7 @@ use super::advance::{Part, Situation, Step};
 use super::touch::Touched;
 use super::world::{Act, Span, World};
 
-/// True if an action can start while it is in progress; grounding modules are not asked for its parameters.
+/// True if an action can start while it is in progress; its grounding module is not asked.
 pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
     let nothing = Span { least_s: 0.0, most_s: 0.0 };
     let mut step = Step { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
@@ -45,7 +45,7 @@ pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32
     acts.into_iter().filter(|&act| !once(&world.acts[act as usize])).collect()
 }
 
-/// The only value that each changed variable is ever given; `None` if there are several.
+/// Only value ever assigned to each changed variable; `None` if there are several.
 fn kept(world: &World) -> FxHashMap<u32, Option<u32>> {
     let acts = world.acts.iter().flat_map(|act| act.start_effects.iter().chain(act.end_effects));
     let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);

@@ -1,11 +1,11 @@
-//! Numbers that are linear in the times of happenings, and the linear programs of what is asked of them.
+//! Numbers that are linear in the times of happenings, and linear programs over them.
 
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, Variable};
 
 use crate::ground::{Expression, Relation};
 
-/// Distance that a strict comparison keeps, in the unit of what is compared: well above the tolerance of linear programs and of
-/// comparisons, 1e-7.
+/// Margin of a strict comparison, in the unit of the compared numbers: well above the tolerance
+/// (1e-7) of linear programs and comparisons.
 const STRICTLY: f64 = 1e-6;
 
 /// A number that is linear in variables of a [`Program`].
@@ -27,7 +27,7 @@ impl Linear {
         Linear { constant: 0.0, terms: vec![(variable, 1.0)] }
     }
 
-    /// The number if it depends on no variable.
+    /// Number as a constant, if it depends on no variable.
     pub fn as_constant(&self) -> Option<f64> {
         self.terms.is_empty().then_some(self.constant)
     }
@@ -62,7 +62,7 @@ impl Linear {
             .fold(self.constant, |sum, &(variable, factor)| sum + factor * values[variable as usize])
     }
 
-    /// An expression over linear numbers; `None` where it is not linear, or asks an attachment.
+    /// Linear form of an expression; `None` if nonlinear, or if it asks an attachment.
     pub fn of(
         expression: &Expression,
         numbers: &[Linear],
@@ -124,7 +124,7 @@ impl Program {
         self.rows.len()
     }
 
-    /// Asks that a comparison holds; whether it can, as far as that is seen without solving anything.
+    /// Adds a comparison as a constraint; false if it is obviously infeasible.
     pub fn ask(&mut self, left: &Linear, relation: Relation, right: &Linear) -> bool {
         let difference = left.plus(-1.0, right);
         if !difference.constant.is_finite() {
@@ -147,7 +147,7 @@ impl Program {
         true
     }
 
-    /// Values of the variables that make a number as small as possible; `None` if there are none.
+    /// Values of the variables that minimise a number; `None` if infeasible.
     pub fn minimised(&self, objective: &Linear) -> Option<Vec<f64>> {
         let mut factors = vec![0.0; self.bounds.len()];
         objective.terms.iter().for_each(|&(variable, factor)| factors[variable as usize] = factor);

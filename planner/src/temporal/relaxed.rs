@@ -1,4 +1,4 @@
-//! The relaxed task of the temporal search, in which nothing is ever taken away: operators over propositions.
+//! Delete-relaxed task of the temporal search: operators over propositions.
 //!
 //! Numeric conditions, and calls whose answer depends on the state, are *tests*: propositions whose truth is looked up
 //! by evaluation, and which every operator moves that changes something they read.
@@ -32,7 +32,7 @@ pub(super) struct Operator {
     pub(super) part: Part,
     pub(super) needs: Vec<u32>,
     pub(super) gives: Vec<u32>,
-    /// Tests that its numeric effects or facts may change.
+    /// Tests that the operator's numeric effects or facts may change.
     pub(super) moves: Vec<u32>,
     /// Calls that never change: asked once the rest is reached.
     pub(super) gates: Vec<(CallId, bool)>,
@@ -43,13 +43,13 @@ pub(super) struct Operator {
 /// Data of an operator that every evaluation reads, side by side in memory.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hot {
-    /// Index in [`Relaxed::given`] of its first effect; its moved tests follow, up to the end.
+    /// Index in [`Relaxed::given`] of the operator's first effect; its affected tests follow.
     pub(super) gives: u32,
     pub(super) moves: u32,
     pub(super) end: u32,
-    /// The number of propositions that it needs.
+    /// Number of preconditions.
     pub(super) needs: u32,
-    /// True if its applicability needs no attachment.
+    /// True if applicability needs no attachment.
     pub(super) plain: bool,
     /// Duration, seconds; infinite if the action can never be applied, NaN if it depends on a call.
     pub(super) seconds: f64,
@@ -58,12 +58,12 @@ pub(super) struct Hot {
 }
 
 impl Hot {
-    /// True if its applicability needs no attachment and its duration is known.
+    /// True if applicability needs no attachment and the duration is known.
     pub(super) fn is_known(&self) -> bool {
         self.plain && !self.seconds.is_nan()
     }
 
-    /// Lower bound on its cost, in time or in costs; zero while that is not known.
+    /// Lower bound on the operator's cost, in time or costs; zero while unknown.
     pub(super) fn least(&self, timed: bool) -> f64 {
         self.seconds.max(0.0) + if timed { 0.0 } else { self.step }
     }
@@ -73,7 +73,7 @@ impl Hot {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Waiter {
     pub(super) operator: u32,
-    /// The only thing that it gives or moves; [`NOBODY`] where there are more.
+    /// Only effect of the operator; [`NOBODY`] if there are several.
     pub(super) target: u32,
     /// Duration as far as known now, seconds.
     pub(super) seconds: f64,
@@ -93,29 +93,28 @@ pub(super) enum Seconds {
 }
 
 impl Seconds {
-    /// Nothing for an instantaneous part of an action.
+    /// Zero for an instantaneous snap action.
     fn or_zero(self, zero: bool) -> Seconds {
         if zero && self != Seconds::Depends { Seconds::Known(0.0) } else { self }
     }
 }
 
-/// The relaxed task and the working memory of its evaluation.
+/// Relaxed task with the working memory of its evaluation.
 pub(crate) struct Relaxed {
     pub(super) offsets: Vec<u32>,
     pub(super) tests: Vec<Test>,
     /// Number of a test's proposition.
     test_index: FxHashMap<Test, u32>,
-    /// For each test, true if an operator or the goal needs it.
+    /// True, by test, if an operator or the goal needs it.
     pub(super) asked: Vec<bool>,
     /// The resources that each test reads.
     pub(super) test_reads: Vec<Vec<u32>>,
     /// The tests that read each resource.
     tests_on: Vec<Vec<u32>>,
     pub(super) test_base: u32,
-    /// For each action with separate start and end: the propositions "is running" and "is not
-    /// running".
+    /// Propositions "is running" and "is not running" of each split action.
     pub(super) tokens: FxHashMap<u32, (u32, u32)>,
-    /// First of those.
+    /// First token proposition.
     pub(super) token_base: u32,
     pub(super) operators: Vec<Operator>,
     pub(super) hot: Vec<Hot>,
@@ -125,14 +124,14 @@ pub(crate) struct Relaxed {
     pub(super) needed_by: Grouped<Waiter>,
     pub(super) goal: Vec<u32>,
     pub(super) goal_gates: Vec<(CallId, bool)>,
-    /// Mean duration: what being a step at all counts.
+    /// Mean duration, the weight of a step.
     pub(super) unit: f64,
     /// Contribution of each action to the measure beside time, in equivalent seconds.
     pub(super) counted: Vec<Option<Expression>>,
-    /// Operators that need nothing.
+    /// Operators without preconditions.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
-    /// Memory for what an operator being made changes.
+    /// Buffer for the changes of an operator under construction.
     touched: Touched,
 }
 
@@ -256,7 +255,7 @@ impl Relaxed {
         self.offsets[fact.variable as usize] + fact.value
     }
 
-    /// Adds the facts that an outcome may make true; of an effect module every value of what it writes.
+    /// Adds the facts that an outcome may achieve; for an effect module, every value of its terms.
     fn given(&self, world: &World, outcome: &Outcome, into: &mut Vec<u32>) {
         match outcome {
             Outcome::Set(fact) => into.push(self.fact(*fact)),
@@ -278,7 +277,7 @@ impl Relaxed {
         facts.chain(comparisons.iter().map(|&comparison| self.test_base + comparison))
     }
 
-    /// One operator for what happens always, and one for each condition under which more happens.
+    /// Adds one operator for the unconditional effects, and one for each further condition.
     fn operator(
         &mut self,
         world: &World,
@@ -312,7 +311,7 @@ impl Relaxed {
         }
     }
 
-    /// The operator of what happens under a further condition.
+    /// Adds the operator of the effects under a further condition.
     fn under(
         &mut self,
         world: &World,
@@ -470,8 +469,8 @@ impl Relaxed {
         self.work = Work::new(count, self.operators.len());
     }
 
-    /// Lists by proposition the operators that need it. Those of which somebody else must be asked come last: by then,
-    /// what they give may be of no use any more.
+    /// Lists operators by precondition; those that ask attachments come last, because their effects
+    /// may be useless by then.
     fn index_needs(&mut self, propositions: usize) {
         let waiter = |hot: &Hot, operator: usize| {
             let target = match self.given[hot.gives as usize..hot.end as usize] {
@@ -491,7 +490,7 @@ impl Relaxed {
     }
 }
 
-/// For each call, true if a condition uses it without a proposed parameter.
+/// True, by call, if a condition uses it without a proposed parameter.
 fn plain_calls(world: &World) -> Vec<bool> {
     let mut plain = vec![false; world.ground.calls.len()];
     let mut note = |condition: &Conjunction| {
@@ -531,7 +530,7 @@ impl Merged {
     }
 }
 
-/// True if the start of an action may itself bring about a fact that is needed after it.
+/// True if the start of an action may itself achieve a fact that is needed after it.
 fn may_give(world: &World, act: &Act, fact: &Fact) -> bool {
     let derived = world.ground.variables[fact.variable as usize].stratum.is_some();
     let gives = |effect: &Effect| effect.outcome == Outcome::Set(*fact);

@@ -10,8 +10,8 @@ use super::estimate::Key;
 use super::relaxed::Relaxed;
 
 impl Relaxed {
-    /// For each proposition, a lower bound on the relaxed plan between it and the last goal, infinite where
-    /// it is of no use; in time, or in costs added up.
+    /// Lower bound on the relaxed plan between each proposition and the last goal, in time or
+    /// summed costs; infinite for useless ones.
     ///
     /// Durations that are not known without a state count as nothing, and so does what else an operator needs.
     pub(super) fn remaining(&self, timed: bool) -> Vec<f64> {

@@ -18,10 +18,11 @@ use super::space::{Base, Space, Track};
 /// Steps that are replayed at most for one plan.
 const MOST_REPLAYED: usize = 50_000;
 
-/// A plan with what replaying it says.
+/// Plan with the results of its replay.
 pub(crate) type Replayed = (f64, Vec<Step>, Base);
 
-/// The plan with steps on its longest path exchanged as long as that makes it better; never worse, and always replayed.
+/// Plan with steps on its critical path exchanged while this improves it; never worse, always
+/// replayed.
 pub(crate) fn tightened(
     space: &Space,
     mut plan: Replayed,
@@ -71,7 +72,7 @@ fn critical_pairs(steps: &[Step], track: &Track) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// The happenings on a longest path of the network, from the end of the plan back to its beginning.
+/// Happenings on a critical path of the network, from the end of the plan to its beginning.
 pub fn longest_path(order: &Order) -> Vec<usize> {
     let mut network: DiGraph<(), f64> = DiGraph::with_capacity(order.len() + 1, 4 * order.len());
     let begin = network.add_node(());

@@ -56,9 +56,9 @@ struct Node {
 }
 
 const NONE: u32 = u32::MAX;
-/// Marks states that a lookahead only passed through: the search may still come to them by itself.
+/// Mark of states passed by a lookahead only; the search may still reach them.
 const PASSED: u64 = 1 << 63;
-/// Work of putting a step of a path in its time, and of making a state.
+/// Work of scheduling a step of a path, and of generating a state.
 const WORK_A_STEP: u64 = 20;
 const WORK_A_STATE: u64 = 50;
 /// Number of queue entries between two checks of the memory limit; a state counts for several.
@@ -67,7 +67,7 @@ const UNSEEN_A_STATE: usize = 64;
 /// Priority of the preferred queue after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
-/// An action in progress as a key: action, proposal, bits of its duration, gates of its end.
+/// Key of an action in progress: action, proposal, duration bits, gates of its end.
 type OpenKey = (u32, Option<Arc<str>>, u64, Gates);
 
 /// The actions in progress, and the number of timed effects that have happened.
@@ -98,7 +98,7 @@ pub(crate) struct Search<'s, 'w, 'a> {
     unseen: usize,
     /// True if something was left out that might have led to a plan.
     lossy: bool,
-    /// Actions that could have started while they were in progress as often as they may be.
+    /// Actions at their maximum overlap with themselves that could have started again.
     overlapping: BTreeSet<u32>,
     /// Relaxed plan of the state evaluated last, to be followed next.
     ahead: Option<Ahead>,
@@ -108,14 +108,15 @@ pub(crate) struct Search<'s, 'w, 'a> {
 #[derive(Debug, Default)]
 struct Times {
     makespan_s: f64,
-    /// Mark that distinguishes equal states: in exact searches everything that future times depend on, else
-    /// the time from the start of the action in progress that started last to the end of everything.
+    /// Mark that distinguishes equal states: in exact searches, everything on which future times
+    /// depend; else the time from the latest start of an action in progress to the end of
+    /// everything.
     mark: u64,
     /// Time at which each resource is free, seconds.
     ready_s: Option<Vec<f64>>,
 }
 
-/// A relaxed plan to follow as far as it goes.
+/// Relaxed plan to follow as far as possible.
 struct Ahead {
     from: u32,
     plan: Vec<(u32, Part)>,
@@ -258,7 +259,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.manner.bound.is_finite() || self.manner.weight.is_some()
     }
 
-    /// Times of the happenings up to a new step; `Err` if they are inconsistent.
+    /// Times of the happenings up to a new step; `Err` if inconsistent.
     fn times(&mut self, parent: u32, step: &Step, open: bool) -> Result<Times, Inconsistent> {
         let wanted = self.manner.timed || self.bounded() && self.space.timed_measure();
         if !self.space.tight && !wanted {
@@ -291,7 +292,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(Times { makespan_s, mark, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
     }
 
-    /// Takes a situation in: forgets it if it is known or too dear, else evaluates and expands it.
+    /// Processes a state: dropped if known or too expensive, else evaluated and expanded.
     fn visit(
         &mut self,
         parent: u32,
@@ -334,7 +335,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(None)
     }
 
-    /// Follows a relaxed plan: takes its steps in their order wherever they can be taken, until none can (Vidal 2004).
+    /// Follows a relaxed plan: applies its steps in order wherever applicable, until none is (Vidal
+    /// 2004).
     fn look_ahead(&mut self, ahead: Ahead) -> Result<Option<End>, Failure> {
         let mut from = self.situation(ahead.from);
         let mut node = ahead.from;
@@ -373,8 +375,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
     }
 
-    /// True if a plan is still valid with its times. From a base, the beginning of the plan is not known
-    /// here, and it counts as valid.
+    /// True if a plan is valid with its times. From a base, the plan's prefix is unknown here, and
+    /// the plan counts as valid.
     fn works_out(&self, node: u32) -> Result<bool, Failure> {
         let settled = !self.space.is_open && self.space.world.ground.timed.is_empty();
         if settled || !self.base.track.actions.is_empty() {
@@ -385,7 +387,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(reaches && (self.space.is_open || schedule(self.space, &path, &|| false).is_some()))
     }
 
-    /// A node on the way of a lookahead, which is not evaluated; `None` if it is known already or its times do not fit.
+    /// Unevaluated node on a lookahead's path; `None` if known or temporally inconsistent.
     fn pass(&mut self, parent: u32, step: Step, situation: &Situation, costs: f64) -> Option<u32> {
         let times = self.times(parent, &step, !situation.open.is_empty()).ok()?;
         let extra = self.extra(situation, times.mark) | PASSED;
@@ -410,8 +412,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         false
     }
 
-    /// True if the possible continuations of a state depend on the times of the path to it, beyond what
-    /// distinguishes the states of this search.
+    /// True if a state's continuations depend on its path's times beyond the marks of this search.
     fn depends_on_times(&self, situation: &Situation) -> bool {
         let fits =
             !self.manner.exact && (!situation.open.is_empty() || !self.space.world.ground.timed.is_empty());
@@ -480,12 +481,12 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.enqueue(node, situation, &estimate, key)
     }
 
-    /// True if an action is in progress as often as it may be.
+    /// True if an action has its maximum number of instances in progress.
     fn is_full(&self, situation: &Situation, act: u32) -> bool {
         situation.open.iter().filter(|open| open.act == act).count() >= self.manner.at_once
     }
 
-    /// Notes an action that could have started while it is in progress.
+    /// Records an action that could have overlapped itself.
     fn note_overlap(&mut self, situation: &Situation, act: u32) -> Result<(), Failure> {
         if self.overlapping.contains(&act) {
             return Ok(());

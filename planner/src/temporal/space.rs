@@ -1,5 +1,5 @@
-//! Search space shared by several searches on one task: the possible steps, the resources they access, the
-//! measure of plans.
+//! Search space shared by several searches on one task: possible steps, accessed resources, measure
+//! of plans.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use super::order::{Clock, Inconsistent, Order};
 use super::timed::is_valid;
 use super::world::{Act, Moment, Span, World};
 
-/// The maximum number of replays of a plan whose actions are stretched in turn by those stretched before.
+/// Maximum number of replays of a plan whose stretched actions stretch others.
 const MOST_STRETCHED: usize = 8;
 /// Differences of times that rounding makes are no stretch.
 const LEAST_STRETCH_S: f64 = 1e-7;
@@ -29,7 +29,7 @@ pub enum Measure {
     Makespan,
     /// Costs of the actions times a sign, plus a weight times the makespan.
     Additive {
-        /// One, or minus one where what actions add is a reward.
+        /// One, or minus one if additive costs are rewards.
         sign: f64,
         /// Weight of the makespan.
         time_weight: f64,
@@ -66,8 +66,8 @@ impl Measure {
         effects.map(|effect| &effect.outcome).chain(given).map(earns).max().unwrap_or(Earns::Never)
     }
 
-    /// For each action, its contribution to the measure beside time, in equivalent seconds. `None` where not
-    /// both count, or where the measure is not linear in them.
+    /// Contribution of each action to the measure besides time, in equivalent seconds; `None` if
+    /// time or costs do not count, or the measure is nonlinear.
     pub fn counted(&self, world: &World) -> Vec<Option<Expression>> {
         let times = |factor: f64, of: &Expression| {
             Expression::Product(vec![Expression::Constant(factor), of.clone()])
@@ -103,28 +103,29 @@ impl Measure {
     }
 }
 
-/// A search space with everything that several searches on it share.
+/// Search space with everything shared by several searches.
 pub struct Space<'w, 'a> {
     /// The task.
     pub world: &'w World<'a>,
-    /// For each action, true if its start and end are separate.
+    /// True, by action, if start and end are separate.
     pub open_act: Vec<bool>,
     /// Measure of plans.
     pub measure: Measure,
     /// Resources accessed by happenings.
     pub accesses: Accesses<'w, 'a>,
-    /// For each variable and value, the actions that are tried where the fact holds.
+    /// Actions tried where a fact holds, by variable and value.
     pivots: Vec<Vec<Vec<u32>>>,
     /// Actions that are looked at everywhere.
     everywhere: Vec<u32>,
     /// True if times can make a sequence impossible.
     pub tight: bool,
-    /// Possibility that actions improve the measure: unless they surely do, a beginning of a plan that costs
-    /// as much as another plan is taken to lead to no better one.
+    /// Possibility that actions improve the measure; unless certain, a prefix as expensive as
+    /// another plan is pruned.
     pub earns: Earns,
     /// True if effects or costs of some action depend on its chosen duration.
     stretches: bool,
-    /// True if that is so or numbers flow: the effects of a plan are then known only once it has its times.
+    /// True if so, or if numbers change continuously: a plan's effects are then known only with its
+    /// times.
     pub is_open: bool,
 }
 
@@ -173,7 +174,7 @@ impl<'w, 'a> Space<'w, 'a> {
         found
     }
 
-    /// True if a shorter makespan makes a plan better, other things being equal.
+    /// True if a shorter makespan improves a plan, other things being equal.
     pub fn counts_time(&self) -> bool {
         self.time_weight() > 0.0
     }
@@ -200,7 +201,7 @@ impl<'w, 'a> Space<'w, 'a> {
         clock.push(start, end.as_ref().map(|end| (end, step.span)));
     }
 
-    /// The track on which nothing has happened yet.
+    /// Empty track.
     pub fn begin(&self) -> Track {
         Track::new(self.accesses.resources)
     }
@@ -236,7 +237,7 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(sign * self.world.evaluate(self.world.acts[step.act as usize].cost, &moment)?)
     }
 
-    /// The measure of a plan or a beginning of one, from its additive costs, its last state and its makespan.
+    /// Measure of a plan or prefix, from additive costs, final state and makespan.
     pub fn measured(&self, costs: f64, state: &Values, makespan_s: f64) -> Result<f64, Failure> {
         match &self.measure {
             Measure::Makespan => Ok(makespan_s),
@@ -249,8 +250,8 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// Replays a sequence of steps from the first state. Returns its measure and the base it leads to; `None`
-    /// if a step is impossible, or if the sequence is long and the search has been asked to stop.
+    /// Replays a sequence of steps from the initial state; returns measure and resulting base.
+    /// `None` if a step is inapplicable, or if a long sequence is stopped.
     pub fn replay(
         &self,
         steps: &mut [Step],
@@ -277,8 +278,8 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(Some((measured, Base { situation, costs, track, clock })))
     }
 
-    /// The same of a whole plan: `None` also if the goal is not fulfilled after it. What an action does that is stretched goes by
-    /// how long it takes then.
+    /// Replays a whole plan; `None` also if the goal does not hold at the end. Effects of a
+    /// stretched action use its stretched duration.
     pub fn replay_to_goal(
         &self,
         steps: &mut [Step],
@@ -307,7 +308,8 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok((!self.is_open || is_valid(self, steps, stop)).then_some((measured, base)))
     }
 
-    /// Fixes how long those actions take that are stretched on a track, where something depends on it; whether there are any.
+    /// Fixes the durations of stretched actions on a track where effects depend on them; true if
+    /// there are any.
     fn stretch(&self, steps: &mut [Step], track: &Track) -> bool {
         let mut any = false;
         for (step, action) in steps.iter_mut().zip(&track.actions) {
@@ -332,16 +334,16 @@ pub struct Base {
     pub costs: f64,
     /// The steps so far, in time.
     pub track: Track,
-    /// The same where times never shift.
+    /// Schedule for tasks whose times never shift.
     pub clock: Clock,
 }
 
-/// The order that a sequence of steps stands for, with where its actions start and end.
+/// Temporal network of a sequence of steps, with the starts and ends of its actions.
 #[derive(Debug, Clone)]
 pub struct Track {
     /// The order.
     pub order: Order,
-    /// For each step, its start, and its end if it has one by now; `None` for ends and timed effects.
+    /// Start of each step's action, and its end if known; `None` for ends and timed effects.
     pub actions: Vec<Option<(u32, Option<u32>)>>,
     /// The first happening since something was in progress without interruption.
     epoch: usize,
@@ -402,7 +404,7 @@ impl Track {
         Ok(())
     }
 
-    /// A hash of everything about the times so far that what comes next can depend on.
+    /// Hash of all past times on which the future can depend.
     ///
     /// With nothing in progress and no timed effect to come there is nothing: all that follows can be shifted. An action
     /// in progress must end in time after all that its end will follow: that depends on how long after its start,
@@ -436,7 +438,7 @@ impl Track {
         hasher.finish() | 1
     }
 
-    /// Ends what is in progress as soon as possible.
+    /// Ends all actions in progress as soon as possible.
     pub fn close(&mut self, space: &Space) -> Result<(), Inconsistent> {
         let open = std::mem::take(&mut self.open);
         open.iter().try_for_each(|open| self.end(space, open))

@@ -30,7 +30,7 @@ pub(crate) struct Store {
 const EMPTY: u32 = u32::MAX;
 
 impl Store {
-    /// For the states of a task.
+    /// Empty store for the states of a task.
     pub fn new(ground: &GroundTask) -> Store {
         let mut fields = Vec::with_capacity(ground.variables.len());
         let (mut word, mut shift) = (0, 0);
@@ -49,7 +49,7 @@ impl Store {
         Store { fields, value_words, words, scratch, table: vec![EMPTY; 1024], count: 0 }
     }
 
-    /// The number of the state, and whether it is new.
+    /// Inserts a state; returns its number and true if new.
     pub fn insert(&mut self, state: &Values, extra: u64) -> (u32, bool) {
         self.scratch.fill(0);
         for (field, &value) in self.fields.iter().zip(&state.values) {
@@ -81,7 +81,7 @@ impl Store {
         (self.count - 1, true)
     }
 
-    /// The state of a number, and its extra word.
+    /// State with a number, and its extra word.
     pub fn get(&self, index: u32, into: &mut Values) -> u64 {
         let words = self.words.row(index as usize);
         into.values.clear();
@@ -94,7 +94,7 @@ impl Store {
         words[words.len() - 1]
     }
 
-    /// Bytes in use, and those that the next growth of the table takes where it is near.
+    /// Memory of the store, and of the table's next growth if near, bytes.
     pub fn bytes(&self) -> [usize; 2] {
         let table = size_of_val(&self.table[..]);
         let next = if soon(2 * self.count as usize, self.table.len()) { 2 * table } else { 0 };

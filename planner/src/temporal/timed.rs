@@ -1,4 +1,4 @@
-//! A finished plan with its times, and whether it is one.
+//! Timed plan, and its validation.
 
 use crate::plan::Plan;
 use crate::validate::validate;
@@ -8,7 +8,7 @@ use super::mentions::keep_apart;
 use super::space::{Space, Track};
 use super::world::World;
 
-/// An action of a plan with its times.
+/// Action of a plan with its times.
 #[derive(Debug, Clone)]
 pub(crate) struct Timed {
     /// The step of the search.
@@ -19,8 +19,8 @@ pub(crate) struct Timed {
     pub duration_s: f64,
 }
 
-/// The earliest schedule of a plan; `None` if it is long and has been asked to stop, or if timed effects leave no room to keep
-/// apart what must not happen together.
+/// Earliest schedule of a plan; `None` if stopped, or if timed effects leave no room to separate
+/// mutex happenings.
 pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
     let mut track = space.track(steps).ok()?;
     track.pass_timed(space).ok()?;
@@ -63,15 +63,15 @@ fn timed(steps: &[Step], track: &Track) -> Vec<Timed> {
     plan
 }
 
-/// True if the validator accepts a plan with its times: where numbers flow, or effects depend on a chosen
-/// duration, the search knows too little about the order of happenings.
+/// True if the validator accepts a plan with its times; needed with continuous change, or effects
+/// that depend on chosen durations, where the search does not know the order of happenings.
 pub(super) fn is_valid(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> bool {
     let Some(timed) = schedule(space, steps, stop) else { return false };
     let world = space.world;
     validate(world.task, world.calls.attachments(), &to_plan(world, &timed)).valid
 }
 
-/// A plan in the words of its task.
+/// Plan in the names of its task.
 pub(crate) fn to_plan(world: &World, timed: &[Timed]) -> Plan {
     let classical = world.ground.durative.is_empty() && world.ground.timed.is_empty();
     let steps = timed.iter().map(|timed| {

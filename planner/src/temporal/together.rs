@@ -14,11 +14,11 @@ use super::advance::derived_roots;
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// A resource that is held or set: a value of a variable; or a variable or number whatever its value.
+/// Held or set resource: a value of a variable; or a variable or number whatever its value.
 type Place = (u32, Option<u32>);
 
-/// True if some actions may be able only to start or only to end together, as far as can be told without a
-/// search.
+/// True if some actions may be able only to start, or only to end, simultaneously, as far as known
+/// without a search.
 pub(super) fn some_only_together(world: &World) -> bool {
     let roots = derived_roots(world);
     let held: Vec<Vec<Place>> = world.acts.iter().map(|act| held(world, &roots, act)).collect();
@@ -73,8 +73,8 @@ fn in_a_circle<'w>(
     circles.iter().any(|circle| circle.iter().filter(|node| node.index() < acts as usize).count() > 1)
 }
 
-/// Resources that must hold over all of an action. A bound on a number is left out: of simultaneous changes,
-/// those that keep it can come first.
+/// Resources that must hold over all of an action, without numeric bounds: of simultaneous changes,
+/// those that keep a bound can come first.
 fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
     let mut places = Vec::new();
     for fact in &act.over_all.facts {

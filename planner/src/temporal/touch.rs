@@ -29,7 +29,7 @@ impl Touched {
             || self.numbers.iter().any(|number| other.numbers.contains(number))
     }
 
-    /// Nothing, with the memory kept.
+    /// Clears the sets and keeps their memory.
     pub fn clear(&mut self) {
         self.variables.clear();
         self.numbers.clear();
@@ -74,7 +74,7 @@ impl Touched {
     }
 }
 
-/// Adds what an expression reads.
+/// Adds the read set of an expression.
 pub(crate) fn expression_touches(world: &World, expression: &Expression, touched: &mut Touched) {
     match expression {
         Expression::Fluent(fluent) => touched.numbers.push(*fluent),

@@ -1,6 +1,6 @@
-//! Tours of a plan put in another order: where steps of one action lead from place to place, as drives do, what is done at a place is
-//! done earlier, later or not at all, and the steps that lead there are made anew (local search for tours, Croes
-//! 1958, Or 1976). A search that adds step to step sees each order as plans of their own, which are too many.
+//! Tour improvement (local search, Croes 1958, Or 1976): where steps of one action lead from place
+//! to place, as drives do, the stops of the tour are reordered or dropped, and the connecting steps
+//! are rebuilt. A step-by-step search treats each order as separate plans, which are too many.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,12 +13,12 @@ use super::world::World;
 
 /// Steps that are replayed at most for one plan.
 const MOST_REPLAYED: usize = 20_000;
-/// In tasks with more actions than this, none is looked up by its arguments.
+/// Maximum number of actions of a task for an index by arguments.
 const MOST_ACTS: usize = 200_000;
 /// Differences below this do not count as better.
 const BETTER: f64 = 1e-6;
 
-/// The actions of a task by what they are about.
+/// Actions of a task, indexed by arguments.
 pub struct Tours<'w, 'a> {
     acts: HashMap<(u32, &'a [u32]), u32>,
     world: &'w World<'a>,
@@ -26,19 +26,19 @@ pub struct Tours<'w, 'a> {
 
 /// A part of a plan that leads from place to place.
 struct Tour {
-    /// The action that leads on, and which of its arguments are where it begins and where it ends.
+    /// Travel action, and the argument positions of its origin and its destination.
     schema: u32,
     from: usize,
     to: usize,
-    /// The arguments of one of them.
+    /// Arguments of one travel step.
     arguments: Vec<u32>,
-    /// Steps before the first of them.
+    /// Steps before the tour.
     before: Vec<Step>,
-    /// The places along the tour, with the steps done there.
+    /// Places along the tour, with the steps at each.
     stops: Vec<Stop>,
 }
 
-/// A place, and what is done there before the tour leads on.
+/// Place with the steps done there.
 #[derive(Clone)]
 struct Stop {
     place: u32,
@@ -46,7 +46,7 @@ struct Stop {
 }
 
 impl<'w, 'a> Tours<'w, 'a> {
-    /// Index of the actions of a world; `None` if it has too many.
+    /// Index of a world's actions; `None` if there are too many.
     pub fn new(world: &'w World<'a>) -> Option<Self> {
         if world.acts.len() > MOST_ACTS {
             return None;
@@ -58,7 +58,7 @@ impl<'w, 'a> Tours<'w, 'a> {
         Some(Tours { acts, world })
     }
 
-    /// The plan with its tours in another order as long as that makes it better; always replayed.
+    /// Plan with its tours reordered while this improves it; always replayed.
     pub fn rearranged(
         &self,
         space: &Space,
@@ -125,7 +125,7 @@ impl<'w, 'a> Tours<'w, 'a> {
         tours
     }
 
-    /// The tour with other stops, in a plan; none where no action leads from one to the next.
+    /// Plan with the tour's stops replaced; `None` if no action connects two stops.
     fn assembled(&self, tour: &Tour, stops: &[Stop]) -> Option<Vec<Step>> {
         let mut steps = tour.before.clone();
         let mut at = tour.arguments[tour.from];
@@ -168,7 +168,7 @@ impl Tour {
     }
 }
 
-/// Indices of the arguments where an action begins and where it ends, judged by successive actions.
+/// Argument positions of origin and destination, judged by consecutive actions.
 fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     let width = all.first()?.len();
     let pairs =
@@ -180,7 +180,7 @@ fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     (most > 0).then_some(best)
 }
 
-/// True if an action begins where one of its kind has ended, and their other arguments are equal.
+/// True if an action begins where one of its kind has ended, with all other arguments equal.
 fn follows(first: &[u32], second: &[u32], from: usize, to: usize) -> bool {
     let is_same = |n: usize| n == from || n == to || first[n] == second[n];
     first[to] == second[from] && (0..first.len()).all(is_same)

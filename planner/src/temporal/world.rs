@@ -16,17 +16,17 @@ use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
 
-/// An action of the temporal search; an instantaneous one has everything at its start.
+/// Ground action of the temporal search; an instantaneous one has everything at its start.
 #[derive(Debug, Clone)]
 pub struct Act<'a> {
-    /// The lifted action and its arguments.
+    /// Lifted action and its arguments.
     pub origin: &'a Origin,
-    /// True if it is durative.
+    /// True if durative.
     pub durative: bool,
     /// Bounds on the duration.
     pub bounds: &'a [DurationBound],
-    /// Position of the duration within its bounds: 0 for the shortest that the conditions allow, 1
-    /// for the longest; above 0 only where the shortest cannot give all effects.
+    /// Position of the duration within its bounds: 0 is the shortest, 1 the longest; above 0 only
+    /// where the shortest cannot give all effects.
     pub share: f64,
     /// Holds right before the start.
     pub at_start: &'a Conjunction,
@@ -36,7 +36,7 @@ pub struct Act<'a> {
     pub at_end: &'a Conjunction,
     /// Happens at the start.
     pub start_effects: &'a [Effect],
-    /// Changes at a rate while it runs.
+    /// Continuous effects, with their rates.
     pub flow_effects: &'a [Effect],
     /// Happens at the end.
     pub end_effects: &'a [Effect],
@@ -44,18 +44,18 @@ pub struct Act<'a> {
     pub cost: &'a Expression,
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
-    /// True if its end may happen together with its start; computed on demand.
+    /// True if the end is independent of the start; computed on demand.
     pub(super) ends_freely: OnceCell<bool>,
 }
 
-/// Fractions of the slack between duration bounds that are tried besides the least where effects depend on
-/// the duration: half of it, and all.
+/// Positions within the duration bounds that are tried besides the shortest, if effects depend on
+/// the duration.
 const SHARES: [f64; 2] = [0.5, 1.0];
 
 pub static NOTHING: Conjunction =
     Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
 
-/// A state, with what expressions may refer to besides it.
+/// State with the other inputs of expressions.
 #[derive(Clone, Copy)]
 pub struct Moment<'s> {
     /// The state.
@@ -85,8 +85,7 @@ impl Span {
             .then_some(Span { least_s: taken_s, most_s: taken_s })
     }
 
-    /// The span reduced to an [`EPSILON_S`] inside bounds that are excluded; the middle, where there is less
-    /// room than that.
+    /// Span reduced by an [`EPSILON_S`] at excluded bounds; its middle if there is less room.
     fn strictly_inside(self, bounds: Span) -> Span {
         let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
         let most_s = self.most_s.min(bounds.most_s - EPSILON_S);
@@ -120,14 +119,14 @@ pub struct World<'a> {
     strata: Vec<Vec<&'a Axiom>>,
     /// Variables that axioms set.
     derived: Vec<usize>,
-    /// For each variable, true if it is an object; empty where none is.
+    /// True, by variable, if an object fluent; empty if none is.
     objects: Vec<bool>,
-    /// For each variable that timed effects set, the index of the last one that does, and its value.
+    /// Index and value of the last timed effect on each variable set by timed effects.
     pub(super) last_given: FxHashMap<u32, (usize, u32)>,
 }
 
 impl<'a> World<'a> {
-    /// From a ground task and its bound calls.
+    /// World of a ground task and its bound calls.
     pub fn new(task: &'a Task, ground: &'a GroundTask, calls: Calls<'a>) -> World<'a> {
         let durative = ground.durative.iter().map(|action| Act {
             origin: &action.origin,
@@ -201,7 +200,7 @@ impl<'a> World<'a> {
         self.acts.iter().any(|act| !act.flow_effects.is_empty() || chooses_effects(act))
     }
 
-    /// True if effects depend on a duration without a greatest value, of which no fraction can be tried.
+    /// True if effects depend on a duration without a maximum, of which no fraction can be tried.
     pub fn chooses_without_end(&self) -> bool {
         let ends = |act: &Act| {
             let mut relations = act.bounds.iter().map(|bound| bound.relation);
@@ -222,7 +221,7 @@ impl<'a> World<'a> {
         Ok(state)
     }
 
-    /// The value of an expression; NaN where it is undefined. `total-time` and preferences count as zero.
+    /// Value of an expression; NaN if undefined. `total-time` and preferences count as zero.
     pub fn evaluate(&self, expression: &Expression, moment: &Moment) -> Result<f64, Failure> {
         Ok(match expression {
             Expression::Constant(number) => *number,
@@ -282,7 +281,7 @@ impl<'a> World<'a> {
         Ok(true)
     }
 
-    /// The durations that the bounds at the start allow, or `None` if there is none.
+    /// Durations allowed by the bounds at the start; `None` if none.
     ///
     /// A durative action takes at least [`EPSILON_S`], unless it must take less and its end is free of its start.
     pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
@@ -336,8 +335,8 @@ impl<'a> World<'a> {
         Ok(true)
     }
 
-    /// Lets effects happen: `moment` is the state before them, `into` a copy of it that becomes the state after, with
-    /// derived variables up to date. `gate` says whether an effect's conditions on earlier times were met.
+    /// Applies effects: `moment` is the state before, `into` a copy that becomes the state after,
+    /// with axioms re-derived. `gate`: true if an effect's conditions on earlier times were met.
     ///
     /// `Ok(false)` if a number becomes undefined or infinite, or changes of a number or an object contradict each other: then the
     /// effects cannot happen.
@@ -442,7 +441,7 @@ impl<'a> World<'a> {
 }
 
 impl Act<'_> {
-    /// True if its effects, its bounds or its cost depend on its duration, and the schedule may choose that.
+    /// True if effects, bounds or cost depend on a duration that the schedule may choose.
     pub fn is_read_off(&self) -> bool {
         self.share == 0.0 && (chooses_effects(self) || chooses_cost(self))
     }
@@ -457,7 +456,7 @@ fn is_fixed(act: &Act) -> bool {
     act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end)
 }
 
-/// True if an action has effects, or bounds at its end, that depend on its chosen duration.
+/// True if effects, or bounds at the end, depend on the chosen duration.
 fn chooses_effects(act: &Act) -> bool {
     let timed = |effect: &Effect| match &effect.outcome {
         Outcome::Change { amount, .. } => mentions_duration(amount),

@@ -1,4 +1,4 @@
-//! State after the first steps of a plan, by the same semantics as everything else.
+//! State after the first steps of a plan, by the common semantics.
 
 use std::sync::Arc;
 
@@ -10,9 +10,9 @@ use crate::semantics::Semantics;
 use crate::state::State;
 use crate::task::{Comparison, Task, When};
 
-/// Every instance of the named predicates and numeric functions that holds or has a value once the steps are carried out from
-/// the initial state; in the order of the names, instances in the order of the task's objects. The goal is not asked for, and the
-/// steps take what the task says that they take in that state, whatever the plan says.
+/// Instances of the named predicates and numeric functions that hold or have a value after the
+/// steps, in the order of the names, instances in object order. The goal is ignored, and steps have
+/// the durations of the task in the current state, whatever the plan states.
 ///
 /// # Errors
 /// The first condition that does not hold, as [`monitor`](super::monitor()) gives it.
@@ -31,7 +31,7 @@ pub fn after(
     Ok(names.iter().flat_map(|name| instances(task, &replayed.state, name)).collect())
 }
 
-/// The steps with the durations that the initial state gives them, where it gives one.
+/// Steps with the durations given by the initial state, where defined.
 fn timed(semantics: &Semantics<'_>, steps: &Plan) -> Plan {
     let Ok(state) = semantics.initial() else { return steps.clone() };
     let asked_s = |step: &Step| -> Option<f64> {

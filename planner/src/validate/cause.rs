@@ -1,4 +1,4 @@
-//! Causes why a plan does not do, with the values that decide them.
+//! Causes of an invalid plan, with the deciding values.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,22 +11,22 @@ use crate::semantics::{Compared, Why};
 pub enum Cause {
     /// The goal does not hold after the last step.
     Goal(Unmet),
-    /// A condition of a step does not hold when it must.
+    /// A condition of a step does not hold when required.
     Condition {
-        /// The time at which it must hold.
+        /// Required time.
         when: Moment,
         /// The part that does not hold.
         #[serde(flatten)]
         unmet: Unmet,
     },
-    /// A step does not take as long as its action asks for.
+    /// The duration of a step violates its action's bounds.
     Duration {
         /// Duration in the plan, seconds.
         planned_s: f64,
         /// Duration that the action asks for, seconds.
         asked_s: f64,
     },
-    /// Anything else, in one sentence.
+    /// Other cause, in one sentence.
     Other {
         /// The sentence, about the step at fault.
         reason: String,
@@ -50,7 +50,7 @@ pub enum Moment {
 /// Part of a condition that does not hold.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unmet {
-    /// The part in PDDL, with objects for its variables.
+    /// Condition part in PDDL, with objects for its variables.
     pub condition: String,
     /// Both sides, if the part compares two numbers.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -1,4 +1,4 @@
-//! A metric that a plan makes ever better: it may have no best value.
+//! Unbounded metrics: a plan may improve its metric without limit.
 
 use super::verdict::validate;
 use crate::attachment::Attachments;
@@ -11,8 +11,8 @@ const MOST_TRIED: usize = 8;
 /// Number of further repetitions with equal gain after which a step counts as repeatable for ever.
 const OFTEN: usize = 100;
 
-/// A step of a valid plan that can be done again and again at its end, with what the metric becomes better by each time; as far as
-/// a hundred times tell.
+/// Step that can be repeated at the end of a valid plan, with the metric's improvement per
+/// repetition, tested up to a hundred times.
 pub fn endless(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<(Step, f64)> {
     let metric = task.metric.as_ref()?;
     let sign = if metric.minimise { 1.0 } else { -1.0 };
@@ -36,7 +36,7 @@ pub fn endless(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<(S
     })
 }
 
-/// The functions that the metric speaks of, and whether it adds them up alone.
+/// Functions in the metric, and true if the metric merely sums them.
 fn counted(task: &Task) -> (Vec<FunctionId>, bool) {
     let (mut counted, mut adds) = (Vec::new(), true);
     if let Some(metric) = &task.metric {
@@ -62,7 +62,7 @@ fn may_help(task: &Task, step: &Step, (counted, adds): &(Vec<FunctionId>, bool))
     })
 }
 
-/// The plan with a step repeated this many times at its end.
+/// Plan with a step repeated at its end.
 fn with_more(plan: &Plan, step: &Step, times: usize) -> Plan {
     let mut more = plan.clone();
     let mut next_s = plan.makespan_s().map(|end_s| end_s + EPSILON_S);

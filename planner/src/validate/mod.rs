@@ -1,4 +1,4 @@
-//! Does a plan do what it should? Every happening is replayed exactly.
+//! Validator: exact replay of every happening of a plan.
 //!
 //! Classical plans are replayed step by step; plans with times as happenings after PDDL 2.1 (Fox and Long 2003, section 8):
 //! what happens at one time must not interfere, conditions over all hold strictly between start and end, durations

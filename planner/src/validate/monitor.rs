@@ -19,7 +19,7 @@ pub struct Broken {
     pub step: Option<usize>,
     /// The reason, in one sentence.
     pub reason: String,
-    /// The same with the values that decide it.
+    /// Cause, with the deciding values.
     pub cause: Cause,
     /// Span in the task's texts.
     pub span: Span,

@@ -17,15 +17,15 @@ use crate::task::{Action, ActionId, Comparison, GroundChange, Task, Timed, When}
 /// The end of a replay.
 pub(crate) struct Replayed {
     pub state: State,
-    /// States with the times at which they begin, for constraints on the trajectory.
+    /// States with their start times, for trajectory constraints.
     pub trace: Vec<(f64, State)>,
-    /// For each preference, the number of violations by preferred conditions of actions.
+    /// Number of violations by action conditions, by preference.
     pub violations: Vec<f64>,
     /// End of the plan: a time, or the number of steps.
     pub end: f64,
 }
 
-/// A durative action between its start and its end.
+/// Durative action in progress.
 struct Running {
     step: usize,
     action: ActionId,
@@ -34,7 +34,7 @@ struct Running {
     since_s: f64,
 }
 
-/// A participant of a happening, with its reads and writes.
+/// Participant of a happening, with its reads and writes.
 struct Part {
     step: Option<usize>,
     touched: Touched,
@@ -135,7 +135,7 @@ fn without_times(
     Some(Fault { cause: Cause::Other { reason: reason.clone() }, reason, step, finding })
 }
 
-/// A step for messages: its number, its text, its time.
+/// Number, text and time of a step, for messages.
 fn step_text(plan: &Plan, index: usize) -> String {
     let step = &plan.steps[index];
     let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();
@@ -143,7 +143,7 @@ fn step_text(plan: &Plan, index: usize) -> String {
     format!("step {} ({}{arguments}){time}", index + 1, step.action)
 }
 
-/// A condition that does not hold, drawn where it stands.
+/// Finding about an unmet condition, at its span.
 pub(super) fn fault(
     reason: String,
     step: Option<usize>,
@@ -196,7 +196,7 @@ impl Replay<'_, '_> {
         self.after_happening()
     }
 
-    /// Changes made by an event, if it can happen now.
+    /// Participant for an event, with the event's changes, if it can happen now.
     fn part(&mut self, event: Event, alone: bool) -> Outcome<Part> {
         let mut touched = Touched::default();
         let (step, at_end) = match event {
@@ -279,7 +279,7 @@ impl Replay<'_, '_> {
         Fault { reason, step, cause, finding }
     }
 
-    /// The duration meets its bounds, as far as they are evaluated now. Plans may be off by ε.
+    /// Checks a duration against the bounds evaluated now, with a tolerance of ε.
     fn duration(&self, step: usize, at_end: bool, binding: &mut Binding) -> Outcome<()> {
         let Some(bounds) = &self.action(step).duration else { return Ok(Ok(())) };
         let duration_s = self.plan.steps[step].duration_s;
@@ -317,7 +317,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Grounding modules propose what the step says they do.
+    /// Checks that the grounding modules propose the step's parameter.
     fn proposed(&self, step: usize, binding: &Binding) -> Outcome<()> {
         let action = self.action(step);
         for (call, proposal) in action.grounding.iter().zip(&binding.proposals) {
@@ -348,7 +348,7 @@ impl Replay<'_, '_> {
         Ok(())
     }
 
-    /// No part of a happening touches what another part reads or writes.
+    /// Checks that no participant of a happening interferes with another's reads or writes.
     fn conflicts(&self, parts: &[Part], time_s: f64) -> Outcome<()> {
         let mut together = Together::default();
         for (index, part) in parts.iter().enumerate() {
@@ -378,7 +378,8 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Conditional end effects of a step that starts in the present state, as far as decided at its start.
+    /// Conditional end effects of a step that starts in the present state, as far as its start
+    /// decides them.
     fn remembered(&self, step: usize) -> Result<Pending, CallFailure> {
         let (action, mut binding) = self.bound[step].clone();
         let effects = &self.semantics.task.action(action).effects.end;
@@ -410,7 +411,7 @@ impl Replay<'_, '_> {
         !self.semantics.task.action(running.action).continuous.is_empty()
     }
 
-    /// Conditions over all of what is running since before a time hold in the present state.
+    /// Checks the invariants of all actions that began before a time.
     fn invariants(&mut self, begun_s: f64) -> Outcome<()> {
         let mut broken = None;
         for running in self.running.iter_mut().filter(|running| running.since_s < begun_s) {
@@ -435,7 +436,7 @@ impl Replay<'_, '_> {
         })
     }
 
-    /// Numbers that change at a rate, up to the next happening; conditions over all hold on the way.
+    /// Advances continuous changes to the next happening, and checks invariants on the way.
     fn flow(&mut self, until_s: f64) -> Outcome<()> {
         let elapsed_s = until_s - self.now_s;
         self.now_s = until_s;

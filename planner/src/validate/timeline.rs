@@ -1,4 +1,4 @@
-//! Timeline of a plan: its happenings in order of time.
+//! Timeline of a plan: its happenings in time order.
 
 use crate::plan::{Plan, Step};
 use crate::task::Task;
@@ -27,8 +27,8 @@ pub(super) struct Happening {
     pub events: Vec<Event>,
 }
 
-/// The happenings of a plan in order of time, timed literals before `until_s` among them. `is_durative` tells of each step whether
-/// its action takes time.
+/// Happenings of a plan in time order, including timed literals before `until_s`. `is_durative`:
+/// true, by step, for a durative action.
 ///
 /// In a plan without times every step is a happening of its own, at 1, 2, ….
 pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool], until_s: f64) -> Vec<Happening> {

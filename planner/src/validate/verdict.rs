@@ -16,13 +16,13 @@ use super::trajectory::{broken_constraint, violations};
 /// The validator's verdict on a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// True if the plan reaches the goal as it stands.
+    /// True if the plan reaches the goal.
     pub valid: bool,
-    /// The reason it is invalid, in one sentence.
+    /// Reason for being invalid, in one sentence.
     pub reason: Option<String>,
     /// The step at fault, counted from 0.
     pub step: Option<usize>,
-    /// Value of the metric, or the number of steps where there is none.
+    /// Value of the metric, or the number of steps without one.
     pub cost: Option<f64>,
     /// End of the last step, in seconds; `None` for a plan without times.
     pub makespan: Option<f64>,

@@ -75,7 +75,7 @@ impl Mentioned {
             || task.init.timed.iter().any(|entry| timed(&entry.change))
     }
 
-    /// For which arguments these effects of an action may change the conditions: a condition on its parameters.
+    /// Condition on an action's parameters under which these effects may change the conditions.
     pub(super) fn touched(&self, action: &Action, effects: &[Effect]) -> Condition {
         any(effects.iter().map(|effect| match &effect.change {
             Change::Add(atom) | Change::Delete(atom) if self.predicates.contains(&atom.predicate) => {

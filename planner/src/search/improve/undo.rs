@@ -23,7 +23,7 @@ struct Opposite {
     other: usize,
 }
 
-/// The operators of a plan that only move numbers by constants, each with those that undo it.
+/// Steps of a plan that only change numbers by constants, each with its inverses.
 struct Shifts {
     opposites: FxHashMap<u32, Vec<Opposite>>,
 }

@@ -1,4 +1,4 @@
-//! Abilities as types: lists of facts, calls and skills, with the functions behind them.
+//! Types of abilities: lists of facts, calls and skills, with the functions behind them.
 
 use std::sync::Arc;
 
@@ -60,11 +60,11 @@ pub struct Ability {
     pub again: Option<KnowsAgain>,
     /// Update after a finished drive, if any.
     pub has_driven: Option<fn(&mut Mind, &Situation)>,
-    /// Update from a drive to a pose that has failed; in words, if a second try is not worthwhile.
+    /// Update after a failed drive to a pose; returns a sentence if a retry is pointless.
     pub drive_failed: Option<DriveFailed>,
 }
 
-/// State of an ability at the beginning of a run, and the map that the body has made itself, if any.
+/// State of an ability at the beginning of a run, and the body's own map if any.
 pub type Recalls = fn(&Domain, Option<&Past>, &dyn Robot, &mut States) -> Option<Arc<dyn OwnMap>>;
 
 /// Adds to the persistent belief.
@@ -267,7 +267,7 @@ pub(crate) fn argument(call: &Call, n: usize) -> Result<&str, CallError> {
         .ok_or_else(|| CallError::Failed(format!("{call} lacks argument {}", n + 1)))
 }
 
-/// The skill that drives from one pose to another.
+/// Skill that drives from one pose to another.
 pub(crate) const MOVE: &str = "move";
 
 /// The skill that looks at a surface.

@@ -1,5 +1,5 @@
-//! Actions of a domain as carried out by the body: skills with their arguments, limits, checks, lessons from
-//! failures.
+//! Actions of a domain as carried out by the body: skills with arguments, limits, checks, lessons
+//! from failures.
 
 use std::sync::Arc;
 
@@ -47,12 +47,12 @@ impl Grounded {
     }
 }
 
-/// Configuration of an action; where the domain has none, the skill of the action's name.
+/// Configuration of an action; by default, the skill with the action's name.
 pub(crate) fn config(domain: &Domain, call: &Call) -> ActionConfig {
     domain.config.action.get(&call.action).cloned().unwrap_or_default()
 }
 
-/// Time for each part of a call.
+/// Time limit of each part of a call, seconds.
 pub(crate) fn limit_s(domain: &Domain, call: &Call) -> f64 {
     config(domain, call).limit_s()
 }
@@ -62,7 +62,7 @@ pub(crate) fn check(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).check.map(|text| substitute(domain, call, &text, None))
 }
 
-/// The reason for a call, where the domain gives one.
+/// Reason for a call as given by the domain, if any.
 pub(crate) fn because(domain: &Domain, call: &Call) -> Option<String> {
     config(domain, call).because.map(|text| substitute(domain, call, &text, None))
 }
@@ -184,7 +184,7 @@ pub(crate) fn foremost(domain: &Domain, call: &Call) -> Option<Grounded> {
     parts().find(|part| part.word.name == call.action).or_else(|| parts().next())
 }
 
-/// Texts over the variables of an action, with a call's objects in their place.
+/// Texts with an action's variables replaced by a call's objects.
 pub(crate) fn substituted(domain: &Domain, call: &Call, texts: &[String]) -> Vec<String> {
     texts.iter().map(|text| substitute(domain, call, text, None)).collect()
 }

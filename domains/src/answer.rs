@@ -80,7 +80,7 @@ pub(crate) struct Asker<'a> {
     pub lexicon: &'a Lexicon,
     pub mind: &'a Mind,
     pub round: &'a Round,
-    /// A part that the domain needs and the body does not have.
+    /// Part of a body that the domain needs and the body lacks.
     pub lacks: Option<Part>,
     pub s: &'a Situation,
     /// The domain's wording of PDDL.
@@ -156,7 +156,7 @@ impl Asker<'_> {
         (Verdict::Achieved, said.join("; "))
     }
 
-    /// Sentence about a surface on which each object is known, or surely none of the known ones.
+    /// Sentence about a surface with all objects identified, or certainly unknown.
     fn identified(&self, on: usize) -> String {
         let surface = &self.s.surfaces[on];
         let there = self.s.belief.tracks.iter().filter(|track| track.on == surface.symbol);
@@ -177,8 +177,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Answer that no object of a kind was seen, once the kind is searched to the required
-    /// confidence.
+    /// Answer that no object of a kind was seen, once searched to the required confidence.
     fn none_of(&self, kind: &Thing) -> (Verdict, String) {
         let s = self.s;
         let left = 1.0 - s.completeness(0);
@@ -359,7 +358,7 @@ impl Asker<'_> {
         self.s.things.iter().enumerate().filter(|(_, t)| t.track.is_none())
     }
 
-    /// The object that is most probably the requested one, if any may be.
+    /// Most probable candidate for a thing, if any.
     fn best(&self, thing: &Thing) -> Option<&Track> {
         let p = |t: &Track| thing.probability(t, &self.s.surfaces);
         self.s.belief.tracks.iter().max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) > 0.0)

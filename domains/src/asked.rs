@@ -17,7 +17,7 @@ const PRESENCE: &str = "presence";
 const PLACED: &str = "placed";
 /// Function for the certainty of the objects on a surface.
 const CLARITY: &str = "clarity";
-/// The predicate that says in which room a surface is.
+/// Predicate of the room of a surface.
 const IN: &str = "in";
 /// Words about seen objects that need sightings to hold.
 const OF_OBJECTS: [&str; 4] = ["on", "is", "confidence", PRESENCE];
@@ -232,7 +232,7 @@ impl<'t> Visit<'t> {
         terms.iter().map(argument).collect()
     }
 
-    /// The room that an atom says a variable to be in.
+    /// Room that an atom assigns to a variable.
     fn room(&self, atom: &Condition, scope: &Scope) -> Option<Within> {
         let Condition::Atom(atom) = atom else { return None };
         let arguments = self.arguments(&atom.arguments, scope);

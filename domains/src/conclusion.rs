@@ -35,14 +35,14 @@ pub enum Verdict {
     Failed,
 }
 
-/// An object, as believed at the end.
+/// Object as believed at the end.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Believed {
     /// Most likely known object; `None`: unknown.
     pub label: Option<String>,
     /// Kind of the object.
     pub kind: Option<String>,
-    /// Probability of that.
+    /// Probability of the label.
     pub confidence: f64,
     /// Centre of the body in the map; `None` while in the hand.
     #[serde(default)]
@@ -50,7 +50,7 @@ pub struct Believed {
     /// Standard deviation of the position in its least certain direction; `None` if unknown.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
-    /// Sides of its footprint and height.
+    /// Sides of the footprint, and height, metres.
     pub size_m: [f64; 3],
     /// Spoken name of the supporting surface.
     #[serde(default)]
@@ -68,13 +68,13 @@ pub struct Believed {
 pub struct Conclusion {
     /// The verdict.
     pub verdict: Verdict,
-    /// The answer with its reason, in a sentence.
+    /// Answer with its reason, in a sentence.
     pub why: String,
     /// Confidence of the answer, 0 to 1.
     pub confidence: f64,
     /// Probability that the sought object is there after all.
     pub remaining: Option<f64>,
-    /// The requested object, if the goal is about a single one.
+    /// Requested object, if the goal is about a single one.
     pub object: Option<String>,
     /// Requested object as believed to stand, if found.
     pub found: Option<Believed>,

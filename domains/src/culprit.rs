@@ -34,7 +34,7 @@ pub fn of_drives(domain: &Domain, round: &Round) -> Option<Compared> {
     nearest
 }
 
-/// Distance of a comparison from holding; infinite where a side has no value.
+/// Distance of a comparison from holding; infinite if undefined.
 fn lacks(compared: &Compared) -> f64 {
     let sides = compared.left_value.zip(compared.right_value);
     sides.map_or(f64::INFINITY, |(left, right)| (left - right).abs())
@@ -49,7 +49,7 @@ pub fn reasons(domain: &Domain, round: &Round, all: Vec<NoPlan>) -> Vec<NoPlan> 
     std::iter::once(NoPlan::Finding { message, help: None }).chain(others).collect()
 }
 
-/// A comparison that does not hold, in words; `say` puts a term of PDDL into words.
+/// Unmet comparison in words; `say` verbalises a PDDL term.
 pub fn told(compared: &Compared, say: &dyn Fn(&str) -> String) -> String {
     let value =
         |value: Option<f64>| value.map_or("without a value".to_string(), |value| format!("{value:.2}"));

@@ -1,4 +1,4 @@
-//! End of a drive.
+//! Handling of finished drives.
 
 use descry_skills::Outcome;
 

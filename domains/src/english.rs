@@ -1,4 +1,4 @@
-//! English around the words of a domain: courtesies, function words, and verbs that mean the same.
+//! English language around a domain's words: courtesies, function words, and synonymous verbs.
 
 /// Opening phrases of requests, without meaning of their own.
 const OPENINGS: [&str; 28] = [
@@ -47,7 +47,7 @@ const CONTRACTIONS: [(&str, &str); 8] = [
     ("let's", ""),
 ];
 
-/// Words and fixed groups of words that request the same.
+/// Words and fixed expressions that request the same.
 const SAME: [&[&str]; 12] = [
     &["find", "locate", "seek", "look for", "search for", "hunt for"],
     &["pick up", "grab", "grasp", "take", "lift"],
@@ -157,7 +157,7 @@ fn is_verb(word: &String) -> bool {
     word == "is" || word == "are"
 }
 
-/// Words without the courtesies at their end.
+/// Words without closing courtesies.
 pub(crate) fn without_endings(words: &[String]) -> &[String] {
     let mut rest = words;
     let ends = |rest: &[String], ending: &str| {
@@ -176,7 +176,7 @@ fn begins(words: &[String], opening: &str) -> Option<usize> {
     (words.len() > opening.len() && words[..opening.len()] == opening[..]).then_some(opening.len())
 }
 
-/// Fixed groups of words as one word each, the longest first.
+/// Words with fixed expressions joined to one word each, longest first.
 pub(crate) fn joined(words: &[String]) -> Vec<String> {
     let groups = || SAME.iter().chain(&RELATED).flat_map(|list| list.iter()).filter(|w| w.contains(' '));
     let mut out: Vec<String> = Vec::new();
@@ -202,7 +202,7 @@ pub(crate) fn is_same(one: &str, other: &str) -> bool {
     one == other || in_one(&SAME, one, other)
 }
 
-/// True if two words are of one field.
+/// True if two words are of one semantic field.
 pub(crate) fn is_related(one: &str, other: &str) -> bool {
     is_same(one, other) || in_one(&RELATED, one, other)
 }
@@ -227,7 +227,7 @@ pub(crate) fn is_function_word(name: &str) -> bool {
     words(name).iter().all(|word| ["and", "or", "it", "not", "please"].contains(&word.as_str()))
 }
 
-/// The forms of a phrase: as given, and as an indirect question ("where is X": "where X is").
+/// Forms of a phrase: as given, and as an indirect question ("where is X": "where X is").
 pub(crate) fn forms(pattern: &[String]) -> Vec<Vec<String>> {
     let mut indirect = pattern.to_vec();
     match pattern.iter().position(is_verb) {

@@ -9,10 +9,10 @@ pub enum WorldError {
     /// The store failed for good.
     #[error("{0}")]
     Store(#[from] descry_memory::Error),
-    /// The domain cannot be used; the text points at the place and offers a mend.
+    /// The domain cannot be used; the text points at the place and suggests a remedy.
     #[error("{0}")]
     Domain(String),
-    /// A fault of descry itself.
+    /// Internal error of descry.
     #[error("{0}")]
     Bug(String),
 }
@@ -23,7 +23,7 @@ impl WorldError {
         WorldError::Bug(format!("a skill came back with {outcome:?}"))
     }
 
-    /// The planner could not read the task, or an attachment failed.
+    /// Error of the planner: an unreadable task, or a failed attachment.
     pub fn of_planner(error: &PlanError) -> Self {
         error.findings().map_or_else(|| Self::Domain(error.to_string()), |f| Self::Domain(f.render(false)))
     }

@@ -22,12 +22,12 @@ pub struct Geometry {
     sights: Vec<Arc<Sight>>,
 }
 
-/// Views of one surface from each viewpoint.
+/// Visibility of one surface from each viewpoint.
 #[derive(Debug)]
 pub(crate) struct Sight {
     outline: Vec<Point3<f64>>,
     is_whole: bool,
-    /// True if the surface stands on a map that the body makes itself, which changes with every look.
+    /// True if the surface is on a map of the body's own making, which changes with every look.
     is_charted: bool,
     /// Pose of the camera by viewpoint.
     pub cameras: Vec<OnceLock<Option<Isometry3<f64>>>>,

@@ -16,10 +16,10 @@ use crate::load::Domain;
 use crate::objective::{Asked, Filled, Goal};
 use crate::slots::{put_in, slots_of, type_of_slot};
 
-/// The reason a goal was not understood, with suggestions.
+/// Reason why a goal was not understood, with suggestions.
 #[derive(Debug, thiserror::Error)]
 pub enum GoalError {
-    /// No phrase of the domain fits.
+    /// No phrase of the domain matches.
     #[error("\"{said}\" is not a goal that the domain {domain} understands\n{suggestions}")]
     NoPhrase {
         /// Words as given.
@@ -39,7 +39,7 @@ pub enum GoalError {
         /// The names that would have been understood.
         suggestions: String,
     },
-    /// The confidence that was asked for is no probability.
+    /// The requested confidence is no probability.
     #[error(
         "\"with confidence {found}\" asks for no probability\n  a number above 0.5 and below 1 was expected, as in \"with confidence 0.9\""
     )]
@@ -55,7 +55,7 @@ pub enum GoalError {
         /// The words after "with confidence".
         found: String,
     },
-    /// The deadline that was asked for is no time.
+    /// The requested deadline is no duration.
     #[error(
         "\"within {found}\" asks for no time\n  a number of seconds or minutes was expected, as in \"within 60 seconds\""
     )]
@@ -71,7 +71,7 @@ pub enum GoalError {
         /// The words after "within".
         found: String,
     },
-    /// A confidence or deadline is given more than once.
+    /// Confidence or deadline is given more than once.
     #[error("\"{condition}\" is said twice\n  expected it once, as in \"find cup A {condition} {example}\"")]
     SaidTwice {
         /// First words of the condition.
@@ -83,7 +83,7 @@ pub enum GoalError {
     /// found out.
     #[error("\"{said}\" may be meant in several ways\n  say it with \"and\" alone, or as goals of their own")]
     Several {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
     },
     /// A word negates the request, and no phrase of the domain has that word.
@@ -91,19 +91,19 @@ pub enum GoalError {
         "\"{word}\" in \"{said}\" rules something out, and goals say what to find, know or bring about (Ctrl-C stops a run)\n{suggestions}"
     )]
     Denied {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
         /// The word that denies.
         word: String,
         /// The phrases that would have been understood, a line each.
         suggestions: String,
     },
-    /// A question stands beside a task.
+    /// A question is combined with a task.
     #[error(
         "\"{said}\" is a question and a task\n  a question changes nothing: ask first, then say what is to be done"
     )]
     Apart {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
     },
     /// One object is requested in two places at once.
@@ -111,14 +111,14 @@ pub enum GoalError {
         "\"{said}\" has {thing} in two places at once: {places}\n  expected one place for a thing; join places by \"or\" if either will do"
     )]
     TwoPlaces {
-        /// The words as they were given.
+        /// Words as given.
         said: String,
-        /// Name of the thing.
+        /// Name of the object.
         thing: String,
         /// Names of the places.
         places: String,
     },
-    /// The phrase itself cannot be used.
+    /// The phrase itself is invalid.
     #[error("the phrase \"{phrase}\" in domain.toml: {because}")]
     BadPhrase {
         /// The phrase.

@@ -99,7 +99,7 @@ enum Held<'a> {
     Other(Referent<'a>),
 }
 
-/// Judges conditions in one situation.
+/// Judge of conditions in one situation.
 pub struct Judge<'a> {
     domain: &'a Domain,
     words: &'a Words,

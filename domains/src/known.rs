@@ -76,9 +76,9 @@ pub struct Known {
     pub spaces: Vec<Arc<Space>>,
     /// Poses to look from.
     pub candidates: Vec<Candidate>,
-    /// The one at which the body stands.
+    /// Index of the candidate at which the body stands.
     pub at: usize,
-    /// The one from which the last look was taken; in the beginning where the body stood.
+    /// Index of the candidate of the last look; initially that of the body.
     pub looked_from: usize,
     /// Time since which the body has been at its pose.
     pub stands_since_ns: i64,
@@ -95,11 +95,11 @@ pub struct Known {
     pub threshold: f64,
     /// Time until the deadline, seconds, if there is one.
     pub time_left_s: Option<f64>,
-    /// Looks that have been taken: candidate and surface.
+    /// Looks taken: candidate and surface.
     pub observed: BTreeSet<(usize, usize)>,
-    /// Candidates that have been given up.
+    /// Candidates given up.
     pub out_of_reach: BTreeSet<usize>,
-    /// Objects, by the number of their track, that a push from a candidate has failed to move.
+    /// Objects (track number) that a push from a candidate has failed to move.
     pub stuck: BTreeSet<(u64, usize)>,
     /// Pushes that may still be tried.
     pub pushes_left: usize,
@@ -111,14 +111,14 @@ pub struct Known {
     pub held: Option<Held>,
     /// Persistent belief from earlier runs.
     pub past: Option<Past>,
-    /// The map that the body has made itself.
+    /// Map of the body's own making.
     pub own_map: Arc<dyn OwnMap>,
     /// State of each ability.
     pub states: States,
     /// Prior weight of each thing, then each kind, then any object, on each surface, relative to
     /// another surface.
     pub expected: Vec<Vec<f64>>,
-    /// Geometry of the map, kept from round to round.
+    /// Geometry of the map, cached from round to round.
     pub geometry: Arc<Geometry>,
 }
 

@@ -19,14 +19,14 @@ pub enum Lesson {
         /// The facts.
         facts: Vec<String>,
     },
-    /// The step may be tried again.
+    /// The step may be retried.
     Retry {
-        /// Failed tries so far.
+        /// Number of failed tries so far.
         tries: usize,
         /// Tries in all.
         most: usize,
     },
-    /// The step is not tried any more; facts hold from then on, in PDDL.
+    /// The step is given up; these facts hold from then on, in PDDL.
     GivenUp {
         /// The facts.
         facts: Vec<String>,

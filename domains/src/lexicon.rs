@@ -11,10 +11,10 @@ use crate::load::Domain;
 use crate::past::Past;
 use crate::symbol::{SENSE, symbol};
 
-/// Types whose objects have names in every domain: their symbols are these names.
+/// Types whose objects have names in every domain, equal to their symbols.
 pub const NAMED: [&str; 6] = ["surface", "room", "door", "kind", "obstacle", SENSE];
 
-/// Advice for names that are not distinct.
+/// Advice for ambiguous names.
 pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and digits alone tell names apart";
 
 /// Named object: PDDL symbol and spoken names, the usual one first.
@@ -22,7 +22,7 @@ pub(crate) const TOLD_APART: &str = "give each a name of its own: letters and di
 pub struct Named {
     /// The PDDL symbol.
     pub symbol: String,
-    /// At least one.
+    /// Names, at least one.
     pub names: Vec<String>,
 }
 
@@ -32,7 +32,7 @@ impl Named {
     }
 }
 
-/// The names of places.
+/// Names of places.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Places {
     /// Surfaces.
@@ -101,7 +101,7 @@ pub struct Lexicon {
 }
 
 impl Lexicon {
-    /// The names of a domain's objects, and of the places.
+    /// Names of a domain's objects and of the places.
     pub fn new(domain: &Domain, places: &Places) -> Self {
         let mut by_type: BTreeMap<String, Vec<Named>> = BTreeMap::new();
         let mut add = |of: &str, named: Named| {
@@ -156,7 +156,7 @@ impl Lexicon {
         }
     }
 
-    /// True if a symbol is valid and not taken yet.
+    /// True if a symbol is valid and free.
     pub fn is_free(&self, symbol: &str) -> bool {
         !symbol.is_empty() && self.by_type.values().flatten().all(|known| known.symbol != symbol)
     }
@@ -178,7 +178,7 @@ impl Lexicon {
         found.and_then(|n| n.names.first()).map_or(symbol, String::as_str)
     }
 
-    /// The names of a type, the usual one of each, for suggestions.
+    /// Usual names of a type's objects, for suggestions.
     pub fn listed(&self, of: &str) -> String {
         let names: Vec<&str> =
             self.of_type(of).iter().filter_map(|n| n.names.first()).map(String::as_str).collect();
@@ -186,7 +186,7 @@ impl Lexicon {
     }
 }
 
-/// Known objects, and the kinds that no object is called by.
+/// Known objects, and the kinds that no object is named after.
 fn things(objects: &[ObjectModel]) -> Vec<Named> {
     let named = |o: &ObjectModel| Named {
         symbol: symbol(&o.name),

@@ -33,7 +33,7 @@ static BUILT_IN: [(&str, Dir<'_>); 5] = [
     ("learning", include_dir!("$CARGO_MANIFEST_DIR/learning")),
 ];
 
-/// The domain that is used when none is named.
+/// Default domain.
 pub const DEFAULT: &str = "tabletop";
 
 /// A loaded domain folder.
@@ -47,13 +47,13 @@ pub struct Domain {
     pub toml: Source,
     /// `domain.toml`.
     pub config: Config,
-    /// `objects/*.toml`, in the order of their file names.
+    /// Models of `objects/*.toml`, in file order.
     pub objects: Vec<ObjectModel>,
-    /// `shapes/*.json`, in the order of their file names.
+    /// Shapes of `shapes/*.json`, in file order.
     pub shapes: Vec<KnownShape>,
     /// `scenes/*.toml`: name and text.
     pub scenes: BTreeMap<String, String>,
-    /// The folder, or none for a built-in domain.
+    /// Folder; `None` for a built-in domain.
     pub folder: Option<PathBuf>,
     /// The texts that all this was read from.
     pub files: Files,
@@ -95,7 +95,7 @@ impl Domain {
     }
 }
 
-/// The object files (`*.toml`) of a folder, in the order of their names.
+/// Object models (`*.toml`) of a folder, in file order.
 ///
 /// # Errors
 /// [`LoadError`] names the file, the place in it and what was expected.

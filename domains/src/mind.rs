@@ -1,4 +1,4 @@
-//! Knowledge of a world, kept from round to round.
+//! Belief state of a run, kept from round to round.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,15 +21,15 @@ pub struct Mind {
     pub words: Words,
     /// Looks and changes, by surface.
     pub regions: Vec<Region>,
-    /// Last merge, if other surfaces may be in the same views.
+    /// Last merge, if its views may show other surfaces.
     pub merged: Option<LastMerged>,
-    /// Views taken so far.
+    /// Number of views taken.
     pub views: usize,
-    /// Pushes tried so far.
+    /// Number of pushes tried.
     pub pushes: usize,
     /// Number of disturbances of the scene: each time something moved, earlier views became void.
     pub disturbed: usize,
-    /// Driven so far, metres.
+    /// Distance driven, metres.
     pub distance_m: f64,
     /// Last reading of each sense, by symbol.
     pub readings: BTreeMap<String, serde_json::Value>,
@@ -40,13 +40,13 @@ pub struct Mind {
 pub struct Region {
     /// Views that still hold.
     pub looks: Vec<RecordedView>,
-    /// State of their last merge, reused by the next one.
+    /// State of the incremental merger.
     pub merger: Merger,
     /// Views in the observed space: timestamp and camera pose of each.
     pub taken_in: Vec<(i64, Isometry3<f64>)>,
-    /// Places where something has moved.
+    /// Places where objects have moved.
     pub changes: Vec<Change>,
-    /// The number of looks taken in all.
+    /// Total number of looks.
     pub taken: usize,
     /// Reason why the last look showed no surface; `None` if it did.
     pub nothing: Option<String>,
@@ -60,7 +60,7 @@ pub struct Region {
     pub expected: Option<Vec<Track>>,
 }
 
-/// A view that was taken and recorded.
+/// Recorded view.
 #[derive(Debug, Clone, Copy)]
 pub struct RecordedView {
     /// When.
@@ -114,7 +114,7 @@ impl Mind {
         (known.observed, known.out_of_reach, known.shut) = (observed, out_of_reach, shut);
     }
 
-    /// The looks that have been taken at a surface no longer count.
+    /// Forgets the looks taken at a surface (`None`: at all), so that they may be repeated.
     pub fn forget_looks(&mut self, surface: Option<&str>) {
         let all: Vec<Vec<String>> = self.words.instances("observed").map(<[String]>::to_vec).collect();
         for look in all {

@@ -28,13 +28,13 @@ pub enum Note {
         /// Changes of the belief by the last view.
         changed: Vec<BeliefChange>,
     },
-    /// A surface that no map knows has come into view.
+    /// A surface outside the map was discovered.
     Surface {
         /// New name.
         name: String,
         /// Centre of the observed part, in the map.
         at_m: [f64; 3],
-        /// Area of that, square metres.
+        /// Area of the surface, square metres.
         area_m2: f64,
     },
     /// The laser has swept.
@@ -42,7 +42,7 @@ pub enum Note {
         /// Objects on the floor, with what is known of their shapes.
         things: Vec<OnTheFloor>,
     },
-    /// A look was taken into the map.
+    /// A look was added to the map.
     Charted {
         /// Walls of the map.
         walls: usize,
@@ -65,7 +65,7 @@ pub enum Note {
     Visited {
         /// Waypoint of the visit.
         waypoint: String,
-        /// The number of visits so far, this one too; 0 if this visit could not be compared.
+        /// Number of visits including this one; 0 if this visit could not be compared.
         visits: usize,
         /// Correction of the body's believed position by perception, metres.
         moved_m: f64,
@@ -75,7 +75,7 @@ pub enum Note {
         strange: Option<String>,
         /// Objects that appeared.
         came: Vec<String>,
-        /// Objects that are gone.
+        /// Vanished objects.
         gone: Vec<String>,
     },
     /// A person moved something: observations before the last view are invalid.
@@ -87,7 +87,7 @@ pub enum Note {
     Nothing {
         /// The reason.
         because: String,
-        /// Advice on settings; empty: none.
+        /// Advice on settings; empty if none.
         #[serde(default, skip_serializing_if = "String::is_empty")]
         advice: String,
         /// True if the view is dropped for good; otherwise, further views may make it usable.
@@ -96,7 +96,7 @@ pub enum Note {
     },
 }
 
-/// A view that was not merged with the others.
+/// View that was not merged.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum LeftOut {
@@ -104,7 +104,7 @@ pub enum LeftOut {
     View {
         /// The number.
         view: usize,
-        /// The reason, said after the number.
+        /// Reason, to follow the number.
         why: String,
     },
     /// Text of an earlier version.

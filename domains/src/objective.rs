@@ -1,4 +1,4 @@
-//! A goal and its subjects.
+//! Goal and its subjects.
 
 use crate::config::Answers;
 
@@ -15,11 +15,11 @@ pub struct Goal {
     pub asked: Asked,
     /// Values of the slots.
     pub slots: Vec<Filled>,
-    /// True if the answer is yes or no.
+    /// True for a yes-no question.
     pub question: bool,
     /// Answers of the phrase.
     pub answer: Answers,
-    /// The confidence that ends the search, 0 to 1.
+    /// Confidence that ends the search, 0 to 1.
     pub threshold: f64,
     /// Deadline, seconds on the body's clock.
     pub deadline_s: Option<f64>,
@@ -30,7 +30,7 @@ pub struct Goal {
 pub struct Filled {
     /// Slot as written in the phrase: `thing`, or `first:thing`.
     pub slot: String,
-    /// Index among several slots of the same name, from 0.
+    /// Index among slots of the same name, from 0.
     pub number: usize,
     /// The PDDL symbol.
     pub symbol: String,

@@ -1,4 +1,4 @@
-//! Origins of the values of words: abilities, programs, the domain itself.
+//! Sources of the values of words: abilities, programs, the domain itself.
 
 use crate::abilities;
 use crate::ability::Fact;

@@ -5,7 +5,7 @@ use descry_robots::{Description, Failure, Place, Robot, Travel};
 
 use crate::surface::KnownSurface;
 
-/// Map that a body makes itself.
+/// Map of a body's own making.
 pub trait OwnMap: Send + Sync {
     /// Level supporting surfaces, as observed.
     fn surfaces(&self) -> Vec<KnownSurface>;
@@ -28,10 +28,10 @@ pub trait OwnMap: Send + Sync {
     /// True if routes are planned on the floor of this map.
     fn has_ways(&self) -> bool;
 
-    /// True if a surface is one of this map.
+    /// True if a surface is on this map.
     fn has(&self, surface: &str) -> bool;
 
-    /// True if a wall or a pillar of this map stands between two places.
+    /// True if a wall or pillar of this map stands between two places.
     fn hides(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool;
 
     /// Sentence about frontiers of the map, where unobserved floor begins without a wall; `None`

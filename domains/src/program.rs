@@ -29,11 +29,11 @@ use serde_json::{Value, json};
 use crate::config::Program;
 use crate::function::Function;
 
-/// The number of last lines on standard error that are shown when a program ends.
+/// Number of last lines of standard error shown when a program ends.
 const LAST_WORDS: usize = 5;
 /// Maximum length of an answer line, bytes.
 const MOST_WORD_BYTES: u64 = 1 << 10;
-/// A line of answer is at most so long: some ten thousand proposals.
+/// Maximum length of an answer line, bytes; enough for some ten thousand proposals.
 const MOST_LINE_BYTES: u64 = 1 << 20;
 /// The number of lines of answer that are read ahead.
 const LINES_AHEAD: usize = 16;
@@ -41,7 +41,7 @@ const LINES_AHEAD: usize = 16;
 const MOST_DATA_BYTES: u64 = 4 << 30;
 /// Grace period for a program to exit after closing its output.
 const END_WAIT: Duration = Duration::from_millis(500);
-/// Environment variables that a program gets, beside `LC_…`: locations and the language.
+/// Environment variables passed to a program, besides `LC_…`: locations and language.
 const SEEN: [&str; 12] = [
     "PATH",
     "HOME",
@@ -148,7 +148,7 @@ impl ProgramAttachment {
         })
     }
 
-    /// Asks one question of any kind, a JSON object without `id`, and waits for the answer: the object that comes back.
+    /// Asks one question of any kind (JSON object without `id`) and waits for the answer object.
     ///
     /// # Errors
     /// [`CallError`] as for calls; [`CallError::Failed`] with its words if the program answers with an `error`.
@@ -200,7 +200,7 @@ impl ProgramAttachment {
         Duration::from_secs_f64(self.program.time_limit_s.clamp(0.001, 3600.0))
     }
 
-    /// The next line that says anything.
+    /// Next non-empty line.
     fn line(&self, running: &mut Running, deadline: Instant) -> Result<String, CallError> {
         loop {
             match running.answers.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
@@ -310,7 +310,7 @@ impl Running {
         self.child.wait()
     }
 
-    /// Kills the process group; one that is already gone is no error.
+    /// Kills the process group; a missing one is no error.
     fn kill(&self) {
         let _ = kill_process_group(Pid::from_child(&self.child), Signal::KILL);
     }
@@ -366,7 +366,7 @@ fn hear(stdout: ChildStdout, answers: &SyncSender<Result<String, CallError>>) {
     }
 }
 
-/// Remembers the last lines that a program says on standard error.
+/// Keeps the last lines of a program's standard error.
 fn listen(stderr: ChildStderr, words: &Mutex<VecDeque<String>>) {
     let mut stderr = BufReader::new(stderr);
     loop {

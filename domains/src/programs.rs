@@ -60,9 +60,10 @@ impl Programs {
         self.actions.get(name)
     }
 
-    /// Facts that the program behind a word states now, a line of PDDL each. It is asked `{"id": 0, "fact":
-    /// "raining", "objects": ["table", …]}` and answers `{"id": 0, "value": ["(raining)"]}`. Once senses of
-    /// the body were read, the question holds the last reading of each: `"readings": {"rain-gauge": 1.5}`.
+    /// Facts that a word's program states now, one PDDL line each. The question is `{"id": 0,
+    /// "fact": "raining", "objects": ["table", …]}`, the answer `{"id": 0, "value":
+    /// ["(raining)"]}`. If senses were read, the question contains their last readings:
+    /// `"readings": {"rain-gauge": 1.5}`.
     ///
     /// # Errors
     /// Why there is no usable answer.
@@ -100,8 +101,9 @@ impl Programs {
 }
 
 impl ProgramAction {
-    /// The call as a skill. The program is asked `{"id": 0, "action": "greet", "arguments": ["anna"]}` and answers
-    /// `{"id": 0, "value": "said hello"}`, or `{"id": 0, "error": "why not"}`, which is tried again as the domain says, as is `false`.
+    /// Skill of a call by its program. The question is `{"id": 0, "action": "greet", "arguments":
+    /// ["anna"]}`, the answer `{"id": 0, "value": "said hello"}`; `{"id": 0, "error": "why not"}`
+    /// and `false` are retried as the domain says.
     pub fn perform(&self, call: &Call) -> Box<dyn Skill> {
         let program = Arc::clone(&self.program);
         let question = json!({ "action": call.action, "arguments": call.arguments });

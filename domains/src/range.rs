@@ -15,7 +15,7 @@ pub struct Range {
     pub greatest: f64,
 }
 
-/// Object that a word is said of.
+/// Argument of a word.
 #[derive(Debug, Clone, Copy)]
 pub enum Referent<'a> {
     /// Object of the problem, by symbol.

@@ -9,7 +9,7 @@ use crate::known::Thing;
 use crate::situation::Situation;
 use crate::surface::KnownSurface;
 
-/// A probability that is said with an answer.
+/// Minimum probability that an answer mentions.
 pub const WORTH_SAYING: f64 = 0.01;
 /// Reason why the absence of a thing cannot be claimed; `None` if it can.
 pub fn left_about(s: &Situation, what: usize) -> Option<String> {
@@ -72,7 +72,7 @@ pub fn may_be_none(s: &Situation, thing: &Thing) -> Option<String> {
     })
 }
 
-/// The reason the answer about every object is incomplete; none if no reason is known.
+/// Reason why the answer about every object is incomplete; `None` if unknown.
 pub fn left_in_all(s: &Situation) -> Option<String> {
     if let Some(late) = out_of_time(s) {
         return Some(late);
@@ -199,7 +199,7 @@ fn out_of_sight(s: &Situation, doubt: &Doubt, what: &str) -> Option<String> {
     })
 }
 
-/// A place in words.
+/// Position in words.
 pub fn place(p: &Point3<f64>) -> String {
     format!("({:.2}, {:.2}) m", p.x, p.y)
 }

@@ -8,7 +8,7 @@ use crate::goal::spoken_types;
 use crate::lexicon::{Lexicon, NAMED, Places};
 use crate::load::Domain;
 
-/// A line of `[said]`: the parameters, in their order, with their types; and the text.
+/// Line of `[said]`: parameters with types, in order; and the text.
 type Form = (Vec<(String, String)>, String);
 
 /// The domain's wording of PDDL.
@@ -67,7 +67,7 @@ impl Saying {
         Saying { forms: forms.collect(), names, spoken: spoken.collect() }
     }
 
-    /// Says an expression in PDDL: a step, a condition or a number. Parts that the domain has no line for stay in PDDL.
+    /// Verbalises a PDDL expression: step, condition or number; parts without a line stay in PDDL.
     pub fn say(&self, pddl: &str) -> String {
         let mut out = String::new();
         let mut rest = pddl;
@@ -89,19 +89,19 @@ impl Saying {
         out + rest
     }
 
-    /// Says that a condition in PDDL does not hold.
+    /// Verbalises that a condition does not hold.
     pub fn deny(&self, pddl: &str) -> String {
         let denied = self.whole(pddl).and_then(|written| self.denied(&written, &[], Mood::Is));
         denied.unwrap_or_else(|| format!("{} does not hold", self.say(pddl)))
     }
 
-    /// Says that a condition in PDDL would not hold.
+    /// Verbalises that a condition would not hold.
     pub fn would_deny(&self, pddl: &str) -> String {
         let denied = self.whole(pddl).and_then(|written| self.denied(&written, &[], Mood::Would));
         denied.unwrap_or_else(|| format!("{} would not hold", self.say(pddl)))
     }
 
-    /// A text that is one expression.
+    /// Text as a single expression.
     fn whole<'t>(&self, pddl: &'t str) -> Option<Written<'t>> {
         expression(pddl.trim()).filter(|(_, after)| after.is_empty()).map(|(written, _)| written)
     }

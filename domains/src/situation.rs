@@ -29,15 +29,15 @@ type Departure = (usize, Vec<usize>);
 /// Lookups and routes, computed on demand and cached.
 #[derive(Default)]
 struct Travel {
-    /// Candidates by their symbols.
+    /// Candidate indices by symbol.
     candidates: OnceLock<HashMap<String, usize>>,
     travel_s: Vec<OnceLock<Vec<f64>>>,
     /// Candidates of the round's plans, once chosen, in order.
     focused: OnceLock<Vec<usize>>,
-    /// Travel to these alone.
+    /// Travel times to the focused candidates only.
     travel_to_focused_s: Vec<OnceLock<Vec<f64>>>,
     travel_past_s: Mutex<BTreeMap<Departure, Arc<Vec<f64>>>>,
-    /// Objects by surface, by their index.
+    /// Objects by surface index.
     standing: OnceLock<Vec<Vec<usize>>>,
 }
 
@@ -152,7 +152,7 @@ impl Situation {
         self.can_drive_to(to) || (!self.out_of_reach.contains(&to) && through_doors())
     }
 
-    /// The kind of a symbol.
+    /// Index of the kind with a symbol.
     ///
     /// # Errors
     /// [`CallError::Failed`] if there is none.
@@ -214,7 +214,7 @@ pub(crate) fn find<'a>(
     symbols.position(|s| s == name).ok_or_else(|| CallError::Failed(format!("`{name}` is not {expected}")))
 }
 
-/// Places for values that are worked out on demand.
+/// Empty cells for values computed on demand.
 pub(crate) fn cells<T>(n: usize) -> Vec<OnceLock<T>> {
     (0..n).map(|_| OnceLock::new()).collect()
 }

@@ -7,7 +7,7 @@ pub fn type_of_slot(slot: &str) -> &str {
     slot.rsplit(':').next().unwrap_or(slot)
 }
 
-/// The slots of a text in their order.
+/// Slots of a text, in order.
 pub fn slots_of(text: &str) -> Vec<&str> {
     let mut slots = Vec::new();
     let mut rest = text;

@@ -22,7 +22,7 @@ macro_rules! state {
 }
 pub(crate) use state;
 
-/// States of abilities, one of each type.
+/// States of abilities, one per type.
 #[derive(Clone, Default)]
 pub struct States(Option<Box<Kept>>);
 
@@ -41,7 +41,7 @@ impl States {
         }
     }
 
-    /// The state of a type, to be changed; snapshots keep the one before.
+    /// Mutable state of a type; earlier snapshots keep the old one.
     pub fn get_mut<T: State>(&mut self) -> &mut T {
         let fresh = || Box::new(Kept { value: Arc::new(T::default()), others: States::default() });
         let Kept { value, others } = &mut **self.0.get_or_insert_with(fresh);

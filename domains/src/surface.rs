@@ -6,8 +6,8 @@ use descry_perception::nalgebra::{Point3, Vector3};
 
 use crate::symbol::symbol;
 
-/// Distance from a wall of the map within which a point, or one beyond the wall, belongs to the wall, metres:
-/// localisation along a surface errs by two or three centimetres.
+/// Distance from a mapped wall within which a point belongs to the wall, metres: localisation along
+/// a surface errs by two or three centimetres.
 const WALL_M: f64 = 0.03;
 
 /// Supporting surface, as far as known.
@@ -27,7 +27,7 @@ pub struct KnownSurface {
     pub up: Vector3<f64>,
     /// True if the outline is complete (from the map); false if it covers the seen part.
     pub whole: bool,
-    /// The reason it may be no surface to stand things on, in words after its name, if it may.
+    /// Reason why it may not be a supporting surface, in words after its name; `None` if undoubted.
     pub doubtful: Option<String>,
     /// Certainty of the alignment with the map's outline; `None` without an outline, or before a
     /// look.
@@ -51,7 +51,7 @@ impl KnownSurface {
         self.room.as_deref().is_some_and(|own| rooms.contains(&symbol(own)))
     }
 
-    /// True if a point lies over the outline widened by a margin in metres.
+    /// True if a point lies over the outline, widened by a margin in metres.
     pub(crate) fn covers(&self, point: &Point3<f64>, margin_m: f64) -> bool {
         is_over(&self.outline, &self.up, point, margin_m)
     }
@@ -74,7 +74,8 @@ impl KnownSurface {
     }
 }
 
-/// True if a point lies over a convex outline, anticlockwise seen from above, widened by a margin in metres.
+/// True if a point lies over a convex outline (anticlockwise from above), widened by a margin in
+/// metres.
 fn is_over(outline: &[Point3<f64>], up: &Vector3<f64>, point: &Point3<f64>, margin_m: f64) -> bool {
     let n = outline.len();
     n >= 3

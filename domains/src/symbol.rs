@@ -1,6 +1,6 @@
 //! PDDL symbols of names.
 
-/// The PDDL symbol of a name: lower case, with hyphens for everything that is no letter or digit.
+/// PDDL symbol of a name: lower case, with hyphens for everything but letters and digits.
 pub fn symbol(name: &str) -> String {
     let words: Vec<String> = name
         .split(|c: char| !c.is_alphanumeric())

@@ -1,4 +1,4 @@
-//! The small domain that a new one begins as.
+//! Template of a new domain.
 
 use std::path::PathBuf;
 

@@ -7,8 +7,8 @@ use descry_robots::{Door, Room};
 
 /// Distance from the end of a line of sight within which a wall does not block it, metres.
 const BEFORE_M: f64 = 0.05;
-/// Maximum thickness of a wall, metres: the outlines of two rooms lie at most this far from the middle of
-/// the door between them.
+/// Maximum thickness of a wall, metres: the distance of two rooms' outlines from the centre of the
+/// door between them.
 const THICK_M: f64 = 0.3;
 /// Least side of a cell of the index, metres, and the maximum number of cells along a side.
 const CELL_M: f64 = 2.0;
@@ -28,7 +28,7 @@ pub struct Walls {
     cells: Vec<Vec<u32>>,
 }
 
-/// One side of a room's outline.
+/// Side of a room's outline.
 #[derive(Debug)]
 struct Wall {
     from: Point2<f64>,

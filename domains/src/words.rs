@@ -1,4 +1,4 @@
-//! The words that are remembered or fixed, and their values.
+//! Values of remembered and fixed words.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,7 @@ pub struct Words {
     held: BTreeMap<String, BTreeMap<Vec<String>, f64>>,
     /// Words that `init` mentions.
     begun: BTreeSet<String>,
-    /// Instances that this run has given a value, or said not to hold.
+    /// Instances that this run has set or unset.
     told: BTreeSet<(String, Vec<String>)>,
 }
 
@@ -49,7 +49,7 @@ impl Words {
         Ok(words)
     }
 
-    /// Gives a word a value on some arguments: of a predicate 1 for true, 0 for false.
+    /// Sets a word for some arguments: 1 and 0 are true and false for a predicate.
     pub fn set(&mut self, name: &str, arguments: Vec<String>, value: Option<f64>) {
         self.told.insert((name.into(), arguments.clone()));
         let instances = self.held.entry(name.into()).or_default();
@@ -179,7 +179,7 @@ pub(crate) fn are_known(condition: &str, problem: &str, domain: &Domain) -> bool
     condition.to_lowercase().split(split).filter(is_name).all(is_known)
 }
 
-/// The task of a round with another goal: for asking whether a condition holds now.
+/// Task of a round with another goal, for testing whether a condition holds now.
 ///
 /// # Errors
 /// What is wrong with the condition, drawn under it.

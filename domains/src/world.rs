@@ -91,7 +91,7 @@ pub struct World<'a> {
 pub enum Choice {
     /// The planner.
     Planner,
-    /// Somebody has chosen these steps.
+    /// Chosen steps.
     Steps(Plan),
     /// Chosen steps; the planner finds the way to their start.
     Towards {
@@ -100,7 +100,7 @@ pub enum Choice {
         /// Steps to carry out there.
         then: Plan,
     },
-    /// Somebody gives up.
+    /// No step is chosen, with the reason.
     Nothing(String),
 }
 
@@ -187,12 +187,12 @@ impl<'a> World<'a> {
         self.mind.known.candidates.len()
     }
 
-    /// Views taken, and metres driven.
+    /// Number of views, and metres driven.
     pub fn taken(&self) -> (usize, f64) {
         (self.mind.views, self.mind.distance_m)
     }
 
-    /// The planning problem of this round: symbols, facts and the goal as PDDL, kept in the record.
+    /// Planning problem of this round, with symbols, facts and goal in PDDL; recorded.
     ///
     /// # Errors
     /// [`WorldError`] if the domain's texts make no task, a fact's program fails, or the record does.
@@ -563,7 +563,7 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// After a failure the body may stand anywhere: that is one more pose to look from.
+    /// Adds the body's pose as a viewpoint: after a failure it may be anywhere.
     pub fn stands_at(&mut self, here: &PoseEstimate) {
         let place = here.place();
         let known = &mut self.mind.known;
@@ -585,7 +585,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// Recognition among percepts by every ability that has one.
+/// Recognisers of learned objects of all abilities.
 static KNOWS_AGAIN: LazyLock<Vec<KnowsAgain>> =
     LazyLock::new(|| abilities::ALL.iter().filter_map(|ability| ability.again).collect());
 
@@ -601,7 +601,7 @@ fn context<'e>(setting: &'e Setting<'_>, robot: &'e dyn Robot) -> Eyes<'e> {
     }
 }
 
-/// A part of a call for the body.
+/// Part of a call for the body.
 pub struct Job {
     /// Skill to run, or the failure if the call cannot be grounded.
     pub skill: Result<Box<dyn Skill>, SkillFailure>,

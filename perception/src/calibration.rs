@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Stated probability, and true if the claim was right.
 pub type Claim = (f64, bool);
 
-/// One bin of a reliability plot.
+/// Bin of a reliability diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bin {
     /// Least stated probability (inclusive).
@@ -14,7 +14,7 @@ pub struct Bin {
     pub high: f64,
     /// Number of claims in the bin.
     pub count: usize,
-    /// Their mean stated probability.
+    /// Mean stated probability of the claims.
     pub stated: f64,
     /// The share that came true.
     pub came_true: f64,
@@ -35,7 +35,8 @@ pub struct Reliability {
     pub bins: Vec<Bin>,
 }
 
-/// Scores claims in `bins` bins of equal width (at least one). Claims whose probability is not finite are left out; others are held within 0 and 1.
+/// Scores claims in `bins` (at least one) bins of equal width; non-finite probabilities are
+/// skipped, others clamped to [0, 1].
 pub fn reliability(claims: &[Claim], bins: usize) -> Reliability {
     let bins = bins.max(1);
     let sound: Vec<Claim> =

@@ -24,17 +24,17 @@ pub struct Intrinsics {
 /// A camera or a depth image that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// The depth image has another size than the camera says.
+    /// Depth image and camera differ in size.
     #[error("the depth image has {found} pixels where a {width} x {height} camera has {}: check the intrinsics", width * height)]
     Size {
-        /// Pixels given.
+        /// Number of pixels given.
         found: usize,
         /// Columns.
         width: usize,
         /// Rows.
         height: usize,
     },
-    /// A focal length that is no positive number.
+    /// Focal length that is not positive.
     #[error("{name} is {value}: a focal length is a positive number of pixels")]
     Focal {
         /// `fx` or `fy`.

@@ -4,7 +4,7 @@ use crate::quantile::median;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Rows and columns of an organised cloud (one point a pixel, row by row).
+/// Rows and columns of an organised cloud (one point per pixel, row by row).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Grid {
     /// Columns (pixels a row).
@@ -20,8 +20,8 @@ const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
 /// Maximum median distance of points from their centre in a cloud that is in metres though far from
 /// the origin, metres. From: chosen.
 const WIDEST_PLACE_M: f64 = 20.0;
-/// Extent as a share of the distance from the origin below which a cloud counts as far away rather than given
-/// in other units. From: chosen.
+/// Extent relative to the distance from the origin, below which a cloud counts as far away rather
+/// than in other units. From: chosen.
 const NARROW: f64 = 0.01;
 /// Median distances, in the cloud's unit, between which a cloud may be in millimetres or in
 /// centimetres: below, it is too near for a depth camera in millimetres; above, too far for one in
@@ -35,19 +35,19 @@ const COARSEST_M: f64 = 1e-4;
 /// Points with optional attributes; each attribute that is present has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cloud {
-    /// Positions in metres. NaN is "no return" and stands in organised clouds only.
+    /// Positions, metres; NaN is a missing return (organised clouds only).
     pub points: Vec<Point3<f32>>,
     /// Present if the points are the pixels of an image, row by row.
     pub grid: Option<Grid>,
     /// Red, green, blue.
     pub colours: Option<Vec<[u8; 3]>>,
-    /// Unit normals; NaN where none could be estimated.
+    /// Unit normals; NaN where undefined.
     pub normals: Option<Vec<Vector3<f32>>>,
     /// A number a point whose meaning the maker of the cloud states (segment, object, truth).
     pub labels: Option<Vec<u32>>,
 }
 
-/// A cloud whose parts do not fit together.
+/// Inconsistency between the parts of a cloud.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CloudError {
     /// An attribute has another length than the points.
@@ -60,7 +60,7 @@ pub enum CloudError {
         /// Points in the cloud.
         points: usize,
     },
-    /// The grid does not hold the points.
+    /// Grid size and number of points differ.
     #[error("a grid of {width} x {height} does not hold {points} points: drop the grid or mend its size")]
     Grid {
         /// Columns.
@@ -127,7 +127,8 @@ impl Cloud {
         self.points.iter().filter(|p| is_finite(p)).count()
     }
 
-    /// The points at `indices`, in that order, with their attributes; the grid is given up. Indices beyond the end are left out.
+    /// Points at `indices` (out-of-range ones skipped), in that order, with attributes, without
+    /// grid.
     pub fn select(&self, indices: &[u32]) -> Cloud {
         fn pick<T: Copy>(from: &[T], indices: &[u32]) -> Vec<T> {
             indices.iter().filter_map(|&i| from.get(i as usize).copied()).collect()
@@ -141,18 +142,18 @@ impl Cloud {
         }
     }
 
-    /// The points for which `keep` holds, in their order, with their attributes; the grid is given up.
+    /// Points accepted by `keep`, in order, with attributes, without grid.
     pub fn filter(&self, keep: impl Fn(&Point3<f32>) -> bool) -> Cloud {
         let kept: Vec<u32> = (0u32..).zip(&self.points).filter(|(_, p)| keep(p)).map(|(i, _)| i).collect();
         self.select(&kept)
     }
 
-    /// The finite points, in their order, with their attributes; the grid is given up.
+    /// Finite points, in order, with attributes, without grid.
     pub fn finite(&self) -> Cloud {
         self.filter(is_finite)
     }
 
-    /// The cloud in another frame: points moved, normals turned, grid and the rest kept. Computed in `f64`.
+    /// Cloud in another frame; grid and other attributes stay. Computed in `f64`.
     pub fn transformed(&self, to_from_here: &Isometry3<f64>) -> Cloud {
         let rotation = to_from_here.rotation.to_rotation_matrix();
         let shift = to_from_here.translation.vector;
@@ -170,7 +171,8 @@ impl Cloud {
         }
     }
 
-    /// Adds the points of `other` behind ours; the grid is given up. An attribute that only one of two non-empty clouds has is dropped.
+    /// Appends the points of `other`, without grid. An attribute of only one of two non-empty
+    /// clouds is dropped.
     pub fn append(&mut self, other: &Cloud) {
         fn join<T: Clone>(ours: &mut Option<Vec<T>>, theirs: &Option<Vec<T>>, empty: bool) {
             match (ours.as_mut(), theirs) {
@@ -251,7 +253,8 @@ impl Cloud {
         }
     }
 
-    /// The median distance of the finite points from their median, metres; `None` if no point is finite.
+    /// Median distance of the finite points from their median, metres; `None` without finite
+    /// points.
     fn within_of_middle_m(&self) -> Option<f64> {
         let finite = || self.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>());
         finite().next()?;

@@ -6,13 +6,13 @@ use nalgebra::Point3;
 /// Clusters that cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ClusterError {
-    /// The step is no positive length.
+    /// Step that is not positive.
     #[error("a step of {step_m} m: give a positive length, such as 0.02")]
     Step {
         /// The value that was given.
         step_m: f32,
     },
-    /// A point lies farther out than cells can be counted.
+    /// Point beyond the countable range of cells.
     #[error(
         "a point lies more than a million steps of {step_m} m from the first: are these millimetres (scale by 0.001), or a stray return?"
     )]
@@ -22,8 +22,8 @@ pub enum ClusterError {
     },
 }
 
-/// The sets of points that are connected by steps no longer than `step_m`, each of `least` points or more: the largest first, equals by their first point.
-/// Indices ascend within a cluster; points without a return belong to none.
+/// Clusters of points connected by steps up to `step_m`, with at least `least` points: by size,
+/// ties by first point. Indices ascend within a cluster; missing returns belong to none.
 ///
 /// Every pair within the step counts, whatever the order of the points: single linkage, as DBSCAN with one point a core.
 ///
@@ -40,11 +40,11 @@ pub fn euclidean(points: &[Point3<f32>], step_m: f32, least: usize) -> Result<Ve
     Ok(collect(&cells, &mut sets, least))
 }
 
-/// Points sorted into cells whose diagonal is one step: points of one cell always hang together.
+/// Points in cells whose diagonal is one step, so that points of a cell are always connected.
 struct Cells {
     /// Cell coordinates, ascending by (z, y, x).
     key: Vec<[i32; 3]>,
-    /// The start of each cell's points in `items`; one more entry at the end.
+    /// Start of each cell's points in `items`, plus the total.
     begin: Vec<u32>,
     items: Vec<(Point3<f32>, u32)>,
 }
@@ -121,7 +121,7 @@ impl Cells {
     }
 }
 
-/// True if any two points of the two cells lie within a step.
+/// True if two points of the two cells lie within a step.
 fn near(a: &[(Point3<f32>, u32)], b: &[(Point3<f32>, u32)], limit: f32) -> bool {
     a.iter().any(|(p, _)| b.iter().any(|(q, _)| (p - q).norm_squared() <= limit))
 }

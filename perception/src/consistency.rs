@@ -18,18 +18,20 @@ use std::fmt;
 /// five standard deviations of a stated quantity. From: chosen, five times what honest simulated
 /// recordings reach.
 const MISFIT: f64 = 30.0;
-/// A look contributes no more misfit than this: one look with a gross pose error must not name a fault of all. From: chosen.
+/// Maximum misfit of a single look, so that one gross pose error cannot suggest a common fault.
+/// From: chosen.
 const MOST_MISFIT: f64 = 150.0;
 /// Share of the statement's misfit that a named fault may leave. From: chosen.
 const LEFT_SHARE: f64 = 0.35;
-/// Fewest looks that name a fault of all looks: from one, a wrong pose looks the same. From: derived.
+/// Minimum number of looks for a common fault; in a single look, a wrong pose looks the same.
+/// From: derived.
 const FEWEST: usize = 2;
-/// Probability, before any look, that a camera or a body lies. From: chosen.
+/// Prior probability of a camera or pose fault. From: chosen.
 const PRIOR: f64 = 0.02;
 /// Probability of a fault below which the looks count as honest. From: chosen.
 const NEGLIGIBLE: f64 = 0.02;
-/// Displacements that the outline of a surface mends, in standard deviations of the stated pose. From: chosen, as far as views are laid
-/// on an outline.
+/// Maximum displacement that aligning a surface with its outline corrects, in standard deviations
+/// of the stated pose. From: chosen, as far as views are laid on an outline.
 const MENDED: f64 = 4.0;
 
 /// A level surface that the map states, in a map whose z axis points up.
@@ -55,14 +57,15 @@ pub enum Fault {
     /// Poses are shifted in time by a number of frames: each look has the pose of so many frames
     /// before (after, if negative).
     Late(i64),
-    /// The stated poses all lie so far from the true ones: a shift in the map, metres, and a turn about the surface's middle, radians.
+    /// All stated poses are displaced by a common shift in the map, metres, and rotation about the
+    /// surface's centre, radians.
     Displaced(Vector2<f64>, f64),
     /// No single fault of camera or poses explains the looks.
     Unexplained,
 }
 
 impl Fault {
-    /// The number of parameters that give the size of the fault.
+    /// Number of parameters of the fault.
     fn numbers(&self) -> usize {
         match self {
             Fault::DepthScale(_) | Fault::FocalLength(_) => 1,
@@ -174,7 +177,7 @@ pub fn judge(
     })
 }
 
-/// The fault that leaves least misfit, and how much; as stated, where none leaves less.
+/// Fault with the minimum misfit; the stated values if none is better.
 fn likeliest<M: Iterator<Item = Model>>(
     fit: &Fit<'_>,
     sights: &[Sight],
@@ -207,7 +210,7 @@ fn total(misfits: &[f64]) -> f64 {
 }
 
 impl MapSurface {
-    /// The mean of its corners, at its height.
+    /// Mean of the corners, at the surface's height.
     fn centre(&self) -> Point3<f64> {
         let sum = self.outline_m.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords);
         let mean = sum / self.outline_m.len().max(1) as f64;
@@ -279,7 +282,7 @@ impl Model {
     }
 }
 
-/// Faults of a kind that differ by numbers.
+/// Family of faults with free parameters.
 #[derive(Clone, Copy, Debug)]
 enum Family {
     DepthScale,
@@ -305,7 +308,7 @@ impl Family {
     /// Pattern search (Hooke and Jeeves 1961) for the minimum misfit, starting from the stated
     /// values; abandoned if no first step removes a good part of the misfit.
     fn search(self, before: f64, misfit: &mut impl FnMut(Fault) -> f64) {
-        /// Steps taken at most, in all. From: work.
+        /// Maximum number of evaluations. From: work.
         const EVALUATIONS: usize = 60;
         /// Maximum share of the misfit that a first step may leave for the search to go on. From: chosen.
         const PROMISING: f64 = 0.8;

@@ -1,4 +1,5 @@
-//! Repeatable random draws (SplitMix64: Steele, Lea, Flood 2014), the same on every machine and in every version.
+//! Deterministic pseudo-random numbers (SplitMix64: Steele, Lea, Flood 2014), equal on every
+//! machine and in every version.
 
 /// Deterministic pseudo-random generator, fixed by its seed.
 #[derive(Clone, Debug)]

@@ -66,7 +66,7 @@ impl Hull {
         if inside { -nearest } else { nearest }
     }
 
-    /// True if the foot of `p` lies in the hull, or no farther than `margin_m` outside (a negative margin: at least as far inside).
+    /// True if the projection of `p` lies in the hull widened by `margin_m` (negative: shrunk).
     pub fn contains(&self, p: &Point3<f64>, margin_m: f64) -> bool {
         self.distance_m(p) <= margin_m
     }

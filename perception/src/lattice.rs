@@ -1,8 +1,9 @@
-//! A sparse voxel grid as a sorted list: cells in the order of their keys, so that neighbours are found by walking, not by hashing.
+//! Sparse voxel grid as a sorted list of keys; neighbours are found by merging, without hashing.
 
 use nalgebra::{Point3, Vector3};
 
-/// Numbers the voxels of a part of the world: x counts most, then y, then z. The lattice is fixed to the world's origin.
+/// Numbers voxels, with x most significant, then y, then z. The lattice is anchored at the world's
+/// origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice {
     pub per_m: f64,

@@ -13,7 +13,7 @@ use nalgebra::{
     UnitQuaternion, Vector2, Vector3,
 };
 
-/// Length of an edge that gives one sample.
+/// Length of an edge per sample, metres.
 const BIN_M: f64 = 0.02;
 /// A sample wants this many endings.
 const FEWEST: usize = 2;
@@ -22,7 +22,8 @@ const FEWEST: usize = 2;
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
 /// Standard deviation of a sample; centimetres, because neighbouring samples share their errors.
 const SAMPLE_SIGMA_M: f64 = 0.03;
-/// Fewest samples of an end on either side; with fewer, the surface is aligned by the extent that was seen.
+/// Minimum number of end samples on either of two opposite sides; with fewer, the observed extent
+/// is used.
 const FEW: usize = 5;
 /// Standard deviation of the observed extent between opposite sides, and maximum shortfall of that
 /// extent, metres.
@@ -39,11 +40,11 @@ pub struct Located {
     /// Root mean square distance of the samples from the aligned outline, metres; 0 without
     /// samples.
     pub residual_m: f64,
-    /// The certainty of that transform; none without an outline.
+    /// Certainty of the alignment; `None` without an outline.
     pub certainty: Option<Certainty>,
 }
 
-/// The certainty of a surface's place on the map.
+/// Certainty of a surface's place on the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty {
     frame: Frame,
@@ -171,7 +172,7 @@ impl Frame {
         Point2::new(self.right.dot(&d), self.ahead.dot(&d))
     }
 
-    /// A motion in the plane as one in space.
+    /// Planar motion as a motion in space.
     fn lift(&self, moved: &Isometry2<f64>) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&self.up, moved.rotation.angle());
         let shift = self.right * moved.translation.x + self.ahead * moved.translation.y;
@@ -241,7 +242,7 @@ fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2
     opposite.filter_map(|(a, b)| between(a, b)).collect()
 }
 
-/// The cosine between the normals of two sides that lie opposite.
+/// Maximum cosine between the normals of opposite sides.
 const OPPOSITE: f64 = -0.98;
 
 /// Endings along a piece of an edge: count, sum of outward distances, and sum of half widths.

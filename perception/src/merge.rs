@@ -1,4 +1,5 @@
-//! Clouds of several views in one (paper 004, section V, "Point Cloud Merging and Alignment").
+//! Merging and alignment of several views (paper 004, section V, "Point Cloud Merging and
+//! Alignment").
 //!
 //! The paper chains pairwise ICP. Here all views are aligned together, against each other and against where localisation had them, so that
 //! nothing drifts and the merged frame stays the average of what localisation said. A view that cannot be placed is left out and says so.
@@ -27,7 +28,7 @@ pub use merged::{Merged, Step, ViewFit};
 pub use options::MergeOptions;
 use prepare::{Ready, filter_and_thin};
 
-/// Merges views into one cloud in the world frame. One view is filtered and fused only.
+/// Merges views into one cloud in the world frame; a single view is only filtered and fused.
 ///
 /// # Errors
 /// If there is no view, no usable point, a pose that is not finite, or an option that means nothing.
@@ -43,7 +44,7 @@ pub fn merge(views: &[View], options: &MergeOptions) -> Result<Merged, MergeErro
     })
 }
 
-/// Aligns the views without a merged cloud: steps 1 to 4 alone. Returns one fit per view, in the order given.
+/// Aligns the views without merging (steps 1 to 4); one fit per view, in order.
 ///
 /// # Errors
 /// As [`merge`].

@@ -83,7 +83,7 @@ struct Item {
     index: u32,
 }
 
-/// A search structure over the finite ones among some points.
+/// Search tree over the finite points of a cloud.
 pub struct Neighbours {
     /// Coordinates by slot; `LEAF` slots a leaf.
     x: Vec<f32>,
@@ -119,7 +119,7 @@ impl Span {
 }
 
 impl Neighbours {
-    /// Builds the tree over the finite points. Points that coincide are all kept.
+    /// Builds the tree over the finite points; coinciding points are all kept.
     ///
     /// # Errors
     /// If there are more points than 32-bit indices can name.
@@ -184,7 +184,7 @@ impl Neighbours {
         found
     }
 
-    /// Calls `found` with every point that is no farther than `radius_m`, in the tree's order.
+    /// Calls `found` with every point within `radius_m`, in tree order.
     pub fn within(&self, query: &Point3<f32>, radius_m: f32, mut found: impl FnMut(Neighbour)) {
         if self.is_empty() || !is_finite(query) {
             return;
@@ -301,12 +301,13 @@ impl Neighbours {
     }
 }
 
-/// The next number above a finite one that is not negative.
+/// Next larger number of a finite non-negative one.
 fn next_up(value: f32) -> f32 {
     if value.is_finite() { value.next_up() } else { value }
 }
 
-/// Splits items at the median of the widest axis so that the left part fills whole leaves; the halves are independent and may run in parallel.
+/// Splits items at the median of the widest axis so that the left part fills whole leaves; the
+/// halves may be built in parallel.
 fn build(items: &mut [Item], nodes: &mut [Bounds], leaves: usize) {
     const PARALLEL_FROM: usize = 1 << 14;
     let bounds = Bounds::around(items);

@@ -11,8 +11,8 @@ pub use fit::Residuals;
 /// Steepest angle between ray and normal that still returns, degrees. From: chosen.
 pub const STEEPEST_DEG: f64 = 85.0;
 
-/// Additional axial noise as a surface steepens, metres at a depth of one. From: sensor, Nguyen et al. 2012,
-/// the term for steep angles.
+/// Additional axial noise on steep surfaces, metres at unit depth. From: sensor, Nguyen et al.
+/// 2012, the term for steep angles.
 const STEEP_M: f64 = 0.0001;
 /// Additional noise across the ray as a surface steepens, pixels. From: sensor, Nguyen et al. 2012, eq. 1.
 const STEEP_PX: f64 = 0.034;

@@ -19,7 +19,8 @@ pub struct Normals {
     pub variation: Vec<f32>,
 }
 
-/// Normals by the `k` nearest points (the point itself counts), turned towards `viewpoint` (metres, in the frame of the points).
+/// Normals from the `k` nearest points (itself included), towards `viewpoint` (metres, in the
+/// points' frame).
 ///
 /// `tree` must be built from `points`. Needs three points or more that do not lie on a line; elsewhere the normal is NaN.
 pub fn estimate(tree: &Neighbours, k: usize, viewpoint: &Point3<f32>) -> Normals {

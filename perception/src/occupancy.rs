@@ -30,7 +30,7 @@ pub struct Occupancy {
 }
 
 impl Occupancy {
-    /// The content of the map at a place.
+    /// Content of the map at a place.
     pub fn at(&self, place: &Point2<f64>) -> Space {
         let cell = (place - self.origin) / self.cell_m;
         self.cell(cell.x.floor(), cell.y.floor())

@@ -5,7 +5,7 @@ use crate::neighbours::Neighbours;
 /// The result of [`statistical`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
-    /// Indices of the points that stay, ascending. Points without a return do not.
+    /// Indices of the kept points, ascending; missing returns are dropped.
     pub indices: Vec<u32>,
     /// Mean over the cloud of the mean distance to the neighbours, metres.
     pub mean_m: f64,

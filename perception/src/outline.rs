@@ -19,7 +19,7 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// The rectangle of no points. From: mark.
+    /// Rectangle of no points. From: mark.
     pub const NONE: Rectangle =
         Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
 }
@@ -108,7 +108,7 @@ fn best_turn(
     best_of(all, &mut std::iter::once(0).chain(aside).map(|aside| (among + aside) % TURNS))
 }
 
-/// Points seen from above, and their coordinates along the sides of the rectangle that was turned last.
+/// Points seen from above, with coordinates along the sides at the last rotation.
 struct Turner {
     /// Number of points. Coordinates are relative to the first point, so that single precision
     /// suffices, and padded to whole blocks with points inside every side.
@@ -120,7 +120,7 @@ struct Turner {
     vs: Vec<f32>,
     /// The outward reach of each block of points across each side: a lesser value is farther out.
     reaches: Vec<[f32; 4]>,
-    /// Across the ends of `us`, then of `vs`.
+    /// Sides across the ends of `us`, then of `vs`.
     sides: [Side; 4],
 }
 

@@ -58,12 +58,12 @@ pub enum PictureError {
     /// The numbers of labels and of points differ.
     #[error("{labels} labels for {points} points: give one a point")]
     Labels {
-        /// Given.
+        /// Number of labels given.
         labels: usize,
         /// Needed.
         points: usize,
     },
-    /// The PNG could not be written.
+    /// PNG encoding failed.
     #[error("the picture could not be encoded: {0}")]
     Encode(String),
 }
@@ -81,7 +81,8 @@ const COLOURS: [[f32; 3]; 9] = [
     [120.0, 200.0, 60.0],
 ];
 
-/// Renders a cloud as PNG bytes. `labels` colours the points (0 is grey); nearer is lighter, and normals, where known, shade.
+/// Renders a cloud as PNG. `labels` select colours (0 is grey); nearer points are lighter, and
+/// normals shade.
 ///
 /// # Errors
 /// If the view is none, or labels and points differ in number.
@@ -131,7 +132,7 @@ impl Canvas {
         }
     }
 
-    /// Draws one point as a square; the camera looks along −z.
+    /// Draws one point as a square, in a camera frame that looks along −z.
     fn put(&mut self, q: &Point3<f64>, label: u32, shade: f32) {
         let depth = -q.z;
         if depth < 0.05 {

@@ -1,4 +1,4 @@
-//! The plane that most points lie in.
+//! Dominant plane of a cloud.
 
 mod search;
 
@@ -23,7 +23,7 @@ impl Plane {
         Plane { normal, offset_m: normal.dot(&at.coords) }
     }
 
-    /// Signed distance, metres: positive where the normal points.
+    /// Signed distance, metres; positive on the normal's side.
     pub fn height_m(&self, p: &Point3<f64>) -> f64 {
         self.normal.dot(&p.coords) - self.offset_m
     }
@@ -87,15 +87,15 @@ pub enum PlaneError {
         /// The number that was found.
         found: usize,
     },
-    /// None of the samples gave a plane that was asked for.
+    /// No sample gave a plane as requested.
     #[error(
         "none of {rounds} samples gave a plane of the asked tilt and height: do the points lie on one line? widen the band, or sample more"
     )]
     None {
-        /// Samples taken.
+        /// Number of samples taken.
         rounds: usize,
     },
-    /// The tolerance is not positive.
+    /// Tolerance that is not positive.
     #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
     Tolerance {
         /// The value that was given.

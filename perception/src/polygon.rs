@@ -6,7 +6,8 @@ pub(crate) fn area(corners: &[[f64; 2]]) -> f64 {
     0.5 * corners.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
 }
 
-/// The part of a convex polygon that lies in another, widened by a margin (Sutherland and Hodgman 1974).
+/// Intersection of a convex polygon with another, widened by a margin (Sutherland and Hodgman
+/// 1974).
 pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<[f64; 2]> {
     if by.len() < 3 {
         return Vec::new();

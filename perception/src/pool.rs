@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tracing::Span;
 
-/// Shares for each thread where work is split: enough that no thread waits long for the last one.
+/// Number of chunks per thread, for load balancing.
 const SHARES: usize = 8;
 
 type Work<'a> = &'a mut (dyn FnMut() + Send);
@@ -16,7 +16,7 @@ fn both(one: Work<'_>, other: Work<'_>) {
     rayon::join(one, other);
 }
 
-/// Does two pieces of work, beside each other where a thread is free.
+/// Runs two pieces of work, in parallel if a thread is free.
 pub(crate) fn join<A: Send, B: Send>(
     one: impl FnOnce() -> A + Send,
     other: impl FnOnce() -> B + Send,
@@ -27,7 +27,7 @@ pub(crate) fn join<A: Send, B: Send>(
     (first.expect("the first was done"), second.expect("the second was done"))
 }
 
-/// Does the work of each share of a range; no share is shorter than `least`.
+/// Runs work on chunks of a range of at least `least` items.
 fn share(range: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)) {
     if range.len() < 2 * least {
         return work(range);
@@ -36,7 +36,7 @@ fn share(range: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)
     both(&mut || share(range.start..middle, least, work), &mut || share(middle..range.end, least, work));
 }
 
-/// Length of one share of `count` items, where at least `least` are worth a thread.
+/// Chunk length for `count` items, with at least `least` per chunk.
 fn length(count: usize, least: usize) -> usize {
     count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
 }
@@ -123,8 +123,7 @@ pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R 
     rayon::scope(|_| span.in_scope(work))
 }
 
-/// Collects the result of each item, in the given order. The heaviest are begun first, so that none is left
-/// to one thread in the end.
+/// Collects the result of each item in order; the heaviest items start first for load balancing.
 pub fn heaviest_first<T: Sync, R: Send>(
     all: &[T],
     weight: impl Fn(&T) -> usize,

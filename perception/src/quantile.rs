@@ -1,4 +1,4 @@
-//! Values by their rank.
+//! Quantiles.
 
 /// Quantiles of a segment's point heights that define its lower edge and its top, excluding noise.
 /// From: chosen.
@@ -27,7 +27,7 @@ fn rank(count: usize, share: f64) -> usize {
 const SAMPLE: usize = 64;
 const WORTH_IT: usize = 4 * SAMPLE;
 
-/// [`quantile`] for shares near 0 and 1: the same value, found without reordering all.
+/// [`quantile`] for shares near 0 and 1, without reordering all values.
 pub fn end(values: &[f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -59,7 +59,7 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
 
 /// Upper limit from a sample, below which at least about `rank` of the values lie.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
-    /// Spreads of how many of the sample fall below a value that more are let through by. From: work.
+    /// Standard deviations added to a sampled rank as a safety margin. From: work.
     const SAFE: f64 = 3.0;
     let stride = values.len() / SAMPLE;
     let mut sample: [f64; SAMPLE] = std::array::from_fn(|i| way(values[i * stride]));

@@ -11,7 +11,7 @@ pub mod surveying;
 
 use crate::ability::{Ability, Fact, SkillWord};
 
-/// Every ability; the first is that of every body and needs no naming.
+/// All abilities; the first belongs to every domain and needs no naming.
 pub const ALL: &[&Ability] = &[
     &moving::ABILITY,
     &searching::ABILITY,

@@ -9,7 +9,7 @@ use crate::error::WorldError;
 use crate::situation::Situation;
 use crate::symbol::{SENSE, symbol};
 
-/// The kind under which a reading is recorded.
+/// Record kind of a reading.
 const READING: &str = "reading";
 
 /// The ability *reading*.

@@ -12,7 +12,7 @@ use crate::origin::{self, Origin};
 use crate::reasons;
 
 impl Asker<'_> {
-    /// Truth of the goal in the last round; unknown where an attachment fails.
+    /// Truth of the goal in the last round; unknown if an attachment fails.
     pub(super) fn judgement(&self) -> Judgement {
         let round = self.round;
         let judge = Judge::new(self.domain, &self.mind.words, self.s, &round.task, &round.attachments);
@@ -179,7 +179,7 @@ impl Asker<'_> {
         }
     }
 
-    /// Answer to a question that no further action can decide better.
+    /// Answer to a question that further actions cannot improve.
     pub(super) fn to_question(&self) -> (Verdict, String) {
         let Judgement { value, word } = self.judgement();
         match value {

@@ -14,7 +14,7 @@ use crate::english::{self, plural};
 use crate::reasons;
 use crate::symbol::symbol;
 
-/// An object nearer than this to where one was is that one, metres.
+/// Maximum distance at which objects of two runs count as the same, metres.
 const SAME_M: f64 = 0.10;
 
 impl Asker<'_> {
@@ -56,7 +56,7 @@ impl Asker<'_> {
         told.chain(left_out).collect::<Vec<_>>().join("; ")
     }
 
-    /// Value of an atom now: the names in the place of the question mark, or a number, or yes or no.
+    /// Current value of an atom: matching names for its question mark, a number, or yes or no.
     pub(super) fn value(&self, atom: &str) -> String {
         let tokens: Vec<String> =
             atom.trim_matches(|c| c == '(' || c == ')').split_whitespace().map(str::to_lowercase).collect();

@@ -19,12 +19,13 @@ const OFF_M: f64 = 0.03;
 const NEGLIGIBLE: f64 = 0.01;
 /// Cosine of the largest angle between a direction and the normal of an edge that constrains it.
 const ACROSS: f64 = 0.7;
-/// Spacing of the sample points along an edge, and their distance inside the edge and above the
-/// surface, metres.
+/// Spacing of sample points along an edge, metres; the next constants are their distances inside
+/// the edge and above the surface.
 const STEP_M: f64 = 0.05;
 const INSIDE_M: f64 = 0.01;
 
-/// Standard deviation of where an object stands, in the direction in which that is known worst, and this direction, metres.
+/// Standard deviation of an object's position in its least certain direction, metres, and that
+/// direction.
 pub(crate) fn worst(surface: &KnownSurface, track: &Track) -> (Option<Vector3<f64>>, f64) {
     let own_m = track.position_sigma_m.hypot(surface.displaced_m);
     match &surface.placed {
@@ -121,5 +122,5 @@ impl Situation {
     }
 }
 
-/// Unseen ends of each surface.
+/// Unseen edges of each surface.
 struct Ends(Vec<OnceLock<Vec<Hypothesis>>>);

@@ -80,7 +80,7 @@ impl Situation {
         told.map(|track| sure(self.kinds[of].probability(track, &self.surfaces))).product()
     }
 
-    /// True if looks can still show that all of a kind are found, as surely as is required.
+    /// True if looks can still raise the completeness of a kind to the required confidence.
     pub fn can_be_complete(&self, of: usize) -> bool {
         self.most_complete(of) >= self.wanted_of(of)
     }

@@ -33,13 +33,13 @@ pub struct Doubt {
     pub hypotheses: Vec<Hypothesis>,
     /// Probability that the thing, or any object, is in unseen space.
     pub hidden: f64,
-    /// Some surface is not known yet: every look may settle everything.
+    /// True if some surface is unknown, so that any look may settle anything.
     pub anywhere: bool,
     /// Hypotheses by surface.
     parts: BTreeMap<usize, Part>,
     /// Settled shares with an obstacle moved, by obstacle, candidate and surface.
     told_without: Mutex<BTreeMap<[usize; 3], Arc<[f64]>>>,
-    /// Total that all looks together can settle, by obstacle moved (0: none).
+    /// Total weight that all looks can settle, by moved obstacle (0: none).
     within_reach: Vec<OnceLock<Reach>>,
 }
 
@@ -230,7 +230,8 @@ impl Doubt {
         weight >= negligible(situation, moved) || (self.hidden > most && self.hidden - weight <= most)
     }
 
-    /// True if looks would settle enough once an obstacle is moved, of all that no look shows now.
+    /// True if looks would settle enough doubt that no look can settle now, once an obstacle is
+    /// moved.
     pub(crate) fn can_be_settled_without(&self, situation: &Situation, what: usize) -> bool {
         let [before, after] = [None, Some(what)].map(|moved| self.shown(situation, moved));
         let only_after = |n: &usize| after[*n] && !before[*n];
@@ -239,7 +240,7 @@ impl Doubt {
         uncovered >= negligible(situation, Some(what))
     }
 
-    /// Largest probability mass that one possible look at a surface would settle.
+    /// Maximum weight that one feasible look at a surface would settle.
     pub fn most_settled_on(&self, situation: &Situation, on: usize) -> f64 {
         if self.anywhere {
             return self.hidden;

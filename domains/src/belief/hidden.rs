@@ -15,13 +15,13 @@ use crate::surface::KnownSurface;
 /// measurement belongs to some object, perhaps to another.
 const MEASURED_WEIGHT: f64 = 50.0;
 
-/// Hidden places on one surface, the latest for each size.
+/// Latest hidden places of each object size on one surface.
 #[derive(Debug, Default)]
 struct Places {
     kept: Mutex<Vec<(Given, Arc<Hidden>)>>,
 }
 
-/// Everything that hidden places follow from.
+/// Inputs from which hidden places are derived.
 #[derive(Debug, Clone)]
 struct Given {
     space: Arc<Space>,
@@ -39,7 +39,7 @@ impl Given {
     }
 }
 
-/// Places on one surface where something of a size may stand unseen.
+/// Places on one surface where an object of one size may stand unseen.
 #[derive(Debug)]
 pub(crate) struct Hidden {
     /// Number of places where the object can stand.
@@ -51,7 +51,7 @@ pub(crate) struct Hidden {
 }
 
 impl Hidden {
-    /// Hidden places on a surface for something of a height and a diameter, metres.
+    /// Hidden places on a surface for an object of a height and diameter, metres.
     pub fn on(situation: &Situation, on: usize, size_m: (f64, f64)) -> Arc<Hidden> {
         let places: &Places = situation.geometry.sight(on).derived.get(&Places::default);
         let basis = Given {

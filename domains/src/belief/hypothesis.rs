@@ -26,6 +26,6 @@ pub enum Basis {
     NotSeen,
     /// Measurement that no object explains.
     Measured,
-    /// An object that was seen and may be the requested one.
+    /// Seen object that may be the requested one.
     Object,
 }

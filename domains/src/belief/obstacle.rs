@@ -12,14 +12,14 @@ use crate::situation::{self, Situation, holding};
 
 /// Distance of a push, metres.
 const DISTANCE_M: f64 = 0.25;
-/// Depth inside its outline at which an object is touched, metres.
+/// Depth inside an object's outline to which the hand pushes, metres.
 const GRIP_M: f64 = 0.02;
-/// Width or height beyond which an object is not pushed, metres.
+/// Maximum width or height of a pushed object, metres.
 const MOST_M: f64 = 0.5;
-/// Margin around an object within which voxels may be its own, metres.
+/// Margin around an object within which voxels may belong to it, metres.
 const MARGIN_M: f64 = 0.03;
-/// Sideways push with this component towards the body (tangent of the angle), so that the object
-/// leaves its neighbours.
+/// Component of a sideways push towards the body (tangent), so that the object leaves its
+/// neighbours.
 const OUTWARDS: f64 = 0.5;
 /// Spacing of the positions along a push that are checked for free space, metres.
 const STEP_M: f64 = 0.02;
@@ -29,11 +29,11 @@ const STEP_M: f64 = 0.02;
 pub struct Obstacle {
     /// PDDL symbol.
     pub symbol: String,
-    /// The number of its track.
+    /// Number of the object's track.
     pub track: u64,
     /// Surface that the obstacle stands on.
     pub on: usize,
-    /// Centre of its footprint.
+    /// Centre of the footprint.
     pub at: Point3<f64>,
     /// Unit normal of the support.
     pub up: Vector3<f64>,
@@ -107,7 +107,7 @@ pub fn push(situation: &Situation, from: usize, obstacle: &Obstacle) -> Option<P
     Some(Push { object, direction: way.xy(), distance_m: DISTANCE_M })
 }
 
-/// The number of places along a push that are beyond the surface or not known to be free.
+/// Number of positions along a push that are off the surface or not known to be free.
 fn obstructions(situation: &Situation, obstacle: &Obstacle, from: &Point3<f64>, way: &Vector3<f64>) -> usize {
     let (surface, space) = (&situation.surfaces[obstacle.on], &situation.spaces[obstacle.on]);
     let steps = ((DISTANCE_M + obstacle.radius_m) / STEP_M) as usize;

@@ -9,13 +9,14 @@ use crate::situation::Situation;
 
 /// Distance before a hypothesis's centre at which its line of sight ends, metres.
 const BEFORE_M: f64 = 0.05;
-/// Distance before it within which something unseen may stand in the way; and the mean free path of sight
-/// through unseen space among the things on a surface, metres.
+/// Distance before a hypothesis within which unseen space may hide an occluder, metres; the next
+/// constant is the mean free path of sight through unseen space.
 const UNSEEN_WITHIN_M: f64 = 0.4;
 const FREE_PATH_M: f64 = 0.5;
-/// A look at a known surface that shows things less clearly than this shows nothing of use: from over three metres for a Kinect.
+/// Minimum clearness of a useful look at a known surface; reached up to about three metres with a
+/// Kinect.
 const CLEAR_ENOUGH: f64 = 0.1;
-/// Size of the smallest thing that tells objects apart, the wall of a cup's handle, metres.
+/// Size of the smallest distinguishing feature, the wall of a cup's handle, metres.
 const SMALLEST_M: f64 = 0.01;
 /// Cosine of the widest angle between the normal of a sector and the line of sight at which the sector still counts as seen.
 const SECTOR_COSINE: f64 = 0.5;
@@ -69,8 +70,8 @@ impl Situation {
             .any(|p| self.in_view(&camera, &p) && !self.is_walled_off(&eye, &p.xy()))
     }
 
-    /// Clearness of a look from a candidate at objects on a surface, 0 to 1: the weight that a depth of its
-    /// noise has (a Kalman gain) where it must tell half of the smallest thing that distinguishes objects.
+    /// Clearness of a look at objects on a surface, 0 to 1: weight of a depth measurement (a Kalman
+    /// gain) for resolving half of the smallest distinguishing feature.
     pub(crate) fn clearness(&self, from: usize, on: usize) -> f64 {
         let middle = self.camera(from, on).zip(self.surfaces[on].centre());
         let Some((camera, centre)) = middle else { return 1.0 };
@@ -79,16 +80,15 @@ impl Situation {
         1.0 / (1.0 + (sigma_m / (SMALLEST_M / 2.0)).powi(2))
     }
 
-    /// True if a point lies in the camera's field of view and range.
+    /// True if a point is in the camera's field of view and range.
     pub(crate) fn in_view(&self, map_from_camera: &Isometry3<f64>, point: &Point3<f64>) -> bool {
         let camera = self.robot.description().camera.as_ref();
         camera.is_some_and(|camera| camera.shows(&map_from_camera.inverse_transform_point(point)))
     }
 
-    /// Share of a hypothesis that a look from a candidate at a surface would settle, 0 to 1: zero unless most
-    /// of its points are in view and not behind known occupied space (except an obstacle that is moved
-    /// before); else the clearness of the look times the probability that nothing stands in unseen space
-    /// before them.
+    /// Share of a hypothesis that a look would settle, 0 to 1: zero unless most of its points are
+    /// in view and unoccluded (apart from an obstacle moved before); else clearness times the
+    /// probability that unseen space in front is empty.
     pub(crate) fn would_settle(
         &self,
         from: usize,
@@ -127,7 +127,7 @@ fn halfway(a: &Point3<f64>, b: &Point3<f64>) -> Point3<f64> {
 }
 
 impl Situation {
-    /// True if a wall of the map, or a door that is believed to be shut, stands between two places.
+    /// True if a wall of the map, or a door believed shut, stands between two places.
     pub(crate) fn is_walled_off(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         self.geometry.walls().stand_between(&self.shut, from, to)
     }

@@ -6,7 +6,7 @@ use descry_perception::nalgebra::{Point3, Vector3};
 
 use crate::surface::KnownSurface;
 
-/// Distance between places where a hidden object may stand.
+/// Spacing of the places where a hidden object may stand, metres.
 const GRID_M: f64 = 0.05;
 /// Margin beyond the seen part of a surface in which the surface may continue, metres.
 const BEYOND_M: f64 = 0.3;
@@ -29,7 +29,7 @@ const FRAYED_SHARE: f64 = 0.5;
 /// of where walls are removed from the clouds, everything is wall.
 const ABOVE: f64 = 1.5;
 const WALL_BLUR: f64 = 3.0;
-/// Probability above which an object is not mistaken for two that blur into each other.
+/// Probability above which an object is not the blur of two.
 const SURE: f64 = 0.8;
 /// Length, in diameters of the requested object, above which an unidentified object may be several.
 const LARGE: f64 = 2.0;
@@ -72,7 +72,7 @@ pub(crate) fn around(surface: &KnownSurface, place: &Point3<f64>) -> impl Iterat
     steps.map(move |(a, b)| place + (e1 * a + e2 * b) * GRID_M)
 }
 
-/// An object that could stand at a place unnoticed.
+/// Object that could stand unnoticed at a place.
 pub struct Unnoticed {
     /// Unobserved points of the volume.
     pub points: Vec<Point3<f64>>,
@@ -160,14 +160,14 @@ pub fn unseen_volume(
     ((0..COLUMNS.len()).filter(is_inside).count() <= GRAZED).then_some(Unnoticed { points: unseen, likely })
 }
 
-/// True if a point lies outside the round body that was fitted to an object.
+/// True if a point lies outside the round body fitted to an object.
 fn is_beyond_body(track: &Track, point: &Point3<f64>, up: &Vector3<f64>, margin_m: f64) -> bool {
     let radius_m = track.evidence.radius_m;
     radius_m > 0.0 && (point - track.position_m).cross(up).norm() > radius_m + margin_m
 }
 
-/// True if a measured surface lies over an unseen point, with no free space seen between: the point is within
-/// a solid body.
+/// True if a measured surface lies above an unseen point without free space in between, so that the
+/// point is inside a solid body.
 fn is_roofed(space: &Space, point: &Point3<f64>, up: &Vector3<f64>) -> bool {
     let step_m = space.voxel_m();
     let above = (0..(ROOF_M / step_m) as usize).map(|k| space.cell(&(point + up * (k as f64 * step_m))));

@@ -106,7 +106,7 @@ impl Check<'_> {
         texts.iter().filter_map(step).collect()
     }
 
-    /// One step of an action.
+    /// Checks one step of an action.
     fn step(&self, action: &str, text: &str, span: Span, label: &str) -> Option<Diagnostic> {
         let mut tokens = text.split_whitespace();
         let name = tokens.next().unwrap_or_default();

@@ -41,7 +41,7 @@ impl Check<'_> {
         self.aim(path, &objects, &format!("(:goal {condition})"))
     }
 
-    /// The fault of a problem's goal or metric over these objects, if any.
+    /// Checks a problem's goal or metric over these objects.
     fn aim(&self, path: &[&str], objects: &str, aim: &str) -> Option<Diagnostic> {
         let domain = &self.domain.vocabulary.task.domain;
         let problem = format!("(define (problem p) (:domain {domain}) (:objects {objects}) (:init) {aim})");

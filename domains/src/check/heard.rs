@@ -35,7 +35,8 @@ impl Check<'_> {
         is_empty.then(|| self.error("no-goal", message, place, help))
     }
 
-    /// Fault of a phrase that contains words which end every goal: confidence and deadline.
+    /// Fault of a phrase that contains the words of confidence and deadline, which may end every
+    /// goal.
     fn never_said(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let ends = |say: &str| {
             let words = shape(say);
@@ -53,7 +54,7 @@ impl Check<'_> {
         Some(self.error("unsayable", message, place, "say it in other words"))
     }
 
-    /// Fault of a phrase with the same words and slots as an earlier one.
+    /// Fault of a phrase with the words and slots of an earlier one.
     fn said_before(&self, n: usize, phrase: &GoalPhrase) -> Option<Diagnostic> {
         let all = self.domain.config.goal[..n].iter().flat_map(GoalPhrase::ways);
         let mut earlier: Vec<&str> = all.collect();

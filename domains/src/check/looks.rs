@@ -21,7 +21,7 @@ pub(super) fn objects(domain: &Domain) -> Vec<Source> {
 }
 
 impl Check<'_> {
-    /// Known objects of one shape and size.
+    /// Findings on known objects with equal shape and size.
     pub(super) fn alike(&self, first_source: usize) -> Vec<Diagnostic> {
         let files = objects(self.domain);
         let mut list = Vec::new();

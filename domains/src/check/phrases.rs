@@ -26,7 +26,7 @@ impl Check<'_> {
         all.collect()
     }
 
-    /// Other wordings that do not have the slots of the phrase.
+    /// Findings on alternative wordings whose slots differ from the phrase's.
     fn other_slots(&self, n: &str, phrase: &GoalPhrase) -> Vec<Diagnostic> {
         let sorted = |say: &str| {
             let mut slots: Vec<String> = slots_of(say).into_iter().map(str::to_string).collect();

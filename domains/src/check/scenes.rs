@@ -1,4 +1,5 @@
-//! The scenes can be read, and the places that `domain.toml` names are in the usual one.
+//! Checks that scenes are readable, and that the default scene has the places named in
+//! `domain.toml`.
 
 use descry_planner::{Diagnostic, Source, Span};
 use descry_robots::sim::SceneSpec;

@@ -133,7 +133,7 @@ impl Check<'_> {
         unknown.map(told).collect()
     }
 
-    /// True if a word is a number without an initial value that no action assigns one.
+    /// True for a number without an initial value or an action that assigns one.
     fn stays_undefined(&self, word: &Word) -> bool {
         // Costs begin at 0.
         let is_cost = word.name == "total-cost" && word.types.is_empty();

@@ -1,4 +1,4 @@
-//! "with confidence 0.9" and "within 60 seconds" at the end of a goal.
+//! Endings of a goal: "with confidence 0.9" and "within 60 seconds".
 
 use super::GoalError;
 use crate::english;
@@ -15,7 +15,7 @@ pub(crate) const CONFIDENCE: [&str; 2] = ["with", "confidence"];
 /// Word that introduces the deadline.
 pub(crate) const DEADLINE: [&str; 1] = ["within"];
 
-/// Takes "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
+/// Splits "with confidence 0.9" and "within 60 seconds" off the end of a goal, in either order.
 pub(super) fn conditions(said: &str) -> Result<(Vec<String>, Wanted), GoalError> {
     let mut words = usual(english::words(said));
     let mut wanted = Wanted { confidence: None, deadline_s: None };
@@ -75,7 +75,7 @@ fn once(other: Option<f64>, condition: &'static str, example: &'static str) -> R
     other.map_or(Ok(()), |_| Err(GoalError::SaidTwice { condition, example }))
 }
 
-/// "0.9" or "90%": a yes must be likelier than a no.
+/// Parses "0.9" or "90%"; must exceed one half.
 fn confidence_of(found: String) -> Result<f64, GoalError> {
     match probability(&found) {
         Some(c) if c > 0.5 && c < 1.0 => Ok(c),

@@ -12,9 +12,10 @@ use crate::slots::type_of_slot;
 const SHOWN: usize = 2;
 /// Number of leading words considered in a long sentence.
 const HEARD: usize = 24;
-/// Score that a name costs which was not said. From: fitted, `domains/tests/phrases.toml`.
+/// Score penalty of a suggested name that was not given. From: fitted,
+/// `domains/tests/phrases.toml`.
 const MADE_UP: f64 = 0.8;
-/// Share of the letters in which a mistyped word may differ.
+/// Maximum share of differing letters in a mistyped word.
 const MISTYPED: f64 = 0.34;
 
 /// A name that occurs among the words.
@@ -39,11 +40,11 @@ struct Candidate {
     score: f64,
 }
 
-/// Suggestions for words that are no goal.
+/// Suggestions for words without a matching phrase.
 pub(super) struct Nearest {
-    /// Goals that could be said, the nearest first.
+    /// Suggested goals, nearest first.
     pub(super) goals: Vec<String>,
-    /// Words that the nearest does not have.
+    /// Words that the nearest suggestion lacks.
     pub(super) left: String,
 }
 
@@ -111,7 +112,7 @@ pub(super) fn has_name(words: &str, domain: &Domain, lexicon: &Lexicon) -> bool 
     !mentions(&words, domain, lexicon, true).is_empty()
 }
 
-/// The name that is meant by a word with a few other letters.
+/// Name that a mistyped word probably means.
 fn mistyped<'n>(names: impl Iterator<Item = &'n String>, found: &str) -> Option<String> {
     let distance = |name: &String| strsim::damerau_levenshtein(&name.to_lowercase(), found);
     let nearest = names.min_by_key(|name| distance(name))?;
@@ -124,7 +125,7 @@ fn is_mistyped(found: &str, wanted: &str) -> bool {
     strsim::damerau_levenshtein(found, wanted) as f64 <= MISTYPED * letters as f64
 }
 
-/// Likeness of a phrase's word to the nearest of the words, and the index of that word.
+/// Similarity of a phrase's word to the most similar given word, with that word's index.
 fn likeness(wanted: &str, words: &[String], used: &[bool]) -> Option<(usize, f64)> {
     let of = |word: &str| match word {
         same if english::is_same(same, wanted) => 2.0,

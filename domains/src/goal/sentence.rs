@@ -30,7 +30,7 @@ pub(super) struct Clause<'a> {
     pub(super) within: Vec<Restriction>,
 }
 
-/// "in the kitchen": the preposition, and the place's type and symbol.
+/// Place restriction, such as "in the kitchen": preposition, type and symbol.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Restriction {
     preposition: String,
@@ -80,7 +80,7 @@ pub(super) struct Reader<'a> {
     pub(super) is_mixed: bool,
     /// Every form of every phrase, in plain words.
     forms: Rc<Vec<(&'a GoalPhrase, Vec<String>)>>,
-    /// Ends of the sentence that are known to be none.
+    /// Suffixes of the sentence that are known not to match.
     dead: BTreeSet<String>,
 }
 
@@ -151,7 +151,8 @@ impl<'a> Reader<'a> {
         Some(Sentence { joint, clauses: head.clauses.into_iter().chain(tail.clauses).collect() })
     }
 
-    /// One phrase, of whose slots one may hold several names. The domain's own words go before words that request the same.
+    /// Matches one phrase, of whose slots one may hold several names. The domain's own words take
+    /// precedence over synonyms.
     fn clause(&mut self, words: &[String]) -> Option<Sentence<'a>> {
         self.clause_in(words, |own, said| own == said).or_else(|| self.clause_in(words, english::is_same))
     }
@@ -171,7 +172,7 @@ impl<'a> Reader<'a> {
         None
     }
 
-    /// A phrase each of whose slots holds one name.
+    /// Phrase with one name per slot.
     fn filled(&mut self, phrase: &'a GoalPhrase, slots: &[(&str, String)]) -> Option<Clause<'a>> {
         let mut filled = Vec::new();
         for (slot, found) in slots {
@@ -190,7 +191,7 @@ impl<'a> Reader<'a> {
         Some(Clause { phrase, slots: filled, within: Vec::new() })
     }
 
-    /// A phrase one of whose slots holds several names, or names that are said to be somewhere.
+    /// Phrase with several names, or names with a place, in one slot.
     fn several(&mut self, phrase: &'a GoalPhrase, slots: &[(&str, String)]) -> Option<Sentence<'a>> {
         let mut lists = Vec::new();
         for (slot, found) in slots {
@@ -302,8 +303,7 @@ fn fill(filled: &mut Vec<Filled>, slot: &str, noun: &Noun) {
     filled.push(Filled { slot: slot.into(), number, symbol: noun.symbol.clone(), name: noun.name.clone() });
 }
 
-/// The object of a name: with or without determiners, whatever signs or spaces are between letters and
-/// digits.
+/// Object with a name, ignoring determiners, punctuation and blanks between letters and digits.
 pub(super) fn named<'l>(all: &'l [Named], words: &[String]) -> Option<&'l Named> {
     let letters = |name: &str| -> String {
         name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
@@ -346,7 +346,7 @@ pub(super) fn restricted(means: &str, within: &[Restriction], domain: &Domain) -
     })
 }
 
-/// Position of the bracket that closes the one opened before a text.
+/// Position of the bracket that closes the one before a text.
 fn closing(text: &str) -> Option<usize> {
     let mut open = 1;
     text.char_indices().find_map(|(at, c)| {
@@ -360,7 +360,7 @@ fn closing(text: &str) -> Option<usize> {
 }
 
 impl Sentence<'_> {
-    /// True if the answer is yes or no.
+    /// True for a yes-no question.
     ///
     /// # Errors
     /// [`GoalError::Apart`] for a question beside a task: a question changes nothing.

@@ -1,8 +1,8 @@
-//! Reasons why a domain's folder could not be loaded.
+//! Errors of loading a domain's folder.
 
 use descry_planner::Findings;
 
-/// The reason a domain's folder could not be loaded.
+/// Error of loading a domain's folder.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Neither a built-in name nor a folder.
@@ -17,7 +17,7 @@ pub enum LoadError {
         /// A question about the nearest of them, or nothing.
         near: String,
     },
-    /// A file could not be read.
+    /// Unreadable file.
     #[error("{path}: {because}\n  expected: {expected}")]
     File {
         /// The file.

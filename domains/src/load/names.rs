@@ -49,7 +49,7 @@ pub fn check(objects: &[Read<'_>]) -> Result<(), LoadError> {
     Err(LoadError::Findings { findings: Findings { sources, list } })
 }
 
-/// Fault of a name that no sentence can hold.
+/// Fault of a name that no sentence can contain.
 fn unsayable(name: &str) -> Option<(String, String)> {
     let shown = name.escape_debug();
     if name.chars().any(char::is_control) {

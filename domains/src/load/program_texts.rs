@@ -16,8 +16,8 @@ impl Domain {
     }
 }
 
-/// The files that a command names, from a folder, and those beside each that end the same way, since a program may use them: what they
-/// hold, by their paths. What else a program reads, its command does not say.
+/// Files named by a command, relative to a folder, and their neighbours with the same extension,
+/// which a program may import; contents by path. Other files that a program reads are unknown.
 pub fn program_texts<'c>(command: impl Iterator<Item = &'c str>, folder: &Path) -> BTreeMap<PathBuf, String> {
     let mut texts = BTreeMap::new();
     for named in command.map(|word| folder.join(word)) {

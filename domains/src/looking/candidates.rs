@@ -56,7 +56,7 @@ pub fn is_same(one: &Place, other: &Place) -> bool {
     }
 }
 
-/// A PDDL symbol must not begin with a digit.
+/// Symbol of a station; a PDDL symbol must not begin with a digit.
 fn station_symbol(name: &str) -> String {
     let is_number = name.starts_with(|c: char| c.is_ascii_digit());
     if is_number { symbol(&format!("station {name}")) } else { symbol(name) }

@@ -4,7 +4,7 @@ use descry_perception::View;
 use descry_perception::nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
-/// A place where something has moved: an upright cylinder.
+/// Place where an object has moved: an upright cylinder.
 #[derive(Debug, Clone, Serialize)]
 pub struct Change {
     /// Time before which observations of the place are invalid.
@@ -30,7 +30,7 @@ impl Change {
         }
     }
 
-    /// True if the straight line from one point to another leads through the cylinder.
+    /// True if a straight line crosses the cylinder.
     pub fn is_crossed(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let split = |v: Vector3<f64>| (v.dot(&self.up), v - self.up * v.dot(&self.up));
         let (low, aside) = split(from - self.foot);

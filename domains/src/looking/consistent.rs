@@ -16,7 +16,7 @@ use crate::note::Note;
 use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 
-/// Cameras nearer to each other than this look from one place, metres.
+/// Distance below which two cameras count as one place, metres.
 const ONE_PLACE_M: f64 = 0.1;
 /// Minimum number of views for a majority to identify the wrong ones.
 const FEWEST: usize = 3;

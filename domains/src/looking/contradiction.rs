@@ -5,7 +5,7 @@ use descry_perception::consistency::Fault;
 /// Reason why the looks at a surface prove nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Contradiction {
-    /// Camera or poses are not as stated.
+    /// A fault of camera or poses.
     Fault(Fault),
     /// The views inconsistent with their stated poses are as many as the consistent ones.
     Apart,

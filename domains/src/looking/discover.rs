@@ -17,11 +17,12 @@ use crate::symbol::symbol;
 
 /// Minimum area of an additional surface, square metres.
 const LEAST_M2: f64 = 0.1;
-/// Height difference below which two surfaces are level with each other, metres.
+/// Height difference below which two surfaces are level, metres.
 const LEVEL_M: f64 = 0.08;
-/// Distance beside an outline within which the middle of another part of the same surface may lie, metres.
+/// Margin around an outline within which the centre of another part of the same surface may lie,
+/// metres.
 const BESIDE_M: f64 = 0.05;
-/// Names of the further ones.
+/// Ordinals for naming further surfaces.
 const ORDINALS: [&str; 9] =
     ["second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
 

@@ -1,4 +1,4 @@
-//! Looks that settle what matters.
+//! Ranking of looks by settled doubt.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;

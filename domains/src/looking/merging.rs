@@ -11,7 +11,7 @@ use crate::mind::{LastMerged, Mind};
 use crate::surface::KnownSurface;
 use crate::symbol::symbol;
 
-/// Height band around a surface of the map in which points are merged, metres.
+/// Height tolerance around a mapped surface for merging points, metres.
 const HEIGHT_TOLERANCE_M: f64 = 0.15;
 /// Maximum height difference between an observed level surface and that of the map, metres; beyond
 /// it, the surface is another or the body is lost.
@@ -19,8 +19,8 @@ const SAME_HEIGHT_M: f64 = 0.08;
 /// Maximum tilt of an observed map surface, radians: localisation and camera mounting err by a
 /// degree or two; a steeper plane cuts through walls and objects.
 const LEVEL_RAD: f64 = 0.045;
-/// Margin around the outline on the map in which points of a surface may lie, metres: localisation errs by
-/// centimetres and degrees.
+/// Margin around the mapped outline in which points of a surface may lie, metres, for localisation
+/// errors.
 const BESIDE_M: f64 = 0.25;
 
 /// Options for merging and segmenting a body's views of a surface (`None`: any), limited to the
@@ -73,7 +73,8 @@ pub(super) fn merged(
     Ok(merged)
 }
 
-/// Takes the walls of the surface's room out of a merged cloud, as the map has them: what stands against a wall is not one with it.
+/// Removes the walls of the surface's room, as mapped, from a merged cloud, so that objects at a
+/// wall are not joined with it.
 pub(super) fn without_walls(known: &KnownSurface, mut merged: Merged) -> Merged {
     merged.cloud = merged.cloud.filter(|p| !known.is_of_wall(&p.cast(), 0.0));
     merged

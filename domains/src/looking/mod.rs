@@ -1,4 +1,4 @@
-//! Looking: where from, and how views become belief.
+//! Looking: viewpoints, and the update of belief from views.
 
 pub mod candidates;
 pub mod change;

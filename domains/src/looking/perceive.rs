@@ -254,7 +254,7 @@ pub fn something_moved(
     Ok(())
 }
 
-/// A push ended that moved an obstacle by so much, if at all.
+/// Handles a finished push, with the distance that the obstacle moved.
 pub fn pushed(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -423,7 +423,7 @@ fn take_in(mind: &mut Mind, on: usize, views: &[View], merged: &Merged) {
     }
 }
 
-/// True if a point two metres before the camera falls into the same voxel from two poses.
+/// True if a point two metres in front of the camera falls into the same voxel from two poses.
 fn is_near(a: &Isometry3<f64>, b: &Isometry3<f64>, voxel_m: f64) -> bool {
     let turn_rad = a.rotation.angle_to(&b.rotation);
     (a.translation.vector - b.translation.vector).norm() + 2.0 * turn_rad < voxel_m

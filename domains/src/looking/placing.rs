@@ -51,8 +51,8 @@ fn located(body: &Description, known: &KnownSurface, merged: &Merged, surface: &
     locate(&endings, &surface.hull, &surface.up, &known.outline, sigmas.0, sigmas.1)
 }
 
-/// Maximum correction of a view in standard deviations of localisation; a larger one is an error of
-/// the alignment.
+/// Maximum correction of a view in standard deviations of localisation; a larger one is an
+/// alignment error.
 const ASTRAY: f64 = 4.0;
 
 /// True if a camera is registered beyond the localisation error from its localised pose.

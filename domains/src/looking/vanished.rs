@@ -72,7 +72,7 @@ pub fn keep_unrefuted(
     belief.tracks.sort_by_key(|track| track.id);
 }
 
-/// True if a camera saw through the middle of an object's place at several heights.
+/// True if a camera saw through the axis of an object's place at several heights.
 fn looked_through(track: &Track, up: &Vector3<f64>, map: &DepthMap) -> bool {
     let free = |share: f64| {
         let place = track.position_m + up * (track.size_m[2] * share);

@@ -1,4 +1,4 @@
-//! Fallback steps where the planner has no plan.
+//! Fallback steps when the planner has no plan.
 
 use descry_planner::{NoPlan, Plan};
 

@@ -15,7 +15,7 @@ use crate::belief::doubt::Doubt;
 use crate::round::Round;
 use crate::situation::Situation;
 
-/// Maximum number of viewpoints, by stage; a map with no more than the first is planned on as a whole.
+/// Maximum number of viewpoints, by stage; smaller maps are planned on as a whole.
 const MOST_VIEWPOINTS: [usize; 2] = [64, 160];
 /// Share of the doubt settleable by a surface's looks that its viewpoints of the second stage
 /// cover.
@@ -131,7 +131,7 @@ fn covering(s: &Situation, on: usize) -> Vec<usize> {
     chosen
 }
 
-/// The task in which actions that lead from viewpoint to viewpoint lead to the chosen ones alone.
+/// Task whose travel actions lead to the chosen viewpoints only.
 fn with_viewpoints(task: &Task, s: &Situation, chosen: &BTreeSet<usize>) -> Task {
     let is_chosen =
         |id: &ObjectId| s.candidate(&task.object(*id).name).map_or(true, |from| chosen.contains(&from));

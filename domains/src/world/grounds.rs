@@ -148,7 +148,7 @@ pub(super) fn expected(domain: &Domain, known: &Known) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// A surface that the domain names and the map, which knows others, does not have.
+/// Checks that surfaces named by the domain are on the map, if that has surfaces.
 pub(super) fn known_by_map(domain: &Domain, surfaces: &[KnownSurface]) -> Result<(), WorldError> {
     if let [first, second, ..] = surfaces
         && surfaces.iter().all(|s| !s.whole)

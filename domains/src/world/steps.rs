@@ -11,9 +11,9 @@ use crate::ability::Deed;
 use crate::actions::{self, Performer};
 use crate::round::Round;
 
-/// Between the end of a step and the begin of the next, seconds.
+/// Gap between consecutive steps, seconds.
 const GAP_S: f64 = 0.001;
-/// Bindings of parameters that no deed names which are tried at most.
+/// Maximum number of tried bindings of parameters that the deed leaves open.
 const BINDINGS: usize = 64;
 
 impl World<'_> {
@@ -143,7 +143,7 @@ fn without(own: Condition, is_gone: &dyn Fn(descry_planner::task::ModuleId) -> b
     }
 }
 
-/// Condition that an action may be taken with some arguments.
+/// Condition under which an action may start with some arguments.
 fn startable(action: &Action, binding: &Binding) -> Scoped<Condition> {
     let bound = (0..).zip(&action.parameters).zip(&binding.objects).map(|((slot, parameter), object)| {
         let parameter = descry_planner::task::Parameter { objects: [*object].into(), ..parameter.clone() };

@@ -4,8 +4,8 @@ use super::sight::{Ray, Sight};
 use super::{MapSurface, Model};
 use nalgebra::{Isometry3, Matrix6, Point2, Point3, Vector2, Vector3, Vector6};
 
-/// Standard deviation of where a surface ends, in the map and as seen, metres. From: chosen, two pixels at 1.5 m and maps good to a
-/// centimetre.
+/// Standard deviation of a surface's edge, in map and view together, metres. From: chosen, two
+/// pixels at 1.5 m and maps good to a centimetre.
 const EDGE_SIGMA_M: f64 = 0.015;
 /// Standard deviation of a surface's height in the map, metres. From: chosen.
 const HEIGHT_SIGMA_M: f64 = 0.01;
@@ -16,9 +16,10 @@ const HEIGHTS: f64 = 6.0;
 /// Maximum distance from an edge that counts in the misfit, metres; larger distances are clamped.
 /// From: chosen.
 const GROSS_M: f64 = 0.10;
-/// Distance beside the outline from which level points may belong to another surface, metres. From: chosen.
+/// Distance beside the outline from which level points may belong to another surface, metres.
+/// From: chosen.
 const OTHER_M: f64 = 0.4;
-/// Surfaces of the map whose heights differ by less are level with each other, metres. From: chosen.
+/// Maximum height difference of level surfaces of the map, metres. From: chosen.
 const LEVEL_M: f64 = 0.05;
 /// Gauss-Newton steps. From: chosen.
 const STEPS: usize = 4;
@@ -46,13 +47,13 @@ impl Sides {
     }
 }
 
-/// Looks, and the map that they are held against.
+/// Looks with the mapped surface that they are compared with.
 pub(super) struct Fit<'a> {
     sights: &'a [Sight],
     surface: &'a MapSurface,
     centre: Point3<f64>,
     sides: Sides,
-    /// Other surfaces of the map at this height.
+    /// Other mapped surfaces of this height.
     level: Vec<Sides>,
 }
 

@@ -12,7 +12,7 @@ const ASKED: usize = 1200;
 /// Maximum distance from the stated height at which the surface is looked for, metres. From: derived, depth
 /// 10 % off at 1.2 m, and a little.
 const BAND_M: f64 = 0.15;
-/// Maximum distance beside the outline at which points of the surface may lie, metres. From: chosen.
+/// Margin around the outline in which points of the surface may lie, metres. From: chosen.
 const BESIDE_M: f64 = 0.4;
 /// Maximum distance of the plane's points from the fitted plane, pass by pass, metres. From: chosen.
 const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
@@ -32,7 +32,7 @@ pub(super) struct Ray {
     pub met: bool,
 }
 
-/// The view of a surface from one look.
+/// Rays of one look at the surface.
 #[derive(Clone, Debug)]
 pub(super) struct Sight {
     pub rays: Vec<Ray>,
@@ -109,7 +109,7 @@ fn plane(points: &[Point3<f64>], world_from_camera: &Isometry3<f64>, surface: &M
     found
 }
 
-/// The height that most points share, within a step of 1 cm; none of too few points.
+/// Most frequent height, in bins of 1 cm; `None` with too few points.
 fn mode(heights_m: impl Iterator<Item = f64>) -> Option<f64> {
     const STEP_M: f64 = 0.01;
     let mut counts = vec![0_usize; (2.0 * BAND_M / STEP_M) as usize + 3];
@@ -124,7 +124,7 @@ fn mode(heights_m: impl Iterator<Item = f64>) -> Option<f64> {
         .then_some((most as f64 - 0.5) * STEP_M - BAND_M)
 }
 
-/// The plane nearest to some points by least squares of their heights over another one.
+/// Least-squares plane by heights over an initial plane.
 fn refit(points: &[&Point3<f64>], about: &Plane) -> Option<Plane> {
     if points.len() < FEWEST {
         return None;

@@ -23,7 +23,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Columns by their names; none without x, y and z.
+    /// Columns by name; `None` without x, y and z.
     pub(super) fn named(names: &[String]) -> Option<Columns> {
         let find = |name: &str| names.iter().position(|n| n == name);
         let triple = |all: [&str; 3]| Some([find(all[0])?, find(all[1])?, find(all[2])?]);

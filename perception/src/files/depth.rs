@@ -9,11 +9,12 @@ pub struct DepthImage {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Metres; NaN where the sensor had no return.
+    /// Depths, metres; NaN for missing returns.
     pub depths_m: Vec<f32>,
 }
 
-/// Reads a depth image of 16 bits a pixel (PNG or PGM); `metres_per_unit` is 0.001 for millimetres. 0 and 65535 are "no return".
+/// Reads a 16-bit depth image (PNG or PGM); `metres_per_unit`: 0.001 for millimetres. 0 and 65535
+/// are missing returns.
 ///
 /// # Errors
 /// If it is no such image or has another depth of pixel.

@@ -18,7 +18,8 @@ const SCALES: usize = 131;
 const OFFSETS: usize = 155;
 const COUNT: usize = 247;
 
-/// Offset of the colour within a point of a format, bytes; none without colour. From: LAS Specification 1.4, tables 7 to 18.
+/// Offset of the colour within a point record, bytes; `None` without colour. From: LAS
+/// Specification 1.4, tables 7 to 18.
 fn colour_at(format: u8) -> Option<usize> {
     match format {
         2 => Some(20),

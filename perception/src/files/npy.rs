@@ -1,4 +1,4 @@
-//! NPY of NumPy: one array of numbers, a row a point, or rows and columns of an image with a point a pixel.
+//! NumPy's NPY: one numeric array, with a row per point, or as an image with a point per pixel.
 
 use super::columns::Columns;
 use super::error::{FileError, Place};

@@ -11,7 +11,8 @@ use header::{Field, Header};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 
-/// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`, `label`; others are noted and left out.
+/// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`,
+/// `label`; a note lists ignored ones.
 ///
 /// # Errors
 /// If the header or the data are broken: with the line or byte, what was expected, and what to do.
@@ -29,7 +30,7 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     finish(cloud, header.viewpoint, notes, place)
 }
 
-/// The bytes of all points and where each field of point `i` begins: `offset + i * step`.
+/// Bytes of all points; a field of point `i` begins at `offset + i * step`.
 struct Table<'a> {
     bytes: Cow<'a, [u8]>,
     /// Per field: begin and step.
@@ -183,7 +184,7 @@ impl<'a> Table<'a> {
         Ok(Cloud { points, grid, colours, normals, labels })
     }
 
-    /// Three fields of every point, made into one.
+    /// Three fields of every point, combined.
     fn triples<T>(&self, header: &Header, fields: [usize; 3], make: impl Fn([f32; 3]) -> T) -> Vec<T> {
         let single = |f: usize| header.fields[f].kind == b'F' && header.fields[f].size == 4;
         if fields.into_iter().all(single) {
@@ -205,7 +206,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Appends the bytes of one line of text.
+/// Appends the binary form of a text line.
 fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> Result<(), FileError> {
     let mut tokens = line.split_ascii_whitespace();
     for field in fields {
@@ -276,7 +277,7 @@ pub fn write(cloud: &Cloud, encoding: PcdEncoding) -> Vec<u8> {
     out
 }
 
-/// One column to write: four bytes a point.
+/// Column to write: four bytes per point.
 struct Column<'a> {
     name: &'static str,
     float: bool,

@@ -7,10 +7,10 @@ use super::loaded::{Loaded, finish, is_padding};
 use crate::cloud::{Cloud, Grid};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// The encoding in which [`write()`] stores the vertices.
+/// Encoding of the vertices for [`write()`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlyEncoding {
-    /// Text, one vertex a line.
+    /// Text, one vertex per line.
     Ascii,
     /// Little endian.
     Binary,
@@ -141,7 +141,7 @@ struct Camera {
 }
 
 impl Camera {
-    /// Reads the first row; none if the element is another program's.
+    /// Camera in the first row; `None` for another program's element.
     fn of(element: &Element, values: &[f64]) -> Option<Camera> {
         let flat: Vec<&str> =
             element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
@@ -200,7 +200,7 @@ impl<'a> Cursor<'a> {
         ))
     }
 
-    /// All values of an element that are no lists, row after row.
+    /// All scalar values of an element, row by row.
     fn rows(&mut self, stored: Stored, element: &Element) -> Result<Vec<f64>, FileError> {
         let least = element.least_bytes(stored);
         let left = self.bytes.len() - self.at;
@@ -223,7 +223,7 @@ impl<'a> Cursor<'a> {
         Ok(values)
     }
 
-    /// The next line that is not empty.
+    /// Next non-empty line.
     fn filled_line(&mut self) -> Option<(usize, &'a str)> {
         std::iter::from_fn(|| self.text_line()).find(|(_, text)| !text.trim().is_empty())
     }
@@ -433,7 +433,8 @@ fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<(
     Ok((Cloud { points, grid: None, colours, normals, labels }, offset))
 }
 
-/// The finite points of a cloud as a PLY file (float coordinates, uchar colours, float normals, uint label). PLY knows no grid.
+/// Encodes the finite points of a cloud as PLY (float coordinates, uchar colours, float normals,
+/// uint label), without grid.
 pub fn write(cloud: &Cloud, encoding: PlyEncoding) -> Vec<u8> {
     let finite = cloud.finite();
     let format = match encoding {

@@ -6,7 +6,7 @@ use super::error::{FileError, Place};
 use super::loaded::{Loaded, finish};
 use nalgebra::Isometry3;
 
-/// Bytes in which the first line must end. From: chosen.
+/// Maximum length of the first line, bytes. From: chosen.
 const FIRST_LINE: usize = 1 << 12;
 
 /// Words of a line: separated by commas, semicolons or blanks.
@@ -29,7 +29,7 @@ fn is_comment(line: &str) -> bool {
     line.trim().is_empty() || line.trim_start().starts_with(['#', '/'])
 }
 
-/// True if the first line that is no comment holds numbers, or names of columns with x, y and z.
+/// True if the first non-comment line has numbers, or column names with x, y and z.
 pub(super) fn is(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(FIRST_LINE)];
     let text = String::from_utf8_lossy(start);

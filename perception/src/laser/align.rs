@@ -1,4 +1,5 @@
-//! Scan-alignment: poses of all scans that violate their angular constraints least (section III).
+//! Scan alignment: poses of all scans with minimum violation of their angular constraints (section
+//! III).
 
 use super::shape::{PosedScan, ShapeError, ShapeModel};
 use super::solve::{Objective, Problem, SolverOptions, solve};
@@ -10,9 +11,9 @@ use std::f64::consts::PI;
 /// Shape model from scans, with the quality of the alignment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
-    /// The scans at their poses after alignment.
+    /// Scans at their aligned poses.
     pub model: ShapeModel,
-    /// Violation at the poses that were given.
+    /// Violation at the given poses.
     pub before: Violation,
     /// Violation after.
     pub after: Violation,
@@ -27,7 +28,8 @@ pub struct Alignment {
     pub evaluations: usize,
     /// Motion of each scan of the model: metres, and radians anticlockwise.
     pub moved: Vec<(f64, f64)>,
-    /// Scans that contradict the others and are no part of the model, by their index; only [`align_consistent`] leaves out any.
+    /// Indices of contradicting scans outside the model; only [`align_consistent`] leaves scans
+    /// out.
     pub left_out: Vec<usize>,
     /// Ends that contradict other scans, with the index of the scan; in the model, the scan is open
     /// on that side. Set by [`align_consistent`] only.
@@ -35,7 +37,8 @@ pub struct Alignment {
 }
 
 impl Alignment {
-    /// The longest error of either kind after alignment, metres: beyond twice the laser's precision the scans contradict each other.
+    /// Longest error after alignment, metres; above twice the laser's precision, the scans
+    /// contradict each other.
     pub fn longest_m(&self) -> f64 {
         self.after.exterior_m.max(self.after.interior_m)
     }
@@ -157,7 +160,7 @@ fn open(posed: &mut PosedScan, side: ScanEnd) {
     }
 }
 
-/// Scans that contradict others, by their index in the list.
+/// Contradicting scans, by index.
 #[derive(Default)]
 struct Contradictions {
     ends: BTreeSet<(usize, ScanEnd)>,

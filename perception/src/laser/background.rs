@@ -11,15 +11,15 @@ use std::f64::consts::{PI, TAU};
 /// Options for background subtraction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserveOptions {
-    /// Maximum gap between readings of one object, metres: wider than the gap between a chair's
+    /// Maximum gap between readings of one object, metres; wider than the gap between a chair's
     /// legs.
     pub step_m: f32,
     /// Minimum number of readings of an object.
     pub least: usize,
     /// Maximum distance of the readings' centre from the expected position, metres.
     pub within_m: f64,
-    /// A reading bounds the object if it ends this much farther out than the object's own last
-    /// reading, metres; if it ends nearer by as much, the object was cut off.
+    /// Minimum depth difference to the object's last reading, metres: a reading that much farther
+    /// bounds the object; a reading that much nearer occludes it.
     pub clear_m: f64,
 }
 
@@ -29,10 +29,10 @@ impl Default for ObserveOptions {
     }
 }
 
-/// Reason for which a scan contributes nothing.
+/// Reason why a scan is not usable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ignored {
-    /// No cluster of readings lies near the expected place.
+    /// No cluster of readings is near the expected position.
     NotSeen,
     /// The object reaches the left end of the field of view, so that LeftBound does not exist.
     NoLeftBound,
@@ -115,7 +115,7 @@ pub fn observe(
 /// Cluster of readings of one object in a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
-    /// Their indices, ascending.
+    /// Indices of the readings, ascending.
     pub readings: Vec<usize>,
     /// Mean end point of the readings, in the map.
     pub middle: Point2<f64>,
@@ -162,7 +162,7 @@ fn clusters(
     Ok(found)
 }
 
-/// The cluster of readings, no background, whose middle is nearest to a place.
+/// Foreground cluster nearest to a position.
 fn readings_near(
     scan: &Scan,
     near: &Point2<f64>,

@@ -59,7 +59,7 @@ pub struct Nearest<'a> {
     pub second: f64,
 }
 
-/// Learns classes from named models; in order of their names.
+/// Learns classes from named models; sorted by name.
 pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -> Vec<FeatureClass> {
     let mut instances: BTreeMap<&str, Vec<Vector2<f64>>> = BTreeMap::new();
     for (name, model) in named {
@@ -95,8 +95,8 @@ pub fn nearest<'a>(classes: &'a [FeatureClass], features: &HullFeatures) -> Opti
     ranked.first().map(|&(distance, class)| Nearest { class, distance, second })
 }
 
-/// Categories without names: models whose mean features differ by fewer than `apart` usual spreads are joined, the nearest first (average linkage).
-/// Indices of each category ascend; categories come in order of their first.
+/// Unnamed categories: models with mean features closer than `apart` usual deviations are joined,
+/// nearest first (average linkage). Indices ascend, categories by first index.
 pub fn groups(models: &[HullFeatures], apart: f64) -> Vec<Vec<usize>> {
     let scaled: Vec<Vector2<f64>> = models
         .iter()

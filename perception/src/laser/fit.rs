@@ -1,4 +1,5 @@
-//! Model alignment and localisation: the motion of one model that makes two violate each other's constraints least (Eq. 4).
+//! Model alignment and localisation: motion of one model that minimises the mutual violation of two
+//! (Eq. 4).
 
 use super::scan::{direction, origin};
 use super::shape::{ObjectScan, PosedScan, ShapeModel};
@@ -16,7 +17,7 @@ pub struct FitOptions {
     pub starts: usize,
     /// Number of starts, local minima of the violation, that are optimised to the end.
     pub followed: usize,
-    /// Violation above which the best roughly settled start is given up, metres as
+    /// Violation of the best coarse start above which the fit is given up, metres as
     /// [`Violation::per_pair_m`].
     pub hopeless_m: f64,
 }
@@ -37,10 +38,10 @@ pub enum Start {
     AllAngles,
 }
 
-/// Pose of a model, or of one scan, on a model.
+/// Pose of a model, or of a scan, on a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFit {
-    /// The pose found: of the other model's frame, or of the laser.
+    /// Pose of the other model's frame, or of the laser.
     pub model_from_other: Isometry2<f64>,
     /// f_C: BV of all scans of both together, square metres (Eq. 4).
     pub f_c_m2: f64,
@@ -52,15 +53,15 @@ pub struct ModelFit {
     pub iterations: usize,
     /// Times that the violation was computed, starts included.
     pub evaluations: usize,
-    /// Rival minima, best first: pose, and violation between the two, square metres. Symmetric
-    /// shapes have good ones.
+    /// Rival minima, best first: pose and mutual violation, square metres; symmetric shapes have
+    /// several.
     pub rivals: Vec<(Isometry2<f64>, f64)>,
 }
 
-/// Ends closer than this are one: metres, and radians.
+/// Difference below which two minima are one, metres and radians.
 const SAME: (f64, f64) = (0.01, 0.05);
 
-/// Brings a model onto another, from all angles with the centres of their hulls together.
+/// Aligns a model with another, by multi-start over headings with the hull centres together.
 pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> ModelFit {
     let _span = tracing::debug_span!("fit").entered();
     let (to, from) = (model.features().centre, other.features().centre);
@@ -121,7 +122,7 @@ fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<
 /// Number of roughly settled minima that are settled in full.
 const SETTLED: usize = 2;
 
-/// Follows the most promising starts to the end.
+/// Optimises the most promising starts.
 fn follow(
     model: &ShapeModel,
     other: &[PosedScan],
@@ -164,7 +165,7 @@ fn same(a: &Isometry2<f64>, b: &Isometry2<f64>) -> bool {
     (origin(a) - origin(b)).norm() < SAME.0 && a.rotation.angle_to(&b.rotation).abs() < SAME.1
 }
 
-/// BV of the scans of one model, square metres.
+/// Boundary violation among one model's scans, square metres.
 fn within(scans: &[PosedScan]) -> f64 {
     let assembly = Assembly::new(scans.iter().map(std::slice::from_ref));
     assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2

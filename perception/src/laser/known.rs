@@ -1,4 +1,4 @@
-//! Recognition in two steps: hull features leave few of the known shapes, model alignment decides among these.
+//! Recognition in two stages: hull features preselect known shapes, model alignment decides.
 
 use super::features::{HullFeatures, USUAL_SPREAD};
 use super::fit::{FitOptions, ModelFit, Start, fit, fit_scans, localise};
@@ -7,9 +7,9 @@ use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Multiple of the rejection threshold at which a coarse fit is given up without refinement.
+/// Multiple of the rejection threshold at which a coarse fit is given up.
 const HOPELESS: f64 = 3.0;
-/// Directions in which the width of a shape is measured.
+/// Number of directions for measuring a shape's width.
 const WIDTHS: usize = 18;
 
 /// A shape with a name.
@@ -20,7 +20,7 @@ pub struct KnownShape {
     pub name: String,
     /// Model.
     pub model: ShapeModel,
-    /// Features of the model's hull, kept so that many known shapes are gone through quickly.
+    /// Cached features of the model's hull.
     #[serde(skip)]
     features: HullFeatures,
 }
@@ -94,7 +94,7 @@ impl RecogniseOptions {
     }
 }
 
-/// A known shape that features or width did not rule out.
+/// Known shape not ruled out by features or width.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeCandidate {
     /// The index in the list of known shapes.
@@ -130,7 +130,7 @@ pub struct Recognition {
     pub may_be: Vec<String>,
 }
 
-/// Classifies a shape as one of the known ones.
+/// Classifies a shape against the known ones.
 pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise", known = known.len()).entered();
     let features = instance.features();
@@ -148,8 +148,8 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     decide(candidates, known, options)
 }
 
-/// Classifies one scan as one of the known shapes; the candidates hold the sensor pose relative to
-/// the shape. One scan is seldom enough for one name.
+/// Classifies one scan against the known shapes; candidates hold the laser's pose on the shape. A
+/// single scan rarely determines the name.
 ///
 /// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
 pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {

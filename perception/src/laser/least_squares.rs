@@ -4,8 +4,8 @@
 use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
-/// Rounds of the solver: the softness of the farthest points, metres, and the factor on the length of
-/// outliers; the last is the objective itself.
+/// Annealing of the solver: smoothing of farthest points, metres, and scale of the outlier length;
+/// the last round is the objective itself.
 const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
 /// Length equivalent of a rotation by one radian about an object's centre, metres: about its
 /// radius.
@@ -20,7 +20,7 @@ pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     rounds(problem, options, &ROUNDS[..1])
 }
 
-/// Damped least squares, ever less soft; the least of all that was come by is kept.
+/// Damped least squares with decreasing smoothing; returns the best poses found.
 pub(super) fn least_squares(problem: &Problem, options: &SolverOptions) -> Solved {
     rounds(problem, options, &ROUNDS)
 }

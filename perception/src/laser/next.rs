@@ -9,7 +9,7 @@ use super::shape::ShapeModel;
 use crate::hull::Hull;
 use nalgebra::{Isometry2, Point2, Point3};
 
-/// Options for counting undetermined places.
+/// Options for undetermined cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextOptions {
     /// Edge of the square around the hull's centre that contains the object, metres.
@@ -94,7 +94,8 @@ impl ScanGain {
     }
 }
 
-/// Ranks poses of the laser in the model's frame: the one whose scan is expected to settle most comes first, equals by their place in the list.
+/// Ranks laser poses (model frame) by the expected settled area of a scan, best first, ties in list
+/// order.
 ///
 /// Whether a pose can be reached, and what that costs, is for the caller to weigh.
 pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Vec<NextScan> {
@@ -109,7 +110,7 @@ pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOpt
     ranked
 }
 
-/// Middles of the cells outside the hull that no scan looked past or through.
+/// Centres of the cells outside the hull that no scan looked past or through.
 fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<Point2<f64>> {
     let centre = hull.centre();
     let across = (options.within_m / options.cell_m).ceil().clamp(0.0, MOST_ACROSS) as usize;

@@ -1,13 +1,13 @@
-//! One sweep of a planar laser.
+//! Sweep of a planar laser.
 
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// One sweep: a distance at each of a set of angles, and where the laser was said to be.
+/// Sweep: ranges at angles, with the stated pose of the laser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scan {
-    /// Ascending, anticlockwise from the laser's x axis, over no more than a full turn.
+    /// Angles, ascending anticlockwise from the laser's x axis, within a full turn.
     pub angles_rad: Vec<f64>,
     /// Range at each angle, metres. Infinite: nothing within reach (serialised as null). NaN, zero
     /// or negative: no reading, no information (serialised as 0).
@@ -20,7 +20,7 @@ pub struct Scan {
 /// A scan that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScanError {
-    /// Angles and ranges do not go together.
+    /// Different numbers of angles and ranges.
     #[error("{ranges} ranges for {angles} angles: give one range an angle")]
     Lengths {
         /// Number of angles.
@@ -28,7 +28,7 @@ pub enum ScanError {
         /// Number of ranges.
         ranges: usize,
     },
-    /// The angles do not ascend.
+    /// Angles that do not ascend.
     #[error(
         "angle {index} is {angle_rad} rad: give finite angles that ascend, over no more than a full turn (6.283 rad)"
     )]
@@ -38,7 +38,7 @@ pub enum ScanError {
         /// The value of the angle, radians.
         angle_rad: f64,
     },
-    /// The pose is not finite.
+    /// Non-finite pose.
     #[error("the pose of the laser is not finite: give metres and radians")]
     Pose,
 }
@@ -68,14 +68,14 @@ impl Scan {
         Ok(())
     }
 
-    /// End point of a reading in the laser's frame; `None` without a return.
+    /// End point of a reading in the laser frame; `None` without a return.
     pub fn endpoint(&self, index: usize) -> Option<Point2<f64>> {
         let (angle, range) = (*self.angles_rad.get(index)?, *self.ranges_m.get(index)?);
         (range > 0.0 && range.is_finite()).then(|| Point2::from(direction(angle) * range))
     }
 }
 
-/// Ranges where numbers must be finite.
+/// Serialisation of ranges, as JSON has no infinity.
 mod ranges {
     use serde::{Deserialize, Deserializer, Serializer};
 

@@ -57,7 +57,7 @@ impl TryFrom<Written> for ShapeModel {
     }
 }
 
-/// Scans that make no model.
+/// Reason why scans form no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     /// The list of scans is empty.
@@ -81,7 +81,7 @@ pub enum ShapeError {
         /// The angles, from right to left, radians.
         angles_rad: [f64; 4],
     },
-    /// The pose is not finite.
+    /// Non-finite pose.
     #[error("the pose of scan {index} is not finite, or its rotation is no unit complex number")]
     Pose {
         /// Index of the scan.
@@ -135,7 +135,7 @@ impl ShapeModel {
         ShapeModel { scans: self.scans.iter().map(moved).collect() }
     }
 
-    /// The scans of both; `other` is brought into this model's frame.
+    /// Union of both models' scans in this model's frame.
     pub fn joined(&self, other: &ShapeModel, self_from_other: &Isometry2<f64>) -> ShapeModel {
         let scans = [self.scans.clone(), other.moved(self_from_other).scans].concat();
         ShapeModel { scans }

@@ -1,8 +1,8 @@
 //! The downhill simplex method (Nelder and Mead 1965) with coefficients that suit many dimensions (Gao and Han 2012).
 
-/// The end point of the simplex search.
+/// Result of the simplex search.
 pub struct Found {
-    /// The best place.
+    /// Best point.
     pub at: Vec<f64>,
     /// Value of the function at the corner.
     pub cost: f64,

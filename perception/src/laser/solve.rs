@@ -1,4 +1,4 @@
-//! Poses of groups of scans that violate their angular constraints least.
+//! Poses of groups of scans with minimum violation of their angular constraints.
 
 use super::least_squares::{least_squares, roughly};
 use super::simplex::simplex;
@@ -24,9 +24,9 @@ pub enum Objective {
     /// Boundary violation, plus with a tenth of its weight a tie-breaker: silhouettes lie midway
     /// between the last hit and the first miss, and poses stay near the given ones.
     Centred {
-        /// Spread of the given positions, metres.
+        /// Standard deviation of the given positions, metres.
         pose_sigma_m: f64,
-        /// Spread of the given headings, radians.
+        /// Standard deviation of the given headings, radians.
         pose_sigma_rad: f64,
     },
 }
@@ -54,7 +54,7 @@ pub struct SolverOptions {
     pub most_iterations: usize,
     /// Most evaluations of the simplex, for each of three numbers a pose.
     pub most_evaluations: usize,
-    /// Settled if a step makes less than this part of the objective.
+    /// Relative decrease of the objective below which the solver has converged.
     pub settle: f64,
     /// First steps of the simplex: metres, and radians.
     pub simplex_steps: (f64, f64),
@@ -81,7 +81,7 @@ impl Default for SolverOptions {
 #[derive(Clone, Debug)]
 pub struct Solved {
     pub poses: Vec<Isometry2<f64>>,
-    /// Value of the objective at these poses.
+    /// Objective at these poses.
     pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
@@ -174,7 +174,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Roughly settled: a step makes less than this part of the objective.
+/// Relative decrease of the objective below which a coarse solution has converged.
 const ROUGH: f64 = 0.05;
 
 /// Runs the chosen solver.

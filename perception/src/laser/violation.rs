@@ -17,23 +17,24 @@ pub struct Violation {
     pub exterior_m: f64,
     /// Length of the longest interior error (Eq. 2), metres.
     pub interior_m: f64,
-    /// Ordered pairs of scans that were held against each other.
+    /// Number of ordered pairs of compared scans.
     pub pairs: usize,
 }
 
 impl Violation {
-    /// Root of the boundary violation a pair of scans, metres: unlike the sum, the same for few scans as for many.
+    /// Root of the boundary violation per pair of scans, metres; comparable across numbers of
+    /// scans.
     pub fn per_pair_m(&self) -> f64 {
         (self.boundary_m2 / self.pairs.max(1) as f64).sqrt()
     }
 }
 
-/// One scan, ready to be held against others.
+/// Scan prepared for comparison.
 #[derive(Clone, Debug)]
 struct Part {
     /// Index of the group of scans that move together.
     group: usize,
-    /// The start of the part's corners in `Assembly::corners`.
+    /// Start of the scan's corners in `Assembly::corners`.
     begin: usize,
     end: usize,
     /// False if the laser looked past the object only far beside it on some side; the scan may have
@@ -105,7 +106,7 @@ pub struct Assembly {
     rays: Vec<Rays>,
     /// Pivot of each group in its own frame: mean of its corners.
     pivots: Vec<Point2<f64>>,
-    /// Pairs of scans of different groups that are held against each other.
+    /// Number of compared pairs of scans in different groups.
     pairs: usize,
 }
 
@@ -124,7 +125,7 @@ pub enum Kind {
     Slack,
 }
 
-/// One violated constraint: `value_m = normal · (at - a point of the line)`, to be made nought.
+/// Violated constraint: `value_m = normal · (at - a point of the line)`, to be minimised.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     pub kind: Kind,

@@ -1,4 +1,4 @@
-//! Stands around an object and their order (section IV-A).
+//! Viewpoints around an object, and their order (section IV-A).
 
 use super::error::LearningError;
 use crate::cloud::is_finite;
@@ -14,9 +14,9 @@ pub struct AroundOptions {
     pub lines: usize,
     /// Farthest stand from the middle of the object, metres (d_max; paper: 2 m).
     pub most_m: f64,
-    /// Nearest one: the camera must have the object in view, metres.
+    /// Minimum distance from the object, metres, for the camera to have it in view.
     pub least_m: f64,
-    /// Radius of the robot's base plus its clearance, metres.
+    /// Radius of the robot's base plus clearance, metres.
     pub footprint_m: f64,
     /// Minimum and maximum height of possible obstacles, metres.
     pub band_m: (f64, f64),
@@ -41,8 +41,7 @@ impl Default for AroundOptions {
 /// Steps along a line, metres.
 const STEP_M: f64 = 0.05;
 
-/// The places where the body fits, on each line from the object: the nearest first, in the order of the
-/// lines.
+/// Nearest position on each line where the body fits, in line order.
 ///
 /// `obstacles` is what was seen (world, z up, metres). A place counts as free if nothing seen is within the footprint; which of them can be reached
 /// is asked of the ways: a body may keep farther away from what its map shows than it must.

@@ -23,10 +23,9 @@ pub struct NoticeOptions {
     /// 1; paper: 1 cm). Where the camera's standard deviation exceeds a third of this value, three
     /// standard deviations count.
     pub delta_m: f64,
-    /// Maximum distance from the camera at which something is new, or gone, metres. Farther points are
-    /// background.
+    /// Maximum range of changes, metres; farther points are background.
     pub range_m: f64,
-    /// Side of the voxels that the static structure is kept in, metres.
+    /// Voxel size of the static structure, metres.
     pub voxel_m: f64,
     /// Maximum distance between neighbouring points of one dynamic cluster, metres.
     pub cluster_step_m: f32,
@@ -49,10 +48,10 @@ impl Default for NoticeOptions {
     }
 }
 
-/// The static structure around a place, refined by each visit.
+/// Static structure of a place, refined by each visit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MetaRoom {
-    /// World frame, one point a voxel.
+    /// World frame, one point per voxel.
     pub cloud: Cloud,
     /// Number of visits in the model.
     pub visits: usize,
@@ -384,7 +383,7 @@ fn every(cloud: &Cloud, step: usize) -> Cloud {
     cloud.select(&kept.map(|i| i as u32).collect::<Vec<_>>())
 }
 
-/// Points no farther from the camera than `range_m`.
+/// Points within `range_m` of the camera.
 fn near(cloud: &Cloud, range_m: f64) -> Cloud {
     cloud.filter(|p| is_finite(p) && f64::from(p.z) <= range_m)
 }

@@ -18,10 +18,10 @@ pub enum LearningError {
         /// Index of the view.
         view: usize,
     },
-    /// The mask does not fit the first view.
+    /// Mask size and first view differ.
     #[error("the mask has {found} pixels where the first view has {expected}: give one entry a pixel")]
     Mask {
-        /// Entries given.
+        /// Number of entries given.
         found: usize,
         /// Pixels of the view.
         expected: usize,
@@ -48,7 +48,7 @@ pub enum LearningError {
         1e2 * shared, 1e3 * off_m, 1e3 * moved_m
     )]
     Disagree {
-        /// Share of the smaller one that lies on the other.
+        /// Overlapping share of the smaller model.
         shared: f64,
         /// Root mean square distance in the overlap, metres.
         off_m: f64,
@@ -65,7 +65,7 @@ pub enum LearningError {
         /// Expected values.
         expected: &'static str,
     },
-    /// The views could not be brought together.
+    /// Registration of the views failed.
     #[error(transparent)]
     Merge(#[from] MergeError),
     /// Registration of a cloud failed.
@@ -74,7 +74,7 @@ pub enum LearningError {
     /// Too many points.
     #[error(transparent)]
     Cloud(#[from] CloudError),
-    /// A cloud could not be thinned.
+    /// Downsampling failed.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
     /// Clustering failed.

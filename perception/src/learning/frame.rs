@@ -20,7 +20,7 @@ pub(super) struct Frame {
     pub near: Vec<u32>,
 }
 
-/// Pixels to each side that a normal is made of: one measurement is vague.
+/// Window options of the normals, wide because single measurements are noisy.
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
@@ -29,8 +29,7 @@ const WIDE: OrganisedOptions =
 const WIDEST_PX: f64 = 32.0;
 
 impl Frame {
-    /// Pixels of a view within `reach_m` of `centre` (world, metres). `None` if the view has no
-    /// depth image.
+    /// Pixels of a view within `reach_m` of `centre` (world, metres); `None` without a depth image.
     pub fn new(
         view: &View,
         world_from_camera: &Isometry3<f64>,

@@ -1,4 +1,5 @@
-//! Fusion of all looks into one cloud, each place from the measurement that is least in doubt (section V-C).
+//! Fusion of all views into one cloud, with each point from its most certain measurement (section
+//! V-C).
 
 use super::error::LearningError;
 use super::frame::Frame;
@@ -11,11 +12,11 @@ use crate::pool;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
 
-/// Doubt beside a depth edge: σ_e = k·exp(−d²/D²), k and D in metres.
+/// Additional standard deviation beside a depth edge: σ_e = k·exp(−d²/D²), with k and D in metres.
 const EDGE_M: (f64, f64) = (1.0, 0.002);
-/// Neighbouring depths that differ by more than this part are an edge.
+/// Relative depth difference of neighbouring pixels that is an edge.
 const EDGE_SHARE: f32 = 0.015;
-/// An edge farther away casts no doubt that counts, metres.
+/// Maximum distance of an edge with a relevant effect, metres.
 const EDGE_REACH_M: f32 = 0.008;
 /// Radius along the surface, metres, within which measurements determine a point; beyond that
 /// distance along the normal, they belong to another surface.
@@ -23,9 +24,9 @@ const SMOOTH_M: f32 = 0.004;
 const DEEP_M: f32 = 0.01;
 /// Maximum number of measurements used for determining points; more do not improve the result.
 const ASKED: usize = 60_000;
-/// Error of a model from one encounter, metres.
+/// Standard deviation of a model from one encounter, metres.
 const MADE_M: f64 = 0.001;
-/// Least cosine between normals of one surface.
+/// Minimum cosine between normals of one surface.
 const SAME_SIDE: f32 = 0.6;
 
 /// Object as measured by one view.
@@ -52,7 +53,7 @@ impl Measured {
         }));
     }
 
-    /// Initialises the map with a model from earlier encounters, weighted by their number.
+    /// Adds a model from earlier encounters, weighted by their number.
     pub fn carry(&mut self, made: &Cloud, meetings: u32) {
         let part = Cloud {
             points: made.points.clone(),
@@ -131,7 +132,7 @@ impl Measured {
     }
 }
 
-/// Pixels beside a step in depth.
+/// Pixels beside a depth edge.
 fn edges(frame: &Frame) -> Mask {
     let width = frame.grid.width;
     let depths = &frame.map.depths_m;

@@ -14,8 +14,8 @@ pub(super) fn transferred(frame: &Frame, usable: &Mask, object: &Neighbours, rad
     Mask::of(frame.grid, near)
 }
 
-/// Region growing: adds usable pixels within `radius_m` of the mask whose normals differ by less
-/// than `angle_rad`, until none is left.
+/// Region growing: adds usable pixels within `radius_m` of the mask with normals within
+/// `angle_rad`, until none is left.
 pub(super) fn grown(frame: &Frame, usable: &Mask, mut mask: Mask, radius_m: f32, angle_rad: f64) -> Mask {
     let along = angle_rad.cos() as f32;
     let mut open: Vec<usize> = mask.pixels().collect();

@@ -29,7 +29,7 @@ impl Mask {
         self.set.iter().filter(|s| **s).count()
     }
 
-    /// True if a pixel lies on the border of the image.
+    /// True if a set pixel lies on the image border.
     pub fn touches_border(&self) -> bool {
         let Grid { width, height } = self.grid;
         self.pixels().any(|i| {
@@ -38,7 +38,7 @@ impl Mask {
         })
     }
 
-    /// All pixels that have one of the mask within a square of `reach` pixels to each side.
+    /// Dilation by a square of `reach` pixels to each side.
     pub fn dilated(&self, reach: usize) -> Mask {
         self.along_rows(reach).transposed().along_rows(reach).transposed()
     }
@@ -49,7 +49,7 @@ impl Mask {
         Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }
     }
 
-    /// Closes gaps narrower than the square; the image border does not count as a side of a gap.
+    /// Closing by a square of `reach` pixels; the image border is no side of a gap.
     pub fn closed(&self, reach: usize) -> Mask {
         let Grid { width, height } = self.grid;
         let wide = Grid { width: width + 2 * reach, height: height + 2 * reach };

@@ -32,9 +32,9 @@ pub struct LearnOptions {
     /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis of
     /// Eq. 4).
     pub plane_hidden_share: f64,
-    /// Distance from the object within which points belong to it, metres (paper: 1 cm).
+    /// Radius around the object within which points are added, metres (paper: 1 cm).
     pub radius_m: f32,
-    /// Greatest angle between normals of one surface, radians (paper: 20 degrees).
+    /// Maximum angle between normals of one surface, radians (paper: 20 degrees).
     pub angle_rad: f64,
     /// Side of the cubes of the model, metres (paper: 2 mm).
     pub cube_m: f32,
@@ -62,7 +62,7 @@ impl Default for LearnOptions {
     }
 }
 
-/// Contribution of one look to a model.
+/// Contribution of one view to a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Used {
     /// Number of object pixels; 0 if the view was left out.
@@ -141,7 +141,7 @@ struct Growing<'a> {
     rules: PlaneRules,
     removed: Removed,
     first: Option<First>,
-    /// The object so far, world frame, thinned.
+    /// Object so far, world frame, thinned.
     object: Cloud,
     measured: Measured,
 }
@@ -158,7 +158,7 @@ struct First {
 const BESIDE_PX: usize = 8;
 
 impl First {
-    /// True if a place of the world is surface that the first look shows beside the object.
+    /// True if a world point is on a surface that the first view shows beside the object.
     fn shows_beside(&self, p: &Point3<f32>) -> bool {
         let q = self.map.camera_from_world * p.cast::<f64>();
         let camera = &self.map.intrinsics;
@@ -167,14 +167,14 @@ impl First {
     }
 }
 
-/// Greatest distance between measurements of one place by two looks, metres.
+/// Maximum distance between two views' measurements of one point, metres.
 fn tolerance_m(q: &Point3<f64>) -> f64 {
     0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)))
 }
 
 /// Fewest pixels that an object is learned from.
 const LEAST_PIXELS: usize = 50;
-/// Spacing to which points carried from look to look are thinned, metres.
+/// Spacing to which points carried from view to view are thinned, metres.
 const CARRIED_M: f32 = 0.004;
 
 impl<'a> Growing<'a> {
@@ -192,7 +192,7 @@ impl<'a> Growing<'a> {
         }
     }
 
-    /// One look: labelled, filtered (section V-A), grown (V-B), kept for fusing (V-C).
+    /// Processes one view: labelled, filtered (section V-A), grown (V-B), kept for fusion (V-C).
     fn look(&mut self, mut frame: Frame, given: Option<&[bool]>) -> Result<Used, LearningError> {
         let options = self.options;
         let pieces = Supervoxels::of(&mut frame, options.supervoxel_m)?;

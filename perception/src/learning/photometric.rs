@@ -22,7 +22,7 @@ const ROUNDS: usize = 5;
 const CELL_PX: usize = 12;
 /// Least change of lightness a pixel at a mark, of 255.
 const CONTRAST: f32 = 3.0;
-/// Usual difference of lightness between looks at one mark; marks that differ more weigh little.
+/// Scale of lightness differences between views; larger ones get little weight.
 const LIGHTNESS: f32 = 8.0;
 /// Minimum tolerance between a feature's predicted depth and the depth measured in the other view,
 /// metres; beyond it the feature is occluded or on another surface.
@@ -90,7 +90,8 @@ struct Look {
     light: Vec<f32>,
     /// True for pixels far enough inside a surface that blur from a depth edge does not reach them.
     inner: Vec<bool>,
-    /// Pixels inside a surface where lightness changes most, and pixels of the surface evenly spread.
+    /// Pixels inside a surface with the strongest gradients; the next field holds evenly spread
+    /// surface pixels.
     marks: Vec<u32>,
     spread: Vec<u32>,
 }
@@ -246,7 +247,7 @@ fn pairs(active: &[usize], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// One step of all poses but the first; false if none moved.
+/// Gauss-Newton step of all poses but the first; false if none moved.
 fn step(active: &[usize], pairs: &[(usize, usize)], links: &[Sums], poses: &mut [Isometry3<f64>]) -> bool {
     let mut slots = vec![None; poses.len()];
     active.iter().skip(1).enumerate().for_each(|(slot, &i)| slots[i] = Some(6 * slot));

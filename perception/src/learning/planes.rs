@@ -29,14 +29,14 @@ const GROUP_RAD: f64 = 0.12;
 /// Maximum distance between planes of one group, metres.
 const GROUP_M: f64 = 0.01;
 
-/// The planes taken out so far, world frame.
+/// Planes removed so far, world frame.
 #[derive(Default)]
 pub(super) struct Removed {
     planes: Vec<(Plane, Point3<f64>)>,
 }
 
 impl Removed {
-    /// The pixels near the object that are of no removed plane (S_t^f).
+    /// Pixels near the object on no removed plane (S_t^f).
     pub fn filtered(&mut self, frame: &Frame, object: &Mask, first: &DepthMap, rules: &PlaneRules) -> Mask {
         let mut left = Mask::of(frame.grid, frame.near.iter().map(|&i| i as usize));
         let mut open = left.clone();

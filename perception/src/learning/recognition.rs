@@ -1,4 +1,4 @@
-//! Learned objects known again (section VI; Aldoma et al. 2013).
+//! Recognition of learned objects (section VI; Aldoma et al. 2013).
 //!
 //! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, where up is known also by how a
 //! thing stands; poses are refined on the scene's surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
@@ -35,7 +35,7 @@ pub use surfels::outward;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KnowOptions {
-    /// Returns farther away are not looked at, metres.
+    /// Maximum range of used returns, metres.
     pub range_m: f64,
     /// Spacing of the keypoints that get a descriptor, metres (paper: 1.5 cm).
     pub keypoint_m: f32,
@@ -73,7 +73,7 @@ pub struct Recognised {
     pub world_from_model: Isometry3<f64>,
     /// Probability of this object at this pose.
     pub confidence: f64,
-    /// Evidence for it.
+    /// Evidence for the recognised pose.
     pub evidence: PoseEvidence,
 }
 
@@ -100,16 +100,17 @@ const LEAST_POINTS: usize = 60;
 /// Votes of a model that are looked at, refined, and judged.
 const LOOKED_AT: usize = 60;
 const REFINED: usize = 6;
-/// Poses nearer to each other than this are one, metres and radians; and poses that were brought onto the scene by a few points.
+/// Difference below which two poses are one, metres and radians; the second pair is for poses
+/// refined with a few points.
 const SAME: (f64, f64) = (0.02, 0.26);
 const SETTLED: (f64, f64) = (0.005, 0.07);
-/// Correspondence distances for aligning a pose from votes with the scene, coarse to fine, metres;
-/// and for one that a few points have aligned already.
+/// Correspondence distances for refining a voted pose, coarse to fine, metres; and for a pose
+/// already refined with a few points.
 const WITHIN_M: [f32; 2] = [0.025, 0.01];
 const SETTLED_WITHIN_M: [f32; 1] = [0.01];
 /// Odds of lying or hanging against standing as when learned; an assumption: nine in ten stand.
 const LYING: f64 = 0.1;
-/// Two answers may share at most this part of the smaller one's explained points.
+/// Maximum shared part of the explained points of two answers, relative to the smaller one.
 const SHARED: f64 = 0.2;
 
 /// The twelve corners of an icosahedron: directions that a model is described from.
@@ -166,8 +167,8 @@ impl Library {
         Ok(choose(self.judged(view, options)?, options.least_confidence))
     }
 
-    /// All candidates that were judged one by one and were not hopeless, even several in one place: for
-    /// [`choose`], and for fitting a [`Judge`].
+    /// All plausible candidates judged in isolation, possibly overlapping: input of [`choose`], and
+    /// for fitting a [`Judge`].
     ///
     /// # Errors
     /// As [`Library::recognise`].
@@ -210,7 +211,7 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// True if both explain much of the same.
+    /// True if both explain largely the same points.
     fn conflicts(&self, other: &Hypothesis) -> bool {
         let shared = self.explained.iter().filter(|c| other.explained.binary_search(c).is_ok()).count();
         shared as f64 > SHARED * self.explained.len().min(other.explained.len()) as f64

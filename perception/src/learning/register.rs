@@ -10,12 +10,12 @@ use crate::merge::{self, MergeOptions};
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-/// A look and where its camera stood.
+/// View with its camera pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframe {
     /// The corrected pose.
     pub world_from_camera: Isometry3<f64>,
-    /// False if the look does not fit the others.
+    /// False if the view does not fit the others.
     pub used: bool,
     /// Reason for convergence or exclusion.
     pub why: String,
@@ -34,7 +34,7 @@ pub fn keyframes(poses: &[Isometry3<f64>], centre: &Point3<f64>, step_rad: f64) 
     kept
 }
 
-/// Brings looks together. `up` is up in the world, `range_m` how far returns are used.
+/// Registers views; `up`: up direction in the world, `range_m`: maximum range of used returns.
 ///
 /// # Errors
 /// If there is no view, no usable point, or a pose that is not finite.

@@ -1,4 +1,5 @@
-//! Supervoxels: small pieces of one surface, whose mean normal is steadier than that of a pixel (section V-A, b).
+//! Supervoxels: small surface patches, whose mean normal is more reliable than a pixel's (section
+//! V-A, b).
 //!
 //! Seeded by cubes, then each pixel goes to the best of the pieces beside it by place and normal, as superpixels do (Achanta et al. 2012;
 //! Papon et al. 2013).

@@ -19,7 +19,7 @@ const MOST_MOVED: (f64, f64) = (0.03, 0.3);
 const LEAST_SHARED: f64 = 0.35;
 const MOST_OFF_M: f64 = 0.003;
 
-/// Two models of one object as one.
+/// Union of two models of one object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct United {
     /// Points with normals, and with colours if both models had them, in the known model's frame,
@@ -27,7 +27,7 @@ pub struct United {
     pub cloud: Cloud,
     /// Pose of the new model in the known one.
     pub known_from_more: Isometry3<f64>,
-    /// Share of the smaller of both that lies on the other.
+    /// Overlapping share of the smaller model.
     pub shared: f64,
     /// Root mean square distance in the overlap, metres.
     pub off_m: f64,

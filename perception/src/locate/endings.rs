@@ -7,7 +7,7 @@ use crate::surface::Surface;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Vector3};
 
-/// Points so near to the plane are of the surface.
+/// Maximum distance of points on the surface from its plane, metres.
 const ON_M: f64 = 0.012;
 /// Depth below the plane from which points belong to a board's side, or are mixed pixels of a depth
 /// edge, metres.
@@ -30,12 +30,12 @@ const LOST: usize = 3;
 /// Length of a gap without returns behind the surface's last point that proves empty space, metres.
 const NOTHING_M: f64 = 0.09;
 
-/// The end of a surface on a line of pixels.
+/// End of a surface on a line of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ending {
-    /// The point where the last ray meets the surface, world frame, metres.
+    /// Point where the last ray hits the surface, world frame, metres.
     pub on: Point3<f64>,
-    /// The point where the first ray past the surface crosses the surface's plane.
+    /// Point where the first passing ray crosses the surface's plane.
     pub past: Point3<f64>,
     /// Mean of the observed points on a board's side at the end; `None` without.
     pub side: Option<Point3<f64>>,
@@ -87,7 +87,7 @@ impl<'a> Rays<'a> {
         rays
     }
 
-    /// The ray of a pixel at a depth of one.
+    /// Ray of a pixel at unit depth.
     fn ray(&self, pixel: usize) -> Vector3<f64> {
         let width = self.map.intrinsics.width;
         self.map.intrinsics.unproject((pixel % width) as f64, (pixel / width) as f64, 1.0).coords
@@ -108,7 +108,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// The point where the ray of a pixel crosses the plane, world frame; none if the ray rises.
+    /// Point where a pixel's ray crosses the plane, world frame; `None` if the ray rises.
     fn through(&self, pixel: usize) -> Option<Point3<f64>> {
         let ray = self.ray(pixel);
         let fall = self.up.dot(&ray);
@@ -134,7 +134,7 @@ impl<'a> Rays<'a> {
         endings
     }
 
-    /// The ends of the surface along a line of pixels.
+    /// Ends of the surface along a line of pixels.
     fn along(&self, line: &[usize], endings: &mut Vec<Ending>) {
         let shown = |at: usize| self.shown[line[at]];
         let most = |what: Shown, range: std::ops::Range<usize>| {

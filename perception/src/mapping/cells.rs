@@ -1,5 +1,5 @@
-//! Points seen of a building, by cubes, whose number grows with the surface, not with the points; and normals
-//! by regions (section 4.1).
+//! Points of a building accumulated in cubes, whose number grows with the surface area, not with
+//! the points; and normals by regions (section 4.1).
 
 use super::station::{Spot, thinned};
 use crate::cloud::is_finite;
@@ -42,7 +42,7 @@ struct Stored {
 /// Cells that cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CellsError {
-    /// The edge length is not positive.
+    /// Edge length that is not positive.
     #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
     Edge {
         /// Given edge.
@@ -123,9 +123,10 @@ impl Region {
 /// Options for normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalOptions {
-    /// A cube with fewer points is noise, and no region …
+    /// Minimum number of points of a region; smaller cubes are noise.
     pub least_points: u32,
-    /// … and so is one with less than this share of the points of the fullest cube within reach: the edges of surfaces are blurred along the line of sight.
+    /// Minimum share of a region's points relative to the fullest cube within reach: edges of
+    /// surfaces are blurred along the line of sight.
     pub least_share: f64,
     /// Radius of a region around the point's own cube, in cubes.
     pub reach: i64,
@@ -217,7 +218,7 @@ impl Cells {
         self.regions(options).iter().filter_map(Region::facet).collect()
     }
 
-    /// Regions of all cells that are no noise, in the order of the cells.
+    /// Regions of all cells above the noise limits, in cell order.
     pub(super) fn regions(&self, options: &NormalOptions) -> Vec<Region> {
         let _span = tracing::debug_span!("normals by regions", cells = self.len()).entered();
         let region = |sums: &Sums| {
@@ -257,7 +258,7 @@ impl Cells {
         Point3::new(axis(0), axis(1), axis(2))
     }
 
-    /// The cubes around one.
+    /// Cubes around one.
     fn around(&self, own: &Sums, reach: i64) -> Vec<&Sums> {
         let span = || -reach..=reach;
         let [a, b, c] = own.cube.map(i64::from);

@@ -8,16 +8,16 @@ use super::station::{FieldOfView, Spot, Station, thinned};
 use crate::pool;
 use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
 
-/// Options for finding places that were passed before.
+/// Options for loop closures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosureOptions {
     /// Minimum route length between two stations for a loop closure, metres.
     pub apart_m: f64,
     /// Assumed drift of poses, as a share of the route between two stations.
     pub drift: f64,
-    /// … by no more than this, metres.
+    /// Upper limit of the assumed drift, metres.
     pub most_m: f64,
-    /// Headings of two stations that may show the same differ by no more, radians.
+    /// Maximum heading difference of two stations of a loop closure, radians.
     pub turn_rad: f64,
     /// Maximum drift of the heading, radians.
     pub heading_drift_rad: f64,
@@ -68,13 +68,14 @@ pub struct Closure {
     pub fit: PairFit,
 }
 
-/// Spread of the field in which a start is looked for, metres; steps of the search, metres and radians.
+/// Standard deviation of the coarse likelihood field, metres; search steps, metres and radians.
 const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
 /// Approximate number of spots by which starts are scored.
 const SOME: usize = 400;
 /// Half the resolution of the search, metres and radians: possible error of a start.
 const START: (f64, f64) = (0.15, 0.05);
-/// Another place that fits nearly as well (mean logarithm of density) and lies farther than this (metres) makes the first doubtful.
+/// Maximum score difference (mean log density), and minimum distance, metres, of a rival that makes
+/// a fit ambiguous.
 const RIVAL: (f64, f64) = (0.1, 0.5);
 
 /// Finds loop closures of a drive, from poses chained from pairwise fits, one per station.
@@ -115,7 +116,7 @@ fn checked(
     poses.iter().enumerate().try_for_each(|(i, pose)| check_pose("station", i, pose))
 }
 
-/// Distance driven between two stations that are matched against earlier ones, metres.
+/// Stations to be matched against earlier ones, by distance driven.
 fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
     let mut last = 0.0;
     (0..ways.len())
@@ -160,7 +161,7 @@ impl Stretch {
         Stretch { spots, here_from_level: plans.map(|(_, pose)| pose).collect(), field: rectify.field }
     }
 
-    /// True for places that one of the stations could see.
+    /// True for places visible from one of the stations.
     fn sees(&self, place: &Point2<f64>) -> bool {
         self.here_from_level.iter().any(|pose| self.field.sees(&pose.inverse_transform_point(place)))
     }

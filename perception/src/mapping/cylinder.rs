@@ -33,7 +33,7 @@ pub struct UprightCylinder {
 }
 
 impl UprightCylinder {
-    /// Seen part of the circle, radians.
+    /// Observed part of the circle, radians.
     pub fn arc_rad(&self) -> f64 {
         self.arcs_rad.iter().map(|(from, to)| to - from).sum()
     }
@@ -63,7 +63,7 @@ pub struct CylinderOptions {
     pub round_wall_m: RangeInclusive<f64>,
     /// Maximum distance of a point from its surface, metres.
     pub tolerance_m: f64,
-    /// Least arc of a pillar that is seen in one piece, radians: less may be a bend …
+    /// Minimum arc of a pillar seen in one piece, radians; less may be a bend.
     pub least_arc_rad: f64,
     /// … and of a round wall: less may be the walls of a cluttered room.
     pub least_round_rad: f64,
@@ -112,7 +112,7 @@ struct Column {
     heights_m: (f64, f64),
 }
 
-/// A circle through columns, and which these are.
+/// Circle with its supporting columns.
 struct Circle {
     middle: Point2<f64>,
     radius_m: f64,
@@ -169,7 +169,7 @@ fn is_part(patch: &Patch, cylinder: &UprightCylinder, options: &CylinderOptions)
     sagitta_m < cylinder.radius_m && [from, 0.5 * (from + to), to].iter().all(|a| off_m(*a) <= within_m)
 }
 
-/// The squares on which something upright stands, in their order.
+/// Cells with upright surfaces, in order.
 fn columns<'a>(regions: impl Iterator<Item = &'a Region>, edge_m: f64) -> Vec<Column> {
     type Sums = (Vector3<f64>, Vector2<f64>, f64, u32, (f64, f64));
     let mut squares: FxHashMap<(i32, i32), Sums> = FxHashMap::default();
@@ -266,7 +266,7 @@ fn best(columns: &[Column], group: &[usize], from_inside: bool, options: &Cylind
     (on.len() >= 5 && radii.contains(&radius_m)).then_some(Circle { middle, radius_m, on })
 }
 
-/// The circle through three places.
+/// Circle through three points.
 fn through(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> Option<(Point2<f64>, f64)> {
     let (u, v) = (b - a, c - a);
     let twice = 2.0 * u.perp(&v);
@@ -369,7 +369,7 @@ fn misses_m2(columns: &[Column], circle: &Circle, tolerance_m: f64) -> f64 {
     mean_m2(columns.iter().map(|c| (c, miss_m(c))), tolerance_m)
 }
 
-/// Mean of the squares of distances, each no more than a tolerance.
+/// Mean squared distance, each limited to the tolerance.
 fn mean_m2<'a>(misses: impl Iterator<Item = (&'a Column, f64)>, tolerance_m: f64) -> f64 {
     let (sum, weight) = misses.fold((0.0, 0.0), |(sum, weight), (c, miss_m)| {
         let levels = f64::from(c.levels);

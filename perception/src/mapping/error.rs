@@ -5,7 +5,7 @@ use nalgebra::Isometry2;
 /// Options or poses that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MappingError {
-    /// A length in the options is not positive, or impossible.
+    /// Option out of range.
     #[error("{name} is {value}: give a number from {least} to {most}")]
     Option {
         /// Name of the option.
@@ -17,7 +17,7 @@ pub enum MappingError {
         /// The greatest that can be.
         most: f64,
     },
-    /// The pose is not finite.
+    /// Pose that is not finite or too far out.
     #[error(
         "the pose of {what} {index} is not finite, or farther out than {FARTHEST_M} m: mend the localisation that it came from"
     )]
@@ -32,7 +32,7 @@ pub enum MappingError {
 /// Farthest that a station may be from the origin, metres.
 pub(super) const FARTHEST_M: f64 = 1e5;
 
-/// Checks that numbers lie within bounds.
+/// Checks that options lie within bounds.
 pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), MappingError> {
     for &(name, value, least, most) in options {
         if !(value >= least && value <= most) {

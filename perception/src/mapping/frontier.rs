@@ -41,12 +41,12 @@ impl Default for ExploreOptions {
     }
 }
 
-/// Open squares in a row that border on unknown ones.
+/// Connected open cells that border on unknown ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frontier {
     /// Cell centres, metres.
     pub squares: Vec<Point2<f64>>,
-    /// The square nearest to their middle.
+    /// Cell nearest to the frontier's centre.
     pub middle: Point2<f64>,
 }
 
@@ -70,15 +70,15 @@ impl NextPose {
     }
 }
 
-/// Headings tried at a place.
+/// Number of headings tried at a place.
 const HEADINGS: usize = 12;
 /// Most squares along a ray.
 const MOST_STEPS: usize = 2000;
-/// Rays all around a place.
+/// Number of rays around a place.
 pub(super) const RAYS: usize = 180;
 /// Spacing of the poses that are tried, metres.
 const PLACES_M: f64 = 0.6;
-/// Places are tried within this of a frontier, metres.
+/// Radius around a frontier in which places are tried, metres.
 const AROUND_M: f64 = 2.0;
 /// Minimum gain of a pose that is worth a look, square metres.
 pub(super) const LEAST_M2: f64 = 0.2;

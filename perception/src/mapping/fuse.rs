@@ -1,4 +1,4 @@
-//! Patches of one wall made one (section 4.3), openings kept.
+//! Joining patches of one wall (section 4.3), preserving openings.
 
 use super::cells::Facet;
 use super::patch::{Constraints, Patch, PlaneEstimator, placed, through};
@@ -8,11 +8,12 @@ use nalgebra::Point3;
 /// Conditions under which two patches belong to one wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FuseOptions {
-    /// The gap between their limits is no wider (U_d), metres: more than the distance at which patches grow, less than a door.
+    /// Maximum gap between the patches' limits (U_d), metres: more than the growing distance of
+    /// patches, less than a door.
     pub gap_m: f64,
     /// Maximum distance of each patch from the other's plane, metres.
     pub across_m: f64,
-    /// Their normals differ by no more (U_o), radians.
+    /// Maximum angle between the normals (U_o), radians.
     pub turned_rad: f64,
 }
 
@@ -25,7 +26,7 @@ impl Default for FuseOptions {
 /// Number of passes over all patches; each joins touching ones.
 const ROUNDS: usize = 8;
 
-/// Joins patches until none is left that belongs to another. The largest first.
+/// Joins patches of one wall until none is left, largest first.
 pub(super) fn fuse(
     facets: &[Facet],
     mut patches: Vec<Patch>,

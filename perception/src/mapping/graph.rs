@@ -9,11 +9,12 @@ use serde::{Deserialize, Serialize};
 pub struct Edge {
     /// Number of a station.
     pub from: usize,
-    /// Number of the other.
+    /// Number of the second station.
     pub to: usize,
     /// Pose of the second in the frame of the first.
     pub from_from_to: Isometry2<f64>,
-    /// Inverse covariance of that pose: shift in the frame of `from` (metres), and turn (radians).
+    /// Information matrix of the relative pose: shift in the frame of `from` (metres), and rotation
+    /// (radians).
     pub information: Matrix3<f64>,
     /// True if the edge may be a false loop closure; its weight then falls with its residual
     /// (Cauchy).
@@ -38,7 +39,7 @@ pub struct Settled {
     pub squares: Vec<f64>,
     /// Weight of each edge, from 0 (rejected) to 1.
     pub weights: Vec<f64>,
-    /// Steps taken.
+    /// Number of iterations.
     pub rounds: usize,
     /// False if the last step still moved poses.
     pub converged: bool,
@@ -61,7 +62,7 @@ pub enum GraphError {
         /// Number of stations.
         stations: usize,
     },
-    /// Poses or edges hold numbers that are no numbers.
+    /// Non-finite poses or edges.
     #[error("{what} {index} is not finite: mend the fit that it came from")]
     NotFinite {
         /// `pose` or `edge`.
@@ -69,7 +70,7 @@ pub enum GraphError {
         /// Index of the edge.
         index: usize,
     },
-    /// A station has no edge.
+    /// Station without an edge.
     #[error("station {station} is held by no edge: give each the step from the one before it")]
     Loose {
         /// Index of the station.
@@ -78,7 +79,7 @@ pub enum GraphError {
 }
 
 const MOST_ROUNDS: usize = 60;
-/// A step that moves no pose farther than this, metres and radians, is the last.
+/// Motion of all poses below which the optimisation ends, metres and radians.
 const SETTLED: f64 = 1e-4;
 /// Residual, in standard deviations, beyond which doubtful edges lose weight; decreases over the
 /// iterations, as drift on a long route is large at first.
@@ -148,7 +149,7 @@ impl PoseGraph {
         self.edges.iter().map(weigh).unzip()
     }
 
-    /// Takes one Gauss-Newton step; returns how far the poses moved.
+    /// Gauss-Newton step; returns the largest motion of a pose.
     fn step(&self, poses: &mut [Isometry2<f64>], weights: &[f64]) -> Result<f64, GraphError> {
         let mut normal = Envelope::of(poses.len(), &self.edges);
         let mut right = vec![0.0; 3 * poses.len()];
@@ -186,7 +187,7 @@ impl Edge {
         shift.push(self.from_from_to.rotation.angle_to(&seen.rotation))
     }
 
-    /// Jacobians of the error with respect to the poses of both ends.
+    /// Jacobians of the error with respect to both poses.
     fn slopes(&self, poses: &[Isometry2<f64>]) -> [(usize, Matrix3<f64>); 2] {
         let (from, to) = (&poses[self.from], &poses[self.to]);
         let back = from.rotation.inverse().to_rotation_matrix().into_inner();
@@ -224,7 +225,7 @@ impl Envelope {
         Envelope { first, rows }
     }
 
-    /// Adds the part of a block that lies in the lower half.
+    /// Adds the lower triangular part of a block.
     fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
         for i in 0..3 {
             for j in 0..3 {

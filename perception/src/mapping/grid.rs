@@ -35,7 +35,7 @@ impl From<Sightlines> for Vec<(i32, i32, u32, u32)> {
 
 /// Number of bearings into which a station's points are sorted.
 const BEARINGS: usize = 720;
-/// Lines of sight are followed no farther, metres.
+/// Maximum length of followed lines of sight, metres.
 const FARTHEST_M: f64 = 100.0;
 /// Most squares of a grid.
 const MOST_SQUARES: usize = 1 << 28;

@@ -18,7 +18,7 @@ pub(super) struct Field {
     logs: Vec<f32>,
     /// Observed cells; empty if not recorded.
     seen: Vec<bool>,
-    /// Value where no spot is near.
+    /// Log density far from all spots.
     nothing: f64,
 }
 
@@ -104,7 +104,7 @@ impl Field {
         (weight > 0.5 * all).then(|| sum / weight)
     }
 
-    /// Share of the spots, put by a pose, that lie nearer than two spreads to one of the field's.
+    /// Share of transformed spots within two standard deviations of a field's spot.
     pub fn explained(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
         let limit = (OUTLIERS + (-2.0_f64).exp()).ln();
         let (near, all) = spots.iter().fold((0.0, 0.0), |(near, all), s| {

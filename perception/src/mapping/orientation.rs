@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 pub struct OrientationOptions {
     /// Number of orientations (the paper: two); `None`: as many as stand out.
     pub count: Option<usize>,
-    /// Angle from every orientation above which a direction has none, radians.
+    /// Maximum angle of a direction from its orientation, radians.
     pub within_rad: f64,
     /// An orientation holds at least this share of all.
     pub least_share: f64,
@@ -38,7 +38,7 @@ const STANDS_OUT: f64 = 1.7;
 const MOST: usize = 8;
 const ROUNDS: usize = 30;
 
-/// Groups directions of normals in the plane (radians); opposite ones are the same.
+/// Groups directions of horizontal normals (radians); opposite ones are equal.
 pub fn orientations(directions_rad: &[f64], options: &OrientationOptions) -> Orientations {
     let mut starts = peaks(directions_rad, options);
     starts.truncate(options.count.unwrap_or(MOST).min(MOST));
@@ -71,7 +71,7 @@ pub fn orientations(directions_rad: &[f64], options: &OrientationOptions) -> Ori
     Orientations { centres_rad, of }
 }
 
-/// A direction modulo half a turn as a direction modulo a whole one.
+/// Unit vector of the doubled angle, for averaging directions modulo half a turn.
 fn doubled(direction_rad: f64) -> Vector2<f64> {
     let (sin, cos) = (2.0 * direction_rad).sin_cos();
     Vector2::new(cos, sin)

@@ -36,7 +36,7 @@ impl Unseen {
         look.shows.iter().map(|(index, likely)| left(index) * likely).sum::<f64>() * look.square_m2
     }
 
-    /// The look is taken.
+    /// Accounts for a look as taken.
     pub fn look(&mut self, look: &Outlook) {
         for (index, likely) in &look.shows {
             *self.left.entry(*index).or_insert(1.0) *= 1.0 - likely;
@@ -124,7 +124,7 @@ impl Floor<'_> {
     }
 }
 
-/// A frontier is looked at from no farther than this share of the camera's reach …
+/// Maximum viewing distance of a frontier, as a share of the camera's range.
 const IN_RANGE: f64 = 0.9;
 /// Minimum probability that another look shows a cell after two looks should have shown it; below
 /// it, the cell is given up.
@@ -204,7 +204,7 @@ impl Floor<'_> {
         there.map(|s| ways[self.index(s)]).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if all squares on the line between two places are open.
+    /// True if all cells on the line between two places are open.
     fn is_clear(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let steps = ((to - from).norm() / (0.5 * self.grid.cell_m)).ceil().max(1.0) as usize;
         (0..=steps).all(|k| {

@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Method of fitting planes to patches and joining them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PlaneEstimator {
-    /// The paper's: the median of the normals and the centroid; where planes are joined, their means weighted by area.
+    /// The paper's method: median of normals and centroid; joined planes average both by area.
     Median,
     /// Least squares of the distances of all facets.
     #[default]
@@ -22,7 +22,8 @@ pub enum PlaneEstimator {
 pub struct Constraints {
     /// Walls are upright.
     pub upright: bool,
-    /// Direction of the normals of most walls, modulo a quarter turn, radians: walls that are nearly so are so.
+    /// Direction of most walls' normals, modulo a quarter turn, radians; nearly parallel or
+    /// perpendicular walls are snapped to it.
     pub main_rad: Option<f64>,
     /// Tolerance, radians.
     pub within_rad: f64,
@@ -36,19 +37,19 @@ pub(super) struct Patch {
     pub middle: Point3<f64>,
     /// Level unit vector in the plane.
     pub along: Vector3<f64>,
-    /// Ends of the patch from the middle, metres: along, and up.
+    /// Limits of the patch from its centre, metres: along, and up.
     pub limits_m: [(f64, f64); 2],
     pub area_m2: f64,
     /// Ascending.
     pub facets: Vec<u32>,
 }
 
-/// Conditions under which two facets are one patch.
+/// Conditions under which two facets belong to one patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
     /// Maximum distance between the facets, metres (λ).
     pub within_m: f64,
-    /// Nor so far along the normal, metres.
+    /// Maximum distance along the normal, metres.
     pub across_m: f64,
     /// Maximum angle between a facet's normal and that of the patch's orientation (or first facet),
     /// radians.
@@ -103,7 +104,7 @@ pub(super) fn grow(
 }
 
 impl Constraints {
-    /// Unit normal closest to one that satisfies the constraints.
+    /// Unit normal closest to the given one that satisfies the constraints.
     pub fn keep(&self, normal: &Vector3<f64>) -> Vector3<f64> {
         let level = Vector3::new(normal.x, normal.y, 0.0).try_normalize(1e-6);
         let Some(level) = level.filter(|_| self.upright) else { return *normal };
@@ -172,7 +173,7 @@ fn median_direction(members: &[u32], normal: impl Fn(u32) -> Vector3<f64>) -> Op
     Vector3::new(axis(0), axis(1), axis(2)).try_normalize(1e-6)
 }
 
-/// The level direction in which the facets spread least.
+/// Horizontal direction of least spread of the facets.
 fn least_upright<'a>(facets: impl Iterator<Item = &'a Facet>, middle: &Point3<f64>) -> Option<Vector3<f64>> {
     let mut spread = Matrix2::zeros();
     for facet in facets {

@@ -50,7 +50,7 @@ pub struct MapOptions {
     pub constrained: bool,
     /// Options for joining patches; `None`: no joining.
     pub fuse: Option<FuseOptions>,
-    /// Options for pillars and round walls; `None`: none are looked for.
+    /// Options for pillars and round walls; `None`: not detected.
     pub cylinders: Option<CylinderOptions>,
     /// Smaller walls are left out, square metres …
     pub least_area_m2: f64,
@@ -60,7 +60,7 @@ pub struct MapOptions {
     pub least_level_m2: f64,
     /// Height band in which openings of walls must be free, metres.
     pub opening_band_m: RangeInclusive<f64>,
-    /// … and at least so wide, metres.
+    /// Minimum width of an opening, metres.
     pub opening_m: f64,
 }
 
@@ -84,15 +84,15 @@ impl Default for MapOptions {
     }
 }
 
-/// An upright plane with ends.
+/// Bounded vertical plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
     /// Plane of the wall, with its normal towards the observer.
     pub plane: Plane,
-    /// One end of the wall's foot, metres.
+    /// One end of the wall's ground line, metres.
     pub from: Point2<f64>,
-    /// The other.
+    /// Other end of the wall's ground line, metres.
     pub to: Point2<f64>,
     /// Observed height range, metres.
     pub heights_m: (f64, f64),
@@ -109,7 +109,7 @@ impl Wall {
         self.stretches_m.iter().map(move |(a, b)| (self.from + along * *a, self.from + along * *b))
     }
 
-    /// The length from end to end, metres.
+    /// Length from end to end, metres.
     pub fn length_m(&self) -> f64 {
         (self.to - self.from).norm()
     }
@@ -135,13 +135,13 @@ pub struct Level {
 pub struct RoomMap {
     /// Walls, the largest first.
     pub walls: Vec<Wall>,
-    /// Pillars and round walls; their facets are not counted as walls.
+    /// Pillars and round walls; their facets are excluded from walls.
     pub cylinders: Vec<UprightCylinder>,
     /// Level surfaces, the largest first.
     pub levels: Vec<Level>,
     /// Direction of the normals of most walls, modulo a quarter turn, radians.
     pub main_rad: Option<f64>,
-    /// Open floor; walls are drawn into squares that no line of sight has settled.
+    /// Occupancy grid; walls fill cells that no line of sight has decided.
     pub grid: Option<Occupancy>,
 }
 
@@ -359,7 +359,7 @@ fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> O
     })
 }
 
-/// Marks the squares under a foot of a wall, but where lines of sight went through.
+/// Marks the cells under a wall's ground line, except where lines of sight passed.
 fn draw((from, to): (Point2<f64>, Point2<f64>), grid: &mut Occupancy) {
     let steps = ((to - from).norm() / (0.5 * grid.cell_m)).ceil() as usize;
     for i in 0..=steps {

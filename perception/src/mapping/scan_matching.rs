@@ -25,7 +25,8 @@ pub enum Matcher {
     Icp,
     /// ICP on the jointly visible spots.
     IcpShared,
-    /// The paper's: expectations over all correspondences, the rotation about one centroid, then the translation around odometry.
+    /// The paper's method: EM over all correspondences, with rotation about a common centroid, then
+    /// translation around odometry.
     IcpEmSplit,
     /// EM with rotation and translation estimated jointly, from the best heading.
     #[default]
@@ -37,11 +38,11 @@ pub enum Matcher {
 pub struct RectifyOptions {
     /// Matcher.
     pub matcher: Matcher,
-    /// Heights between floor and ceiling that are kept, metres.
+    /// Height band of used points between floor and ceiling, metres.
     pub band_m: RangeInclusive<f64>,
     /// The camera's field of view.
     pub field: FieldOfView,
-    /// Squares of the plan that are one point, metres.
+    /// Cell size for thinning the plan, metres.
     pub thin_m: f64,
     /// Standard deviation of spots around their partners in the first and the last iteration,
     /// metres.
@@ -53,7 +54,7 @@ pub struct RectifyOptions {
     /// Minimum share of the second plan that must match the first for [`Matcher::IcpEm`] to be
     /// accepted; else odometry is used.
     pub explained: f64,
-    /// Number of independent points that one plane counts for, as neighbouring errors are
+    /// Number of independent points that one plan counts for, because neighbouring errors are
     /// correlated.
     pub looks: f64,
 }
@@ -107,7 +108,7 @@ pub struct PairFit {
     pub information: Matrix3<f64>,
 }
 
-/// Fewest spots of a plan with which the camera has a say beside odometry.
+/// Minimum number of spots of a plan for the camera to influence odometry.
 const FEWEST: usize = 12;
 /// Expectations at each spread.
 const EXPECTATIONS: usize = 3;
@@ -116,13 +117,13 @@ const ROUNDS: usize = 2;
 /// Step of the heading search, radians, and standard deviation of its likelihood field, metres.
 const HEADING_STEP_RAD: f64 = 0.01;
 const HEADING_SIGMA_M: f64 = 0.12;
-/// Ratio of each spread to the one before.
+/// Ratio of consecutive standard deviations (annealing).
 const COOLING: f64 = 0.7;
-/// Steps in which the translation is looked for: coarse, and fine, metres.
+/// Coarse and fine step of the translation search, metres.
 const STEPS_M: [f64; 2] = [0.03, 0.006];
 /// Search range of the translation, in standard deviations of odometry.
 const WINDOW: f64 = 3.0;
-/// A fit farther from odometry, in spreads, is not believed.
+/// Maximum distance of an accepted fit from odometry, in standard deviations.
 const STRAYED: f64 = 4.0;
 /// Steps for the numerical curvature at the result: metres, radians.
 const PROBE: (f64, f64) = (0.03, 0.015);
@@ -142,7 +143,7 @@ pub fn rectify_pair(
     Ok(step(before, after, options))
 }
 
-/// Rectifies each step of a drive: one fit fewer than stations.
+/// Corrects each step of a drive; one fit fewer than stations.
 ///
 /// # Errors
 /// If an option or a pose of odometry cannot be used.
@@ -159,7 +160,7 @@ fn step(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit 
     fit(&plan(before), &plan(after), &odometry, options)
 }
 
-/// Poses of the stations in the frame of the first, one step after the other.
+/// Station poses in the frame of the first, chained from pairwise fits.
 pub fn chained(pairs: &[PairFit]) -> Vec<Isometry2<f64>> {
     let mut poses = vec![Isometry2::identity()];
     for pair in pairs {
@@ -181,7 +182,7 @@ fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &Rec
     }
 }
 
-/// Aligns two plans that are already cut to their common field of view.
+/// Registers two plans already cut to their common field of view.
 pub(super) fn fit_cut(
     seen: &[Spot],
     moved: &[Spot],
@@ -248,7 +249,7 @@ struct Problem<'a> {
     field: &'a Field,
     prior: &'a Prior,
     options: &'a RectifyOptions,
-    /// The one centroid of both plans, in the frame of the first.
+    /// Common centroid of both plans, in the frame of the first.
     centroid: Point2<f64>,
     /// Density of outliers.
     outliers: f64,
@@ -355,7 +356,7 @@ impl<'a> Problem<'a> {
         self.options.looks / (all * sigma_m * sigma_m)
     }
 
-    /// The pose after one expectation and the best rotation about the centroid (Eq. 3).
+    /// Pose after one EM iteration of the rotation about the centroid (Eq. 3).
     fn turned(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
         let (mut along, mut across) = (0.0, 0.0);
         for spot in self.after {
@@ -373,7 +374,7 @@ impl<'a> Problem<'a> {
         self.about_centroid(pose, turn.clamp(-0.2, 0.2))
     }
 
-    /// The pose after one expectation and the best rotation and translation.
+    /// Pose after one EM iteration of rotation and translation.
     fn moved(&self, pose: &Isometry2<f64>, sigma_m: f64) -> Isometry2<f64> {
         let worth = self.worth(sigma_m);
         let prior = self.prior.information();

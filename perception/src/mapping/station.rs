@@ -11,16 +11,16 @@ use std::ops::RangeInclusive;
 /// left, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
-    /// Points in the level frame, metres. Points that are not finite are ignored.
+    /// Points in the level frame, metres; non-finite ones are ignored.
     pub points: Vec<Point3<f32>>,
-    /// Pose by odometry; only the step from one station to the next is used.
+    /// Odometry pose; only steps between stations are used.
     pub odom_from_level: Isometry2<f64>,
 }
 
 /// The view cannot serve as a station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StationError {
-    /// The pose is not finite.
+    /// Non-finite pose.
     #[error("the pose of the camera is not finite: give metres and a unit quaternion")]
     Pose,
     /// The camera looks along the plumb line.
@@ -69,8 +69,7 @@ impl Station {
     }
 }
 
-/// The spots thinned to one per square, at their centroid, with the weight of all, in the order of the
-/// squares.
+/// Spots thinned to one per cell, at the weighted centroid, in cell order.
 pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spot> {
     let mut squares: FxHashMap<(i32, i32), (Vector2<f64>, f64)> = FxHashMap::default();
     for spot in spots {
@@ -86,13 +85,13 @@ pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spo
 
 /// Fewest points in a square that are more than noise.
 const FEWEST: f64 = 2.0;
-/// Maximum weight of a square in points: more points are of one place.
+/// Maximum weight of a cell, points; further points are of the same place.
 const MOST: f64 = 8.0;
 
 /// A square of the plan that holds points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {
-    /// Their centroid, metres.
+    /// Centroid of the points, metres.
     pub at: Point2<f64>,
     /// Weight.
     pub weight: f64,
@@ -101,9 +100,9 @@ pub(super) struct Spot {
 /// Field of view in the plan: a sector around the direction ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
-    /// The right end of the field of view, anticlockwise from ahead: negative, radians.
+    /// Right limit of the field of view, anticlockwise from ahead (negative), radians.
     pub right_rad: f64,
-    /// The left end of the field of view, radians.
+    /// Left limit of the field of view, radians.
     pub left_rad: f64,
     /// The nearest depth, metres; of more than half a turn, the nearest range.
     pub near_m: f64,

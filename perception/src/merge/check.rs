@@ -10,21 +10,21 @@ use std::fmt;
 
 /// Fewest matched points for a view to count as overlapping. From: chosen.
 const FEWEST_MATCHED: usize = 80;
-/// Maximum distance between a surface and a place that another camera looked through before the two
-/// contradict, metres ... From: chosen.
+/// Minimum distance between a surface and free space seen by another camera for a contradiction,
+/// metres (the larger of this and the next limit counts). From: chosen.
 pub(super) const CLEAR_M: f64 = 0.03;
-/// ... and in spreads of both measurements: far off, depth is vague.
-/// From: chosen, so that five views of a room with poses 5 cm and 3° off come back together.
+/// Minimum distance for a contradiction, in standard deviations of both measurements. From: chosen,
+/// so that five views of a room with poses 5 cm and 3° off come back together.
 const CLEAR_SPREADS: f64 = 5.0;
 /// Share of points that another camera looked through from which a view counts as wrongly placed. From: chosen.
 const MOST_CONTRADICTED: f64 = 0.22;
 
-/// A reason why a view is left out of a merge.
+/// Reason why a view is left out of a merge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Misfit {
     /// The view has no usable point in range.
     Empty,
-    /// The view shares too few points with the others: this many.
+    /// Too few points shared with the others: their number.
     Alone(usize),
     /// The required correction exceeds the localisation error, metres and radians.
     Far(f64, f64),
@@ -124,7 +124,8 @@ fn contradicted(
     sum / f64::from(n.max(1))
 }
 
-/// The correction of a camera pose as a multiple of the largest plausible one, and the misfit; `None` if plausible.
+/// Correction of a camera pose relative to the maximum plausible one, with the misfit; `None` if
+/// plausible.
 fn too_far(view: &Prepared, pose: &Isometry3<f64>, loose: f64) -> Option<(f64, Misfit)> {
     /// Maximum accepted pose correction, in standard deviations of localisation, or in metres and
     /// radians if larger: stated errors are sometimes too small, and 10 cm and 6° must be

@@ -29,7 +29,7 @@ const COLUMNS: usize = 320;
 /// From: chosen.
 const FINE: OrganisedOptions = OrganisedOptions { reach: 1, depth_step_share: 0.02, base_m: 0.006, least: 5 };
 
-/// Returns that are taken together of a cloud without rows. From: work.
+/// Number of returns processed together in a cloud without rows. From: work.
 const ROW: usize = 512;
 /// Pixels that are judged together. From: work.
 const LANES: usize = 16;
@@ -43,9 +43,9 @@ const THING: u32 = u32::MAX - 1;
 pub(super) struct DepthSample {
     /// Camera frame, metres.
     pub at: Vector3<f32>,
-    /// Camera frame; not finite if unknown.
+    /// Normal in the camera frame; non-finite if unknown.
     pub normal: Vector3<f32>,
-    /// Inverse of the squared spread, one over square metres.
+    /// Inverse variance, per square metre.
     pub weight: f32,
     pub pixel: u32,
 }
@@ -62,7 +62,7 @@ impl Looked {
         planes: &[Plane],
         options: &MergeOptions,
     ) -> Looked {
-        /// Rows that one thread looks through. From: work.
+        /// Number of rows per thread. From: work.
         const ROWS: usize = 16;
         let returns = DepthSamples::of(view, prepared, world_from_camera, planes, options);
         let rows = returns.view.cloud.len().div_ceil(returns.width);
@@ -93,7 +93,7 @@ struct DepthSamples<'a> {
     /// Pixels a row.
     width: usize,
     planes: Vec<InCamera>,
-    /// Number of the plane that each pixel of the coarser copy lies on, or [`THING`].
+    /// Plane number of each pixel of the coarser copy, or [`THING`].
     on: Vec<u32>,
     coarse: Facing<'a>,
     things: Facing<'a>,
@@ -210,8 +210,7 @@ impl<'a> DepthSamples<'a> {
         }
     }
 
-    /// The block of some pixels in the middle of three rows, given by the row's number; `None` if none of the
-    /// pixels is fused.
+    /// Block of pixels in the middle of three rows; `None` if none is fused.
     fn block(&self, lines: &[Line; 3], row: usize, column: usize) -> Option<Block> {
         let [x, y, z] = [0, 1, 2].map(|axis| some(&lines[1].0[axis], column + 1));
         let mut block = Block { at: [*x, *y, *z], weight: [0.0; LANES], on: [DROPPED; LANES] };
@@ -254,7 +253,7 @@ impl<'a> DepthSamples<'a> {
         Some(block)
     }
 
-    /// The planes that some pixels may lie on.
+    /// Planes that some pixels may lie on.
     fn around(&self, row: usize, column: usize) -> [u32; LANES] {
         let mut around = [THING; LANES];
         for (on, column) in around.iter_mut().zip(&self.coarse.columns[column..]) {
@@ -281,7 +280,7 @@ impl Line {
         Line(std::array::from_fn(|_| vec![f32::NAN; width.next_multiple_of(LANES) + 2]))
     }
 
-    /// A row may be shorter than others.
+    /// Fills the row; a row may be shorter than others.
     fn fill(&mut self, row: &[Point3<f32>]) {
         for (axis, line) in self.0.iter_mut().enumerate() {
             line[1..].iter_mut().zip(row).for_each(|(c, p)| *c = p[axis]);
@@ -298,14 +297,14 @@ fn some(line: &[f32], from: usize) -> &[f32; LANES] {
 /// Spread of a return, metres.
 #[inline(always)]
 fn sigma_m(depth: f32, range_sq: f32) -> f32 {
-    /// Square of the share of the range that depth is taken to be of at the least: no ray is farther aside than 60°. From: chosen.
+    /// Minimum squared ratio of depth to range; rays are at most 60° off axis. From: chosen.
     const HALF_SQ: f32 = 0.25;
     // Depth, but for what is seen far aside.
     let (depth_sq, half_sq) = (depth * depth, HALF_SQ * range_sq);
     frontal_sigma_m(if depth_sq > half_sq { depth_sq } else { half_sq }.sqrt())
 }
 
-/// The plane that each point of the coarser copy lies on.
+/// Plane of each point of the coarser copy.
 fn lying_on(cloud: &Cloud, normals: &[Vector3<f32>], within: &Within, planes: &[InCamera]) -> Vec<u32> {
     let on = |(p, normal): (&Point3<f32>, &Vector3<f32>)| {
         let at = [p.x, p.y, p.z];

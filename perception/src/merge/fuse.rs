@@ -1,4 +1,4 @@
-//! Step 5: one cloud, sharper than any view, of bounded size.
+//! Step 5: fusion into one cloud, sharper than any view and of bounded size.
 //!
 //! Returns at depth edges that hang between two surfaces are dropped. The rest are averaged in voxels, each weighted by the spread of its
 //! range. What lies on a level plane is averaged in columns that stand on it instead: the table is one sheet.
@@ -23,7 +23,7 @@ pub(super) struct Cell {
     pub weight: f32,
     /// Voxels from the grid's lowest corner.
     pub at: Vector3<f32>,
-    /// Unit length or zero in the end.
+    /// Normal, of unit length or zero after settling.
     pub normal: Vector3<f32>,
     /// Number of views that measured the voxel, and the last of them.
     pub views: u16,
@@ -31,7 +31,7 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// Measured by no view. From: mark.
+    /// Cell without a measurement. From: mark.
     const EMPTY: Cell = Cell {
         weight: 0.0,
         at: Vector3::new(0.0, 0.0, 0.0),
@@ -169,7 +169,7 @@ pub(super) fn gather_further(
     true
 }
 
-/// The fused returns of a view, and their pose.
+/// Fused returns of a view, with their pose.
 struct Taken<'a> {
     number: u16,
     looked: Arc<Looked>,

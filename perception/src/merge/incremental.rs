@@ -118,7 +118,7 @@ impl Merger {
         self.kept();
     }
 
-    /// The kept state, after waiting for the computation that is done ahead.
+    /// Kept state, after waiting for background work.
     fn kept(&mut self) -> &mut Kept {
         if let Some(ahead) = self.ahead.take() {
             self.kept = ahead.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
@@ -159,7 +159,7 @@ impl Kept {
         }
     }
 
-    /// Prepares each view; views that were already prepared are kept.
+    /// Prepares the views that are not prepared yet.
     fn prepare(&mut self, views: &[View], options: &MergeOptions) {
         let digests = pool::map(views, 1, digest);
         let kept = self.prepared.drain(..).zip(self.maps.drain(..));
@@ -178,7 +178,7 @@ impl Kept {
         self.digests = digests;
     }
 
-    /// Merged base that the next view is aligned with, from the kept state.
+    /// Merged base for aligning the next view, from the kept state.
     fn base_of(&mut self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
         let anew = together(views.len());
         let is_begun = |base: &Base| {
@@ -384,8 +384,7 @@ fn digest(view: &View) -> u64 {
     parts.into_iter().fold(0, |digest, bytes| mixed(digest, digest_of(bytes)))
 }
 
-/// Hash of bytes in one number: four parts are read side by side and mixed in independent lanes, to
-/// keep the processor busy.
+/// 64-bit hash of bytes, in four independent lanes for speed.
 fn digest_of(bytes: &[u8]) -> u64 {
     /// Words that are mixed in side by side. From: work.
     const LANES: usize = 4;

@@ -1,4 +1,4 @@
-//! Steps 3 and 4: all views moved together until their surfaces meet.
+//! Steps 3 and 4: joint alignment of all views.
 //!
 //! One least-squares problem over all poses: point-to-plane distances between every two views that overlap, and each pose's distance
 //! from where localisation had it. The second part fixes the common frame: it is the robust average of what localisation said.
@@ -12,10 +12,10 @@ use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Matrix3x6, Matrix6, Translation3, UnitQuaternion, Vector3, Vector6,
 };
 
-/// The parameters of one round of alignment.
+/// Parameters of one alignment round.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Round {
-    /// Partners lie within this, metres, at the first pass ...
+    /// Maximum correspondence distance at the first iteration, metres.
     pub from_m: f64,
     /// ... and at the last.
     pub to_m: f64,
@@ -27,7 +27,7 @@ pub(super) struct Round {
     pub rest_weight: f32,
 }
 
-/// The result of a round for one view.
+/// Result of a round for one view.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     pub matched: usize,
@@ -55,7 +55,7 @@ const SAME_SIDE: f32 = 0.75;
 /// Allowed excess of a partner's distance over the nearest point's, as a share of the maximum
 /// distance; the surface is much the same there. From: chosen.
 const SLACK: f32 = 0.1;
-/// A pass that moves no camera farther than this, metres and radians, ends the round. From: chosen.
+/// Motion of all cameras below which a round ends, metres and radians. From: chosen.
 const SETTLED: (f64, f64) = (2e-4, 2e-4);
 /// Multiple of the convergence limit at which views still count as settled after the last
 /// iteration. From: chosen.
@@ -63,8 +63,8 @@ const NEARLY: f64 = 5.0;
 /// Multiple of the final correspondence distance at which a round ends early. From: chosen.
 const LATE: f64 = 1.5;
 
-/// Aligns the views marked `used` with each other. `loose` is a factor on the stated localisation
-/// error of each view; views with 0 stay fixed. `parts` labels the points of each view.
+/// Aligns the views marked `used` jointly. `loose`: factor on each view's stated localisation error
+/// (0: fixed). `parts`: partition of each view's points.
 pub(super) fn align(
     views: &[Prepared],
     used: &[bool],
@@ -122,7 +122,7 @@ impl Askers {
         Askers([Part::Plane, Part::Standing, Part::Around].map(of))
     }
 
-    /// At most about `asked` points of each sort, evenly spread, different ones for each partner, with their
+    /// At most about `asked` points per part, evenly spread and different for each partner, with
     /// weights.
     fn some(&self, asked: usize, round: &Round, partner: usize) -> impl Iterator<Item = (usize, f32)> {
         let spread = move |of: &'_ [u32]| {
@@ -135,11 +135,11 @@ impl Askers {
     }
 }
 
-/// The matches of one view with another in the passes of a round.
+/// Correspondences of one view with another over a round.
 struct Asked {
     from: usize,
     to: usize,
-    /// Points of the first view with their weights.
+    /// Query points of the first view, with weights.
     points: Vec<(Surfel, f32)>,
     /// The state of each point's partner.
     partners: Vec<Partner>,
@@ -161,7 +161,7 @@ impl Asked {
 
 /// Pairs of views to match: all if few, else each view with those of the nearest cameras.
 fn pairs(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
-    /// Number of views from which not all pairs of views are matched. From: chosen.
+    /// Number of views from which only nearest pairs are matched. From: chosen.
     const ALL_BELOW: usize = 7;
     let active: Vec<usize> = (0..views.len()).filter(|&i| used[i] && !views[i].points.is_empty()).collect();
     let mut pairs = Vec::new();
@@ -250,7 +250,7 @@ impl Link {
     }
 }
 
-/// One Gauss-Newton step on all poses; returns the largest shift and turn.
+/// Gauss-Newton step on all poses; returns the largest shift and rotation.
 fn step(
     views: &[Prepared],
     used: &[bool],
@@ -319,7 +319,7 @@ fn step(
     most
 }
 
-/// The transform that moves views, fixed among each other, onto the robust average of their localised poses.
+/// Rigid transform of all views onto the robust mean of their localised poses.
 pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<f64>]) -> Isometry3<f64> {
     /// Number of Gauss-Newton steps; the first nearly suffices. From: chosen.
     const PASSES: usize = 4;
@@ -356,7 +356,7 @@ pub(super) fn onto_priors(views: &[Prepared], used: &[bool], poses: &[Isometry3<
 /// Weight of a camera's prior in the common frame, decreasing with its departure, so that one lost
 /// view does not drag the others.
 fn prior_weight(sigmas: f64) -> f64 {
-    /// Distance, in standard deviations, at which the weight is one half. From: chosen.
+    /// Distance at which the weight is one half, in standard deviations. From: chosen.
     const HALVED: f64 = 4.0;
     1.0 / (1.0 + (sigmas / HALVED).powi(2))
 }

@@ -14,7 +14,7 @@ const DOMINANT: f64 = 0.06;
 const LEVEL: f64 = 0.95;
 /// Minimum and maximum height of objects on a surface, metres. From: chosen.
 const STANDING_M: (f64, f64) = (0.01, 0.5);
-/// Side of the cells in which the outline of the surface is sought, metres. From: chosen.
+/// Cell size for the surface's outline, metres. From: chosen.
 const CELL_M: f64 = 0.05;
 /// Maximum distance of a point on a dominant plane, in standard deviations and in metres (the
 /// larger counts). From: chosen.
@@ -25,7 +25,7 @@ pub(super) const PLANE_FACING: f64 = 0.8;
 /// its pose. From: chosen.
 pub(super) const FEWEST: usize = 60;
 
-/// The part of the scene that a point of a view belongs to.
+/// Part of the scene that a view's point belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// A dominant plane.
@@ -43,7 +43,7 @@ pub(super) type Plane = (Vector3<f64>, f64);
 /// The parts of the points of all views.
 #[derive(Debug)]
 pub(super) struct Parts {
-    /// The part, by view and point.
+    /// Part of each point, by view.
     pub of: Vec<Vec<Part>>,
     /// The dominant planes, world frame.
     pub planes: Vec<Plane>,
@@ -112,7 +112,7 @@ pub(super) fn find(
     Parts { of: parts, planes, up, standing }
 }
 
-/// The level planes once more, by least squares where the views lie now.
+/// Refits the level planes by least squares at the current poses.
 pub(super) fn level_again(
     planes: &[Plane],
     up: Option<Unit<Vector3<f64>>>,

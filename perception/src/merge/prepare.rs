@@ -20,7 +20,8 @@ use rustc_hash::FxHashSet;
 /// cm. From: chosen.
 const COLUMNS: usize = 216;
 
-/// Normals for the alignment: of many pixels, since one measurement is vague. From: chosen.
+/// Normal estimation for alignment, from many pixels because single measurements are noisy.
+/// From: chosen.
 const WIDE: normals::OrganisedOptions =
     normals::OrganisedOptions { reach: 2, depth_step_share: 0.025, base_m: 0.008, least: 8 };
 
@@ -35,13 +36,13 @@ pub(super) struct Prepared {
     pub coarse: Option<Cloud>,
     /// The localised pose of the camera.
     pub prior: Isometry3<f64>,
-    /// Spread of that position, metres.
+    /// Standard deviation of the position, metres.
     pub sigma_m: f64,
-    /// Spread of that orientation, radians.
+    /// Standard deviation of the orientation, radians.
     pub sigma_rad: f64,
 }
 
-/// A place on a surface, camera frame.
+/// Surface point with its normal, camera frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surfel {
     /// Metres.
@@ -64,11 +65,12 @@ impl Surfel {
 
 /// The bounds of the returns that are merged, in the camera frame.
 pub(super) struct Within {
-    /// Height is this along the point, and between these, metres.
+    /// Up direction in the camera frame, with the height limits along it.
     up: Vector3<f32>,
     heights_m: (f32, f32),
     range_sq: f32,
-    /// Horizontal directions into the region, and how far along them it begins, metres.
+    /// Horizontal directions into the region, with the distance at which the region begins along
+    /// each, metres.
     pub edges: Vec<(Vector3<f32>, f32)>,
 }
 
@@ -111,10 +113,9 @@ impl Within {
     }
 }
 
-/// Filters and thins one view. A view without usable points gives an empty one.
+/// Filters and thins one view; empty without usable points.
 pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
-    /// Localisation error where none is stated: a few centimetres and degrees. From: chosen, as for the
-    /// paper's robot.
+    /// Default localisation error. From: chosen, as for the paper's robot.
     const SIGMA_M: f64 = 0.03;
     const SIGMA_RAD: f64 = 0.035;
     /// Margin beyond the height band: spreads of localisation, and a distance, metres. From: chosen.
@@ -169,7 +170,7 @@ fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
 
 /// The points of a cloud to be merged, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
-    /// Points that a normal is taken from. From: chosen.
+    /// Number of points for a normal. From: chosen.
     const NEAREST: usize = 15;
     let kept = view.cloud.filter(|p| within.holds([p.x, p.y, p.z]));
     let thin = voxel::downsample(&kept, options.align_voxel_m as f32).unwrap_or(kept);

@@ -13,14 +13,14 @@ use rustc_hash::FxHashSet;
 /// Surface point with its unit normal.
 pub(super) type Oriented = (Point3<f64>, Vector3<f64>);
 
-/// Points of the view that are tried against the others. From: chosen.
+/// Number of the view's points used in the search. From: chosen.
 const TRIED: usize = 220;
 /// Maximum distance of surfaces from a view's centre, along the table and in height, that take
 /// part, metres. From: chosen.
 const FARTHEST_M: [f64; 2] = [3.0, 1.5];
 /// Side of the coarse and fine cells, metres. From: chosen.
 const CELLS_M: [f64; 2] = [0.03, 0.012];
-/// Smallest share of points that must fall on the others' surfaces. From: chosen.
+/// Minimum share of points that must match the others' surfaces. From: chosen.
 pub(super) const SURE_SHARE: f64 = 0.25;
 /// Minimum matching share for a view that would otherwise be left out: views from opposite sides
 /// share little. From: chosen, so that of 40 pairs of views from opposite sides none is left out,
@@ -41,7 +41,8 @@ struct Cells {
     side_m: f64,
     low: [i32; 3],
     size: [usize; 3],
-    /// Six tables of cells in the order z, x, y: shifts along y are next to each other.
+    /// Scores of cells for six facings, in the order z, x, y, so that shifts along y are
+    /// contiguous.
     worth: Vec<u8>,
 }
 
@@ -81,7 +82,7 @@ impl Cells {
         (0..3).all(|c| at[c] < self.size[c]).then(|| (at[2] * self.size[0] + at[0]) * self.size[1] + at[1])
     }
 
-    /// A surface of that side in the cell, which the margin keeps off the edge.
+    /// Marks a surface of a facing in a cell.
     fn mark(&mut self, side: usize, at: usize) {
         let (row, plane) = (self.size[1], self.size[0] * self.size[1]);
         let table = side * plane * self.size[2];
@@ -201,8 +202,8 @@ pub(super) fn place(
 ) -> Option<Placed> {
     /// Steps of the turn, coarse and fine, radians. From: chosen.
     const TURN_STEPS_RAD: [f64; 2] = [0.03, 0.009];
-    /// Around the best coarse places, how far the fine search goes in shift, metres, and turn, radians. From: derived, a coarse cell and
-    /// three fine steps.
+    /// Range of the fine search around the best coarse poses, metres and radians. From: derived, a
+    /// coarse cell and three fine steps.
     const FINE: (f64, f64) = (CELLS_M[0], 0.027);
     if view.len() < FEWEST || placed.len() < FEWEST {
         return None;
@@ -257,7 +258,7 @@ struct Candidate {
     score: f64,
 }
 
-/// The three best that are not the same valley.
+/// Three best candidates in distinct minima.
 fn distinct(found: &[Candidate], apart: f64) -> [Candidate; 3] {
     let mut kept = [found[0]; 3];
     for k in 0..3 {
@@ -273,7 +274,7 @@ fn distinct(found: &[Candidate], apart: f64) -> [Candidate; 3] {
 
 /// Points rotated about the vertical, each with its dominant facing.
 fn turned(points: &[Oriented], angle: f64) -> Vec<(Point3<f64>, usize)> {
-    /// Components of a normal that differ by no more are equally long. From: rounding.
+    /// Difference below which components of a normal count as equal. From: rounding.
     const ALIKE: f64 = 1e-9;
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), angle);
     let most = |n: Vector3<f64>| sides(&n, n.amax() - ALIKE).next().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Step 5, second half: the voxels moved onto their common surface.
+//! Step 5, second half: smoothing of the voxels onto their common surface.
 //!
 //! Every voxel is moved along its normal onto the weighted mean of the like-facing voxels beside it, every column of a sheet along the sheet's
 //! normal onto that of the columns beside it. What a single view claims and another looked through is left out. Of a further look only what it
@@ -18,8 +18,8 @@ use std::slice::Iter;
 
 /// Maximum smoothing shift of a voxel along its normal, in its standard deviations. From: chosen.
 const TUBE_SPREADS: f32 = 2.5;
-/// The spread of a voxel: that of a point at arm's length, metres. A voxel of many points is no narrower a tube.
-/// From: chosen, the sensor at .3 to 1.4 m has .0012 to .0031.
+/// Standard deviation of a point at arm's length, used for a voxel's smoothing tube whatever its
+/// number of points, metres. From: chosen, the sensor at .3 to 1.4 m has .0012 to .0031.
 const VOXEL_SPREAD_M: f32 = 0.003;
 /// Minimum distance of a ray from the surface that proves free space there, metres. From: derived,
 /// as where views are held against each other.
@@ -123,7 +123,7 @@ impl Gathered {
     /// Means of all voxels, reusing earlier ones. Voxel means are needed by all neighbours, column
     /// means by few.
     fn means(&self, before: Vec<Cell>) -> Vec<Cell> {
-        /// Cells that one thread takes in a row. From: work.
+        /// Number of cells per thread. From: work.
         const SOME: usize = 4096;
         let cells = if self.flat { &[][..] } else { &self.blocks.cells };
         let mut means = before;
@@ -208,7 +208,8 @@ fn drop_looked_through(row: &mut Vec<Settled>, gazes: &[Gaze], known: usize) {
 /// normals.
 #[inline(always)]
 fn smoothed(own: &Cell, around: &[u32], cells: &[Cell], voxel_m: f32) -> Vector3<f32> {
-    /// Voxels face alike if the cosine of the angle between their normals is more. From: chosen, about 46°.
+    /// Minimum cosine between normals of voxels that are smoothed together. From: chosen, about
+    /// 46°.
     const ALIKE: f32 = 0.7;
     let tube = TUBE_SPREADS * VOXEL_SPREAD_M / voxel_m;
     let (mut weight, mut offset) = (0.0, 0.0);

@@ -36,7 +36,7 @@ impl Grid {
 
 /// The position of a block, in blocks: 20 bits per axis.
 type Place = u64;
-/// Bits of a place along an axis. From: derived, three axes in 64 bits.
+/// Bits of a coordinate in a key. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
 
 /// Some voxels of a block: a bit for each of a layer, x fastest.

@@ -4,7 +4,7 @@ use super::nearby::Nearby;
 use super::{Bounds, LEAF, Neighbours, Span};
 use crate::pool;
 
-/// The buffers of one walk; kept between leaves.
+/// Reusable buffers of a tree walk.
 #[derive(Default)]
 struct Scratch {
     open: Vec<Span>,
@@ -95,7 +95,7 @@ impl Neighbours {
         }
     }
 
-    /// The smallest node around `leaf` that holds `k` points, and the bounds of the leaf itself.
+    /// Smallest node around `leaf` with at least `k` points, and the bounds of the leaf.
     fn seed(&self, leaf: usize, k: usize) -> (Span, Bounds) {
         let mut span = self.root();
         let mut seed = span;
@@ -110,7 +110,7 @@ impl Neighbours {
         (seed, self.nodes[span.node])
     }
 
-    /// Squared distance of the k-th nearest point of the seed: no more than so far are the k nearest of all.
+    /// Squared distance of the k-th nearest point of the seed, an upper bound for all.
     fn bound_from(&self, q: &[f32; 3], seed: Span, k: usize, nearby: &mut Nearby) -> f32 {
         nearby.clear();
         let mut bound = f32::MAX;

@@ -2,7 +2,7 @@
 
 use super::LEAF;
 
-/// Points near a query: squared distances and slots, in no particular order.
+/// Candidates near a query: squared distances and slots, unordered.
 #[derive(Default)]
 pub(crate) struct Nearby {
     /// Both hold room for a leaf beyond `len`.
@@ -12,12 +12,12 @@ pub(crate) struct Nearby {
     order: Vec<(u32, u32)>,
 }
 
-/// Bounds tried before giving up and sorting: many candidates just as far admit none that leaves few between.
+/// Maximum number of bracketing steps before sorting; many ties admit no narrow bracket.
 const GUESSES: usize = 12;
 /// Candidates around the k-th that are sorted.
 const FEW: usize = 8;
 
-/// Squared distances on both sides of the k-th nearest, and how many candidates are no farther than each.
+/// Squared distances on both sides of the k-th nearest, with the number of candidates up to each.
 struct Parting {
     low: f32,
     below: usize,

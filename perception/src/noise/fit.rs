@@ -19,7 +19,7 @@ const COVERED: f64 = 0.8;
 /// Maximum distance of a return from its face, as a share of the depth, metres per metre.
 /// From: chosen.
 const NEAR_SHARE: f64 = 0.012;
-/// A block is so far within the face, metres. From: chosen.
+/// Minimum distance of a block from the face's outline, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
 /// Residual, in standard deviations of the block, beyond which a pixel is off the face.
 /// From: chosen.
@@ -40,7 +40,7 @@ pub struct Residuals {
     blocks: Vec<Block>,
 }
 
-/// A part of a face in one view.
+/// Part of a face in one view.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     depth_m: f64,
@@ -97,7 +97,7 @@ impl Residuals {
     }
 }
 
-/// True if a pixel shows a place of the surface, camera frame.
+/// True if a pixel shows the surface (camera frame).
 fn is_on(
     map: &DepthMap,
     outline: &Outline,
@@ -154,8 +154,8 @@ fn fit_plane(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<
     normal.cholesky().map(|c| c.solve(&right))
 }
 
-/// The number of independent errors among the returns of a cell: the variance of one return over that of the
-/// mean of a cell.
+/// Number of independent errors among a cell's returns: variance of a return divided by variance of
+/// the cell's mean.
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
     /// Number of cells in a block. From: derived, its side has so many.
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);

@@ -1,4 +1,4 @@
-//! Normals of organised clouds from the pixels around each point: no tree.
+//! Normals of organised clouds from pixel neighbourhoods, without a search tree.
 
 use super::Normals;
 use crate::cloud::{Cloud, Grid};
@@ -82,7 +82,7 @@ struct Image {
 /// The coordinates of each product: xx xy xz yy yz zz.
 const FACTORS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// Sums over the windows of some pixels beside each other, about the pixels themselves.
+/// Window sums of neighbouring pixels, relative to the pixels themselves.
 struct WindowSums {
     count: [u32; LANES],
     sum: [[f32; LANES]; 3],
@@ -158,8 +158,8 @@ impl WindowSums {
     /// Equivalent to [`spread::least`], branch-free per lane.
     #[inline(always)]
     fn surfaces(&self, at: &[[f32; LANES]; 3], options: &OrganisedOptions) -> [[f32; LANES]; 4] {
-        /// Number of Newton iterations; single precision has converged by then, unless no direction
-        /// has the least variance.
+        /// Number of Newton iterations; single precision converges, unless no direction has the
+        /// least variance.
         const STEPS: usize = 6;
         /// Minimum ratio of the spread across a line to that along it; below, it is rounding.
         const COLLINEAR: f32 = 1e-6;

@@ -10,15 +10,15 @@ use nalgebra::{Point3, Vector3};
 /// Number of points for the preliminary score; only hypotheses that may beat the best are scored on
 /// all points.
 const FIRST: usize = 1024;
-/// Points scored between two looks at whether the best can still be reached.
+/// Number of points scored between two checks against the best score.
 const BLOCK: usize = 4096;
-/// Number of standard deviations below the best within which a first score is still evaluated in full: one in
-/// 30,000 would be lost.
+/// Standard deviations below the best score within which a hypothesis is still evaluated in full;
+/// one in 30,000 would be lost.
 const DEVIATIONS: f64 = 4.0;
-/// Rounds of least squares and collecting anew.
+/// Maximum number of least-squares refits.
 const REFITS: usize = 3;
 
-/// The plane with most points within the tolerance. The same points, options and seed give the same plane.
+/// Plane with most inliers; deterministic for points, options and seed.
 ///
 /// # Errors
 /// If there are fewer than three finite points, if they do not span a plane, or if no plane is as asked.
@@ -38,7 +38,7 @@ pub fn find(points: &[Point3<f32>], options: &PlaneOptions) -> Result<PlaneFit, 
     Ok(polish(points, best, finite.len(), rounds_used, options))
 }
 
-/// The least-squares plane of the given points, on the side of the origin; `None` if they do not span one.
+/// Least-squares plane of the points, towards the origin; `None` if they are degenerate.
 pub fn refit<'a>(points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Plane> {
     let mut points = points.into_iter().filter(|p| is_finite(p)).peekable();
     let mut moments = Moments::about(points.peek()?);

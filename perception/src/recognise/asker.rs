@@ -1,4 +1,4 @@
-//! Visibility of the places around one body, per camera, each camera aligned with the body.
+//! Visibility around one body, per camera, with each camera registered at the body.
 
 use crate::round::Round;
 use crate::scale::APART_M;
@@ -11,15 +11,15 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 const SAME_SIDE: f64 = 0.9;
 /// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;
-/// Share of a body's points in view that a camera must see through, against the others, to count as
+/// Minimum seen-through share of a body's points, against other cameras, for a camera to count as
 /// misregistered there. From: chosen.
 const ASTRAY: f64 = 0.5;
 
-/// Maximum distance of a place from a measured surface to count as seen, where only whether a body is in view
-/// is asked, metres. From: chosen.
+/// Tolerance on the distance to a measured surface when testing whether a body is in view, metres.
+/// From: chosen.
 pub(super) const IN_VIEW_M: f64 = 0.06;
 
-/// A place above the surface, asked of the cameras.
+/// Visibility queries at points above the surface, over all cameras.
 #[derive(Clone)]
 pub struct Asker<'a> {
     pub views: Vec<Lying<'a>>,
@@ -49,12 +49,13 @@ impl<'a> Lying<'a> {
         }
     }
 
-    /// The same where what it shows lay so far beside the body, metres along both axes of the surface.
+    /// Camera moved so that its points near the body shift by this much, metres along both axes of
+    /// the surface.
     pub fn moved(&self, [x, y]: [f64; 2]) -> Lying<'a> {
         Lying::of(self.map, Translation3::new(-x, -y, 0.0) * self.surface_from_camera)
     }
 
-    /// A place (surface frame) as seen from the camera.
+    /// Point (surface frame) in the camera's frame.
     fn seen_at(&self, place: &Point3<f64>) -> Point3<f64> {
         (self.turn * place.coords + self.shift).into()
     }
@@ -66,9 +67,8 @@ impl<'a> Lying<'a> {
 }
 
 impl<'a> Asker<'a> {
-    /// Cameras that are used as witnesses of a body (points in the surface's frame). A camera that
-    /// sees through the body while others with the same accuracy see it is misregistered there and
-    /// left out.
+    /// Cameras used for a body (points in the surface's frame), without misregistered ones: those
+    /// that see through the body while equally accurate cameras see it.
     pub fn of(
         seen: &'a Visibility,
         world_from_surface: Isometry3<f64>,
@@ -85,7 +85,8 @@ impl<'a> Asker<'a> {
         Asker { views, tolerance_m }
     }
 
-    /// The best knowledge of a place (surface frame): free in any look outweighs surface, hidden and never.
+    /// Best knowledge of a point (surface frame): free in any view outweighs surface, hidden and
+    /// never.
     pub fn look(&self, x: f64, y: f64, z: f64) -> Seen {
         let place = Point3::new(x, y, z);
         let mut best = Seen::Never;
@@ -101,7 +102,8 @@ impl<'a> Asker<'a> {
     /// Horizontal direction from a body to the cameras that had it in view, if all saw the same
     /// side.
     pub fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
-        /// A camera that is nearer to the axis, seen from above, looks from no side, metres. From: chosen.
+        /// Horizontal distance from the axis below which a camera looks from no side, metres.
+        /// From: chosen.
         const ABOVE_M: f64 = 0.1;
         /// Directions that add up to less cancel out. From: rounding.
         const CANCELLED: f64 = 1e-9;
@@ -115,8 +117,8 @@ impl<'a> Asker<'a> {
         each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
     }
 
-    /// Standard deviation of the best measurement of a point of the surface, metres; `None` if cameras that measure better look
-    /// through it: it is noise, or a mixed pixel of a depth edge.
+    /// Standard deviation of the best measurement of a surface point, metres; `None` if more
+    /// accurate cameras look through it, so that it is noise or a mixed pixel.
     pub fn support(&self, p: &Point3<f64>) -> Option<f64> {
         let (mut through, mut here) = (0.0, 0.0);
         let mut best_m = f64::INFINITY;
@@ -136,7 +138,7 @@ impl<'a> Asker<'a> {
     }
 }
 
-/// The cameras that do not look through a body which others see.
+/// Cameras that do not look through a body which others see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
     /// Minimum measured share of the sampled points of a body in view of a camera, as a divisor.
     /// From: chosen.

@@ -128,7 +128,7 @@ impl Cuboid {
         longer
     }
 
-    /// The length of the side with this end, metres.
+    /// Length of the side with this end, metres.
     pub fn length_m(&self, end: usize) -> f64 {
         self.high[end / 2] - self.low[end / 2]
     }

@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Descry {
-    /// Probability before looking that an object on a table is one of the models. From: chosen.
+    /// Prior probability that an object on a table is one of the models. From: chosen.
     pub known: f64,
     /// Expected number of objects that differ from a known one in one feature (handle, lid, flat
     /// sides, taper), per known object; an unseen feature stays in doubt. From: fitted, with the
@@ -44,7 +44,8 @@ pub struct Descry {
     /// Odds of a round object lying on its side rather than standing; five times higher for closed
     /// ones. From: chosen, as upside down.
     pub lying: f64,
-    /// Least probability with which a percept carries a model's name. From: chosen, likelier than not.
+    /// Minimum probability at which a percept is labelled with a model's name. From: chosen,
+    /// likelier than not.
     pub least: f64,
     /// Exponent on the likelihoods of sizes and form; below 1 it softens them for effects outside
     /// the measurement model. From: chosen.
@@ -190,7 +191,7 @@ impl Descry {
         explained.into_iter().flatten().collect()
     }
 
-    /// Judges both parts of a segment, and how much likelier pixels are with the parts than with one body.
+    /// Judges both parts of a split segment, with the log likelihood ratio against one body.
     fn judge_parts(
         &self,
         setting: &Setting,
@@ -270,7 +271,7 @@ const DOUBT: f64 = 0.1;
 /// one more round body has five sizes, each told to one part in fifty.
 const FAR: f64 = 20.0;
 
-/// The percepts of both parts of a segment, and the log of how much likelier the parts make the pixels than one body does.
+/// Percepts of both parts of a segment, and the log likelihood ratio of the parts against one body.
 struct Parted {
     body: Percept,
     rest: Percept,
@@ -438,7 +439,7 @@ impl Descry {
     /// Log likelihood of objects that resemble a model except for one feature, with sizes within a
     /// tenth; `lids`: factor for those with a lid.
     fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured, lids: f64) -> f64 {
-        /// Similarity: share of a size, or of a taper, by which things made like a known one differ.
+        /// Relative deviation of a look-alike's size or taper from the known object's.
         /// From: chosen.
         const ALIKE: f64 = 0.1;
         /// Ratio of the width of a uniform distribution to its standard deviation. From: derived,

@@ -10,9 +10,10 @@ use crate::pool;
 use crate::scale::{APART_M, EDGE_M};
 use crate::visibility::Seen;
 
-/// True if most places just above the object are hidden by something nearer to the cameras.
+/// True if most positions just above the object are occluded.
 pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool {
-    /// Places above are asked about so far from the middle, as a share of the shorter side. From: chosen.
+    /// Distance of the tested positions from the centre, as a share of the shorter side.
+    /// From: chosen.
     const REACH: f64 = 0.25;
     let reach = REACH * footprint.sides_m[1];
     let places = [(0.0, 0.0), (reach, 0.0), (-reach, 0.0), (0.0, reach), (0.0, -reach)];
@@ -24,7 +25,7 @@ pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool
     !asker.views.is_empty() && 2 * hidden > places.len()
 }
 
-/// The likelihood of each length of one side of a box given the views, relative to the likeliest length.
+/// Likelihood of each length of one side of a box, relative to the likeliest.
 #[derive(Clone, Debug)]
 pub struct Side {
     /// Smallest length that was tried, metres (steps of [`EDGE_M`]), and the log-likelihood of each
@@ -84,13 +85,13 @@ impl Side {
 
 /// Step of the sums over lengths, metres. From: work.
 const STEP_M: f64 = 0.5 * EDGE_M;
-/// Log from which the position of an end is beyond doubt. From: chosen.
+/// Log likelihood ratio from which an end is certain. From: chosen.
 const SURE: f64 = 40.0;
 /// Steps of the search for a box's sides and rotation, metres and radians, each with its maximum
 /// repetitions. From: work, a turn moves the ends of what is 15 cm long by as much.
 const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
 const TRIES: usize = 8;
-/// Number of rounds in which the views are aligned with the box, and the box with the views. From: work.
+/// Number of alternations between registering the views and fitting the box. From: work.
 const ROUNDS: usize = 2;
 
 /// Box, with its best shift in each view.
@@ -116,7 +117,7 @@ impl Boxed<'_> {
         self.log = self.log_of(&self.body);
     }
 
-    /// Log of how likely another box makes all views.
+    /// Log likelihood of another box in all views.
     fn log_of(&self, body: &Cuboid) -> f64 {
         let of_view = |n: usize| self.rays.views[n].log_likelihood(&body.moved(self.placed[n].shift_m));
         pool::each(self.rays.views.len(), 1, of_view).iter().sum()

@@ -17,7 +17,7 @@ use crate::surface::nearest_sigma_m;
 use crate::visibility::{Seen, Visibility};
 use nalgebra::Point3;
 
-/// Distances from the body at which a handle has some of itself, metres. From: chosen.
+/// Distances from the body at which a handle is sampled, metres. From: chosen.
 const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
 /// Heights at which a handle is sought, as shares of the body's height. From: chosen.
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];

@@ -26,8 +26,8 @@ const TOUCHED_M: f64 = 0.03;
 /// Radius around the original place within which an object that slipped out of the hand may lie,
 /// metres.
 const SLIPPED_M: f64 = 0.15;
-/// Standard deviations of localisation to allow for, and the distance from which things are looked at,
-/// metres.
+/// Localisation margin in standard deviations; the next constant is the distance of looks at
+/// objects, metres.
 const ASTRAY: f64 = 2.0;
 const FROM_M: f64 = 1.2;
 
@@ -129,7 +129,7 @@ fn holding(s: &Situation) -> Vec<String> {
     held.map(|thing| format!("(holding {})", thing.symbol)).collect()
 }
 
-/// True if the object in the hand is that thing.
+/// True if the object in the hand is the thing.
 fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     match thing.track {
         Some(id) => id == track.id,
@@ -169,7 +169,8 @@ fn middle(s: &Situation, track: &Track) -> Point3<f64> {
     track.position_m + up * (0.5 * track.size_m[2])
 }
 
-/// Distance of a point from the body at a candidate, along the floor, metres; none if a wall is between.
+/// Horizontal distance of a point from the body at a candidate, metres; `None` with a wall in
+/// between.
 fn distance_m(s: &Situation, from: usize, p: &Point3<f64>) -> Option<f64> {
     let Place::Pose(base) = &s.candidates[from].place else { return None };
     (!s.is_walled_off(&base.point(), &p.xy())).then(|| (p.xy() - base.point()).norm())
@@ -180,8 +181,8 @@ fn astray_m(body: &Description) -> f64 {
     ASTRAY * (body.pose_sigma_m + body.pose_sigma_rad * FROM_M)
 }
 
-/// True if the hand reaches a point from a candidate, past every wall and at any allowed localisation error;
-/// where the point is too far from every candidate for that, the nearest one counts.
+/// True if the hand reaches a point from a candidate, past every wall and at any allowed
+/// localisation error; if no candidate is near enough for that, the nearest one counts.
 fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
     let body = s.robot.description();
     let Some((d_m, reach_m)) = distance_m(s, from, p).zip(body.reach_m()) else { return false };

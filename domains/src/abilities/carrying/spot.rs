@@ -10,9 +10,9 @@ use crate::situation::Situation;
 pub(super) const USUAL_RADIUS_M: f64 = 0.06;
 /// Minimum gap to other objects and to the surface's edge, metres.
 const GAP_M: f64 = 0.05;
-/// Distance of the places that are tried, metres.
+/// Spacing of the tried places, metres.
 const GRID_M: f64 = 0.04;
-/// Heights above the surface at which a place must have been seen free, metres.
+/// Heights above the surface at which a place must be observed free, metres.
 const FREE_AT_M: [f64; 2] = [0.04, 0.10];
 
 /// Free place on a surface nearest to the body and within reach from a viewpoint: seen empty, or

@@ -22,7 +22,7 @@ const RANGE_M: f64 = 3.0;
 const TOGETHER: usize = 3;
 /// Guesses of all views together that are looked at, the surest first.
 const GUESSES: usize = 12;
-/// Guesses nearer to each other than this are one, metres and radians.
+/// Difference below which two candidates are one, metres and radians.
 const SAME: (f64, f64) = (0.03, 0.35);
 /// Minimum probability of a reported candidate.
 const LEAST: f64 = 0.05;
@@ -50,7 +50,7 @@ const SHORTER: f64 = 0.6;
 const BESIDE_IT_M: f64 = 0.04;
 pub const NOT_IT: f64 = 0.002;
 
-/// Recognition results of views, by their times.
+/// Cached recognition results, by view time.
 #[derive(Clone, Default)]
 struct Glances {
     by_time: BTreeMap<i64, Arc<Glance>>,
@@ -96,7 +96,7 @@ impl Found {
 /// Views with their camera poses, and the up direction if known.
 type Shown<'a> = (&'a [(&'a View, Isometry3<f64>)], Option<Vector3<f64>>);
 
-/// A guess, and where in the world that is.
+/// Candidate with its pose in the world.
 type Placed = (Guess, Isometry3<f64>);
 
 /// Learned objects recognised in the views (with camera poses), most confident first, without

@@ -29,7 +29,7 @@ use crate::objective::Goal;
 use crate::situation::Situation;
 use crate::viewpoint::Candidate;
 
-/// Returns farther than this are not learned from, metres.
+/// Maximum range of returns used for learning, metres.
 const RANGE_M: f64 = 2.5;
 
 /// The ability *learning*.

@@ -1,4 +1,4 @@
-//! Visited places, novel objects found there, and learned things.
+//! Visited places, novel objects there, and learned objects.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -25,10 +25,10 @@ pub(super) const DIRECTIONS: usize = 36;
 /// covers.
 const TO_EITHER_SIDE: usize = 1;
 
-/// Visited places, novel objects and learned things.
+/// Visited places, novel objects and learned objects.
 #[derive(Clone, Default)]
 pub struct News {
-    /// Places to visit, by the symbols of their poses.
+    /// Places to visit, by pose symbol.
     pub places: Vec<Place>,
     /// Novel objects that match no learned one.
     pub novelties: Vec<Novelty>,
@@ -44,7 +44,7 @@ pub struct News {
     pub records: Vec<RecordId>,
 }
 
-/// A place that is visited.
+/// Visited place.
 #[derive(Clone)]
 pub struct Place {
     /// Symbol of the waypoint.
@@ -55,7 +55,7 @@ pub struct Place {
     pub room: Option<Arc<MetaRoom>>,
     /// True if visited in this run.
     pub is_visited: bool,
-    /// The reason a visit could not be compared with earlier ones.
+    /// Reason why a visit could not be compared with earlier ones.
     pub strange: Option<String>,
 }
 
@@ -103,7 +103,7 @@ pub enum Fate {
     Learned {
         /// Name.
         name: String,
-        /// Looks that fit, and of how many.
+        /// Numbers of registered views and of all views.
         looks: (usize, usize),
         /// Share of directions around the object from which it was seen.
         sides: f64,
@@ -112,7 +112,7 @@ pub enum Fate {
     Known {
         /// Name.
         name: String,
-        /// Probability of that.
+        /// Probability of the match.
         confidence: f64,
         /// Modelling result, in words, if it was viewed from all around.
         model: Option<String>,
@@ -140,18 +140,18 @@ pub enum Difference {
         /// Former position.
         at: Point3<f64>,
     },
-    /// Something of the static structure is gone.
+    /// Part of the static structure is gone.
     Gone {
         /// Middle.
         at: Point3<f64>,
-        /// Sides of the box around it, metres.
+        /// Size of the bounding box, metres.
         size_m: [f64; 3],
     },
-    /// Something has come that stands on no surface.
+    /// An object on no surface has appeared.
     Beside {
         /// Middle.
         at: Point3<f64>,
-        /// Sides of the box around it, metres.
+        /// Size of the bounding box, metres.
         size_m: [f64; 3],
     },
 }
@@ -222,7 +222,7 @@ impl Novelty {
         (turn / TAU * DIRECTIONS as f64).round() as usize % DIRECTIONS
     }
 
-    /// The directions that a look from a place shows.
+    /// Directions of the object that a look from a point shows.
     fn shown(&self, from: &Point3<f64>) -> impl Iterator<Item = usize> + use<> {
         let middle = self.direction(from) + DIRECTIONS - TO_EITHER_SIDE;
         (0..=2 * TO_EITHER_SIDE).map(move |k| (middle + k) % DIRECTIONS)
@@ -258,7 +258,7 @@ impl Novelty {
         self.stands.iter().flatten().filter(can_go).filter(|pose| self.looks.iter().all(|l| l.from != **pose))
     }
 
-    /// Directions that were not seen and can be seen from where the body fits, as a share of all.
+    /// Share of the directions that are unseen but visible from where the body fits.
     pub(super) fn unfaced(&self, s: &Situation) -> f64 {
         let seen = self.seen();
         let open: BTreeSet<usize> = self.open_stands(s).flat_map(|pose| self.shown_from(s, pose)).collect();
@@ -268,7 +268,7 @@ impl Novelty {
 
 /// Learned objects prepared for recognition.
 pub struct Models {
-    /// Their surfaces and features.
+    /// Surfels and features of the models.
     pub(super) known: Library,
     /// Index in [`News::things`] of each model; incompletely seen objects have no model.
     pub(super) things: Vec<usize>,
@@ -289,8 +289,7 @@ impl Models {
 
 /// Object model of a learned object, for visibility: a body of the same size.
 fn model(thing: &LearnedThing) -> ObjectModel {
-    /// Tolerance of a size comparison: the object may rest on another side, and edges are measured
-    /// this accurately.
+    /// Relative tolerance of a size comparison; the object may rest on another side.
     const OFF: f64 = 0.1;
     let (low, high) = thing.cloud.bounds().unwrap_or_default();
     let size: Vector3<f64> = (high - low).cast();
@@ -319,7 +318,7 @@ pub fn called(name: &str) -> String {
 state!(News);
 
 impl Known {
-    /// Novel objects and learned things.
+    /// Novel and learned objects.
     pub(super) fn news(&self) -> &News {
         self.states.get()
     }

@@ -273,7 +273,7 @@ fn is_sliver(cloud: &Cloud) -> bool {
     size_m[1] < SLIVER_M || size_m[1] < EDGE_M && size_m[2] > LONG * size_m[1]
 }
 
-/// A size and a place, for people.
+/// Size and position for people.
 pub(super) fn size([w, d, h]: &[f64; 3], at: &Point3<f64>) -> String {
     let [w, d, h] = [w, d, h].map(|m| 1e2 * m);
     format!("{w:.0} x {d:.0} x {h:.0} cm at ({:.2}, {:.2}, {:.2}) m", at.x, at.y, at.z)
@@ -397,7 +397,7 @@ fn left(mind: &mut Mind, on: &str, map: &DepthMap) -> Vec<String> {
     said
 }
 
-/// A look at something new was taken.
+/// Handles a look at a novel object.
 pub(super) fn face(
     mind: &mut Mind,
     eyes: Eyes<'_>,
@@ -453,7 +453,7 @@ fn improved(mind: &mut Mind, f: &Found, looks: &Novelty, model: &LearnedModel) -
     said
 }
 
-/// Something is not learned, and why.
+/// Gives up learning an object, with the reason.
 fn given_up(mind: &mut Mind, what: &str, because: String) -> Result<String, WorldError> {
     let said = format!("it is not learned: {because}");
     novelty(mind, what)?.fate = Fate::GivenUp(because);
@@ -467,7 +467,7 @@ fn make_ready(mind: &mut Mind) {
     again::forget(mind);
 }
 
-/// Looks were brought together: something was learned, or is known after all, or cannot be learned.
+/// Handles a modelling result: the object is learned, known after all, or cannot be learned.
 pub(super) fn learned(mind: &mut Mind, what: &str, modelled: &Modelled) -> Result<String, WorldError> {
     let of = novelty(mind, what)?.clone();
     let poses = |n: usize| modelled.keyframes.get(n).map(|k| k.world_from_camera);

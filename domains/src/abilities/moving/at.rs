@@ -1,4 +1,4 @@
-//! `(at ?where)`: where the robot stands.
+//! `(at ?where)`: place of the body.
 
 use crate::situation::Situation;
 

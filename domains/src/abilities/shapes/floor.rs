@@ -1,4 +1,4 @@
-//! Objects on the floor that the laser found and the map does not show, and the named shapes.
+//! Objects on the floor found by the laser outside the map, and the named shapes.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -23,13 +23,13 @@ const STRANGER: f64 = 0.5;
 /// 1 of 210 measured with closed outlines, see `experiments/measure/src/shapes`. Open outlines
 /// constrain scans less and are scanned once more before they are called unknown.
 const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
-/// Strangers taken for one of five known shapes once they are no looser than so much, metres: measured with 210 strangers that were scanned until then, and
-/// as long as several shapes were left.
+/// Probability that a stranger is taken for one of five known shapes, by looseness of the outline
+/// (metres): measured with 210 strangers, scanned until that looseness or until one shape was left.
 const TAKEN_FOR_KNOWN: [(f64, f64); 4] = [(0.01, 0.07), (0.02, 0.10), (0.16, 0.16), (f64::INFINITY, 0.60)];
 /// The number of known shapes in that measurement.
 const MEASURED_WITH: f64 = 5.0;
 
-/// The floor as the laser has found it: objects that the map does not show, and named shapes.
+/// Objects found by the laser outside the map, and the named shapes.
 #[derive(Clone, Default)]
 pub struct Floor {
     /// Named shapes: those of the domain, then learned ones.
@@ -38,19 +38,19 @@ pub struct Floor {
     pub learned: Vec<KnownShape>,
     /// Objects that were found.
     pub things: Vec<FloorThing>,
-    /// When each sweep was taken, and the pose.
+    /// Time and pose symbol of each sweep.
     pub sweeps: Vec<(i64, String)>,
     /// Records of the sweeps.
     pub records: Vec<descry_memory::RecordId>,
-    /// The floor that no sweep has passed over.
+    /// Floor that no sweep has passed over.
     pub unseen: UnseenFloor,
     /// Symbol of the shape whose place is requested; `None`: the goal is about [`THIS`].
     pub sought: Option<String>,
-    /// Names of shapes, by their symbols.
+    /// Spoken names of shapes, by symbol.
     pub names: Vec<(String, String)>,
-    /// Middles of places where something of the sought shape may stand unseen.
+    /// Unobserved places where an object of the sought shape may stand.
     pub room: Vec<Point2<f64>>,
-    /// Poses from which some of these can be seen.
+    /// Viewpoints of some of these places.
     pub promising: BTreeSet<String>,
     /// Number and distance of the viewpoints placed around a floor object.
     pub poses: Candidates,
@@ -77,7 +77,7 @@ pub struct FloorThing {
 
 /// Joint outline of an object's scans.
 pub struct Outline {
-    /// The scans brought together, in the map.
+    /// Aligned scans, in the map.
     pub alignment: Alignment,
     /// Expected gain of a scan from each viewpoint around the object.
     pub outlook: ScanGain,
@@ -89,7 +89,7 @@ impl Floor {
         self.things.iter().find(|t| t.symbol == name)
     }
 
-    /// True if a shape of that name is known.
+    /// True if a shape with this name is known.
     pub fn knows(&self, shape: &str) -> bool {
         self.known.iter().any(|k| symbol(&k.name) == shape)
     }
@@ -173,12 +173,12 @@ fn sure_of_name(loose_m: f64, known: usize) -> f64 {
     is / (is + by_chance(loose_m, known) * STRANGER)
 }
 
-/// The probability that a stranger fits one of so many known shapes.
+/// Probability that a stranger fits one of `known` shapes by chance.
 fn by_chance(loose_m: f64, known: usize) -> f64 {
     1.0 - (1.0 - up_to(&TAKEN_FOR_KNOWN, loose_m)).powf(known as f64 / MEASURED_WITH)
 }
 
-/// The share of the first bin that a looseness lies in.
+/// Value of the first bin that contains a looseness.
 fn up_to(bins: &[(f64, f64)], loose_m: f64) -> f64 {
     bins.iter().find(|(edge_m, _)| loose_m < *edge_m).map_or(1.0, |(_, share)| *share)
 }
@@ -228,7 +228,7 @@ pub(super) fn least_width_m(corners: &[Point2<f64>]) -> f64 {
 state!(Floor);
 
 impl Known {
-    /// The floor as the laser has found it.
+    /// The laser objects of the floor.
     pub(super) fn floor(&self) -> &Floor {
         self.states.get()
     }

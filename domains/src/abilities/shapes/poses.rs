@@ -10,7 +10,7 @@ use crate::mind::Mind;
 use crate::situation::Situation;
 use crate::viewpoint::Candidate;
 
-/// Poses from which the floor is surveyed lie so far from each other, metres.
+/// Spacing of the poses for surveying the floor, metres.
 const SURVEY_M: f64 = 3.0;
 
 /// Adds viewpoints around a point to the candidate poses; returns their symbols.
@@ -94,7 +94,7 @@ pub(super) fn seconds(s: &Situation, from: usize, way: &[usize]) -> f64 {
 /// Minimum distance of a straight drive from the object's centre, metres.
 const CLEAR_M: f64 = 0.9;
 
-/// True if the straight line between two poses keeps clear of a place.
+/// True if the straight line between two poses stays clear of a place.
 fn beside(s: &Situation, a: usize, b: usize, middle: &Point2<f64>) -> bool {
     let Some((a, b)) = point(s, a).zip(point(s, b)) else { return false };
     let along = b - a;

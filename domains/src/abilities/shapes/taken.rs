@@ -1,5 +1,5 @@
-//! Perception of a laser sweep: recorded, read back by its timestamp, separated from the map, and aligned
-//! with earlier readings of each thing.
+//! Perception of a laser sweep: recorded, read back by its timestamp, separated from the map, and
+//! assigned to objects.
 
 use std::sync::Arc;
 
@@ -26,14 +26,14 @@ use crate::symbol::symbol;
 /// Minimum distance of a reading in front of the mapped obstacle to belong to an object, metres;
 /// twice the localisation error is added.
 const BEFORE_MAP_M: f64 = 0.1;
-/// A scan tells of a thing's shape from no farther off, metres, and with no fewer readings of it.
+/// Maximum distance, metres, and minimum number of readings, of an object in a usable scan.
 const NEAR_M: f64 = 3.0;
 const LEAST_READINGS: usize = 5;
 /// Maximum distance of readings from the believed outline of an object to belong to it, metres.
 const SAME_M: f64 = 0.5;
 /// Half width assumed for an object with few readings, metres.
 const USUAL_RADIUS_M: f64 = 0.2;
-/// Beyond an error so long scans contradict each other: twice the laser's precision, metres.
+/// Error length beyond which scans contradict each other, metres: twice the laser's precision.
 pub(super) const LONGEST_M: f64 = 0.02;
 
 /// Options for aligning scans, from the body's localisation accuracy.
@@ -205,7 +205,7 @@ pub(super) fn recognise(s: &Situation, alignment: &Alignment, loose_m: f64) -> R
     recognise_scans(&alignment.model, loose_m, &s.floor().known, &options)
 }
 
-/// Sentence part about scans that contradict the others.
+/// Clause about scans that contradict the others.
 pub(super) fn contradict(alignment: &Alignment) -> String {
     let scans = match alignment.left_out.len() {
         0 => String::new(),

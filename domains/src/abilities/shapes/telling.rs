@@ -1,4 +1,5 @@
-//! Final answers about shapes: the shape of a thing, its place, and the poses that could not be scanned from.
+//! Final answers about shapes: identity and place of an object, and viewpoints that could not be
+//! used.
 
 use descry_perception::laser::Verdict as Taken;
 

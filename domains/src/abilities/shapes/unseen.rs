@@ -6,14 +6,14 @@ use descry_robots::OccupancyGrid;
 
 /// Distance before a reading's end beyond which the ray no longer proves free floor, metres.
 const BEFORE_M: f64 = 0.05;
-/// The maximum number of possible places whose visibility is checked.
+/// Maximum number of possible places whose visibility is tested.
 const ASKED: usize = 200;
 
-/// Floor that no sweep has passed over.
+/// Floor not covered by any sweep.
 #[derive(Clone, Default)]
 pub struct UnseenFloor {
     grid: Option<OccupancyGrid>,
-    /// Cells of the grid that are free by the map and were not passed over.
+    /// True, by cell, if mapped as free and not yet covered.
     open: Vec<bool>,
 }
 
@@ -50,7 +50,7 @@ impl UnseenFloor {
         }
     }
 
-    /// Middles of the discs of a radius on which something may stand.
+    /// Centres of uncovered discs of a radius on which an object may stand.
     pub fn room_for(&self, radius_m: f64) -> Vec<Point2<f64>> {
         let Some(grid) = &self.grid else { return Vec::new() };
         let reach = (radius_m / grid.resolution_m).floor() as isize;

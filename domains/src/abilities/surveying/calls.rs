@@ -38,7 +38,8 @@ fn expected_view(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     gain_m2(s, call).map(Answer::Number)
 }
 
-/// The share of all that is still unknown and can be seen, of all that confidence lacks: what is known already and left to be searched is worth more.
+/// Expected gain of confidence from the newly visible floor: its share of all unknown visible
+/// floor, scaled to half of what confidence lacks.
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let what = s.thing(argument(call, 1)?)?;
     Ok(Answer::Number((1.0 - s.confidence(what)) * share_shown(s, call)?))

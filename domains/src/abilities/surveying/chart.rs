@@ -29,29 +29,31 @@ use crate::viewpoint::Candidate;
 pub(super) const NAME: &str = "surveying";
 /// Edge length of the cells of observed space, metres.
 const CELL_M: f64 = 0.1;
-/// Depths beyond this are not used for the map, metres: the noise of a stereo camera grows with their square.
+/// Maximum depth used for the map, metres; the noise of a stereo camera grows with its square.
 const FAR_M: f64 = 5.0;
 /// Height range of obstacles to the body, metres.
 pub(super) const BODY_M: std::ops::RangeInclusive<f64> = 0.15..=1.6;
-/// Heights of level surfaces on which people put things, metres, and how large these are at least, square metres.
+/// Height range of supporting surfaces, metres; the next constant is their minimum area, square
+/// metres.
 const SURFACE_M: std::ops::RangeInclusive<f64> = 0.3..=1.4;
 const SURFACE_M2: f64 = 0.15;
 /// Clearance between the footprint and mapped obstacles, metres: half a cell, plus the pose error.
 const CLEAR_M: f64 = 0.08;
-/// Poses that a plan weighs against each other.
+/// Number of exploration poses offered to the planner.
 const WEIGHED: usize = 7;
-/// A look takes so long, seconds.
+/// Duration of a look, seconds.
 pub(super) const LOOK_S: f64 = 2.0;
 /// Floor that counts as unknown before the first look, square metres.
 pub(super) const NOTHING_SEEN_M2: f64 = 100.0;
 /// Maximum height difference of overlapping level surfaces that count as one, metres.
 const SAME_HEIGHT_M: f64 = 0.08;
 
-/// The map that the body makes itself.
+/// Map under construction by the body.
 #[derive(Clone, Default)]
 pub struct Chart {
     survey: Option<Survey>,
-    /// Poses of the looks of this run and earlier ones, aligned with the map: in the frame of the first look.
+    /// Poses of the looks of this run and earlier ones, aligned with the map, in the frame of the
+    /// first look.
     pub(super) stood: Vec<Isometry2<f64>>,
     /// Poses at which the body believed to be for these looks, in its own map.
     pub(super) believed: Vec<Isometry2<f64>>,
@@ -63,16 +65,16 @@ pub struct Chart {
     /// Routes with clearance, and routes without it for places that are unreachable otherwise.
     router: Option<Arc<Router>>,
     narrow: Option<Arc<Router>>,
-    /// Floor that drives have shown to be passable or not.
+    /// Passability of floor as learned from drives.
     pub(super) ground: Ground,
-    /// Poses from which more would be seen, by their symbols.
+    /// Exploration poses with their symbols.
     pub(super) open: Vec<(String, Outlook)>,
     /// Unknown floor visible only from places that became unreachable through failed drives, square
     /// metres.
     cut_off_m2: f64,
     /// Level supporting surfaces: names and observations.
     pub(super) surfaces: Vec<(String, Level)>,
-    /// Symbols that were given to poses so far.
+    /// Number of pose symbols assigned so far.
     given: usize,
     /// Viewpoints of surfaces.
     pub(super) poses: Candidates,
@@ -108,7 +110,7 @@ impl Chart {
         Some(kept)
     }
 
-    /// The survey so far.
+    /// Accumulated survey.
     pub(super) fn survey(&mut self) -> Result<&mut Survey, String> {
         if self.survey.is_none() {
             self.survey = Some(Survey::new(CELL_M).map_err(|e| e.to_string())?);
@@ -236,7 +238,7 @@ impl Chart {
         Some((floor, footing))
     }
 
-    /// The poses from which more would be seen, as places to go to.
+    /// Exploration poses as candidates.
     pub(super) fn poses(&self) -> impl Iterator<Item = Candidate> + '_ {
         self.open.iter().map(|(symbol, look)| {
             let at = self.map_from_chart * look.pose;
@@ -306,7 +308,7 @@ fn is_one(a: &Level, b: &Level) -> bool {
     (a.height_m - b.height_m).abs() < SAME_HEIGHT_M && (holds(a, &middle(b)) || holds(b, &middle(a)))
 }
 
-/// A grid in which only that is free where the middle of the body may be.
+/// Grid whose free cells are the positions of the body's centre.
 fn grid(floor: &Occupancy, stand: &[bool]) -> OccupancyGrid {
     let width = floor.width.max(1);
     OccupancyGrid {
@@ -361,7 +363,7 @@ pub(super) fn rectify(body: &Description, camera: &Camera) -> RectifyOptions {
 state!(Arc<Chart>);
 
 impl Known {
-    /// The map that the body has made itself.
+    /// Map of the body's own making.
     pub(super) fn chart(&self) -> &Chart {
         self.states.get::<Arc<Chart>>()
     }
@@ -470,7 +472,7 @@ impl OwnMap for Chart {
     }
 }
 
-/// The map with which a run begins.
+/// Initial map of a run.
 pub(super) fn recall(
     domain: &Domain,
     past: Option<&Past>,

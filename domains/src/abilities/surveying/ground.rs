@@ -31,7 +31,7 @@ pub struct Ground {
     pub barred: Vec<Point2<f64>>,
 }
 
-/// Squares on which the middle of the body may be, in the order of a grid's cells.
+/// True, by grid cell, if the body's centre may be there.
 pub struct Footing {
     /// Passable by all that is known, with a margin.
     pub stand: Vec<bool>,
@@ -216,14 +216,14 @@ fn points(way: &[Place]) -> impl Iterator<Item = Point2<f64>> {
     })
 }
 
-/// The point of a line that is nearest to a place.
+/// Point of a segment nearest to a place.
 pub fn nearest([a, b]: &[Point2<f64>; 2], p: &Point2<f64>) -> Point2<f64> {
     let along = b - a;
     let share = (p - a).dot(&along) / along.norm_squared();
     if share.is_finite() { a + along * share.clamp(0.0, 1.0) } else { *a }
 }
 
-/// Number of the square that holds a place.
+/// Index of the cell at a place.
 pub fn square(grid: &Occupancy, place: &Point2<f64>) -> Option<usize> {
     let at = ((place - grid.origin) / grid.cell_m).map(f64::floor);
     let rows = grid.cells.len() / grid.width.max(1);

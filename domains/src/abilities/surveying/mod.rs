@@ -26,7 +26,8 @@ use crate::note::Note;
 use crate::objective::Goal;
 use crate::situation::Situation;
 
-/// A look that maps goes to a place so far ahead and so high, metres: the floor begins near the body, and walls are seen up to the height of a man.
+/// Target of a mapping look, metres ahead and metres high, so that the floor near the body and
+/// walls up to a man's height are visible.
 const AHEAD_M: (f64, f64) = (3.0, 0.35);
 
 /// The skill that takes a look into the map.
@@ -80,7 +81,7 @@ fn ahead(s: &Situation) -> Option<Point3<f64>> {
     Some(Point3::new(pose.x_m + ahead_m * cos, pose.y_m + ahead_m * sin, height_m))
 }
 
-/// A look was taken.
+/// Handles a mapping look.
 fn charted(
     mind: &mut Mind,
     eyes: Eyes<'_>,

@@ -1,5 +1,5 @@
-//! Perception of a mapping look: recorded, read back by its timestamp, registered against earlier looks, and
-//! merged into the map.
+//! Perception of a mapping look: recorded, read back by its timestamp, registered to earlier looks,
+//! and added to the map.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ use crate::note::Note;
 use crate::own_map::OwnMap;
 use crate::viewpoint::Candidate;
 
-/// The kind under which the map is recorded.
+/// Record kind of the map.
 const MAP: &str = "map";
 /// Displacement of an extended surface's centre above which its ring of viewpoints is renewed,
 /// metres.

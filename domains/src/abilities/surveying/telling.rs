@@ -1,4 +1,4 @@
-//! Final answer where only the map was asked for.
+//! Final answer for goals about the map alone.
 
 use crate::conclusion::{Conclusion, Ended, Verdict};
 use crate::mind::Mind;
@@ -6,7 +6,7 @@ use crate::note::and_round;
 use crate::objective::Goal;
 use crate::situation::Situation;
 
-/// Answers a goal that is about the map alone; `None` for other goals.
+/// Answers a goal about the map alone; `None` for other goals.
 pub(super) fn answer(_: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
     if !(s.things.is_empty() && s.kinds.is_empty() && s.asked.is_empty()) {
         return None;

@@ -15,7 +15,7 @@ pub enum PcdEncoding {
     BinaryCompressed,
 }
 
-/// One field: `count` values of `size` bytes.
+/// Field: `count` values of `size` bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field {
     pub name: String,
@@ -42,7 +42,8 @@ impl Field {
         }
     }
 
-    /// Appends the bytes of a number in text. Colours of kind `F` stand in files both as packed whole numbers and as the float of the same bits.
+    /// Appends the binary form of a number in text. Colours of kind `F` occur both as packed
+    /// integers and as floats of the same bits.
     pub(super) fn encode(&self, token: &str, out: &mut Vec<u8>) -> Option<()> {
         let colour = matches!(self.name.as_str(), "rgb" | "rgba") && self.size == 4;
         let packed = colour.then(|| token.parse::<u32>().ok()).flatten();

@@ -14,15 +14,15 @@ pub struct PoseEvidence {
     /// Model points facing the camera, plus back-facing ones without a front: points of a visible
     /// side that was never learned.
     pub facing: usize,
-    /// Number of these points at which the camera measured a surface with the model's normal …
+    /// Number of these points with a measured surface of similar normal.
     pub explained: usize,
     /// Number of facing points that the camera saw through.
     pub through: usize,
     /// Number of points without information: occluded, without return, outside the image, or
     /// back-facing.
     pub hidden: usize,
-    /// Similarity of colours where explained: 1 the same, 0 altogether different; `None` if model
-    /// or scene has no colour.
+    /// Colour similarity of explained points, 1 (equal) to 0; `None` if model or scene has no
+    /// colour.
     pub colour: Option<f64>,
     /// Mean distance along the ray at explained points, in standard deviations of the camera.
     pub off_sigmas: f64,
@@ -104,11 +104,11 @@ impl Judge {
     }
 }
 
-/// Least cosine between the normals of model and scene where a point is explained.
+/// Minimum cosine between model and scene normals at an explained point.
 const TURNED_AS: f32 = 0.6;
 /// Farthest scene point that a point of the model explains, metres.
 pub(super) const NEAR_M: f32 = 0.012;
-/// Colour difference (CIE 1976, lightness counts half) at which colours no longer speak for a
+/// Colour difference (CIE 1976, lightness at half weight) from which colours are no evidence for a
 /// match.
 const UNLIKE: f32 = 14.0;
 /// Distance beyond explained points at which continuation of the scene is tested, metres, where no
@@ -116,7 +116,7 @@ const UNLIKE: f32 = 14.0;
 const BEYOND_M: f32 = 0.018;
 const WITHIN_M: f32 = 0.010;
 const SMOOTH: f32 = 0.94;
-/// Number of border points that are added as neutral evidence: a short border says little.
+/// Number of neutral border points added, so that a short border has little weight.
 const LEAST_BORDER: usize = 10;
 
 /// Evidence, and the scene's points that are explained.
@@ -234,7 +234,7 @@ fn rays(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView) 
     Rays { evidence: e, pairs, seen }
 }
 
-/// Mean likeness of colours of pairs (model, scene), after the lightness of the one is brought to that of the other.
+/// Mean colour similarity of pairs (model, scene), after equalising lightness.
 fn likeness(model: &Surfels, scene: &Surfels, pairs: &[(usize, usize)]) -> Option<f64> {
     let (a, b) = (model.lab.as_ref()?, scene.lab.as_ref()?);
     if pairs.is_empty() {
@@ -273,7 +273,7 @@ pub fn beyond(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &Scene
     carried as f64 / (asked + LEAST_BORDER) as f64
 }
 
-/// Tests if a surface with that normal is measured at a place; `None` if the place cannot be seen.
+/// True if a surface of the given normal is measured at a point; `None` if the point is invisible.
 fn carries_on(scene: &SceneView, q: &Point3<f64>, normal: &Vector3<f32>) -> Option<bool> {
     let off = scene.around(q)?.0 - q.z as f32;
     let tolerance = tolerance_m(q.z as f32);

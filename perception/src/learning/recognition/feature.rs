@@ -5,20 +5,20 @@ use super::surfels::{Surfels, across};
 use crate::pool;
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
-/// A described place.
+/// Keypoint with its descriptor's source.
 #[derive(Clone, Copy, Debug)]
 pub struct Feature {
     pub at: Point3<f32>,
     pub normal: Vector3<f32>,
 }
 
-/// Bytes that are compared in one go: of descriptors, and of codes.
+/// Number of descriptor or code bytes compared at once.
 const BLOCK: usize = 32;
 const CODE: usize = 16;
 /// Quantisation step of the descriptor's group sums in a code.
 const COARSE: u16 = 4;
 
-/// Features of one kind with their descriptors one after the other, in bytes, so that distances are quick.
+/// Features of one kind, with contiguous byte descriptors for fast distances.
 #[derive(Clone, Debug)]
 pub struct Descriptors {
     pub all: Vec<Feature>,
@@ -29,7 +29,7 @@ pub struct Descriptors {
     pub codes: Vec<[u8; CODE]>,
 }
 
-/// A feature of one set, the most alike of another's, and how far their descriptors are apart.
+/// Feature of one set, its most similar one of another set, and their descriptor distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alike {
     pub own: usize,
@@ -40,9 +40,9 @@ pub struct Alike {
 /// Kind of descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DescriptorKind {
-    /// Spread of the normals around a place.
+    /// Distribution of normals around a keypoint.
     Shape,
-    /// The colours around a place, in the tangent plane.
+    /// Colours around a keypoint, in the tangent plane.
     Pattern,
 }
 
@@ -55,7 +55,8 @@ impl DescriptorKind {
         }
     }
 
-    /// The byte of the code that a byte goes into: shapes' by sector, whatever the angle between normals, patterns' by squares of four cells.
+    /// Code byte that a descriptor byte contributes to: by sector for shapes, by squares of four
+    /// cells for patterns.
     const fn sum_of(self, byte: usize) -> usize {
         match self {
             DescriptorKind::Shape => byte / SECTORS[3],
@@ -68,12 +69,12 @@ impl DescriptorKind {
 }
 
 impl Descriptors {
-    /// An empty set of features of a kind.
+    /// Empty set of a kind.
     pub fn none(kind: DescriptorKind) -> Descriptors {
         Descriptors { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }
 
-    /// Features at some points of a surfel cloud; points without enough neighbours have none.
+    /// Features at keypoints of a surfel cloud; points without enough neighbours are skipped.
     pub fn of(surfels: &Surfels, keypoints: &[u32], kind: DescriptorKind) -> Descriptors {
         let describe = |&i: &u32| {
             let descriptor = match kind {
@@ -145,7 +146,7 @@ impl Descriptors {
         /// comparison; a factor of two gave more false answers.
         const LIKELY: usize = 6;
         const CLOSE: usize = 24;
-        /// Number of features in the middle by their codes that give the median.
+        /// Number of features, central by their codes, that determine the median.
         const MIDDLE: usize = 15;
         let codes = |own: usize| {
             let code = self.code(own);
@@ -193,7 +194,8 @@ pub fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
     a.iter().zip(b).map(of).sum()
 }
 
-/// Features of a model nearer to each other than this, metres, whose descriptors differ by no more in all (a unit a byte) are one.
+/// Maximum distance of features of a model, metres, and of their descriptors, at which they are
+/// one.
 const SAME_PLACE_M: f32 = 0.004;
 const SAME_OFF: u32 = 256;
 
@@ -232,7 +234,7 @@ fn shape(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
     (length > 0.0).then(|| bins.iter().map(|b| (510.0 * b / length).min(255.0) as u8).collect())
 }
 
-/// Adds one to the bins around a place, by proportion; azimuth goes round, the others end.
+/// Adds a unit to the bins around a position by interpolation; azimuth wraps, the others end.
 fn spread(bins: &mut [f32], places: [f32; 4]) {
     for corner in 0..16_usize {
         let (mut index, mut weight) = (0, 1.0);
@@ -249,8 +251,8 @@ fn spread(bins: &mut [f32], places: [f32; 4]) {
     }
 }
 
-/// Rows are the axes of the local reference frame: by the spread of the neighbours weighed by nearness, z to the side of the normal, x to
-/// where most neighbours lie.
+/// Local reference frame as rows: axes from the distance-weighted scatter of the neighbours, z
+/// towards the normal, x towards the majority.
 fn local_frame(
     surfels: &Surfels,
     at: &Point3<f32>,

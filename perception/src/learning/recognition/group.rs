@@ -5,7 +5,7 @@ use super::feature::{Descriptors, Feature};
 use crate::register::rigid;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// A place of the model and one of the scene that look alike.
+/// Keypoint of the model and similar keypoint of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Correspondence<'a> {
     pub model: &'a Feature,
@@ -14,7 +14,7 @@ pub struct Correspondence<'a> {
     pub off: f32,
 }
 
-/// Most matches of one kind that are grouped, and most groups begun.
+/// Maximum number of matches of one kind that are grouped, and of groups begun.
 const MATCHES: usize = 300;
 const SEEDS: usize = 120;
 /// Matches of a group agree in distances to this, metres, and in cosines between normals to this.
@@ -128,7 +128,7 @@ fn agree(a: &Correspondence, b: &Correspondence) -> bool {
         && (a.model.normal.dot(&b.model.normal) - a.scene.normal.dot(&b.scene.normal)).abs() < AGREE_COS
 }
 
-/// The pose of least squares of the places and of points out along the normals.
+/// Least-squares pose from points and points offset along the normals.
 pub fn pose(group: &[Correspondence]) -> Option<Isometry3<f64>> {
     let out = |f: &Feature| -> [Point3<f64>; 2] {
         let at = f.at.cast::<f64>();

@@ -8,7 +8,7 @@ use std::f32::consts::TAU;
 
 /// Tilt from the vertical above which an object lies, radians.
 const TILTED_RAD: f64 = 0.35;
-/// Points no higher above the lowest are of the foot, metres.
+/// Maximum height above the lowest point of foot points, metres.
 const FOOT_M: f32 = 0.015;
 /// Number of directions around the foot, and distance from it in metres, in which a support is
 /// sought.
@@ -19,9 +19,9 @@ const BESIDE_M: f32 = 0.02;
 const STEP_M: f64 = 0.03;
 /// Minimum cosine between up and the normal of a level surface.
 const LEVEL: f64 = 0.8;
-/// Fewest places that give evidence.
+/// Minimum number of places with evidence.
 const LEAST: usize = 6;
-/// Ratio of places seen past to places that carry the model from which the model floats.
+/// Ratio of places seen past to supporting places, from which the model floats.
 const FLOATS: usize = 2;
 
 /// False if a model is tilted, or hardly supported: the camera saw past the support height all

@@ -1,4 +1,4 @@
-//! Recognition from several looks: candidates of each look are tested against all others.
+//! Recognition from several views: candidates of each view are tested against all others.
 
 use super::error::KnowError;
 use super::evidence::{PoseEvidence, verify};
@@ -110,8 +110,8 @@ impl Library {
 }
 
 impl PoseEvidence {
-    /// Combines the evidence of several looks: free space in one counts against matches in others.
-    /// Errors of looks are correlated, so n looks count as √n.
+    /// Combines the evidence of several views: free space in one counts against matches in others.
+    /// Errors of views are correlated, so n views count as √n.
     fn of_several(all: &[PoseEvidence]) -> PoseEvidence {
         let root = (all.len().max(1) as f64).sqrt();
         let sum = |of: fn(&PoseEvidence) -> usize| {

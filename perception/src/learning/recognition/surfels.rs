@@ -25,7 +25,7 @@ pub fn across(along: &Vector3<f32>) -> Vector3<f32> {
 pub struct Surfels {
     pub points: Vec<Point3<f32>>,
     pub normals: Vec<Vector3<f32>>,
-    /// CIE L*, a*, b*; none if the cloud has no colours.
+    /// CIE L*, a*, b*; `None` without colours.
     pub lab: Option<Vec<[f32; 3]>>,
     pub tree: Neighbours,
 }

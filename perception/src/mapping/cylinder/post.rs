@@ -4,7 +4,7 @@ use super::{Column, mean_m2};
 use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
-/// Turns that are tried, and rounds in which the sides come to rest.
+/// Number of tried rotations, and iterations of fitting the sides.
 const TURNS: usize = 22;
 const ROUNDS: usize = 5;
 /// Maximum distance of columns that influence a side, in tolerances.

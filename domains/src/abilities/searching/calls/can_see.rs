@@ -1,4 +1,5 @@
-//! `[can-see ?from ?on]`: whether a look from a pose shows any of a surface, by the camera's field of view and range.
+//! `[can-see ?from ?on]`: true if a look from a viewpoint shows any part of a surface, by field of
+//! view and range.
 
 use descry_planner::{Answer, Call, CallError};
 

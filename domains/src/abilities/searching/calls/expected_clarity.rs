@@ -1,4 +1,4 @@
-//! `[expected-clarity ?from ?on]`: by how much a look is expected to raise the clarity of a surface.
+//! `[expected-clarity ?from ?on]`: expected rise of a surface's clarity by a look.
 
 use descry_planner::{Answer, Call, CallError};
 

@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.surfaces.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty: unknown for a surface that was not looked at.
+/// Bounds on the certainty; unknown for a surface without a look.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of {
         [Referent::Named(on)] => match s.surface(on) {

@@ -10,7 +10,7 @@ pub(super) fn state(situation: &Situation) -> Vec<String> {
     (0..situation.kinds.len()).map(fluent).collect()
 }
 
-/// Bounds on the certainty: unknown for a kind that was not looked for.
+/// Bounds on the certainty; unknown for a kind that was not searched.
 pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
     match of.first() {
         Some(Referent::Named(kind)) => match s.kind(kind) {

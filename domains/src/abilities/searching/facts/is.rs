@@ -1,4 +1,4 @@
-//! `(is ?what ?kind)`: an object that was seen is surely of a kind.
+//! `(is ?what ?kind)`: a seen object certainly is of a kind.
 
 use descry_memory::belief::Track;
 use descry_perception::recognise::ObjectModel;

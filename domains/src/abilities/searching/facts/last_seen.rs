@@ -1,4 +1,5 @@
-//! `(last-seen ?what ?on)` and `(hours-since ?what)`: where an earlier run saw a sought object last, and how long ago.
+//! `(last-seen ?what ?on)` and `(hours-since ?what)`: place and age of an earlier run's last
+//! sighting of a sought object.
 
 use descry_memory::remember::Recollection;
 

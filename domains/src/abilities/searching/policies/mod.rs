@@ -30,11 +30,11 @@ pub const PLAN: &str = "plan";
 pub struct Chooser {
     /// Maker of the choice.
     pub by: By,
-    /// True if the first look is taken from where the body stands, without a choice.
+    /// True if the first look is taken from the body's pose, without a choice.
     pub first_look_here: bool,
 }
 
-/// Who chooses where to look next.
+/// Maker of the choice where to look next.
 pub enum By {
     /// The planner.
     Planner,
@@ -80,7 +80,7 @@ const ALL: [(&str, &str, Make); 8] = [
 /// Error of an unavailable policy.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum PolicyError {
-    /// No policy has that name.
+    /// No policy has this name.
     #[error("no policy is called \"{name}\"\n  expected one of: {known}")]
     Unknown {
         /// The requested name.

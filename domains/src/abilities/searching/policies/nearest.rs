@@ -1,4 +1,4 @@
-//! `nearest`: from the nearest pose that has not been looked from.
+//! `nearest`: the nearest viewpoint not used yet.
 
 use super::policy::{Look, Policy, best};
 use crate::situation::Situation;

@@ -4,7 +4,7 @@ use descry_robots::Place;
 
 use crate::situation::Situation;
 
-/// A look that could be taken.
+/// Possible look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// The candidate to look from.
@@ -29,8 +29,8 @@ pub trait Policy: Send {
     }
 }
 
-/// True visibility of the requested object in a look from a place at a named surface, 0 to 1; in experiments
-/// in simulation only.
+/// True visibility of the requested object in a look from a place at a named surface, 0 to 1;
+/// available in simulated experiments only.
 pub type Foresight = Box<dyn Fn(&Place, &str) -> f64 + Send>;
 
 /// The look of the greatest value; among equals the nearest, then the first.

@@ -1,4 +1,4 @@
-//! The space above a surface that no view has shown, as points on a grid.
+//! Unobserved space above a surface, as points on a grid.
 
 use descry_memory::space::Cell;
 use descry_perception::nalgebra::{Point3, Vector3};

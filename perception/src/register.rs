@@ -1,4 +1,4 @@
-//! Bringing one cloud onto another: iterative closest point in three kinds, with results that explain themselves.
+//! Registration of clouds: three variants of ICP with diagnosable results.
 
 mod align;
 mod equations;
@@ -58,7 +58,7 @@ impl Prepared {
         self.normals.as_deref()
     }
 
-    /// Their tree.
+    /// Search tree of the points.
     pub fn tree(&self) -> &Neighbours {
         &self.tree
     }
@@ -71,7 +71,7 @@ pub enum Method {
     PointToPoint,
     /// Distances of the source's points from the target's tangent planes (Chen and Medioni 1992).
     PointToPlane,
-    /// Distances weighted by the shape of the surface at both ends (Segal, Haehnel, Thrun 2009).
+    /// Distances weighted by the local surface shape at both points (Segal, Haehnel, Thrun 2009).
     Generalised,
 }
 
@@ -82,7 +82,7 @@ pub struct RegisterOptions {
     pub method: Method,
     /// The initial pose of the source in the target.
     pub start_target_from_source: Isometry3<f64>,
-    /// Partners are no farther apart, metres.
+    /// Maximum correspondence distance, metres.
     pub within_m: f32,
     /// Most rounds of pairing and moving.
     pub rounds: usize,
@@ -187,7 +187,7 @@ pub enum RegisterError {
         /// The method.
         method: Method,
     },
-    /// An option that is no positive length.
+    /// Length option that is not positive.
     #[error("{name} is {value_m} m: give a positive length")]
     Length {
         /// The name of the option.
@@ -195,7 +195,7 @@ pub enum RegisterError {
         /// The value that was given.
         value_m: f64,
     },
-    /// The start is not finite.
+    /// Non-finite initial pose.
     #[error("the start pose is not finite: mend the transform it came from")]
     Start,
 }

@@ -1,4 +1,4 @@
-//! Fitting an upright body of revolution with straight sides (a cylinder, a cup) to one object.
+//! Fits an upright body of revolution with straight sides (cylinder, cup) to one object.
 
 #[doc(hidden)]
 pub mod lying;
@@ -25,9 +25,9 @@ const SCOUTS: usize = 800;
 const FEWEST: (usize, usize) = (20, 12);
 /// Gates of the first steps of a fit, in tolerances. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];
-/// Directions around an axis that are looked at one by one. From: chosen.
+/// Number of directions around an axis. From: chosen.
 pub const SECTORS: usize = 36;
-/// The side is not looked for in these shares of the height, at the foot and below the top. From: chosen.
+/// Shares of the height, at the foot and below the top, excluded from the side. From: chosen.
 pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
 /// Prior standard deviations of radius, metres, and slope of objects on tables, and the maximum
 /// slope. From: chosen.
@@ -38,7 +38,7 @@ pub const STEEPEST: f64 = 0.6;
 /// explains a third. From: chosen, just above a third; on real mugs a circle explains half of the
 /// side.
 pub(crate) const NO_CIRCLE: f64 = 0.34;
-/// Seed of the circles proposed where a segment is measured. From: mark.
+/// Seed of the proposed circles in segments. From: mark.
 pub(crate) const SEED: u64 = 7;
 
 /// An upright cone frustum in the surface's frame.
@@ -69,8 +69,8 @@ pub struct Round {
     pub inliers: f64,
 }
 
-/// An end of the body's silhouette against free space: the side of the body reaches `reach_m` from the origin
-/// along `direction` at a height.
+/// End of the body's silhouette against free space: along `direction`, the side reaches `reach_m`
+/// from the origin at a height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Edge {
     /// Horizontal unit vector.
@@ -81,15 +81,15 @@ pub(crate) struct Edge {
     pub height_m: f64,
 }
 
-/// Spread of where a silhouette ends, metres: about a pixel and a half at arm's length. From: chosen.
+/// Standard deviation of a silhouette end, metres: about a pixel and a half at arm's length.
+/// From: chosen.
 const EDGE_SIGMA_M: f64 = 0.0025;
 /// Maximum effective number of points of one body, per view where views are registered on it:
 /// depths of one body share systematic errors (a structured-light camera flattens round surfaces).
 /// From: chosen.
 pub(crate) const MOST_INDEPENDENT: f64 = 25.0;
 
-/// Factor on the tolerance within which a point counts as part of the side, once the fit is near.
-/// From: chosen.
+/// Tolerance factor for points on the side in the last iterations. From: chosen.
 const LAST_GATE: f64 = 1.5;
 /// Maximum outside distance that counts, metres; larger distances are clamped. From: chosen.
 const OUTSIDE_M: f64 = 0.02;
@@ -109,7 +109,7 @@ impl Round {
 /// Sector index, of [`SECTORS`], of the direction (`x`, `y`) from an axis.
 #[inline]
 pub fn sector(x: f64, y: f64) -> usize {
-    /// Tangents of the ends of a quarter's sectors, without the last. From: derived, every ten degrees.
+    /// Tangents of the sector borders within a quarter turn. From: derived, every ten degrees.
     const ENDS: [f64; SECTORS / 4 - 1] = [
         0.176_326_980_708_464_98,
         0.363_970_234_266_202_36,
@@ -242,7 +242,8 @@ pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     base_m + ENDS.0 * height..top_m - ENDS.1 * height
 }
 
-/// The circle through three points that most points lie on and fewest outside of, seen from above, from the first point of the side.
+/// Circle through three points with the most points on it and the fewest outside, seen from above,
+/// relative to the side's first point.
 fn propose(side: &SidePoints, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
     let judges = side.judges(JUDGES);
@@ -261,7 +262,8 @@ fn propose(side: &SidePoints, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
 
 fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
     let (bx, by, cx, cy) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
-    /// Four times the area of three points that are taken to lie on a line, square metres. From: rounding.
+    /// Minimum of four times the area of three points for a circle through them, square metres.
+    /// From: rounding.
     const FLAT_M2: f64 = 1e-7;
     let twice = 2.0 * (bx * cy - by * cx);
     if twice.abs() < FLAT_M2 {
@@ -272,7 +274,7 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
     Some([a[0] + ux, a[1] + uy, distance(ux, uy)])
 }
 
-/// One Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
+/// Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
 fn improve(round: &Round, side: &SidePoints, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
     let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
     if count < FEWEST.1 as f64 {

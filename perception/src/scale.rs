@@ -1,4 +1,4 @@
-//! Lengths that many judgements share: how exactly a place, an edge and a shape are known once views are merged.
+//! Shared length scales: accuracy of positions, edges and shapes in merged views.
 
 /// Position accuracy in merged views: closer points count as one place, metres. From: chosen, what
 /// is left of poses that err by centimetres; most uses bear half of it and twice as much.
@@ -8,8 +8,7 @@ pub(crate) const PLACE_M: f64 = 0.008;
 pub const APART_M: f64 = 2.0 * PLACE_M;
 /// Accuracy of an edge or an end, metres. From: derived, half of a place.
 pub const EDGE_M: f64 = 0.5 * PLACE_M;
-/// Deviation of real things from the straight forms that they are compared with, metres. From: derived, half
-/// of an edge.
+/// Deviation of real objects from the ideal forms, metres. From: derived, half of an edge.
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
 /// Number of spreads of a measurement beyond which a deviation is more than noise. From: chosen.
 pub(crate) const SPREADS: f64 = 3.0;

@@ -1,4 +1,5 @@
-//! The objects on a surface, each in one piece (paper 004, section V: plane away, clusters; here also touching and stacked objects).
+//! Segmentation of the objects on a surface (paper 004, section V: plane removal and clustering;
+//! here also touching and stacked objects).
 //!
 //! Points above the surface are gathered into voxels, voxels into small flat patches. Patches of one object meet convexly or
 //! smoothly; where two objects touch, the surface has a concave crease. Vessels are the exception that is mended afterwards: what lies inside
@@ -119,7 +120,8 @@ fn above(cloud: &Cloud, surface: &Surface, options: &SceneOptions) -> Placed {
 
 /// Points above the surface among consecutive ones, numbered from `from`.
 fn above_of(from: u32, of: &[Point3<f32>], surface: &Surface, rows: &Rows, options: &SceneOptions) -> Placed {
-    /// Number of spreads of the surface within which a point belongs to the surface itself. From: chosen.
+    /// Multiple of the surface's standard deviation within which points belong to the surface.
+    /// From: chosen.
     const ROUGH: f64 = 2.5;
     /// Number of points whose heights are computed together. From: work.
     const BLOCK: usize = 16;

@@ -38,7 +38,7 @@ impl Moments {
     }
 }
 
-/// Covariance (xx xy xz yy yz zz) from a count, the sum and the sums of products about any one reference.
+/// Covariance (xx xy xz yy yz zz) from count, sum and sum of products about a common reference.
 #[inline(always)]
 pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64; 6] {
     let per = 1.0 / count;
@@ -57,7 +57,7 @@ pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64;
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
     pub normal: [f64; 3],
-    /// Least eigenvalue as a part of all three: 0 flat, 1/3 round.
+    /// Least eigenvalue as a share of the sum: 0 is flat, 1/3 isotropic.
     pub share: f64,
 }
 
@@ -71,7 +71,8 @@ const MOST_STEPS: usize = 40;
 /// Minimum step of the iteration; the remaining error is about its square and negligible.
 const LAST_STEP: f64 = 1e-8;
 
-/// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` if the points lie on a line or in one place.
+/// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` for collinear or
+/// coincident points.
 #[inline(always)]
 pub fn least(c: &[f64; 6]) -> Option<Least> {
     let [least] = least_of(&c.map(|value| [value]));

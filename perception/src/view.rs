@@ -5,7 +5,7 @@ use crate::cloud::Cloud;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// The view of a camera from one pose.
+/// View: cloud and camera pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
     /// The time of the view, nanoseconds in the clock of the recording.
@@ -16,9 +16,9 @@ pub struct View {
     pub intrinsics: Option<Intrinsics>,
     /// The pose of the camera as stated by localisation.
     pub world_from_camera: Isometry3<f64>,
-    /// Standard deviation of that position along each axis, metres.
+    /// Standard deviation of the camera's position along each axis, metres.
     pub pose_sigma_m: f64,
-    /// Standard deviation of that orientation about each axis, radians.
+    /// Standard deviation of the camera's orientation about each axis, radians.
     pub pose_sigma_rad: f64,
 }
 

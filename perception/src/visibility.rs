@@ -1,4 +1,4 @@
-//! Visibility of places to the cameras: free, surface, hidden or never looked at.
+//! Visibility of points: free, surface, hidden, or never observed.
 //!
 //! A recogniser may only count something as absent (a handle, a lid) where a camera looked *through* the place.
 
@@ -10,7 +10,7 @@ use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// The state of a place in one camera's view, or in the best of several.
+/// State of a point in one camera's view, or in the best of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
     /// Outside all views, or a pixel without return.
@@ -26,7 +26,7 @@ pub enum Seen {
 /// Depth image of one view with the (corrected) camera pose.
 #[derive(Clone, Debug)]
 pub struct DepthMap {
-    /// The camera; the image has its size.
+    /// Camera intrinsics; the image has their size.
     pub intrinsics: Intrinsics,
     /// World to optical frame.
     pub camera_from_world: Isometry3<f64>,
@@ -37,7 +37,7 @@ pub struct DepthMap {
 /// All that the cameras of a scene saw.
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
-    /// One map a look.
+    /// One depth map per view.
     pub maps: Vec<DepthMap>,
     /// True if the maps are original camera images, so that their rows show the cameras' attitude.
     pub held: bool,
@@ -60,7 +60,7 @@ impl DepthMap {
         Some(DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m })
     }
 
-    /// A depth map made by projecting a cloud (least depth a pixel); holes stay "no return".
+    /// Depth map from projecting a cloud (minimum depth per pixel); holes stay missing returns.
     fn project(
         cloud: &Cloud,
         camera_from_cloud: &Isometry3<f64>,

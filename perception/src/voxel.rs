@@ -6,13 +6,13 @@ use nalgebra::{Point3, Vector3};
 /// Voxels that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VoxelError {
-    /// The edge is no positive length.
+    /// Edge length that is not positive.
     #[error("a voxel edge of {edge_m} m: give a positive length, such as 0.01")]
     Edge {
         /// The value that was given.
         edge_m: f32,
     },
-    /// A point lies outside of the two million voxels that an axis can count.
+    /// Point beyond the two million voxels that an axis can number.
     #[error(
         "point {index} lies {distance_m} m out, too far for voxels of {edge_m} m (the farthest is {farthest_m} m): \
          are these millimetres (scale by 0.001), or a stray return?"
@@ -32,7 +32,7 @@ pub enum VoxelError {
 /// Voxels an axis on each side of zero; three axes fill 63 bits.
 const HALF_RANGE: i64 = 1 << 20;
 
-/// The whole number below. The standard one is a call where the processor's oldest instruction set is aimed at.
+/// Floor as an integer; the standard function is slow on the oldest instruction set.
 #[inline(always)]
 pub(crate) fn floor(value: f64) -> i64 {
     let toward_zero = value as i64;
@@ -80,7 +80,7 @@ pub fn downsample(cloud: &Cloud, edge_m: f32) -> Result<Cloud, VoxelError> {
     Ok(Cloud { points, grid: None, colours, normals, labels })
 }
 
-/// The voxel of a point that has none.
+/// Mark of a point without a voxel.
 pub const NONE: u32 = u32::MAX;
 
 /// The voxel of each point.

@@ -51,7 +51,7 @@ pub enum FactValue {
     Number(f64),
     /// Value of an object fluent: the object's name.
     Object(Arc<str>),
-    /// A fluent that has no value yet.
+    /// Undefined fluent.
     Undefined,
 }
 
@@ -62,7 +62,7 @@ pub struct Reading {
     pub symbol: Arc<str>,
     /// Names of objects.
     pub arguments: Arc<[Arc<str>]>,
-    /// The value in the state in which the call is made.
+    /// Value in the state of the call.
     pub value: FactValue,
 }
 
@@ -74,11 +74,11 @@ pub enum Read {
     /// Instances whose arguments equal the call's arguments at the given positions; `None`: any
     /// object.
     At(String, Vec<Option<usize>>),
-    /// The whole state. The cache then helps only where a state recurs.
+    /// Whole state; the cache then helps only for recurring states.
     Everything,
 }
 
-/// One question to an attachment.
+/// Question to an attachment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Call {
     /// The module's PDDL name.
@@ -176,11 +176,11 @@ impl Answer {
     }
 }
 
-/// Reason for which an attachment gave no usable answer.
+/// Error of an attachment without a usable answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CallError {
-    /// The attachment itself reports a failure.
+    /// Failure reported by the attachment.
     #[error("{0}")]
     Failed(String),
     /// The attachment read a fact that is not declared in `reads`, or has another type.
@@ -191,7 +191,7 @@ pub enum CallError {
         /// The type looked for.
         expected: &'static str,
     },
-    /// An answer of the wrong kind, a negative or undefined cost, or a number that is not finite.
+    /// Answer of the wrong kind, a negative or undefined cost, or a non-finite number.
     #[error("answered {got}, expected {expected}")]
     WrongAnswer {
         /// Expected answer.
@@ -199,7 +199,7 @@ pub enum CallError {
         /// Given answer.
         got: String,
     },
-    /// No answer in time.
+    /// No answer within the time limit.
     #[error("no answer within {limit_s} s")]
     TimedOut {
         /// The time limit.
@@ -245,7 +245,7 @@ pub trait Attachment: Send + Sync {
     /// The exact answer.
     fn evaluate(&self, call: &Call) -> Result<Answer, CallError>;
 
-    /// A cheap answer for heuristics, or `None` if the exact one is as good (the default).
+    /// Cheap answer for heuristics; `None` (the default) if the exact one is as good.
     ///
     /// It should be optimistic (a cost not above the exact one, false only where the exact answer is false), or
     /// plans may be missed and *unsolvable* may be wrong.
@@ -258,7 +258,7 @@ pub trait Attachment: Send + Sync {
         calls.iter().map(|call| self.evaluate(call)).collect()
     }
 
-    /// Takes one entry of `:moduleoptions`: the arguments after the name under which this attachment is registered.
+    /// Receives one entry of `:moduleoptions`: the arguments after this attachment's name.
     fn configure(&self, _options: &[String]) -> Result<(), CallError> {
         Ok(())
     }

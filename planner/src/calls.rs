@@ -40,7 +40,7 @@ struct Asked<'a> {
     sources: Option<Arc<Sources>>,
 }
 
-/// A ground call: who is asked, about which objects, and where the readings come from.
+/// Ground call: attachment, arguments, and sources of the readings.
 #[derive(Clone, Copy)]
 struct Bound<'b> {
     asked: &'b Asked<'b>,
@@ -185,7 +185,7 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// True if a condition module gives the needed answer; refusals are remembered.
+    /// True if a condition module gives the needed answer; refusals are recorded.
     pub fn agrees(
         &self,
         (call, wanted): (CallId, bool),
@@ -292,13 +292,13 @@ impl<'a> Calls<'a> {
         (&sources.variables, &sources.numbers)
     }
 
-    /// True if the answer, without a proposed parameter, is the same in every state.
+    /// True if the answer, without a proposed parameter, is independent of the state.
     pub fn settles(&self, call: CallId) -> bool {
         let (variables, numbers) = self.reads(call);
         variables.is_empty() && numbers.is_empty()
     }
 
-    /// Answers so far that differed from the needed ones.
+    /// Recorded answers that differed from the needed ones.
     pub fn refusals(&self) -> Refusals {
         let mut refusals = Refusals::default();
         let refused = self.refused.borrow();

@@ -1,4 +1,4 @@
-//! Diagnostics: faults of a text, with place and mend.
+//! Diagnostics: faults of a text with place and remedy.
 
 mod excerpt;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct Source {
     /// Name of the text in messages.
     pub name: String,
-    /// The text itself.
+    /// Source text.
     pub text: String,
 }
 
@@ -66,9 +66,9 @@ pub enum Severity {
 /// Span with a message.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Label {
-    /// The place.
+    /// Span of the label.
     pub span: Span,
-    /// Text at the place.
+    /// Message at the span.
     pub text: String,
 }
 
@@ -81,14 +81,14 @@ pub struct Diagnostic {
     pub code: &'static str,
     /// The fault in one sentence, without the place.
     pub message: String,
-    /// The places; the first is where the finding is reported.
+    /// Labels; the finding is reported at the first.
     pub labels: Vec<Label>,
     /// Mend.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
-    /// A fault at a place.
+    /// Error at a span.
     pub fn error(
         code: &'static str,
         message: impl Into<String>,
@@ -98,7 +98,7 @@ impl Diagnostic {
         Self::new(Severity::Error, code, message, span, label)
     }
 
-    /// A warning at a place.
+    /// Warning at a span.
     pub fn warning(
         code: &'static str,
         message: impl Into<String>,
@@ -182,7 +182,7 @@ impl Findings {
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
     }
 
-    /// File, line and column of a place, both from 1.
+    /// File, line and column of a span's start, from 1.
     pub fn place(&self, span: Span) -> (&str, usize, usize) {
         let Some(source) = self.sources.get(span.source as usize) else { return ("", 1, 1) };
         let (line, column) = excerpt::line_and_column(&source.text, span.start as usize);

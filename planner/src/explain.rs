@@ -40,10 +40,10 @@ pub struct Explanation {
     /// True if the goal is reachable under delete relaxation.
     #[serde(skip)]
     pub(crate) only_lost: bool,
-    /// True if the only reason is that every state was seen and none fulfils the whole goal.
+    /// True if the only reason is exhaustion: no reachable state fulfils the whole goal.
     #[serde(skip)]
     pub(crate) exhausted: bool,
-    /// Attachments that did not answer as needed, in the order of their findings.
+    /// Refusing attachments, in the order of their findings.
     #[serde(skip)]
     refused: Vec<NoPlan>,
 }
@@ -52,7 +52,7 @@ pub struct Explanation {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum NoPlan {
-    /// An attachment did not answer as needed.
+    /// An attachment refused.
     Refused {
         /// Name of the attachment.
         module: String,
@@ -61,7 +61,7 @@ pub enum NoPlan {
         /// Refused calls, in PDDL.
         calls: Vec<String>,
     },
-    /// Every state that can be reached was seen, and none fulfils the goal.
+    /// No reachable state fulfils the goal.
     Exhausted,
     /// Other reason, in one sentence.
     Finding {
@@ -72,13 +72,13 @@ pub enum NoPlan {
     },
 }
 
-/// An answer of an attachment that leaves no plan.
+/// Refusal by an attachment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refusal {
-    /// No, where yes is needed.
+    /// "No" where "yes" is needed.
     No,
-    /// Yes, where no is needed.
+    /// "Yes" where "no" is needed.
     Yes,
     /// An infinite cost.
     Impossible,
@@ -125,7 +125,7 @@ impl Explanation {
 
 /// Code of findings about the goal or a part of the goal.
 const UNSOLVABLE: &str = "unsolvable";
-/// Code of findings about attachments that did not answer as needed.
+/// Code of findings about refusing attachments.
 const REFUSED: &str = "attachment-refused";
 /// Code of findings about actions that could overlap themselves.
 const OVERLAP: &str = "overlap-untried";
@@ -145,7 +145,7 @@ impl fmt::Display for Explanation {
     }
 }
 
-/// Calls that were not answered as needed, by module and whether yes was needed (of a cost: a finite one).
+/// Refused calls by module and needed answer (of a cost: finite).
 pub(crate) type Refusals = BTreeMap<(u32, bool), Vec<String>>;
 
 /// The maximum number of refused calls shown for one module.
@@ -199,7 +199,7 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     Explanation { only_lost, exhausted, refused: told_refused, ..Explanation::new(task, list) }
 }
 
-/// Message where no relaxation gives a better reason.
+/// Message when no relaxation gives a better reason.
 const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
 
 /// Explanation that no plan satisfies the constraints; `reachable`: plans exist that violate them.

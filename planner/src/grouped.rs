@@ -5,7 +5,7 @@ use std::ops::Range;
 /// Values grouped by key, in their order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Grouped<T> {
-    /// Begin of the values of each key; one more for the end.
+    /// Start of each key's values, plus the total.
     from: Vec<u32>,
     pub(crate) values: Vec<T>,
 }

@@ -25,7 +25,7 @@ impl MemoryLimit {
         (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
     }
 
-    /// The limit that remains beside `others` bytes in use elsewhere.
+    /// Limit that remains besides `others` bytes used elsewhere.
     pub fn beside(self, others: usize) -> MemoryLimit {
         match self.used {
             Some(_) => self,
@@ -86,12 +86,12 @@ impl<T> Rows<T> {
         self.len = 0;
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.pieces.iter().map(|piece| piece.capacity() * size_of::<T>()).sum()
     }
 
-    /// The piece that the next row belongs to. The first one grows as lists do: most are never filled.
+    /// Chunk for the next row. The first grows like a vector, because most are never filled.
     fn last(&mut self) -> &mut Vec<T> {
         let at = self.len >> self.shift;
         if at == self.pieces.len() {
@@ -102,27 +102,27 @@ impl<T> Rows<T> {
         &mut self.pieces[at]
     }
 
-    /// One row.
+    /// Row by index.
     #[inline]
     pub fn row(&self, index: usize) -> &[T] {
         let start = (index & ((1 << self.shift) - 1)) * self.width;
         &self.pieces[index >> self.shift][start..start + self.width]
     }
 
-    /// One row, to be changed.
+    /// Mutable row by index.
     #[inline]
     pub(crate) fn row_mut(&mut self, index: usize) -> &mut [T] {
         let start = (index & ((1 << self.shift) - 1)) * self.width;
         &mut self.pieces[index >> self.shift][start..start + self.width]
     }
 
-    /// Appends a row of one item.
+    /// Appends a single-item row.
     pub(crate) fn push(&mut self, item: T) {
         debug_assert_eq!(self.width, 1);
         self.last().push(item);
     }
 
-    /// Takes the last row, of one item.
+    /// Removes and returns the last single-item row.
     pub(crate) fn pop(&mut self) -> Option<T> {
         debug_assert_eq!(self.width, 1);
         self.len = self.len.checked_sub(1)?;
@@ -159,7 +159,7 @@ impl<T> IndexMut<usize> for Rows<T> {
     }
 }
 
-/// A queue that gives the least item first.
+/// Min-heap.
 #[derive(Debug)]
 pub struct Heap<T> {
     items: Rows<T>,
@@ -177,7 +177,7 @@ impl<T: Ord + Copy> Heap<T> {
         self.items.len() == 0
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.items.bytes()
     }

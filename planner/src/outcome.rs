@@ -20,14 +20,14 @@ pub struct Options {
     pub first: bool,
     /// Accept only plans whose metric (makespan or cost where there is none) is below this.
     pub bound: Option<f64>,
-    /// Decides every choice that is left to chance; the search for plans without times leaves none.
+    /// Seed of random choices; the classical search makes none.
     pub seed: u64,
-    /// Give up beyond this much memory for the grounded task and the search; with `memory_used`, for the whole process.
+    /// Memory limit for grounded task and search, bytes; with `memory_used`, for the whole process.
     pub memory_limit_bytes: Option<u64>,
     /// Measures the memory of the whole process, bytes; polled now and then. `None`: only the
     /// searches' own memory is counted.
     pub memory_used: Option<fn() -> u64>,
-    /// Give up, or stop improving, after this many evaluated states.
+    /// Maximum number of evaluated states.
     pub evaluation_limit: Option<u64>,
     /// Number of parallel searches for plans without durations; default 1. The plan is the same for
     /// any number unless limits run out. If states or search memory are limited, 1 is used.
@@ -41,7 +41,7 @@ pub struct Statistics {
     pub evaluated: u64,
     /// States whose successors were made.
     pub expanded: u64,
-    /// Plans found, each better than the one before.
+    /// Number of plans found, each better than the one before.
     pub plans: u64,
     /// Ground actions.
     pub actions: u64,
@@ -75,16 +75,17 @@ pub enum Outcome {
         /// Statistics.
         statistics: Statistics,
     },
-    /// Stopped before a plan was found, or (anytime) before the best one was proven best: then with a plan.
+    /// Stopped before a plan was found, or (anytime) before optimality was proven, then with a
+    /// plan.
     OutOfTime {
-        /// The best plan so far.
+        /// Best plan so far.
         best: Option<Plan>,
         /// Statistics.
         statistics: Statistics,
     },
     /// The memory limit was reached.
     OutOfMemory {
-        /// The best plan so far.
+        /// Best plan so far.
         best: Option<Plan>,
         /// Statistics.
         statistics: Statistics,
@@ -121,7 +122,7 @@ impl Outcome {
     }
 }
 
-/// Error for which planning gave no answer at all.
+/// Error without any planning result.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
@@ -141,7 +142,7 @@ pub enum PlanError {
         /// Findings, to be drawn under the text.
         findings: Findings,
     },
-    /// The search's plan does not pass validation: a fault of this crate.
+    /// A plan of the search failed validation: an internal error.
     #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
     Internal {
         /// Message of the validator.

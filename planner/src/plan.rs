@@ -10,7 +10,7 @@ use crate::diagnostic::{Diagnostic, Findings, Source, Span};
 /// Minimum time between two interfering happenings (epsilon), seconds.
 pub const EPSILON_S: f64 = 0.001;
 
-/// One step of a plan.
+/// Step of a plan.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Step {
     /// Start time from the beginning of the plan, seconds; `None` in a classical plan.
@@ -33,7 +33,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Reads `0.000: (move a b) [3.200]` and `(move a b)`, one or more to a line; steps come in order of time.
+    /// Parses `0.000: (move a b) [3.200]` and `(move a b)`, one or more per line; sorts the steps
+    /// by time.
     ///
     /// # Errors
     /// Every line that is no step.
@@ -103,7 +104,7 @@ impl fmt::Display for Plan {
     }
 }
 
-/// Seconds with three digits, six if three are not exact, or as many as the exact number needs.
+/// Seconds with three decimals, six if three are inexact, or as many as needed.
 pub fn seconds(value: f64) -> String {
     let short = [3, 6].map(|digits| format!("{value:.digits$}"));
     let exact = |text: &&String| text.parse() == Ok(value);

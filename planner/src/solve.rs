@@ -85,7 +85,7 @@ const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
 const LEAST_SPACING: f64 = 0.1;
 /// Bytes that a search's own form of the task takes, as a multiple of the grounded task's.
 const FORMS: usize = 2;
-/// Evaluated states that a part of a goal may always take.
+/// Minimum evaluation limit for a part of a goal.
 const LEAST_EVALUATIONS: u64 = 1_000;
 
 /// Distinguishes an unreachable goal from unsatisfiable constraints, after a search without a plan.
@@ -452,7 +452,7 @@ fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
         .then(|| finding.with_help("give durations and times in a larger unit, such as hours"))
 }
 
-/// Gives consecutive start times to the steps of a plan without times, apart from all timed literals.
+/// Assigns consecutive start times, apart from all timed literals, to a plan without times.
 fn give_times(task: &Task, plan: &mut Plan) {
     let is_taken =
         |at_s: f64| task.init.timed.iter().any(|timed| (timed.time_s - at_s).abs() < EPSILON_S / 2.0);

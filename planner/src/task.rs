@@ -59,7 +59,7 @@ pub struct Task {
     pub types: Vec<Type>,
     /// Constants of the domain, then objects of the problem.
     pub objects: Vec<Object>,
-    /// Predicates, derived ones included.
+    /// Predicates, including derived ones.
     pub predicates: Vec<Predicate>,
     /// Functions, numeric and object-valued.
     pub functions: Vec<Function>,
@@ -77,7 +77,7 @@ pub struct Task {
     pub goal_span: Span,
     /// Trajectory constraints; preferred ones refer to their preference.
     pub constraints: Vec<Trajectory>,
-    /// Preferences, by name; several preferences may share a name, which then counts their violations.
+    /// Preferences by name; a shared name sums the violations.
     pub preferences: Vec<Preference>,
     /// Metric.
     pub metric: Option<Metric>,
@@ -120,7 +120,7 @@ pub struct Object {
 pub struct Parameter {
     /// Name, with the question mark.
     pub name: String,
-    /// An object fits that is of one of these.
+    /// Types of which a fitting object has at least one.
     pub types: Vec<TypeId>,
     /// The objects that fit, in rising order.
     pub objects: Arc<[ObjectId]>,
@@ -172,7 +172,7 @@ pub struct Module {
     pub span: Span,
 }
 
-/// A place that an effect module writes.
+/// Term written by an effect module.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Written {
     /// A number.
@@ -254,7 +254,7 @@ pub enum Condition {
     And(Vec<Condition>),
     /// Disjunction; empty is false.
     Or(Vec<Condition>),
-    /// Not the leaf inside: an `Atom`, `Same`, `Call`, or a `Compare` for equality.
+    /// Negation of a leaf: `Atom`, `Same`, `Call`, or a `Compare` for equality.
     Not(Box<Condition>),
     /// Universal quantification.
     Forall(Vec<Quantified>, Box<Condition>),
@@ -262,11 +262,11 @@ pub enum Condition {
     Exists(Vec<Quantified>, Box<Condition>),
     /// A fact, basic or derived.
     Atom(Atom),
-    /// Two terms are the same object.
+    /// Equality of two object terms.
     Same(Box<[Term; 2]>, Span),
-    /// A comparison of numbers; false where a number has no value.
+    /// Numeric comparison; false if a side is undefined.
     Compare(Comparison, Box<[Expression; 2]>, Span),
-    /// A condition module says yes.
+    /// Call of a condition module.
     Call(Call),
 }
 
@@ -350,7 +350,7 @@ pub struct Action {
     pub parameters: Vec<Parameter>,
     /// Slots in all, quantified variables included.
     pub slots: usize,
-    /// `None` for an instantaneous action. Bounds on the duration of a durative one (all must hold).
+    /// Bounds on the duration (all must hold); `None` for an instantaneous action.
     pub duration: Option<Vec<DurationBound>>,
     /// Precondition.
     pub condition: Timed<Condition>,
@@ -376,7 +376,7 @@ impl Action {
 /// `?duration` compared with a bound, in seconds.
 #[derive(Debug, Clone)]
 pub struct DurationBound {
-    /// The time at which the bound is evaluated: start or end.
+    /// Time at which the bound is evaluated: start or end.
     pub when: When,
     /// Comparison with `?duration` on the left-hand side: `<=`, `=`, `>=`, `<` or `>`.
     pub comparison: Comparison,
@@ -528,7 +528,7 @@ pub struct Preference {
 /// A condition on the last state that is only preferred.
 #[derive(Debug, Clone)]
 pub struct PreferredGoal {
-    /// One instance for all objects of these.
+    /// Quantified variables; each binding is an instance.
     pub forall: Vec<Quantified>,
     /// The condition.
     pub condition: Condition,

@@ -44,17 +44,17 @@ const HANDLE_HIGH_M: f64 = 0.012;
 const BESIDE_M: f64 = 0.012;
 /// Minimum height of an object, metres. From: rounding.
 const LEAST_HEIGHT_M: f64 = 0.001;
-/// The rim takes at least and at most these shares of the height. From: chosen.
+/// Minimum and maximum height of the rim, as shares of the body's height. From: chosen.
 const RIMS: (f64, f64) = (0.1, 0.45);
 /// Number of side points that share an error, and maximum number of such groups. From: chosen.
 const SHARING: f64 = 12.0;
 const MOST_GROUPS: f64 = 60.0;
 
-/// The measures of one segment.
+/// Measures of one segment.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub evidence: Evidence,
-    /// The thickness of the surface in the same cloud, metres: noise and the remaining error of merging.
+    /// Thickness of the surface in the same cloud, metres: noise plus the remaining merging error.
     pub blur_m: f64,
     pub round: Option<Round>,
     pub rectangle: Option<Rectangle>,
@@ -76,16 +76,16 @@ pub(super) struct Measured {
     pub looked_through: f64,
     /// Effective number of independent points on the side.
     pub independent: f64,
-    /// Spread of one measurement, metres.
+    /// Standard deviation of one measurement, metres.
     pub sigma_m: f64,
     /// Share of sides and top that was seen or looked past.
     pub seen_fraction: f64,
-    /// The evidence of rays on the upper end.
+    /// Evidence of rays about the upper end.
     pub upper: Upper,
 }
 
 impl Measured {
-    /// The distance between merged views of one surface, metres: no measurement is more exact.
+    /// Distance between merged views of one surface, metres, a lower bound on measurement accuracy.
     pub fn apart_m(&self) -> f64 {
         if self.evidence.views > 1 { self.blur_m } else { 0.0 }
     }
@@ -142,7 +142,7 @@ impl<'a> Setting<'a> {
     }
 }
 
-/// Least and greatest place of a segment along both axes of the surface, metres.
+/// Minimum and maximum coordinate of a segment along both axes of the surface, metres.
 struct Reach {
     low: [f64; 2],
     high: [f64; 2],
@@ -197,7 +197,7 @@ pub(super) fn rays_around(
     Rays::of(asker, sensor, &around, own, others.flat_map(|(other, _)| &other.points))
 }
 
-/// The maximum distance of a place from a measured surface to count as that surface, metres.
+/// Maximum distance of a point from a measured surface that counts as on the surface, metres.
 pub(super) fn tolerance_m(sigma_m: f64) -> f64 {
     (SPREADS * sigma_m).clamp(PLACE_M, APART_M)
 }
@@ -277,7 +277,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
 /// Heights at which silhouettes are looked at, as shares of the body's height. From: chosen.
 const SILHOUETTES: [(f64, f64); 3] = [(0.15, 0.4), (0.4, 0.65), (0.65, 0.92)];
 
-/// The ends of the body's outline in each view against free space: left and right, at three heights.
+/// Left and right ends of the body's silhouette against free space in each view, at three heights.
 fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, height: f64) -> Vec<Edge> {
     /// Narrowing of each side by lost pixels at depth edges, metres. From: chosen.
     const LOST_M: f64 = 0.001;
@@ -329,7 +329,7 @@ fn measure_round(
     (segment, asker, rays): (&Segment, &Asker, &Rays),
     (base_m, top): (f64, f64),
 ) {
-    /// Weight of the sides in the share of a body that was seen; the top has the rest. From: chosen.
+    /// Weight of the sides in the seen share of a body; the top has the rest. From: chosen.
     const SIDES: f64 = 0.75;
     let height = top - base_m;
     let evidence = &mut measured.evidence;
@@ -388,7 +388,7 @@ fn measure_round(
 struct Sectors {
     measured: [bool; SECTORS],
     looked_through: [bool; SECTORS],
-    /// Share of the places of a handle through which a camera looked.
+    /// Seen-through share of possible handle positions, by direction.
     handle_free: [f64; SECTORS],
 }
 
@@ -428,7 +428,7 @@ impl Sectors {
         share(&self.looked_through)
     }
 
-    /// Share of the circumference that was measured or beside which a camera looked past.
+    /// Share of the circumference that was measured, or beside which a camera looked past.
     fn covered_share(&self) -> f64 {
         let covered = |i: usize| self.measured[i] || self.handle_free[i] > 0.5;
         (0..SECTORS).filter(|&i| covered(i)).count() as f64 / SECTORS as f64
@@ -487,7 +487,7 @@ impl Protrusion {
     ) -> Option<Protrusion> {
         /// Heights at which something may stick out, as shares of the body's height. From: chosen.
         const HEIGHTS: (f64, f64) = (0.08, 1.02);
-        /// Sectors that are taken together. From: chosen.
+        /// Number of sectors combined for a protrusion. From: chosen.
         const WINDOW: usize = 3;
         /// Fewest points. From: chosen.
         const FEWEST: usize = 3;

@@ -1,4 +1,4 @@
-//! Likelihood of the measures given sizes, a form, an upper end and a handle.
+//! Likelihood of the measures given sizes, form, upper end and handle.
 
 use super::ends::Side;
 use super::evidence::Measured;

@@ -1,11 +1,12 @@
-//! Bodies that narrow in a shoulder towards a neck, as bottles do: one body, though neck and body may have been segmented apart.
+//! Bodies with a shoulder and a neck, such as bottles, which may have been segmented into two
+//! parts.
 
 use super::model::{ObjectModel, Shape};
 use crate::round::{self, Round, distance};
 use crate::scale::{APART_M, EDGE_M, PLACE_M};
 use crate::segment::{Scene, Segment, quantile, top_m};
 
-/// A model that narrows by more than this may do so in a shoulder. From: chosen, less is a straight side's.
+/// Minimum taper of a model that may have a shoulder; less is a straight side. From: chosen.
 const NARROWS: f64 = 1.3;
 /// Shares of the height that show body and neck. From: chosen.
 const BODY: f64 = 0.4;

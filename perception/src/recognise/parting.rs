@@ -1,4 +1,4 @@
-//! Choice between one body and two for the pixels around a segment.
+//! Comparison of one body with two for the pixels around a segment.
 
 use super::body::{Body, Cuboid, Frustum, Ray};
 use super::evidence::Measured;
@@ -6,7 +6,7 @@ use super::rays::{BAD_VIEW, Rays, bounded};
 use super::verify::{MERGED, WALL_M, placed};
 use crate::pool;
 
-/// A body that a part of a segment may be.
+/// Form of a part of a segment.
 #[derive(Clone, Copy)]
 enum Form {
     Round(Frustum),
@@ -76,17 +76,18 @@ impl<'a> Standing<'a> {
     }
 }
 
-/// Body that stands on or in its holder.
+/// Body on or in its holder.
 #[derive(Clone, Copy)]
 pub(super) struct Held<'a> {
     pub body: Standing<'a>,
     pub holder: Standing<'a>,
-    /// True if the body stands on the bottom of an open holder; otherwise the holder ends at the foot of the body.
+    /// True if the body stands on the bottom of an open holder; otherwise the holder ends at the
+    /// body's foot.
     pub is_within: bool,
 }
 
 impl Held<'_> {
-    /// Log likelihoods of the views given the likeliest pair of body and holder.
+    /// Log likelihoods of the views for the likeliest pair of body and holder.
     fn logs(&self, rays: &Rays) -> Vec<f64> {
         let holders: Vec<Form> = if self.is_within {
             self.holder.round(Some(WALL_M)).into_iter().collect()
@@ -109,8 +110,8 @@ fn best<B: Body + Sync>(rays: &Rays, bodies: &[B]) -> Vec<f64> {
     bodies.iter().map(of).chain([none]).max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default()
 }
 
-/// Log likelihood ratio of two explanations, summed over the views; each view speaks no louder against the first than a bad
-/// view may.
+/// Log likelihood ratio of two explanations, summed over the views; each view's evidence against
+/// the first is bounded.
 fn likelier_log(with: &[f64], without: &[f64]) -> f64 {
     let of_view = |(with, without): (&f64, &f64)| match with - without {
         log if log < 0.0 => bounded(log, BAD_VIEW),

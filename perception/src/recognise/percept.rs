@@ -1,4 +1,4 @@
-//! Results of recognition: percepts with their evidence. No identity: that begins in memory.
+//! Results of recognition: percepts with evidence. Identities over time are assigned in memory.
 
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ pub struct Evidence {
     pub box_residual_m: f64,
     /// Share of the top that was looked into below the rim.
     pub open: f64,
-    /// Share of the top on which a lid or face was measured.
+    /// Share of the top with a measured lid or face.
     pub lid: f64,
     /// The open rim with an inside.
     pub inside: Sighting,
@@ -58,18 +58,18 @@ pub struct Evidence {
     pub handle: Sighting,
     /// Share of the directions in which a handle could still hide.
     pub handle_unseen: f64,
-    /// The reach of the protrusion out of the body, metres.
+    /// Reach of the largest protrusion, metres.
     pub protrusion_m: f64,
     /// The number of views that looked at the object.
     pub views: usize,
 }
 
-/// One object on the surface.
+/// Percept of one object on the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Percept {
     /// Name of the most likely known object; `None`: *unknown*.
     pub label: Option<String>,
-    /// The kind of the object.
+    /// Most likely kind.
     pub kind: Option<String>,
     /// Probability of each model, in model order; with `unknown` they sum to one. (The published
     /// recogniser gives similarity scores here, which are no probabilities.)
@@ -80,7 +80,8 @@ pub struct Percept {
     pub unknown: f64,
     /// Position, world frame, metres: centre of the body's footprint on its support.
     pub position_m: Point3<f64>,
-    /// Standard deviation of each coordinate of the position within the cloud, metres (errors of localisation not included).
+    /// Standard deviation of each coordinate of the position within the cloud, metres, without
+    /// localisation errors.
     pub position_sigma_m: f64,
     /// Longer and shorter side of the footprint, and height, metres, including the part cut off by
     /// the plane.

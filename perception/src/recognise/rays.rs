@@ -1,4 +1,4 @@
-//! Likelihood of the depths that cameras measured around a body, given the body.
+//! Likelihood of the depths measured around a body, given the body.
 //!
 //! Each pixel met the body, something nearer, what lies behind it, or nothing that is there; a body is as likely as all pixels together
 //! make it, against there being none. Neighbouring pixels err together, so that each counts for a part of a look only, and no view says
@@ -31,8 +31,8 @@ pub(super) const BAD_VIEW: f64 = 0.05;
 /// Maximum number of independent measurements that a block of pixels counts for: errors of the pose
 /// are common to all. From: chosen.
 const MOST_LOOKS: f64 = 2.3;
-/// Offsets of a wandering ray, in spreads across the ray: columns and rows. From: derived, three directions
-/// that balance each other.
+/// Offsets of a displaced ray, in standard deviations across the ray: columns and rows.
+/// From: derived, three directions that balance each other.
 const WANDER: [[f64; 2]; 3] = [[0.0, 1.0], [0.87, -0.5], [-0.87, -0.5]];
 
 /// Pixels of all views that carry evidence about one body.
@@ -40,7 +40,7 @@ pub struct Rays {
     pub views: Vec<ViewRays>,
 }
 
-/// The pixels of one view.
+/// Pixels of one view.
 pub struct ViewRays {
     pub from: [f64; 3],
     /// Offsets of a ray displaced by the lateral noise, to either side and up.
@@ -57,7 +57,7 @@ pub struct Pixel {
     pub depth_m: f64,
     /// Spread of the depth, metres.
     pub sigma_m: f64,
-    /// Density of the depth without a body, one by a metre.
+    /// Density of the depth without a body, per metre.
     pub without: f64,
     /// True if the pixel shows another object.
     pub other: bool,

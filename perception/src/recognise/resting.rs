@@ -19,9 +19,9 @@ const DROP_M: f64 = APART_M;
 /// Minimum share of a circle with a height drop for a body to be sought there. From: chosen, a
 /// single view shows half of a top.
 const CIRCLE: f64 = 0.5;
-/// Radii that are tried are so far apart, metres. From: derived, half a cell.
+/// Step of the tried radii, metres. From: derived, half a cell.
 const RADII_M: f64 = EDGE_M;
-/// Circles of one segment that are followed up. From: work.
+/// Maximum number of circles followed up per segment. From: work.
 const MOST: usize = 3;
 /// Minimum and maximum distance from a body in which its surroundings are searched, metres.
 /// From: chosen, no nearer than an edge is known.
@@ -56,7 +56,7 @@ const FEWEST_LEFT: usize = 60;
 pub(super) struct Resting {
     pub body: Segment,
     pub rest: Segment,
-    /// True if the body stands in the rest, a vessel.
+    /// True if the body stands in the remainder, a vessel.
     pub is_within: bool,
 }
 
@@ -70,7 +70,7 @@ struct Circle {
     share: f64,
 }
 
-/// The radii of known round bodies, and the least height of one, metres.
+/// Radii of known round bodies, and the height of the lowest, metres.
 pub(super) struct Rounds {
     radii_m: Vec<f64>,
     least_m: f64,
@@ -143,7 +143,7 @@ impl HeightMap {
         Some(HeightMap { low: [low.x, low.y], size, base_m: low.z, levels, tops_m })
     }
 
-    /// Cells beside which heights drop: column, row and height.
+    /// Cells next to a height drop: column, row and height.
     fn edges(&self) -> Vec<(usize, usize, f64)> {
         /// Number of cells to either side that are searched. From: derived, an edge may lie on the border
         /// between two.
@@ -162,7 +162,7 @@ impl HeightMap {
         cells.map(|(n, top)| (n % width, n / width, *top)).filter(drops).collect()
     }
 
-    /// The circles on which most heights drop, none over another.
+    /// Circles with the most height drops, without overlaps.
     fn circles(&self, radii_m: &[f64]) -> Vec<Circle> {
         let edges = self.edges();
         let mut found: Vec<Circle> =

@@ -75,7 +75,7 @@ pub(super) fn settle<'a>(
     Some(Settled { segment, asker: Asker { views, ..asker.clone() }, round: settled })
 }
 
-/// The part of the side that one view shows.
+/// Part of the side shown by one view.
 struct Side {
     points: Vec<Point3<f64>>,
     /// Spread of a measurement, metres.
@@ -160,8 +160,8 @@ fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
 }
 
 impl Side {
-    /// True if the points, moved back by a shift, lie on the side of a body, as smooth as the camera
-    /// measures.
+    /// True if the points, shifted back, lie on a body's side with the spread of the camera's
+    /// noise.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
         /// Maximum distance of tested points from the side, if also beyond two standard deviations,
         /// metres. From: derived, the last of the gates.
@@ -180,8 +180,7 @@ struct Cells {
     /// First cell of the bounding rectangle, and its size in cells.
     first: [i32; 2],
     sizes: [i32; 2],
-    /// For each cell of the rectangle: true if points lie in the cell, and true if any lie in or beside the
-    /// cell.
+    /// Two flags per cell: points lie in the cell; points lie in or next to the cell.
     own: Vec<bool>,
     beside: Vec<bool>,
     low: Point3<f64>,
@@ -240,7 +239,7 @@ impl Cells {
     }
 }
 
-/// The points that a camera measured in or beside the cells of a body, surface frame.
+/// Points measured by a camera in or next to a body's cells, surface frame.
 fn shown_of(view: &Lying<'_>, body: &Cells) -> Vec<Point3<f64>> {
     let mut shown = Vec::new();
     let Some([columns, rows]) = pixels_of(view.map, &view.surface_from_camera.inverse(), body) else {

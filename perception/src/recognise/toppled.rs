@@ -132,9 +132,9 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
 /// Handle of a lying object, if seen.
 struct HandleSeen {
     sighting: Sighting,
-    /// Share of the directions in which one could hide.
+    /// Share of the directions in which a handle could hide.
     unseen: f64,
-    /// The reach of the handle out of the body, metres.
+    /// Reach of the handle, metres.
     reach_m: f64,
 }
 

@@ -10,7 +10,7 @@ use crate::scale::{EDGE_M, PLACE_M, SPREADS};
 /// Probability that a view is uninformative about an upper end. From: chosen.
 const BAD_VIEW: f64 = 0.002;
 
-/// The evidence on the upper end.
+/// Evidence about the upper end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Upper {
     /// Log likelihood ratio of an open against a closed end.
@@ -21,9 +21,9 @@ pub struct Upper {
 }
 
 impl Upper {
-    /// The evidence on the upper end from views of a body.
+    /// Evidence about the upper end from views of a body.
     pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
-        /// Distance from the rim within which a ray gives no evidence, metres. From: chosen.
+        /// Distance from the rim within which a ray is uninformative, metres. From: chosen.
         const RIM_M: f64 = 0.006;
         /// Minimum descent of a ray that tests an end. From: rounding.
         const LEVEL: f64 = 1e-3;

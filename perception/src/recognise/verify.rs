@@ -13,8 +13,8 @@ use crate::scale::{EDGE_M, PLACE_M};
 pub(super) const WALL_M: f64 = 0.003;
 /// Steps of the search for a body's best shift in a view, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
-/// Maximum error of views that were aligned with each other, metres, and maximum number of tries of each
-/// step. From: derived, as exactly as an edge is known; work.
+/// Maximum shift of registered views, metres, and maximum number of tries per step. From: derived,
+/// as exactly as an edge is known; work.
 const LAID: (f64, usize) = (EDGE_M, 2);
 /// Standard deviation and number of steps of the shift for views at their merged poses.
 /// From: derived, a place; work, so that they are moved up to 3 cm.
@@ -31,7 +31,7 @@ pub(super) struct Placed {
 }
 
 impl Placed {
-    /// Placement of a body without evidence: not moved. From: mark.
+    /// Unmoved placement without evidence. From: mark.
     pub const UNMOVED: Placed = Placed { log: 0.0, shift_m: [0.0; 2] };
 }
 

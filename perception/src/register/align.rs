@@ -6,7 +6,7 @@ use super::{Fit, Method, Prepared, RegisterError, RegisterOptions, Termination};
 use crate::pool;
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3};
 
-/// Points whose sums are added up together: fixed, so that the sums do not depend on the number of threads.
+/// Number of points per partial sum, fixed so that results do not depend on the number of threads.
 const CHUNK: usize = 1024;
 
 /// Variance of a surface along its normal relative to that along itself in [`Method::Generalised`]
@@ -134,8 +134,8 @@ impl<'a> Run<'a> {
         self.stride = stride;
     }
 
-    /// Runs at most `most` iterations in all; ends when the motion is below `ease` times the
-    /// convergence limit.
+    /// Runs at most `most` iterations; ends when the motion is below `ease` times the convergence
+    /// threshold.
     fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Termination {
         let options = self.options;
         let mut first = true;

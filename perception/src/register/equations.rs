@@ -14,7 +14,8 @@ pub(crate) struct Sums {
     /// Upper triangle of the normal matrix, row by row.
     h: [f64; 21],
     g: [f64; 6],
-    /// Weights, and weighted sums of source and target points about the centre and of their products: for the closed form.
+    /// Sum of weights, for the closed form; further fields: weighted sums of source and target
+    /// points and of their products.
     weight: f64,
     source: [f64; 3],
     target: [f64; 3],
@@ -71,7 +72,7 @@ impl Sums {
         }
     }
 
-    /// The normal matrix of pairs of points, J = [−[p]×, I], from their sums.
+    /// Normal matrix of point pairs, J = [−[p]×, I], from their sums.
     fn point_information(&self) -> Matrix6<f64> {
         let [xx, xy, xz, yy, yz, zz] = self.spread;
         let turn = Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
@@ -153,7 +154,7 @@ impl Sums {
         full
     }
 
-    /// The motion of least squares by the normal matrix. Directions that the pairs leave free are not moved along.
+    /// Least-squares motion from the normal matrix, zero along unconstrained directions.
     pub(super) fn motion(&self, centre: &Point3<f64>) -> Motion {
         let information = self.information();
         let (inverse, free) = held_inverse(&information);
@@ -198,7 +199,7 @@ pub(crate) fn rigid(pairs: &[(Point3<f64>, Point3<f64>)]) -> Option<Isometry3<f6
     (motion.free == 0 && finite).then_some(motion.step)
 }
 
-/// Singular vectors with the least value last, where the sign of a reflection belongs.
+/// Singular vectors sorted, with the least value last, where a reflection's sign is flipped.
 fn ordered(u: Matrix3<f64>, v_t: Matrix3<f64>, values: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
@@ -211,7 +212,7 @@ fn ordered(u: Matrix3<f64>, v_t: Matrix3<f64>, values: &Vector3<f64>) -> (Matrix
 /// scaled by the typical distance from the centre).
 const FREE: f64 = 1e-5;
 
-/// The inverse of a normal matrix on the directions that are held, and how many are not.
+/// Inverse of a normal matrix on its constrained directions, and the number of unconstrained ones.
 pub(super) fn held_inverse(information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
     let turn = (0..3).map(|k| information[(k, k)]).sum::<f64>();
     let shift = (3..6).map(|k| information[(k, k)]).sum::<f64>();

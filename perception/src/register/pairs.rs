@@ -69,9 +69,9 @@ pub(crate) struct Partner {
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
     slot: u32,
-    /// Least distance of all other points of the target at that time, metres.
+    /// Minimum distance of all other target points at the last search, metres.
     others_m: f32,
-    /// Squared distance to the nearest now; infinite if none is near enough.
+    /// Current squared distance to the partner; infinite if none is near enough.
     pub(super) distance_sq: f32,
 }
 
@@ -135,7 +135,7 @@ fn distance_sq(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     x * x + y * y + z * z
 }
 
-/// The two nearest so far.
+/// Two nearest points so far.
 struct Two {
     slot: u32,
     first_sq: f32,

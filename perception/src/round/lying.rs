@@ -14,7 +14,7 @@ const SCOUTS: usize = 300;
 /// A round body about an axis along the surface.
 #[derive(Clone, Copy)]
 pub struct LyingRound {
-    /// Surface to a frame in which the axis is z and y leads away from the surface.
+    /// Transform from the surface's frame to one with z along the axis and y away from the surface.
     pub turned: Isometry3<f64>,
     /// Body and the positions of its ends.
     pub round: Round,

@@ -30,19 +30,19 @@ pub struct Sums {
     /// Sum of the products of the derivatives of a point's distance from the side by axis, radius and slope,
     /// with the sign reversed.
     pub normal: Matrix4<f64>,
-    /// Sum of the same derivatives times the distance.
+    /// Sum of the derivatives times the distances (right-hand side).
     pub right: Vector4<f64>,
     /// Sum of the squared distances.
     pub squares: f64,
     pub count: f64,
-    /// Sum of the squared distances of all points that are not inside, each at most [`OUTSIDE_M`].
+    /// Sum of the squared distances of all points not inside, each limited to [`OUTSIDE_M`].
     pub spread: f64,
     /// Number of points outside the side.
     pub outside: f64,
 }
 
 impl SidePoints {
-    /// The points between base and top that can lie on the side.
+    /// Points between base and top that can lie on the side.
     pub fn between(points: &[Point3<f64>], base_m: f64, top_m: f64) -> SidePoints {
         let band = side_band(base_m, top_m);
         let column = || Vec::with_capacity(points.len().next_multiple_of(LANES));
@@ -125,11 +125,11 @@ impl SidePoints {
 impl Judges {
     /// Score of a circle for the points, seen from above; `None` if not better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
-        /// Penalty of a point inside the circle: less than the half for one outside. From: chosen.
+        /// Penalty of a point inside the circle; less than the half for one outside. From: chosen.
         const INSIDE: f32 = 0.15;
         /// Points after which a circle may be left. From: work.
         const BLOCK: usize = 16;
-        /// Difference of scores within which rounding may hide the better one. From: rounding.
+        /// Score difference within the rounding error. From: rounding.
         const ROUNDING: f32 = 1e-3;
         let ([x, y, r], per_m) = (circle.map(|c| c as f32), (1.0 / tolerance) as f32);
         let claim = |x_m: f32, y_m: f32| {

@@ -15,14 +15,14 @@ const FACES: usize = 2;
 /// Minimum cosine between the normals of one upright face, and between those of two ends of one
 /// (15°). From: chosen.
 const FLAT: f64 = 0.966;
-/// Widest part of a face that is taken to be hidden, metres. From: chosen.
+/// Maximum width of a hidden part of a face, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
 /// Step along a gap at which visibility is tested, metres, and at which shares of its height.
 /// From: work.
 const STEP_M: f64 = 0.01;
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
 
-/// An upright face of a part, surface frame.
+/// Upright face of a part, surface frame.
 struct Face {
     /// Unit, horizontal.
     normal: Vector2<f64>,
@@ -121,7 +121,7 @@ impl Face {
         Point3::new(flat.x, flat.y, height_m)
     }
 
-    /// The gap between this face and another that may be the same face.
+    /// Gap between this face and another that may be the same face.
     fn gap_to<'a>(&'a self, other: &'a Face) -> Option<Gap<'a>> {
         if self.normal.dot(&other.normal) < FLAT {
             return None;

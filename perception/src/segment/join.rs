@@ -1,4 +1,4 @@
-//! Grouping of voxels into objects: patches, and the creases between them.
+//! Grouping of voxels into objects by patches and the creases between them.
 
 use super::mend::mend;
 use super::patches::{SOME, Voxels};
@@ -20,7 +20,7 @@ const SMOOTH_RAD: f64 = 0.35;
 /// Sets of voxels within which parts are sought.
 pub(super) struct Sets {
     thin: Vec<bool>,
-    /// The connected sets of voxels that are not thin.
+    /// Connected sets of voxels, without thin ones.
     sets: Vec<Vec<usize>>,
     /// Index of each voxel in its set; [`NONE`] for thin ones.
     place: Vec<u32>,
@@ -40,7 +40,7 @@ impl Sets {
     }
 }
 
-/// The part number of each voxel. Numbers are voxel indices, the same in every run.
+/// Part number of each voxel; deterministic, as it is a voxel's index.
 pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options: &SceneOptions) -> Vec<u32> {
     let name = |set: &Vec<usize>| match options.part_touching {
         true => Piece::of(voxels, set, place).parts(),
@@ -57,9 +57,9 @@ pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options:
 /// Connected voxels without thin ones; the methods use indices within the piece.
 pub(super) struct Piece<'a> {
     pub voxels: &'a Voxels,
-    /// Their numbers among all, ascending.
+    /// Indices of the piece's voxels, ascending.
     pub of: &'a [usize],
-    /// The start of each voxel's neighbours in `near`, and the end of the last.
+    /// Start of each voxel's neighbours in `near`, and the total.
     starts: Vec<u32>,
     near: Vec<u32>,
 }
@@ -81,12 +81,12 @@ impl<'a> Piece<'a> {
         Piece { voxels, of, starts, near }
     }
 
-    /// The neighbours of one.
+    /// Neighbours of a voxel.
     fn near(&self, voxel: usize) -> impl Iterator<Item = u32> {
         self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize].iter().copied()
     }
 
-    /// The part number of each voxel of the piece.
+    /// Part number of each voxel of the piece.
     fn parts(&self) -> Vec<u32> {
         let patch_of = grow_patches(self);
         let patches = describe(self, &patch_of);
@@ -239,7 +239,7 @@ fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
 
 /// True if the surface is convex or nearly flat from one patch to the other.
 fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
-    /// Normals that differ by less (sine) have no crease. From: rounding.
+    /// Sine of the angle between normals below which there is no crease. From: rounding.
     const NO_CREASE: f64 = 1e-3;
     /// Cosine of the least angle between the crease and the line between the centres. From: chosen.
     const ALONG: f64 = 0.85;
@@ -271,7 +271,7 @@ fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32
     first
 }
 
-/// Disjoint sets; the lowest member is the root, whatever the order of joins.
+/// Disjoint sets; the lowest member is the root, independent of the joining order.
 pub(super) struct Union {
     parent: Vec<u32>,
 }

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 
 /// Size relative to a neighbour below which a part is no object of its own. From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
-/// Minimum number of voxels of a part that is no fragment. From: chosen.
+/// Minimum number of voxels of an object of its own. From: chosen.
 const CRUMB_VOXELS: usize = 40;
 /// Relative size below which a part without contact to the surface belongs to the body it is
 /// attached to (a handle, a spout). From: chosen.
@@ -79,14 +79,14 @@ impl Belonging {
         own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large, made })
     }
 
-    /// True if neither part has been joined to another since.
+    /// True if neither part has been joined since.
     fn is_current(&self, parts: &[Option<Part>]) -> bool {
         let is_same = |part: u32, made| parts[part as usize].as_ref().is_some_and(|p| p.made == made);
         is_same(self.small, self.made[0]) && is_same(self.large, self.made[1])
     }
 }
 
-/// A border with another part.
+/// Border with another part.
 #[derive(Clone, Copy)]
 struct Link {
     other: u32,
@@ -98,12 +98,12 @@ struct Part {
     /// Heights of the part's voxels, ascending, metres.
     heights_m: Vec<f64>,
     places: Vec<[f64; 2]>,
-    /// Places whose hull is that of all.
+    /// Points that span the part's hull.
     outer: Vec<[f64; 2]>,
     hull: OnceLock<Vec<[f64; 2]>>,
-    /// The links to other parts, one each, in no order.
+    /// Links to other parts, one each, unordered.
     links: Vec<Link>,
-    /// The number of joins after which the part was made.
+    /// Number of joins before the part was made.
     made: u32,
 }
 
@@ -147,7 +147,7 @@ impl Part {
     }
 }
 
-/// Merges two ascending runs into one.
+/// Merges two ascending lists.
 fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
     let mut both = Vec::with_capacity(long.len() + short.len());
     let mut from = 0;
@@ -161,7 +161,7 @@ fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
     both
 }
 
-/// The parts by their roots, not linked yet.
+/// Parts by root, without links.
 fn gather(joined: &mut Union, Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Option<Part>> {
     let patches = patch_of.iter().max().map_or(0, |&p| p as usize + 1);
     let mut parts: Vec<Option<Part>> = (0..patches).map(|_| None).collect();
@@ -215,7 +215,7 @@ fn is_inside(small: &Part, large: &Part) -> bool {
     small.top_m() < large.top_m() + PLACE_M && most_within(large.hull(), &small.places, |p| *p)
 }
 
-/// A handle: small, lifted off the surface, not above the body.
+/// True if the small part is a handle: lifted off the surface and not above the body.
 fn hangs_on(small: &Part, large: &Part) -> bool {
     f64::from(small.points) < HANGING_SHARE * f64::from(large.points)
         && small.low_m() > large.low_m() + PLACE_M

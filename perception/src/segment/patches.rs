@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Minimum number of voxels of an upright side. From: chosen.
 pub(super) const SIDE_VOXELS: usize = 25;
 
-/// Occupied voxels of a set of points, in order of their place.
+/// Occupied voxels of a set of points, sorted by position.
 pub(super) struct Voxels {
     /// Mean of the voxel's points, metres.
     pub centres: Vec<Point3<f64>>,
@@ -20,11 +20,10 @@ pub(super) struct Voxels {
     pub curvatures: Vec<f64>,
     /// Number of points.
     pub counts: Vec<u32>,
-    /// The start of each voxel's neighbours in `near`, and the end of the last.
+    /// Start of each voxel's neighbours in `near`, and the total.
     starts: Vec<u32>,
     near: Vec<u32>,
-    /// The starts of runs of consecutive points in one voxel, and the end of the last; and the voxel of each
-    /// run.
+    /// Start of each run of consecutive points in one voxel, and the total.
     run_starts: Vec<u32>,
     of_run: Vec<u32>,
     /// Point runs grouped by voxel, and the end of each voxel's group.
@@ -64,12 +63,12 @@ impl Voxels {
         sets
     }
 
-    /// The number of runs of consecutive points in one voxel.
+    /// Number of runs of consecutive points in one voxel.
     pub fn count_runs(&self) -> usize {
         self.of_run.len()
     }
 
-    /// Ranges of points that follow each other in one voxel, and this voxel, in the order of the points: some of these runs.
+    /// Some runs of consecutive points in one voxel, in point order: point range and voxel.
     pub fn runs(&self, of: Range<usize>) -> impl Iterator<Item = (Range<usize>, usize)> {
         let ends =
             self.run_starts[of.start..=of.end].windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
@@ -101,7 +100,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// The moments of no points. From: mark.
+    /// Moments of no points. From: mark.
     const NONE: Moments = Moments { count: 0.0, sum: Vector3::new(0.0, 0.0, 0.0), products: [0.0; 6] };
 
     fn add(&mut self, p: &Point3<f64>) {
@@ -120,7 +119,7 @@ impl Moments {
 
 /// Number of voxels whose normals are computed together. From: work.
 const LANES: usize = 4;
-/// Voxels that one thread takes in a row. From: work.
+/// Number of voxels per thread. From: work.
 pub(super) const SOME: usize = 256;
 
 /// Groups points into voxels of the given side, and estimates each voxel's normal from its
@@ -191,8 +190,8 @@ pub(super) fn voxels<T: Send>(
     (voxels, told)
 }
 
-/// Points that follow each other in one voxel, as neighbours in an image do: the voxel and the number of each run, and where the runs begin
-/// and the last one ends.
+/// Runs of consecutive points in one voxel, as neighbouring pixels form: voxel key and number of
+/// each run; and run starts with the total.
 fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>) {
     let of = |range: Range<usize>| {
         let mut runs: Vec<(u64, u32)> = Vec::with_capacity(range.len() / 2);
@@ -214,7 +213,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
 
 /// The start of each voxel's neighbours, and the neighbours of all voxels in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
-    /// Maximum number of shares in which the neighbours are found. From: work.
+    /// Maximum number of chunks for the neighbour search. From: work.
     const SHARES: usize = 8;
     let of = |range: Range<usize>| {
         let (mut starts, mut near) = (Vec::with_capacity(range.len() + 1), Vec::new());
@@ -242,7 +241,7 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     (starts, near)
 }
 
-/// Normals and curvatures of the voxels from one on, from their own and their neighbours' points.
+/// Normals and curvatures of consecutive voxels, from their own and neighbouring points.
 fn surfaces(
     voxels: &Voxels,
     moments: &[Moments],

@@ -23,8 +23,8 @@ const STEP_M: f64 = (RADII_M.1 - RADII_M.0) / (RADII - 1) as f64;
 /// Maximum distance of a point from the body that still belongs to it, metres. From: chosen, a
 /// millimetre less leaves a piece beside one thing in 32.
 const CLEAR_M: f64 = 0.009;
-/// Distance from the body beyond which a point is no image of the body in a misplaced view, metres.
-/// From: chosen.
+/// Distance from the body beyond which a point is no image of the body in a misregistered view,
+/// metres. From: chosen.
 const BESIDE_M: f64 = 0.035;
 /// Cosine of the greatest angle between a normal of the side and the direction away from the axis: the faces of a box turn by 45° about theirs.
 /// From: chosen, between 1 and the cosine of 45°.
@@ -102,7 +102,7 @@ struct Cut {
 }
 
 impl Cut {
-    /// None if the body is just one of the parts, or no body.
+    /// Body about an axis; `None` if there is no body, or if it is exactly one of the parts.
     fn around(
         voxels: &Voxels,
         body: &[usize],
@@ -265,8 +265,8 @@ impl Axis {
         wide.then(|| of.iter().copied().filter(belongs).collect())
     }
 
-    /// True if the top of a body runs on into the remainder beside the body, in as many directions as a side
-    /// must be seen from: a piece that a circle cuts out of the top of a low box is no body.
+    /// True if the body's top continues into the remainder in as many directions as a side must be
+    /// seen from, so that the circle merely cuts the top of a low box.
     fn parts_a_top(&self, voxels: &Voxels, body: &[usize], left: &[Vec<usize>]) -> bool {
         let mut heights: Vec<f64> = body.iter().map(|&v| voxels.centres[v].z).collect();
         let top_m = quantile(&mut heights, VOXEL_ENDS.1);
@@ -284,7 +284,7 @@ impl Axis {
     }
 }
 
-/// Lowest and highest corner of a box around places.
+/// Minimum and maximum corner of the bounding box.
 fn bounds(places: impl Iterator<Item = Point2<f64>> + Clone) -> (Point2<f64>, Point2<f64>) {
     let first = places.clone().next().unwrap_or_else(Point2::origin);
     places.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)))

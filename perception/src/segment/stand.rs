@@ -18,8 +18,8 @@ pub const BOTTOM_M: (f64, f64) = (0.004, 0.003);
 /// Maximum distance between an object's lower edge and the measured top of its support, metres.
 /// From: chosen.
 const MEETS_M: f64 = 0.03;
-/// Minimum number of directions in which an enclosing object is seen around a place, and a
-/// supporting one. From: chosen.
+/// Minimum number of directions with an enclosing object around a point; the next constant is that
+/// for a supporting one. From: chosen.
 const AROUND: usize = 27;
 const BEARS: usize = 15;
 
@@ -90,7 +90,7 @@ fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>,
     (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
 }
 
-/// The number of directions from a place in which points lie.
+/// Number of directions from a point in which other points lie.
 fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
     let mut seen = [false; SECTORS];
     points.for_each(|p| seen[sector(p.x - x, p.y - y)] = true);

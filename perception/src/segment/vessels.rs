@@ -1,4 +1,5 @@
-//! Vessels in one piece: their near outside and far inside meet only in a thin rim, which no camera resolves.
+//! Joins parts of vessels: near outside and far inside meet only in a thin rim, which cameras do
+//! not resolve.
 
 use super::footprint::{OUTSIDE, bounds, hull_from_above, middle, most_within};
 use super::scene::{Segment, top_m};
@@ -14,13 +15,13 @@ use std::sync::OnceLock;
 
 /// Widest vessel, metres of radius. From: chosen.
 const WIDEST_M: f64 = 0.14;
-/// Share of the points of both that lie on the common round body. From: chosen.
+/// Minimum share of both parts' points on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
 /// Minimum share of the side of each of two parts on its own round body for both to be images of
 /// one, and of a rim on its circle; handles are off. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
-/// Bodies are in one place if their axes are nearer than this share of the smaller radius.
-/// From: chosen, two bodies cannot stand so near to each other.
+/// Maximum distance between the axes of one body, as a share of the smaller radius. From: chosen,
+/// two bodies cannot stand so near to each other.
 const ONE_PLACE: f64 = 0.5;
 /// Maximum residual of a body's side, as a share of the residual of any box. From: chosen.
 const OF_BOX: f64 = 0.6;
@@ -150,8 +151,8 @@ fn lies_within(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>])
     })
 }
 
-/// True if the upper ends of two parts lie on one circle that holds both: near outside and far inside of a
-/// bowl, whose side is no cone's.
+/// True if the upper ends of two parts lie on one circle that encloses both: near outside and far
+/// inside of a bowl, whose side is not conical.
 fn one_rim(parts: [&Candidate; 2], viewpoints: &[Point3<f64>]) -> bool {
     let top_m = parts[0].top_m.max(parts[1].top_m);
     let rims = parts.map(|part| {
@@ -194,7 +195,7 @@ pub(super) fn round_body(
 /// The round body that comes nearest to points, however badly.
 struct Fitted {
     body: Round,
-    /// Spread of one measurement, metres.
+    /// Standard deviation of one measurement, metres.
     sigma_m: f64,
 }
 
@@ -207,8 +208,8 @@ impl Fitted {
         (body.radius_m < WIDEST_M).then_some(Fitted { body, sigma_m })
     }
 
-    /// True if the points that the body was fitted to have a lesser residual from the body than this share of
-    /// their residual from any box.
+    /// True if the points' residual from the body is below this share of their residual from any
+    /// box.
     fn beats_box(&self, points: &[Point3<f64>], share: f64) -> bool {
         !outline::fits(points, self.body.residual_m / share)
     }
@@ -218,8 +219,8 @@ impl Fitted {
         self.is_near(points, ON_BODY)
     }
 
-    /// True if at least this share of the points lies on the body, within the measurement error, and much
-    /// nearer than to a box.
+    /// True if at least this share of the points lies on the body within the measurement error, and
+    /// much nearer than to a box.
     fn is_near(&self, points: &[Point3<f64>], share: f64) -> bool {
         self.body.residual_m < 2.0 * self.sigma_m + SHAPE_M
             && self.body.inliers >= share
@@ -235,8 +236,8 @@ impl Fitted {
     }
 }
 
-/// True if two parts are images of one body in slightly misaligned views: two bodies cannot stand in one
-/// place.
+/// True if two parts are images of one body in slightly misregistered views, as two bodies cannot
+/// stand in one place.
 fn in_one_place(a: &Candidate, b: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
     let (Some(one), Some(other)) = (a.fitted(viewpoints), b.fitted(viewpoints)) else { return false };
     let apart_m = (one.body.x - other.body.x).hypot(one.body.y - other.body.y);
@@ -268,7 +269,7 @@ fn share_on(body: &Round, part: &Segment) -> f64 {
     on as f64 / part.points.len().max(1) as f64
 }
 
-/// True if the boxes around the two come near each other.
+/// True if the bounding boxes of two parts are near each other.
 pub fn near(a: &Candidate, b: &Candidate) -> bool {
     (0..3).all(|k| a.low[k] - APART_M < b.high[k] && b.low[k] - APART_M < a.high[k])
 }

@@ -1,4 +1,4 @@
-//! Votes for upright axes: a place and a radius each, counted in cells.
+//! Hough votes for upright axes: position and radius, in cells.
 
 /// Number of radii of the Hough transform. From: chosen, steps of 6 mm in the range that is sought.
 pub const RADII: usize = 11;
@@ -17,7 +17,7 @@ pub struct Votes {
 }
 
 impl Votes {
-    /// None yet, over the cells from `low` to `high`.
+    /// Empty accumulator over the cells from `low` to `high`.
     pub fn over(low: [i32; 2], high: [i32; 2]) -> Votes {
         let tiles = |k: usize| (high[k] - low[k]).max(0) as usize / TILE + 1;
         Votes { low, deep: tiles(1), tiles: vec![0; tiles(0) * tiles(1)], counts: Vec::new() }
@@ -36,7 +36,7 @@ impl Votes {
         self.change(cells, |count| count.saturating_add(1));
     }
 
-    /// Votes that were given are none.
+    /// Takes votes back.
     pub fn take_back(&mut self, cells: &[[i32; 2]; RADII]) {
         self.change(cells, |count| count.saturating_sub(1));
     }

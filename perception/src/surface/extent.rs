@@ -27,17 +27,17 @@ const BESIDE_M: f64 = 0.3;
 /// corners.
 const PLACES: [[f64; 2]; 5] = [[0.5, 0.5], [0.1, 0.1], [0.9, 0.1], [0.1, 0.9], [0.9, 0.9]];
 
-/// The part of a plane that a cell belongs to.
+/// Owner of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Owner {
-    /// The cell has not been tested yet.
+    /// Cell not tested yet.
     #[default]
     Untold,
-    /// The plane may reach on here, from whichever part comes first.
+    /// The plane may continue here, for whichever part reaches the cell first.
     Open,
-    /// The plane is not taken to reach on here.
+    /// The plane does not continue here.
     Nobody,
-    /// The part of this number.
+    /// Part with this number.
     Part(u32),
 }
 
@@ -56,10 +56,11 @@ struct Above<'a> {
     map: &'a DepthMap,
     /// The height of the camera above the plane, metres.
     high_m: f64,
-    /// The corner of the cell at zero, and one cell on in x and in y, as seen from the camera, metres.
+    /// Corner of cell zero in the camera frame, metres; further fields: steps of one cell in x and
+    /// in y.
     origin: Vector3<f64>,
     steps: [Vector3<f64>; 2],
-    /// The length of the longest ray of the image for one metre of depth.
+    /// Length of the longest image ray per metre of depth.
     longest: f64,
 }
 
@@ -100,7 +101,7 @@ impl<'a> Hiding<'a> {
     /// Decides for each neighbour of some cells whether the plane may continue there; keeps
     /// neighbours that are not inside their own part.
     fn ask(&self, owners: &mut Owners, border: &mut Vec<[i32; 2]>, unseen: bool) {
-        /// Cells that one thread takes in a row. From: work.
+        /// Number of cells per thread. From: work.
         const SOME: usize = 256;
         let mut asked = Vec::new();
         border.retain(|cell| {
@@ -214,7 +215,7 @@ impl Surface {
         self.widened(&grid.turn, high.iter().map(|(_, p)| p))
     }
 
-    /// Widens the hull to hold some further places.
+    /// Extends the hull to contain further points.
     fn widened<'a>(
         self,
         turn: &UnitQuaternion<f64>,
@@ -231,7 +232,7 @@ impl Surface {
 
 /// Cells along the edges of a surface, in order.
 fn along_edges(surface: &Surface, grid: &Grid) -> Vec<[i32; 2]> {
-    /// Maximum number of places named along one edge. From: chosen.
+    /// Maximum number of points listed along one edge. From: chosen.
     const MOST: f64 = 2000.0;
     let ends = surface.hull.iter().zip(surface.hull.iter().cycle().skip(1));
     let edge = |(a, b): (&Point3<f64>, &Point3<f64>)| {

@@ -89,7 +89,7 @@ pub(super) fn faces(plane: &Plane, samples: &[Sample], cloud: &Cloud, seen: &Vis
     parts.iter().zip(&members).enumerate().filter_map(surface).collect()
 }
 
-/// The part that each cell belongs to.
+/// Part of each cell.
 fn owners(parts: &[Vec<[i32; 2]>]) -> Owners {
     let mut owners = Owners::new();
     let all = parts.iter().enumerate().flat_map(|(n, part)| part.iter().map(move |cell| (*cell, n)));
@@ -176,7 +176,7 @@ impl Grid {
     fn filled_by(plane: &Plane, held: &[&Sample]) -> Grid {
         /// Stride of the samples that are enough for the widest cells. From: work.
         const STRIDE: usize = 4;
-        /// Cells in one that is twice as wide. From: derived, two along each side.
+        /// Number of cells in a cell of twice the width. From: derived, two along each side.
         const QUARTERS: f64 = 4.0;
         let mut grid = Grid { side_m: WIDEST_CELL_M, ..Grid::fine(plane) };
         let (mut seen, mut cells) = (Tiles::new(), 0.0);
@@ -192,7 +192,7 @@ impl Grid {
         grid
     }
 
-    /// The cell that a place lies in.
+    /// Cell of a point.
     pub fn cell_of(&self, p: &Point3<f64>) -> [i32; 2] {
         let per_m = 1.0 / self.side_m;
         self.axes.each_ref().map(|axis| floor(axis.dot(&p.coords) * per_m))

@@ -3,7 +3,7 @@
 use super::level::Surface;
 use nalgebra::{Point3, Vector3};
 
-/// The half spaces whose common part is above and below a surface.
+/// Half spaces whose intersection is the region above and below a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
     /// Unit normals into the surface, with the edges' offsets along them, metres.
@@ -22,7 +22,8 @@ impl Outline {
         Outline { edges: if n < 3 { Vec::new() } else { (0..n).filter_map(edge).collect() } }
     }
 
-    /// True if the point (frame of the surface's hull) lies above or below the outline widened by `margin_m`.
+    /// True if the point (in the hull's frame) lies above or below the outline widened by
+    /// `margin_m`.
     pub fn covers(&self, p: &Point3<f64>, margin_m: f64) -> bool {
         self.edges.len() >= 3 && self.edges.iter().all(|(n, edge)| n.dot(&p.coords) - edge >= -margin_m)
     }
@@ -43,7 +44,7 @@ struct Row {
 
 /// Width of a row, metres. From: work.
 const ROW_M: f64 = 0.01;
-/// Nearer to an edge than this the edge itself is asked, metres. From: rounding.
+/// Distance from an edge within which the edge itself decides, metres. From: rounding.
 const ROUNDING_M: f64 = 1e-6;
 
 impl Rows {
@@ -59,7 +60,8 @@ impl Rows {
         Rows { outline, low_m, rows: (0..count).map(row).collect() }
     }
 
-    /// [`Outline::covers`] without a margin, of a place given in the surface's frame and in the outline's.
+    /// [`Outline::covers`] without a margin, for a point in both the surface's and the outline's
+    /// frame.
     #[inline(always)]
     pub fn covers(&self, flat: &Point3<f64>, place: &Point3<f64>) -> bool {
         let row = (flat.y - self.low_m) * (1.0 / ROW_M);

@@ -11,15 +11,15 @@ use rustc_hash::FxHashMap;
 pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.
 const PROPOSALS: usize = 240;
-/// Planes taken away one after another at most. From: chosen.
+/// Maximum number of planes found one after another. From: chosen.
 pub(super) const ROUNDS: usize = 6;
-/// Proposals go through points of one cube of this side, metres. From: chosen.
+/// Side of the cubes from which the points of a proposal are drawn, metres. From: chosen.
 const REACH_M: f64 = 0.3;
 /// Points that judge a proposal, at the most. From: chosen.
 const JUDGES: usize = 2400;
 /// Judges after which a proposal may be left. From: work.
 const BLOCK: usize = 128;
-/// Points that one thread takes in a row. From: work.
+/// Number of points per thread. From: work.
 const SOME: usize = 2048;
 
 /// Maximum distance of a measurement from its plane, in standard deviations and in metres (the
@@ -37,7 +37,7 @@ impl Plane {
         self.normal.dot(&p.coords) - self.offset
     }
 
-    /// True if a point may be a measurement of one of the plane.
+    /// True if a sample may be a measurement of the plane.
     pub fn holds(&self, sample: &Sample) -> bool {
         self.distance(&sample.point).abs() <= Plane::band_m(sample)
     }
@@ -53,7 +53,8 @@ impl Plane {
     }
 }
 
-/// Normals and offsets of planes that hold at least a share of all `total` places, which come with their spreads, metres.
+/// Normals and offsets of planes that hold at least a share of all `total` points; each point has a
+/// standard deviation, metres.
 pub(crate) fn dominant_planes(
     places: impl Iterator<Item = (Point3<f64>, f64)>,
     total: usize,
@@ -102,7 +103,7 @@ pub(super) fn large_planes(
 struct Cubes {
     /// The cube of each point.
     of: Vec<u32>,
-    /// The start of each cube's points in `members`, and the end of the last.
+    /// Start of each cube's points in `members`, and the total.
     starts: Vec<u32>,
     /// Numbers of points, cube by cube, ascending in each.
     members: Vec<u32>,
@@ -127,7 +128,7 @@ impl Cubes {
         cubes
     }
 
-    /// Keeps only the points for which `kept` is true, in their order.
+    /// Keeps the points accepted by `kept`, in order.
     fn keep(&mut self, mut kept: impl Iterator<Item = bool>) {
         self.of.retain(|_| kept.next().unwrap_or(false));
         self.sort();
@@ -159,7 +160,7 @@ impl Cubes {
 
 /// Cube number of each point, and the cubes in order of appearance.
 fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
-    /// Cubes a metre. From: derived, their side.
+    /// Number of cubes per metre. From: derived, their side.
     const PER_M: f64 = 1.0 / REACH_M;
     let (mut numbers, mut keys): (FxHashMap<[i32; 3], u32>, Vec<[i32; 3]>) = Default::default();
     let mut last = ([i32::MIN; 3], 0);
@@ -177,9 +178,8 @@ fn numbered(samples: &[Sample]) -> (Vec<u32>, Vec<[i32; 3]>) {
     (samples.iter().map(number).collect(), keys)
 }
 
-/// Sample points that score plane proposals, one array a coordinate, relative to the first point in
-/// single precision (accurate to a micrometre). Padded to whole blocks with NaN, which lies near no
-/// plane.
+/// Points that score plane proposals, in structure-of-arrays form, relative to the first point in
+/// single precision (accurate to a micrometre). Padded with NaN, which lies near no plane.
 struct Judges {
     count: usize,
     origin: Vector3<f64>,
@@ -281,7 +281,8 @@ fn propose(
 
 /// Weighted least squares on the points near the plane, repeated with a narrowing band.
 fn refine(mut plane: Plane, samples: &[Sample]) -> Option<Plane> {
-    /// Spreads of a measurement, one a step, and a distance, metres. From: chosen.
+    /// Inlier limits of the refinement steps in standard deviations; the next constant is the limit
+    /// in metres. From: chosen.
     const BANDS: [f64; 4] = [4.0, 3.0, 2.5, 2.5];
     const BESIDE_M: f64 = 0.003;
     /// Multiple of the first band beyond which a sample is never considered. From: chosen.

@@ -51,7 +51,7 @@ const UNDER_M: f64 = 0.25;
 const REACH_M: f64 = 1.2;
 /// Minimum area of the visible floor if nothing stands on the floor, square metres. From: chosen.
 const WIDE_M2: f64 = 2.5;
-/// A height band no wider than this speaks of tables alone, metres. From: chosen.
+/// Maximum height of a requested band that can only mean tables, metres. From: chosen.
 const TELLING_M: f64 = 1.0;
 
 /// Origin of a ray, if known, and its return.

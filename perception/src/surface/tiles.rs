@@ -7,7 +7,8 @@ use std::cell::Cell;
 const BITS: usize = 3;
 const SIDE: usize = 1 << BITS;
 
-/// A value for each cell: the default where none was set. Neighbours lie in one tile, most often, so that few are looked up.
+/// Values by cell, with a default. Neighbours are mostly in one tile, so that few tiles are looked
+/// up.
 pub struct Tiles<T> {
     /// The start of each tile in `values`.
     starts: FxHashMap<[i32; 2], usize>,

@@ -25,7 +25,7 @@ const LEAST_SHARE: f64 = 0.0125;
 /// Maximum deviation of level and upright planes, radians. From: chosen, 8°: twice what a poor
 /// camera bends.
 const ALIKE_RAD: f64 = 0.14;
-/// Hypotheses that lie no farther apart are one, radians. From: chosen, 15°.
+/// Angle between hypotheses below which they are one, radians. From: chosen, 15°.
 const ONE_RAD: f64 = 0.26;
 /// Minimum probability of the up direction, against all other directions; where the direction is against how
 /// cameras are held, [`SURE`]. From: chosen, more likely than not.
@@ -71,7 +71,7 @@ pub(super) fn up(
     seen: &Visibility,
     seed: u64,
 ) -> Result<(Unit<Vector3<f64>>, f64), Doubt> {
-    /// Stride through the samples: large planes need no more. From: work.
+    /// Sampling stride; large planes need no more points. From: work.
     const STRIDE: usize = 4;
     let samples: Vec<Sample> = samples.iter().step_by(STRIDE).copied().collect();
     let (faces, rest) = faces(&samples, seen, seed);
@@ -107,7 +107,7 @@ fn settled(up: &Unit<Vector3<f64>>, faces: &[Face]) -> Unit<Vector3<f64>> {
     Unit::try_new(sum, 0.0).unwrap_or(*up)
 }
 
-/// True if a plane that faces a camera is level where this is up.
+/// True if a plane facing a camera is level under this up direction.
 fn is_level(face: &Face, up: &Vector3<f64>) -> bool {
     face.plane.normal.dot(up) > ALIKE_RAD.cos()
 }
@@ -183,7 +183,7 @@ impl Face {
     }
 }
 
-/// The returns that lie in no plane.
+/// Returns off all planes.
 struct Things {
     /// For each plane, the points that would stand on it.
     standing: Vec<Vec<bool>>,
@@ -271,8 +271,8 @@ fn held_log(up: &Vector3<f64>, seen: &Visibility) -> f64 {
     const RAISED_RAD: f64 = 0.2;
     const RAISED_SPREAD_RAD: f64 = 0.25;
     const LEAST_RAISED: f64 = -5.0;
-    /// Angle of looking down from which fewer cameras do so, radians, the width of that fall, radians, and
-    /// log of the chance to look straight down. From: chosen.
+    /// Downward pitch from which cameras become rarer, radians; the next constants are the width of
+    /// that decline, radians, and the log probability of looking straight down. From: chosen.
     const STEEP_RAD: f64 = 1.1;
     const STEEPER_RAD: f64 = 0.3;
     const STRAIGHT: f64 = -2.0;

@@ -46,10 +46,10 @@ struct CacheKey {
     level: Level,
     module: Arc<str>,
     arguments: Vec<Arc<str>>,
-    /// Truth values of the readings, two bits each: false, true, or one of the others. A call may
-    /// read hundreds of facts.
+    /// Truth values of the readings, two bits each: false, true, or "in `others`". A call may have
+    /// hundreds of readings.
     truths: Vec<u64>,
-    /// The readings that are no truths, in their order.
+    /// Other readings, in order.
     others: Vec<KeyValue>,
 }
 
@@ -91,7 +91,7 @@ impl fmt::Debug for Attachments {
 }
 
 impl Attachments {
-    /// No attachments.
+    /// Empty registry.
     pub fn new() -> Attachments {
         Attachments::default()
     }
@@ -108,7 +108,7 @@ impl Attachments {
         self.insert_shared(name, Arc::new(attachment));
     }
 
-    /// Like [`Attachments::insert`] for an attachment that others hold too.
+    /// [`Attachments::insert`] for a shared attachment.
     pub fn insert_shared(&mut self, name: impl Into<String>, attachment: Arc<dyn Attachment>) {
         let registered = Registered {
             reads: attachment.reads(),
@@ -148,7 +148,7 @@ impl Attachments {
         self.registered.get(name).map_or(&[], |registered| &registered.reads)
     }
 
-    /// Counter of answers that a caller cached by itself.
+    /// Counter for answers cached by the caller itself.
     pub(crate) fn hits(&self, name: &str) -> Option<&AtomicU64> {
         self.registered.get(name).map(|registered| &registered.hits)
     }

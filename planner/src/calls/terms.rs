@@ -12,7 +12,7 @@ use crate::task::{ObjectId, Task};
 /// Source of a reading.
 #[derive(Debug, Clone)]
 pub(super) enum Origin {
-    /// True where the variable has the value.
+    /// Truth of a variable having a value.
     Fact(VariableId, u32),
     /// The number.
     Number(NumericId),
@@ -54,7 +54,7 @@ impl Sources {
     }
 }
 
-/// Ground terms by name, to where their values stand.
+/// Ground terms by name, with the origin of each value.
 #[derive(Default)]
 pub(super) struct Terms {
     facts: FxHashMap<(u32, Vec<u32>), (VariableId, u32)>,
@@ -84,7 +84,7 @@ impl Terms {
         terms
     }
 
-    /// The ground readings of one declared read, in the order of the task's objects.
+    /// Ground readings of one declared read, in the task's object order.
     pub(super) fn readings(
         &self,
         task: &Task,

@@ -18,7 +18,7 @@ const LARGEST_COST: f64 = 1.0e6;
 /// Maximum plan cost that the search can represent; infinite bounds are one above.
 pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
-/// Lists of different lengths in one array.
+/// Lists of different lengths, stored in one array.
 #[derive(Clone, Debug, Default)]
 pub struct Lists<T> {
     starts: Vec<u32>,
@@ -26,7 +26,7 @@ pub struct Lists<T> {
 }
 
 impl<T> Lists<T> {
-    /// No lists.
+    /// Empty collection.
     pub(crate) fn new() -> Self {
         Lists { starts: vec![0], items: Vec::new() }
     }
@@ -37,7 +37,7 @@ impl<T> Lists<T> {
         self.starts.push(self.items.len() as u32);
     }
 
-    /// One list.
+    /// List by index.
     #[inline]
     pub(crate) fn get(&self, index: usize) -> &[T] {
         &self.items[self.starts[index] as usize..self.starts[index + 1] as usize]
@@ -75,12 +75,12 @@ impl<T> Lists<T> {
     }
 }
 
-/// One effect: a fact that comes about where the conditions hold.
+/// Conditional effect on one fact.
 #[derive(Clone, Copy, Debug)]
 pub struct Achieve {
     /// First condition in [`Compiled::conditions`].
     pub from: u32,
-    /// One past the last.
+    /// End of the range, exclusive.
     pub to: u32,
     /// The fact.
     pub fact: Fact,
@@ -106,7 +106,7 @@ pub struct Compiled {
     /// True, by operator, if its effects may give one object fluent several values at once; empty
     /// if no operator can.
     contested: Vec<bool>,
-    /// True, by variable that is not derived, for object fluents.
+    /// True, by basic variable, for object fluents.
     objects: Vec<bool>,
     /// Search costs by operator.
     pub costs: Vec<u32>,
@@ -124,7 +124,7 @@ pub struct Compiled {
     pub axiom_heads: Vec<Fact>,
     /// First axiom of each stratum, and the number of axioms.
     pub strata: Vec<usize>,
-    /// Axioms with a fact in their body, by fact.
+    /// Axioms by body fact.
     pub axioms_with: Lists<u32>,
     /// Goal facts.
     pub goal: Vec<Fact>,
@@ -300,15 +300,15 @@ impl Compiled {
             && self.possible(operator, state)
     }
 
-    /// True if an operator whose preconditions hold leaves all numbers defined and finite, and
-    /// gives each object one value.
+    /// True if an operator leaves all numbers defined and finite, and gives each object one value;
+    /// preconditions are assumed.
     #[inline]
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         (self.numbers.is_empty() || self.numbers.possible(operator, state))
             && (self.contested.is_empty() || self.agrees(operator, state))
     }
 
-    /// True if some operators may be inapplicable although their preconditions hold.
+    /// True if some operator may be inapplicable although its preconditions hold.
     pub(crate) fn some_impossible(&self) -> bool {
         !self.numbers.is_empty() || !self.contested.is_empty()
     }
@@ -347,7 +347,7 @@ impl Compiled {
         self.derive(next);
     }
 
-    /// Applies the operator to the state itself.
+    /// Applies the operator in place.
     pub fn advance(&self, operator: u32, state: &mut [u32]) {
         let effects = self.effects.get(operator as usize);
         let conditional = effects.iter().any(|e| e.from != e.to);

@@ -9,7 +9,7 @@ use super::numbers::{Linear, Numbers, add_linear};
 #[derive(Clone, Debug)]
 pub struct Measure {
     kind: Kind,
-    /// Cost by operator, or an estimate where the cost depends on the state.
+    /// Cost by operator; an estimate for state-dependent costs.
     pub estimates: Vec<f64>,
 }
 

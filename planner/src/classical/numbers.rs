@@ -10,7 +10,7 @@ use crate::model::relation::quotient;
 
 use super::compiled::Lists;
 
-/// One effect on a number.
+/// Numeric effect.
 #[derive(Clone, Debug, Default)]
 pub struct NumberChange {
     /// Facts (including those of comparisons) that enable the change.
@@ -37,7 +37,7 @@ impl NumberChange {
 /// A sum of weighted numbers and a constant.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
-    /// Numbers with their weights, each number once.
+    /// Numbers with their weights, without duplicates.
     pub weights: Vec<(u32, f64)>,
     /// The constant.
     pub constant: f64,
@@ -58,7 +58,7 @@ pub struct Numbers {
     pub reads: Vec<Vec<u32>>,
     /// Comparisons that read each number.
     pub read_by: Lists<u32>,
-    /// First values; NaN where undefined.
+    /// Initial values; NaN if undefined.
     pub initial: Vec<f64>,
     /// Changes of numbers by operator.
     pub changes: Vec<Vec<NumberChange>>,
@@ -66,8 +66,8 @@ pub struct Numbers {
     turned: Lists<u32>,
     /// True, by operator, if a number may become undefined or infinite, which forbids the operator.
     risky: Vec<bool>,
-    /// True, by operator, if changes of one number may contradict each other, which forbids the
-    /// operator.
+    /// True, by operator, if its changes of one number may contradict each other, which makes it
+    /// inapplicable.
     contradicting: Vec<bool>,
 }
 
@@ -189,7 +189,7 @@ impl Numbers {
         self.value(left, state) - self.value(right, state)
     }
 
-    /// Change of left minus right of a comparison; NaN if it depends on the state.
+    /// Change of left minus right of a comparison; NaN if state-dependent.
     pub(crate) fn gain(&self, comparison: u32, changes: &[NumberChange]) -> f64 {
         let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
         let weight = |n: u32| linear.weights.iter().find(|(number, _)| *number == n).map_or(0.0, |w| w.1);
@@ -230,12 +230,12 @@ impl Numbers {
         self.turned.get(operator as usize)
     }
 
-    /// The value of an expression; NaN where it is undefined.
+    /// Value of an expression; NaN if undefined.
     pub(crate) fn value(&self, expression: &Expression, state: &[u32]) -> f64 {
         evaluate(expression, &|number| self.get(state, number))
     }
 
-    /// Applies an operator's changes to `next`, a copy of `state` with the operator's other effects.
+    /// Applies an operator's numeric changes to `next`, a copy of `state` with the other effects.
     pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut [u32]) {
         for change in &self.changes[operator as usize] {
             let (Some(how), Some(amount)) = (change.change, &change.amount) else { continue };
@@ -250,8 +250,7 @@ impl Numbers {
         }
     }
 
-    /// True if all numbers that an operator changes stay defined and finite, and no changes
-    /// contradict each other.
+    /// True if all numbers changed by an operator stay defined and finite, without contradictions.
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         if !self.risky[operator as usize] {
             return true;
@@ -267,7 +266,7 @@ impl Numbers {
         })
     }
 
-    /// True if changes that happen in a state contradict each other.
+    /// True if changes triggered in a state contradict each other.
     fn contradict(&self, operator: u32, state: &[u32]) -> bool {
         let happens = |c: &&NumberChange| c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
         let happening = self.changes[operator as usize].iter().filter(happens);
@@ -290,13 +289,13 @@ impl Numbers {
     }
 }
 
-/// Number of repetitions beyond which the exact number no longer matters.
+/// Maximum number of repetitions that is counted exactly.
 const MOST_TIMES: f64 = 1.0e6;
-/// Part of a repetition that is left to rounding.
+/// Tolerance of repetition counts.
 const SLACK: f64 = 1.0e-9;
 
-/// Number of additions until a gap (left minus right) stands in the relation to zero; `None` if
-/// adding does not help.
+/// Number of additions until left minus right satisfies the relation to zero; `None` if adding does
+/// not help.
 pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32> {
     let (missing, gain) = match relation {
         Relation::AtLeast | Relation::Greater => (-gap, gain),
@@ -314,7 +313,7 @@ pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32
     Some(times.clamp(1.0, MOST_TIMES) as u32)
 }
 
-/// The value of an expression over numbers; NaN where it is undefined.
+/// Value of an expression over numbers; NaN if undefined.
 pub(crate) fn evaluate(expression: &Expression, number: &impl Fn(u32) -> f64) -> f64 {
     match expression {
         Expression::Constant(value) => *value,

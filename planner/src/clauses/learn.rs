@@ -3,7 +3,8 @@
 use super::Literal;
 use super::solver::{NONE, PAIR, Solver};
 
-/// A clause learned: the first literal becomes true once the search is back at `level`, which is the second one's.
+/// Learned clause; after backtracking to `level` (that of the second literal), its first literal
+/// becomes true.
 pub(super) struct Learned {
     pub clause: Vec<Literal>,
     pub level: u32,
@@ -12,7 +13,7 @@ pub(super) struct Learned {
 }
 
 impl Solver {
-    /// Learns from a clause that does not hold.
+    /// Conflict analysis: learns a clause from a conflicting one.
     pub(super) fn learn(&mut self, mut reason: Vec<Literal>) -> Learned {
         let mut clause = vec![Literal::default()];
         let (mut open, mut index) = (0, self.trail.len());
@@ -57,7 +58,7 @@ impl Solver {
         self.measured(clause)
     }
 
-    /// The false literals that made one true.
+    /// False literals that propagated a literal.
     fn because(&self, literal: Literal) -> Vec<Literal> {
         let reason = self.reasons[literal.variable() as usize];
         if reason & PAIR != 0 && reason != NONE {
@@ -66,7 +67,7 @@ impl Solver {
         self.literals(reason).filter(|&other| other != literal).collect()
     }
 
-    /// True if a literal's reason lies in the marked literals.
+    /// True if a literal is implied by the marked literals.
     fn follows(&self, literal: Literal) -> bool {
         let reason = self.reasons[literal.variable() as usize];
         let marked = |other: Literal| {

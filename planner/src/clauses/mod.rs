@@ -24,7 +24,7 @@ impl Literal {
         Literal(self.0 ^ 1)
     }
 
-    /// The literal of the variable `by` places later, with the same sign.
+    /// Literal of the variable `by` positions later, with the same sign.
     pub(crate) fn shifted(self, by: u32) -> Literal {
         Literal(self.0 + 2 * by)
     }

@@ -7,17 +7,17 @@ use super::Literal;
 /// Position of a clause in the arena; [`NONE`] for no reason.
 pub(super) type Place = u32;
 pub(super) const NONE: Place = u32::MAX;
-/// Set in a reason that is a clause of two: the other literal.
+/// Flag of a reason that is a binary clause with the given other literal.
 pub(super) const PAIR: u32 = 1 << 31;
 /// Words before a clause's literals: length and LBD (0 for an input clause).
 pub(super) const HEAD: usize = 2;
 
 /// Conflicts of the shortest run between restarts.
 const RESTART: u64 = 64;
-/// Learned clauses that are kept at first, and how many more after each time some are forgotten.
+/// Initial limit of learned clauses; the next constant is its increase after each reduction.
 const KEPT: usize = 2_000;
 const KEPT_MORE: usize = 500;
-/// Learned clauses with literals of so few levels are never forgotten.
+/// Maximum LBD of learned clauses that are never deleted.
 const GLUE: u32 = 2;
 
 /// Answer of a search.
@@ -25,7 +25,7 @@ const GLUE: u32 = 2;
 pub enum Answer {
     /// All clauses hold under the values.
     Satisfied,
-    /// No values satisfy the clauses.
+    /// Unsatisfiable.
     Unsatisfiable,
     /// Work limit reached or stopped by the caller; the solver can continue.
     Interrupted,
@@ -48,7 +48,7 @@ pub(super) struct Watch {
 
 /// Clause database and assignment.
 pub struct Solver {
-    /// Clauses of three and more, one after another.
+    /// Clauses of three or more literals, consecutively.
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
     kept: usize,
@@ -66,15 +66,15 @@ pub struct Solver {
     bump: f64,
     pub(super) trail: Vec<Literal>,
     starts: Vec<usize>,
-    /// Up to where the trail was followed.
+    /// Position in the trail up to which propagation is done.
     followed: usize,
     contradiction: bool,
-    /// Decisions to try next, the last one first.
+    /// Stack of planned decisions.
     plan: Vec<Literal>,
     conflicts: u64,
     restart_at: u64,
     restarts: u64,
-    /// Watches looked at since the beginning: a measure of work that no clock is part of.
+    /// Number of inspected watches: a deterministic measure of work.
     pub work: u64,
     pub(super) seen: Vec<bool>,
     bytes: usize,
@@ -108,12 +108,12 @@ impl Solver {
         }
     }
 
-    /// Bytes taken, about.
+    /// Approximate memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes + self.arena.capacity() * 4
     }
 
-    /// The value of a literal; `None` while it is unassigned.
+    /// Value of a literal; `None` while unassigned.
     pub fn value(&self, literal: Literal) -> Option<bool> {
         match self.values[literal.at()] {
             0 => None,
@@ -312,7 +312,7 @@ impl Solver {
         }
     }
 
-    /// Learns from a clause that does not hold and goes back.
+    /// Learns from a conflicting clause and backtracks.
     fn resolve(&mut self, broken: Vec<Literal>) {
         self.conflicts += 1;
         let learned = self.learn(broken);
@@ -325,7 +325,7 @@ impl Solver {
         self.bump /= 0.95;
     }
 
-    /// Sets the next literal; `false` if none is open.
+    /// Makes the next decision; `false` if all literals are assigned.
     fn try_next(&mut self, decide: &mut dyn Decide) -> bool {
         let next = loop {
             match self.plan.pop() {

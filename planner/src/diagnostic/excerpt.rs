@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use super::{Diagnostic, Severity, Source, Span};
 
-/// Lines with more bytes than this are not drawn whole.
+/// Length above which a line is shortened, bytes.
 const LONG_LINE_BYTES: usize = 400;
-/// Characters shown before and after a place.
+/// Number of characters shown around a span.
 const AROUND: usize = 40;
-/// Characters of a place that are shown.
+/// Maximum number of characters shown of a span.
 const MOST_SHOWN: usize = 60;
 
 /// Line and column of a byte, both from 1.

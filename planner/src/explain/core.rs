@@ -4,7 +4,7 @@ use crate::task::{Condition, Task};
 
 use super::{Explanation, together};
 
-/// Goals with more parts than this are not taken apart.
+/// Maximum number of goal parts for the subset search.
 const MOST_PARTS: usize = 24;
 
 /// Drops goal parts while `unsolvable` still proves the remainder unreachable; returns the

@@ -1,11 +1,11 @@
-//! Findings about actions that can never be taken, whatever holds: no duration is allowed.
+//! Findings about actions that are never applicable, because no duration is allowed.
 
 use crate::diagnostic::{Diagnostic, Span};
 use crate::ground::{DurationBound, Expression, GroundTask, Relation};
 use crate::plan::number_text;
 use crate::task::Task;
 
-/// Least and greatest duration in seconds, where bounds that are the same in every state leave none.
+/// Contradicting minimum and maximum duration, seconds, from state-independent bounds.
 fn contradiction(bounds: &[DurationBound]) -> Option<(f64, f64)> {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {
@@ -20,7 +20,7 @@ fn contradiction(bounds: &[DurationBound]) -> Option<(f64, f64)> {
     (least_s > most_s).then_some((least_s, most_s))
 }
 
-/// Findings about actions none of whose instances has a duration.
+/// Findings about actions without an instance that has a duration.
 pub(super) fn without_duration(task: &Task, ground: &GroundTask) -> Vec<Diagnostic> {
     let mut findings = Vec::new();
     for (schema, action) in (0..).zip(&task.actions) {

@@ -104,7 +104,7 @@ fn added<'t>(task: &'t Task, action: &'t Action) -> impl Iterator<Item = (Predic
     })
 }
 
-/// Finding about a part of the goal that no action can bring about; `None` where some might.
+/// Finding about a goal part without achievers; `None` if some action might achieve it.
 pub(super) fn goal_part(
     task: &Task,
     reach: &Reach,

@@ -20,7 +20,7 @@ struct Had<'g> {
     ground: &'g GroundTask,
     /// Reached facts, by variable and value.
     facts: Vec<Vec<bool>>,
-    /// Actions that have been taken: instantaneous ones, durative ones.
+    /// Applied actions: instantaneous and durative ones.
     taken: [Vec<bool>; 2],
 }
 
@@ -36,7 +36,7 @@ impl<'g> Had<'g> {
         had
     }
 
-    /// Takes every action once more; whether that gave anything.
+    /// Applies every action once more; true if this reached anything new.
     fn grow(&mut self) -> bool {
         let ground = self.ground;
         let before = self.count();
@@ -70,7 +70,7 @@ impl<'g> Had<'g> {
         self.holds_after(&[], condition)
     }
 
-    /// True if a condition holds once these effects have happened.
+    /// True if a condition holds after these effects.
     fn holds_after(&self, effects: &[Effect], condition: &Conjunction) -> bool {
         let given = |fact: &Fact| {
             let mut outcomes = self.happening(effects);
@@ -94,8 +94,8 @@ impl<'g> Had<'g> {
             && lasts(&action.duration)
     }
 
-    /// True if effects surely have a result: of numbers, where known amounts are added to known numbers; of
-    /// objects, where each gets one value.
+    /// True if effects certainly have a result: known amounts are added to known numbers, and each
+    /// object gets one value.
     fn can_happen(&self, effects: &[Effect]) -> bool {
         let kinds = effects.iter().filter_map(|effect| match effect.outcome {
             Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {

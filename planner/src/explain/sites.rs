@@ -1,4 +1,4 @@
-//! Places in a task that call a module.
+//! Calls of a module in a task's text.
 
 use crate::diagnostic::Span;
 use crate::model::walk::{self, Part};

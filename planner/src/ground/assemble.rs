@@ -1,4 +1,4 @@
-//! The last step of grounding: variables, actions and axioms in their final form.
+//! Last step of grounding: variables, actions and axioms in their final form.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -239,7 +239,7 @@ fn timed(encoding: &Encoding, time_s: f64, deeds: &[Deed]) -> TimedEffect {
     TimedEffect { time_s, outcomes: outcomes.collect() }
 }
 
-/// The numbers at first; NaN where undefined.
+/// Initial numbers; NaN if undefined.
 pub(super) fn initial_numbers(make: &Instantiate<'_>) -> Vec<f64> {
     let number = |f: &NumericFluent| {
         make.statics.numbers.get(&(f.function, f.arguments[..].into())).copied().unwrap_or(f64::NAN)
@@ -400,7 +400,8 @@ fn holds_without_calls(ground: &GroundTask, condition: &Conjunction) -> bool {
 }
 
 impl Expression {
-    /// The value over these numbers; NaN where a fluent is undefined or the expression needs more than numbers.
+    /// Value over these numbers; NaN if a fluent is undefined or the expression needs more than
+    /// numbers.
     pub fn number(&self, numbers: &[f64]) -> f64 {
         match self {
             Expression::Constant(value) => *value,

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 /// No object: an unbound slot.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// The atoms of one predicate that agree on some arguments, as a list in rising order.
+/// Atoms of one predicate that agree on some arguments, ascending.
 #[derive(Clone, Copy)]
 struct Chain {
     first: u32,
@@ -21,7 +21,7 @@ struct Index {
     next: Vec<u32>,
 }
 
-/// The atoms of one predicate; a row is an atom's position here.
+/// Atoms of one predicate; a row is an atom's index in the table.
 struct Table {
     arity: usize,
     arguments: Vec<u32>,
@@ -44,7 +44,7 @@ fn key_of(bits: u32, arguments: impl Iterator<Item = u32>) -> u64 {
 }
 
 impl Atoms {
-    /// No atoms, for this many predicates over this many objects.
+    /// Empty set of atoms, for this many predicates and objects.
     pub(super) fn new(predicates: usize, objects: usize) -> Self {
         let table = || Table {
             arity: 0,
@@ -120,8 +120,8 @@ impl Atoms {
         (atom, true)
     }
 
-    /// Upper bound on the number of atoms of the predicate that agree with the bound arguments (all
-    /// others are `NONE`): two keys may share a chain when the arguments are too many for one word.
+    /// Upper bound on the number of the predicate's atoms that match the bound arguments (others
+    /// `NONE`); keys may collide when the arguments exceed one word.
     pub(super) fn count(&mut self, predicate: u32, pattern: &[u32]) -> u32 {
         let mask = mask_of(pattern);
         if mask == 0 {
@@ -132,7 +132,7 @@ impl Atoms {
         self.tables[predicate as usize].indexes[index].chains.get(&key).map_or(0, |c| c.length)
     }
 
-    /// The first row that agrees with the bound arguments, and the index with which to go on.
+    /// First row that matches the bound arguments, and the index for continuing.
     pub(super) fn first(&mut self, predicate: u32, pattern: &[u32]) -> (usize, u32) {
         let mask = mask_of(pattern);
         if mask == 0 {
@@ -144,7 +144,7 @@ impl Atoms {
         (index, self.tables[predicate as usize].indexes[index].chains.get(&key).map_or(NONE, |c| c.first))
     }
 
-    /// The row after this one in the index.
+    /// Next row in the index.
     pub(super) fn next(&self, predicate: u32, index: usize, row: u32) -> u32 {
         let table = &self.tables[predicate as usize];
         if index == usize::MAX {

@@ -21,7 +21,7 @@ use super::rules::{self, Rules};
 use super::statics::{Statics, Tries};
 use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
 
-/// Reason for which a task was not grounded.
+/// Reason why a task was not grounded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GroundError {
     /// The caller's stop signal.

@@ -1,5 +1,4 @@
-//! Earliest times at which facts can hold in the delete relaxation, in which only facts that are given until
-//! some time end.
+//! Earliest times of facts in the delete relaxation, in which only facts of timed literals end.
 //!
 //! Labels are times and spread from what holds at first (Dijkstra 1959): what an operator gives comes no earlier than all that
 //! it needs, and never where something that it needs is over by then.
@@ -71,7 +70,7 @@ impl<'g> Earliest<'g> {
         labels.fold(0.0, f64::max)
     }
 
-    /// True if no fact that a condition needs is false for good by the last timed literal.
+    /// True if no needed fact is false for good before the last timed literal.
     pub(crate) fn lasts(&self, condition: &Conjunction) -> bool {
         condition.facts.iter().all(|&fact| self.until_s[self.place(fact) as usize].is_infinite())
     }
@@ -129,8 +128,7 @@ impl<'g> Earliest<'g> {
         }
     }
 
-    /// Adds operators for effects that happen where some facts hold, a given time after an action has
-    /// started.
+    /// Adds operators for conditional effects, a given time after an action's start.
     fn effects(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, effects: &[Effect]) {
         let plain = effects.iter().filter(|effect| effect.when.is_none());
         let gives: Vec<u32> = plain.flat_map(|effect| self.given(&effect.outcome)).collect();

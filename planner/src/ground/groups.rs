@@ -16,7 +16,7 @@ use super::rules::Rules;
 /// Names of atoms, and of tokens that mark a running durative action.
 struct Names<'a> {
     atoms: &'a Atoms,
-    /// Atoms at and beyond this one are tokens.
+    /// First atom number that is a token.
     first: u32,
     first_token: u32,
     tokens: Vec<(u32, &'a [u32])>,
@@ -100,7 +100,7 @@ pub(super) fn groups(
     Groups { found, fixed: fixed_groups }
 }
 
-/// Every action, start, end and timed effect as a transition; tokens are numbered from `token` on.
+/// Every action, start, end and timed effect as a transition; tokens are numbered from `token`.
 fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
     let mut all = Transitions::default();
     for action in &raw.actions {
@@ -126,7 +126,7 @@ fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
     all
 }
 
-/// A start or an end as a transition; conditions that are not atoms make a deletion unreliable.
+/// Snap action as a transition; deletions under conditions that are not atoms are unreliable.
 fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32, into: &mut Transitions) {
     let positive = |c: &Clauses| {
         let literals = c.literals.iter().filter(|&&l| l & 1 == 0);

@@ -11,7 +11,7 @@ use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, T
 use super::statics::{Statics, each, found};
 use super::task::{Change, Comparison, Expression, NumericFluent, Origin, Relation};
 
-/// A ground condition with its disjunctions still in place. A literal is `atom << 1 | negated`.
+/// Ground condition with disjunctions; a literal is `atom << 1 | negated`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Clauses {
     pub literals: Vec<u32>,
@@ -95,7 +95,7 @@ impl RawCall {
 /// A ground effect.
 #[derive(Clone, Debug)]
 pub(super) struct GroundEffect {
-    /// Condition at the start, over all, at the end; `None` for always.
+    /// Conditions at start, over all and at end; `None`: unconditional.
     pub when: Option<Box<[Clauses; 3]>>,
     pub deed: Deed,
 }
@@ -114,7 +114,7 @@ pub(super) struct Instantiate<'a> {
     pub calls: Vec<RawCall>,
     numeric_ids: FxHashMap<NumericFluent, u32>,
     comparison_ids: FxHashMap<Vec<u64>, u32>,
-    /// Numbers of calls, as atoms of their module.
+    /// Call numbers, as atoms of the calls' modules.
     call_ids: Atoms,
 }
 
@@ -324,7 +324,7 @@ impl<'a> Instantiate<'a> {
         id
     }
 
-    /// The ground effects of a lifted one.
+    /// Ground effects of a lifted one.
     pub(super) fn effect(
         &mut self,
         effect: &Effect_,
@@ -404,7 +404,7 @@ impl<'a> Instantiate<'a> {
         Ok(if always { None } else { Some(Box::new([here, at_start, over_all])) })
     }
 
-    /// The reached atoms of an object function's instance, one a value.
+    /// Reached atoms of an object function's instance, one per value.
     pub(super) fn values_of(&mut self, predicate: u32, prefix: &[u32]) -> Vec<u32> {
         let mut pattern = prefix.to_vec();
         pattern.push(NONE);
@@ -521,7 +521,7 @@ fn guards_of(formula: &Formula) -> Vec<&Pattern> {
     }
 }
 
-/// A key that two expressions share only if they are the same.
+/// Key that is equal only for equal expressions.
 fn encode(expression: &Expression, key: &mut Vec<u64>) {
     let mut list = |tag: u64, parts: &[&Expression]| {
         key.push(tag << 32 | parts.len() as u64);

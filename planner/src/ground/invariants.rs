@@ -29,7 +29,7 @@ pub(crate) struct Transitions {
     before: Vec<u32>,
     adds: Vec<Changed>,
     deletes: Vec<Changed>,
-    /// Ends of the parts of a transition, by transition.
+    /// End positions of each transition's parts.
     ends: Vec<[u32; 3]>,
 }
 
@@ -81,14 +81,14 @@ pub(crate) trait AtomNames {
     fn arguments(&self, atom: u32) -> &[u32];
 }
 
-/// One predicate of a candidate, with the argument positions that make the key, in the order of the key.
+/// Predicate of a candidate, with the argument positions of the key, in key order.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Part {
     predicate: u32,
     key: Vec<u8>,
 }
 
-/// Number of candidates after which the search for further groups ends.
+/// Maximum number of candidates.
 const MOST_CANDIDATES: usize = 400;
 /// Transitions looked at in all.
 const MOST_WORK: usize = 30_000_000;
@@ -275,7 +275,7 @@ fn placements(key: &[u32], arguments: &[u32], chosen: &mut Vec<u8>, found: &mut 
     }
 }
 
-/// The atoms of each key that exactly one atom has at first.
+/// Atoms of each key with exactly one initially true atom.
 fn instances<N: AtomNames>(names: &N, atoms: &[u32], initial: &[u32], invariant: &[Part]) -> Vec<Vec<u32>> {
     let key_of = |atom: u32| {
         let predicate = names.predicate(atom);

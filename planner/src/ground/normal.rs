@@ -89,7 +89,7 @@ pub(super) struct Effect_ {
     pub change: Change_,
 }
 
-/// Something at start, over all and at end.
+/// Values for start, over all and end.
 #[derive(Clone, Debug)]
 pub(super) struct Timed3<T> {
     pub start: T,
@@ -291,7 +291,7 @@ impl<'a> Scope<'a> {
         if wanted { fresh.positive(formula) } else { fresh.negative(formula) }
     }
 
-    /// An equation with a function on one side is an atom of that function.
+    /// Equation with an object function on one side as an atom of that function.
     fn same(&mut self, left: &LiftedTerm, right: &LiftedTerm, wanted: bool, fresh: &mut Fresh) -> Formula {
         let (function, value) = match (left, right) {
             (LiftedTerm::Function(f), value) => (f, value),
@@ -377,7 +377,7 @@ impl<'a> Scope<'a> {
         Effect_ { forall, when, change }
     }
 
-    /// True for an atom of an object function that may have no value.
+    /// True for an atom of an object function that may be undefined.
     fn unsure(&self, atom: &Pattern) -> bool {
         let function = atom.predicate.checked_sub(self.task.predicates.len() as u32);
         function.is_some_and(|function| may_be_undefined(self.task, FunctionId(function)))
@@ -401,7 +401,7 @@ impl<'a> Scope<'a> {
 /// Conditions under which effects have a result.
 #[derive(Default)]
 struct Needs {
-    /// Conditions of their action.
+    /// Conditions of the action.
     conditions: Vec<Formula>,
     /// Effects that must not happen, besides end effects with conditions on earlier times.
     forbidden: Vec<Effect_>,
@@ -421,7 +421,7 @@ fn without_result(function: u32, forall: &[u32], when: &Timed3<Formula>, fresh: 
     Effect_ { forall: forall.to_vec(), when, change }
 }
 
-/// True if an object function may have no value for some arguments.
+/// True if an object function may be undefined for some arguments.
 fn may_be_undefined(task: &Task, function: FunctionId) -> bool {
     let arguments: usize =
         task.function(function).parameters.iter().map(|parameter| parameter.objects.len()).product();

@@ -34,7 +34,7 @@ struct Find<'a> {
     queue: Vec<MissingAtom>,
 }
 
-/// The chain of obstacles from the goal on; empty where the goal's atoms can all be had.
+/// Chain of obstacles from the goal on; empty if the goal's atoms are all reachable.
 pub(super) fn obstacles(normal: &Normal, atoms: &Atoms, reached: &[bool]) -> Vec<Obstacle> {
     let mut find = Find { normal, atoms, reached, found: Vec::new(), queue: Vec::new() };
     let binding = vec![NONE; normal.goal_domains.len()];
@@ -58,7 +58,7 @@ impl Find<'_> {
         }
     }
 
-    /// The positive atoms of a conjunction that no reached atom matches.
+    /// Positive atoms of a conjunction without a matching reached atom.
     fn missing(&self, formula: &Formula, binding: &[u32]) -> Vec<MissingAtom> {
         match formula {
             Formula::And(parts) => parts.iter().flat_map(|p| self.missing(p, binding)).collect(),

@@ -3,7 +3,7 @@
 
 use super::task::{Action, Fact, GroundTask, Outcome};
 
-/// Facts, and words of pairs looked at, beyond which this is not tried.
+/// Maximum number of facts, above which h² is skipped; the next constant limits the work.
 const MOST_FACTS: usize = 4_000;
 const MOST_WORK: usize = 50_000_000;
 /// Members of all groups at most.

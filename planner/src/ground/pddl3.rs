@@ -33,11 +33,11 @@ const MOST_OF_AN_ACTION: usize = 3;
 
 /// A task without preferences and constraints.
 pub(crate) struct Compiled {
-    /// The task. Actions whose names hold a blank are no steps of a plan.
+    /// Compiled task; actions with a blank in their names are no plan steps.
     pub task: Task,
     /// True if a preference that the metric counts was dropped.
     pub forgets: bool,
-    /// The metric counts no preference at all.
+    /// True if the metric counts no preference.
     pub uncounted: bool,
 }
 
@@ -83,7 +83,7 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
 enum Asked {
     /// Acceptance by an automaton.
     States(&'static Automaton),
-    /// Truth of the first condition at some time up to this one, in seconds.
+    /// First condition true at some time up to this one, seconds.
     Within(f64),
 }
 
@@ -98,9 +98,9 @@ struct Stated {
 /// Bound constraint or preference with its automaton and flags.
 struct Instance {
     automaton: &'static Automaton,
-    /// Both conditions; atoms and their absence only, where numbers are compared.
+    /// Both conditions, reduced to literals where numbers are compared.
     conditions: [Condition; 2],
-    /// Facts: the automaton's flags, and one for having been broken where that is allowed.
+    /// Flag facts of the automaton, and one for a violation if allowed.
     flags: Vec<Condition>,
     preference: Option<PreferenceId>,
 }
@@ -414,7 +414,7 @@ impl Compiler<'_> {
         Compiled { task: self.made, forgets: self.forgets, uncounted }
     }
 
-    /// The actions after the last one of the plan.
+    /// Adds the bookkeeping actions after the plan's last action.
     fn last_stage(&mut self) {
         let at_work = self.fact("at work");
         for action in &mut self.made.actions {

@@ -9,7 +9,7 @@ use super::task::{DurationBound, Expression};
 /// Maximum number of action copies for a disjunctive condition; more become a derived variable.
 const MOST_COPIES: usize = 4;
 
-/// The durative part of an action.
+/// Durative part of an action.
 #[derive(Clone, Debug)]
 pub(super) struct Later {
     pub over_all: Clauses,
@@ -44,7 +44,7 @@ pub(super) struct RawTask {
     pub actions: Vec<RawAction>,
     pub axioms: Vec<RawAxiom>,
     pub goal: Clauses,
-    /// True, by atom, in the initial state (derived atoms are not).
+    /// True, by atom, if initially true (derived atoms are false).
     pub init: Vec<bool>,
     /// Number of the first atom that stands for a disjunction.
     pub inner: u32,
@@ -70,7 +70,7 @@ impl<'a> Resolve<'a> {
         self.next
     }
 
-    /// The condition with every disjunction as one derived atom.
+    /// Condition with every disjunction replaced by a derived atom.
     pub(super) fn flat(&mut self, mut clauses: Clauses, stratum: u32) -> Clauses {
         for or in std::mem::take(&mut clauses.ors) {
             if !self.tries.go_on() {

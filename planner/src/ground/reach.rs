@@ -19,12 +19,12 @@ pub(super) struct Rule {
     pub filters: Vec<Formula>,
     /// Pairs of terms that must differ, tested early.
     pub unequal: Vec<(Term, Term)>,
-    /// Pairs of terms that must be the same.
+    /// Pairs of terms that must be equal.
     pub equal: Vec<(Term, Term)>,
-    /// Slots that must be bound in the end, body or not.
+    /// Slots that must be bound, even if not in the body.
     pub slots: Vec<u32>,
     pub heads: Vec<Head>,
-    /// The action whose instances the rule finds, and how many of the first entries of `slots` make the instance.
+    /// Action of the rule's instances, and the number of leading `slots` that identify an instance.
     pub instance: Option<(u32, usize)>,
 }
 
@@ -72,7 +72,7 @@ pub(super) struct Reach<'a, P: Possible> {
 /// Number of tried objects between two queries of the stop signal.
 const TRIED_AT_ONCE: usize = 1 << 14;
 
-/// Scratch space of one join.
+/// Working memory of one join.
 struct Join<'r> {
     rule: &'r Rule,
     domains: &'r [Arc<[ObjectId]>],

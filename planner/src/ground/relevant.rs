@@ -53,7 +53,7 @@ pub(super) fn is_risky(change: Change, fluent: u32, amount: &Expression, undefin
     risky || may_fail(amount)
 }
 
-/// The value of an expression that is the same in every state; NaN for others.
+/// Value of a state-independent expression; NaN for others.
 fn known(expression: &Expression) -> f64 {
     if let Expression::Constant(value) = expression { *value } else { f64::NAN }
 }
@@ -98,7 +98,7 @@ impl Work<'_> {
         }
     }
 
-    /// Literals, or (`flipped` 1) their opposites.
+    /// Marks literals, or (`flipped` 1) their negations.
     fn literals(&mut self, clauses: &Clauses, flipped: u32) {
         for literal in clauses.literals.iter().map(|literal| literal ^ flipped) {
             let list = if literal & 1 == 0 { &mut self.relevant.wanted } else { &mut self.relevant.unwanted };
@@ -192,7 +192,7 @@ impl Work<'_> {
         }
     }
 
-    /// True if both effects would give one object two values.
+    /// True if both effects give one object different values.
     fn exclude(&self, one: &GroundEffect, other: &GroundEffect) -> bool {
         let (Some(one), Some(other)) = (&one.when, &other.when) else { return false };
         let has = |literal: u32| if literal & 1 == 0 { self.valued.get(&(literal >> 1)) } else { None };

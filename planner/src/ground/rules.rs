@@ -1,4 +1,5 @@
-//! The rules of relaxed reachability: one an action or axiom, and further ones for conditional and end effects.
+//! Rules of relaxed reachability: one per action or axiom, plus those of conditional and end
+//! effects.
 
 use std::sync::Arc;
 
@@ -177,7 +178,7 @@ fn is_true(formula: &Formula) -> bool {
     matches!(formula, Formula::And(parts) if parts.iter().all(is_true))
 }
 
-/// Makes the rules; `fresh` gives predicates for "the action was applied".
+/// Makes the rules; `fresh` creates predicates "the action was applied".
 pub(super) fn make(task: &Task, normal: &Normal, fresh: &mut dyn FnMut() -> u32) -> Rules {
     let mut all = Rules {
         rules: Vec::new(),

@@ -62,7 +62,7 @@ impl Statics<'_> {
         self.numbers.get(&(named.index, arguments)).copied().unwrap_or(f64::NAN)
     }
 
-    /// The value where everything is static.
+    /// Value if everything is static.
     pub(super) fn constant(&self, number: &Number, binding: &[u32]) -> Option<f64> {
         Some(match number {
             Number::Constant(value) => *value,

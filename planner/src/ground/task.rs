@@ -71,7 +71,8 @@ impl Variable {
     }
 }
 
-/// A numeric fluent that some effect, timed literal or attachment writes; all others are folded into constants.
+/// Numeric fluent written by some effect, timed literal or attachment; others are folded into
+/// constants.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct NumericFluent {
     /// Numeric function of the lifted task.
@@ -177,7 +178,7 @@ impl Expression {
     }
 }
 
-/// A numeric condition. False where a side is NaN.
+/// Numeric comparison; false if a side is NaN.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Left side.
@@ -191,7 +192,7 @@ pub struct Comparison {
 /// A conjunction of conditions; empty is true. Disjunctions have been split off into actions or derived variables.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Conjunction {
-    /// Facts, sorted, at most one a variable.
+    /// Facts, sorted, at most one per variable.
     pub facts: Vec<Fact>,
     /// Numeric conditions, sorted.
     pub comparisons: Vec<ComparisonId>,
@@ -206,7 +207,7 @@ impl Conjunction {
     }
 }
 
-/// Outcome of one effect.
+/// Outcome of an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// The variable takes the value.
@@ -234,11 +235,11 @@ pub enum Outcome {
 /// Condition of a conditional effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct When {
-    /// Must hold where the effect happens.
+    /// Condition at the time of the effect.
     pub here: Conjunction,
     /// Condition at the start of the durative action (end effects only).
     pub at_start: Conjunction,
-    /// Must have held all the time (only in effects at the end of a durative action).
+    /// Condition throughout the durative action (end effects only).
     pub over_all: Conjunction,
 }
 
@@ -307,13 +308,13 @@ pub struct Action {
 pub struct DurativeAction {
     /// Lifted action and its arguments.
     pub origin: Origin,
-    /// Bounds on the duration in seconds, evaluated in the state at the start (`true`) or at the end (`false`).
+    /// Bounds on the duration, seconds, evaluated at the start (`true`) or at the end (`false`).
     pub duration: Vec<DurationBound>,
     /// Condition right before the start.
     pub at_start: Conjunction,
-    /// Condition strictly between start and end.
+    /// Condition strictly between start and end (invariant).
     pub over_all: Conjunction,
-    /// Condition right before the end.
+    /// Condition just before the end.
     pub at_end: Conjunction,
     /// Effects at the start.
     pub start_effects: Vec<Effect>,
@@ -336,7 +337,7 @@ pub struct DurationBound {
     pub seconds: Expression,
 }
 
-/// Makes a derived variable true (value 0) in every state where the body holds.
+/// Axiom: the derived variable is true (value 0) in every state in which the body holds.
 #[derive(Clone, Debug)]
 pub struct Axiom {
     /// Derived fact, always value 0 of its variable.
@@ -363,7 +364,7 @@ pub struct Call {
     pub writes: Vec<Place>,
 }
 
-/// A place that an effect module writes.
+/// Term written by an effect module.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Place {
     /// A number.
@@ -372,7 +373,7 @@ pub enum Place {
     Truth(VariableId),
     /// An object fluent: the variable whose values' meanings are [`Meaning::Object`].
     Object(VariableId),
-    /// Something that no condition depends on.
+    /// Irrelevant term.
     Nowhere,
 }
 
@@ -383,7 +384,7 @@ pub struct Metric {
     pub minimise: bool,
     /// The whole expression.
     pub expression: Expression,
-    /// True where the metric is a constant, plus the costs of the plan's actions, plus `time_weight` × makespan.
+    /// True if the metric is a constant plus action costs plus `time_weight` × makespan.
     pub additive: bool,
     /// Possible improvement by actions beyond the value without them; if any, a best value may not
     /// exist.
@@ -403,7 +404,8 @@ pub enum Earns {
     Surely,
 }
 
-/// A state: a value a variable (derived ones included and up to date), a number a numeric fluent (NaN where undefined).
+/// State: value of each variable (derived ones up to date), and each numeric fluent (NaN if
+/// undefined).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {
     /// Values by variable.
@@ -431,7 +433,7 @@ pub struct GroundTask {
     pub axioms: Vec<Axiom>,
     /// Timed effects, by time.
     pub timed: Vec<TimedEffect>,
-    /// The first state, with derived variables evaluated where no call is involved.
+    /// Initial state, with derived variables evaluated unless calls are involved.
     pub initial: Values,
     /// Goal.
     pub goal: Conjunction,

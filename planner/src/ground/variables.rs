@@ -3,7 +3,7 @@
 use super::instantiate::{Clauses, Deed, GroundEffect};
 use super::task::{Conjunction, Effect, Fact, Outcome, Variable, When};
 
-/// An atom that no variable carries.
+/// Mark of an atom without a variable.
 const NOWHERE: Fact = Fact { variable: u32::MAX, value: 0 };
 
 /// Encoding of atoms in variables.
@@ -42,7 +42,7 @@ pub(super) struct Choice<'a> {
     pub derived: &'a [Option<u32>],
 }
 
-/// Chooses the variables: fixed groups, then the group that covers most uncovered atoms again and again.
+/// Chooses the variables: fixed groups, then greedily the group with most uncovered atoms.
 pub(super) fn encode(choice: Choice<'_>) -> Encoding {
     let count = choice.carried.len();
     let mut covered: Vec<bool> = choice.carried.iter().map(|c| !c).collect();

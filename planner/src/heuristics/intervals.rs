@@ -80,7 +80,7 @@ impl Range {
         if upper { self.high } else { self.low }
     }
 
-    /// True if some value stands in this relation to one of the other.
+    /// True if some pair of values satisfies the relation.
     fn may(self, relation: Relation, other: Range) -> bool {
         !self.is_empty()
             && !other.is_empty()
@@ -158,10 +158,10 @@ struct Move {
     gain: f64,
 }
 
-/// Reachable intervals of numbers, with the working memory of one evaluation.
+/// Reachable intervals of numbers, with the working memory of an evaluation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Intervals {
-    /// Facts of the first comparison: fact `first + 2 * c` says that comparison `c` holds.
+    /// First comparison fact: fact `first + 2 * c` means that comparison `c` holds.
     first: u32,
     numbers: Arc<Numbers>,
     /// Moves by node.
@@ -437,7 +437,7 @@ impl Intervals {
         self.times.get((fact - self.first) as usize / 2).copied()
     }
 
-    /// Nodes that raise a number, and by how much.
+    /// Nodes that increase a number, with the amounts.
     pub(super) fn givers(&self, number: u32) -> &[(u32, f64)] {
         &self.givers[number as usize]
     }

@@ -16,13 +16,13 @@ const NONE: u32 = u32::MAX;
 /// Relaxed operator during an evaluation: an operator's unconditional effects, one conditional effect, or an axiom.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Preconditions not reached yet.
+    /// Number of unreached preconditions.
     open: u32,
     /// Precondition of the greatest h_max; `NONE` until all are reached.
     supporter: u32,
     /// h_max of the supporter.
     supported: u32,
-    /// Cost that no landmark has taken yet.
+    /// Remaining cost, not used by any landmark.
     left: u32,
 }
 
@@ -38,7 +38,7 @@ pub struct LandmarkCut {
     waiting: Lists<u32>,
     /// Nodes with an effect, by fact.
     achievers: Lists<u32>,
-    /// Facts that hold in every relaxed state: absences of derived facts, and the precondition of nodes without one.
+    /// Facts of every relaxed state: absent derived facts, and a dummy precondition.
     always: Vec<u32>,
     /// The fact that all goals hold.
     goal: u32,
@@ -196,7 +196,7 @@ impl LandmarkCut {
         least
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         let lists = [&self.preconditions, &self.effects, &self.parts, &self.waiting, &self.achievers];
         let items: usize = lists.iter().map(|list| list.all().len() + list.len()).sum();

@@ -1,4 +1,5 @@
-//! Landmarks: facts that every plan makes true at some time, with orderings, and how many are still to come.
+//! Landmarks (facts that every plan makes true at some time), their orderings, and the number still
+//! open.
 //!
 //! Found by backchaining from the goal (Hoffmann, Porteous and Sebastia 2004; Richter, Helmert and Westphal 2008):
 //! what all operators need that can bring a landmark about for the first time is a landmark too, ordered right before.
@@ -25,7 +26,7 @@ pub struct Landmark {
     pub goal: bool,
     /// Landmarks ordered before this one (greedy-necessary and reasonable orders).
     before: Vec<u32>,
-    /// Landmarks for whose first achievement this one must be true.
+    /// Landmarks for whose first achievement this one is needed.
     enables: Vec<u32>,
     /// Facts that become true whenever the landmark first does.
     beside: Vec<u32>,
@@ -168,7 +169,7 @@ impl<'a> Find<'a> {
         }
     }
 
-    /// Facts that every one of some operators brings about without condition.
+    /// Facts that all of some operators add unconditionally.
     fn brought_about(&self, operators: &[u32]) -> Vec<u32> {
         let task = self.task;
         let effects = |op: u32| {
@@ -222,7 +223,7 @@ impl<'a> Find<'a> {
         found
     }
 
-    /// Relaxed reachability by fact, if none of `without` ever becomes true.
+    /// Relaxed reachability by fact when `without` never become true.
     fn reach_without(&mut self, without: &[u32]) -> Vec<bool> {
         let task = self.task;
         let operators = task.operators();
@@ -318,7 +319,7 @@ struct Exclusions<'a> {
     mutex_groups: &'a [Vec<Fact>],
     /// Mutex groups by fact.
     groups_of: Lists<u32>,
-    /// Landmark of a goal by fact and by variable; `u32::MAX` for none.
+    /// Goal landmark by fact, and by variable; `u32::MAX` for none.
     goal_of_fact: Vec<u32>,
     goal_of_variable: Vec<u32>,
 }
@@ -363,7 +364,7 @@ impl<'a> Exclusions<'a> {
     }
 }
 
-/// True if `first` is ordered before `second`, directly or not.
+/// True if `first` is ordered before `second`, directly or transitively.
 fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool {
     let mut seen = vec![false; all.len()];
     let mut stack = vec![second];
@@ -392,7 +393,7 @@ impl Status {
         Status { accepted: Rows::new(landmarks.words), scratch: vec![0; landmarks.words] }
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.accepted.bytes()
     }

@@ -1,4 +1,4 @@
-//! A radix heap: a priority queue for keys that never fall below the last one taken (Ahuja et al. 1990).
+//! Radix heap: a monotone priority queue (Ahuja et al. 1990).
 
 /// Monotone radix heap with 32-bit keys; ties leave in a deterministic order.
 #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-//! The additive heuristic and the relaxed plan that its best supporters make (h_FF with h_add supporters;
+//! Additive heuristic, and the relaxed plan of its best supporters (h_FF with h_add supporters;
 //! Bonet and Geffner 2001, Keyder and Geffner 2008).
 
 use crate::classical::compiled::{Compiled, Lists};
@@ -14,15 +14,15 @@ const NONE: u32 = u32::MAX;
 /// Maximum repetitions of an operator that refills a consumed number.
 const MOST_REFILLS: f64 = 1000.0;
 
-/// Number of steps that weigh as much as a unit of cost where zero-cost operators exist.
+/// Number of steps that weigh as one unit of cost in tasks with zero-cost operators.
 const COST_OVER_STEPS: u32 = 64;
 
 /// Operator cost of the heuristic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counting {
-    /// Every operator counts one.
+    /// Unit costs.
     Steps,
-    /// Cost, plus one unless all costs are one.
+    /// Cost plus one, unless all costs are one.
     CostAndSteps,
     /// Cost first; steps break ties, so that zero-cost operators do not lengthen plans.
     CostThenSteps,
@@ -57,18 +57,19 @@ pub struct Relevant {
     pub until: u32,
 }
 
-/// Sum of two estimates, capped so that a reachable fact never looks unreachable.
+/// Sum of two estimates, capped below "unreachable".
 fn reached(cost: u32, more: u32) -> u32 {
     cost.saturating_add(more).min(NONE - 1)
 }
 
-/// Marks an operator that refills a number which others of the relaxed plan use up, in place of a fact.
+/// Stands for a fact: marks an operator that refills a number consumed by the relaxed plan.
 pub const REFILL: u32 = u32::MAX - 1;
 
 /// Additive heuristic with its working memory.
 #[derive(Clone)]
 pub struct Relaxed {
-    /// Preconditions of each node (an operator's unconditional effects, one conditional effect, or an axiom).
+    /// Preconditions of each node (an operator's unconditional effects, one conditional effect, or
+    /// an axiom).
     preconditions: Lists<u32>,
     effects: Lists<u32>,
     /// Index of the node's operator in `names`; `NONE` for an axiom.
@@ -100,7 +101,7 @@ pub struct Relaxed {
     pub plan: Vec<Relevant>,
     /// Operators of the relaxed plan that can be applied right away.
     pub preferred: Vec<u32>,
-    /// Facts and nodes touched since the beginning: a measure of work that no clock is part of.
+    /// Number of visited facts and nodes: a deterministic measure of work.
     pub work: u64,
 }
 
@@ -112,7 +113,7 @@ impl Relaxed {
         Relaxed::with(task, counting, all, goal)
     }
 
-    /// The heuristic with these operators only, towards these facts.
+    /// Heuristic restricted to these operators and goal facts.
     pub(crate) fn with(task: &Compiled, counting: Counting, operators: Vec<u32>, goal: Vec<u32>) -> Relaxed {
         let mut needed = vec![false; task.facts];
         goal.iter().for_each(|&f| needed[f as usize] = true);
@@ -145,7 +146,7 @@ impl Relaxed {
         build.finish(operators)
     }
 
-    /// The estimate from a state, or `None` if the goal is out of reach even relaxed. Leaves the relaxed plan and the
+    /// Estimate from a state, or `None` if relaxed-unreachable; leaves the relaxed plan and the
     /// preferred operators.
     pub fn evaluate(&mut self, task: &Compiled, state: &[u32]) -> Option<u32> {
         if !self.explore(task, state) {
@@ -332,7 +333,7 @@ impl Relaxed {
         }
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.base_costs.len() * 40 + self.fact_costs.len() * 24
     }

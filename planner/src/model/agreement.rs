@@ -33,7 +33,7 @@ fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f
     }
 }
 
-/// Changes that contradict an earlier change of the same number, as pairs of indices.
+/// Pairs of indices of contradicting changes of one number.
 pub fn contradictions<N: Hash + Eq>(
     changes: impl Iterator<Item = (N, Assignment, f64)>,
 ) -> Vec<(usize, usize)> {
@@ -48,7 +48,7 @@ pub fn contradictions<N: Hash + Eq>(
     found
 }
 
-/// The first value that contradicts an earlier one given to the same name at once, as a pair of indices.
+/// First pair of indices that give one name different values at once.
 pub fn reset<N: Hash + Eq, V: PartialEq + Copy>(
     values: impl Iterator<Item = (N, V)>,
 ) -> Option<(usize, usize)> {

@@ -6,7 +6,7 @@
 
 use crate::task::Modal;
 
-/// Something that holds in a state, or does not.
+/// Literal over a condition or flag in a state.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Literal {
     /// The operator's first condition.
@@ -68,7 +68,7 @@ static SOMETIME_BEFORE: Automaton = Automaton {
 };
 
 impl Automaton {
-    /// Automaton of an operator; `None` for one that asks for times.
+    /// Automaton of a modal operator; `None` for one with times.
     pub(crate) fn of(operator: Modal) -> Option<&'static Automaton> {
         match operator {
             Modal::AtEnd => Some(&AT_END),

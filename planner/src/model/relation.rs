@@ -1,4 +1,4 @@
-//! Comparison of numbers, everywhere: numbers that differ by no more than rounding are equal.
+//! Numeric comparison, with a common tolerance for rounding.
 
 use crate::task::Comparison;
 
@@ -20,7 +20,7 @@ pub enum Relation {
     AtLeast,
     /// `>`
     Greater,
-    /// Not `=`; only from negated conditions.
+    /// Not equal; only from negated conditions.
     Unequal,
 }
 
@@ -42,7 +42,7 @@ impl Relation {
         !matches!(self, Relation::Equal | Relation::Unequal)
     }
 
-    /// True if two numbers stand in this relation; false if one is undefined (NaN).
+    /// True if two numbers satisfy the relation; false for NaN.
     ///
     /// Of `<`, `=` and `>` exactly one holds of any two numbers.
     pub fn holds(self, left: f64, right: f64) -> bool {

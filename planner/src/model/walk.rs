@@ -87,7 +87,7 @@ fn effect<'t>(own: &'t Effect, visit: &mut dyn FnMut(Part<'t>)) {
     }
 }
 
-/// Visits all that an action says.
+/// Visits all parts of an action.
 pub(crate) fn action<'t>(own: &'t Action, visit: &mut dyn FnMut(Part<'t>)) {
     own.grounding.iter().for_each(|own| call(own, visit));
     own.duration.iter().flatten().for_each(|bound| expression(&bound.value, visit));

@@ -3,7 +3,7 @@
 use crate::attachment::CallKind;
 use crate::diagnostic::Span;
 
-/// A name or token, case-folded (names of modules and of their functions keep their case in `text`).
+/// Case-folded name or token (names of modules and their functions keep their case in `text`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol(pub u32);
 
@@ -16,7 +16,7 @@ pub struct Name {
     pub span: Span,
 }
 
-/// One name of a typed list, such as `?x - (either car truck)`.
+/// Entry of a typed list, such as `?x - (either car truck)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Typed {
     /// The name that is declared.
@@ -25,7 +25,7 @@ pub struct Typed {
     pub types: Vec<Name>,
 }
 
-/// A declared predicate, or the head of a derived one.
+/// Declared predicate, or head of a derived one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signature {
     /// Name.
@@ -34,7 +34,7 @@ pub struct Signature {
     pub parameters: Vec<Typed>,
 }
 
-/// A declared function; `result` is empty or `number` for numeric ones.
+/// Declared function; `result` is empty or `number` for numeric ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FunctionDeclaration {
     /// Name and parameters.
@@ -98,7 +98,7 @@ pub enum Term {
     Arithmetic {
         /// The operation.
         operator: Arithmetic,
-        /// One or more operands.
+        /// Operands, at least one.
         operands: Vec<Term>,
         /// The whole term.
         span: Span,
@@ -143,7 +143,7 @@ pub enum Comparison {
     Greater,
 }
 
-/// The time at which a part of a durative action holds.
+/// Time specifier of a part of a durative action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum When {
     /// `at start`
@@ -284,7 +284,7 @@ pub enum Effect {
     Timed(When, Box<Effect>, Span),
 }
 
-/// A bound on a duration, `(<= ?duration e)`, at start or end.
+/// Bound on a duration, `(<= ?duration e)`, at start or end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DurationBound {
     /// The time at which the bound is evaluated.
@@ -302,13 +302,13 @@ pub struct DurationBound {
 pub struct Action {
     /// Name.
     pub name: Name,
-    /// True if it was declared `:durative-action`.
+    /// True for a `:durative-action`.
     pub durative: bool,
     /// Parameters.
     pub parameters: Vec<Typed>,
     /// Calls of grounding modules.
     pub grounding: Vec<Call>,
-    /// Bounds on its duration.
+    /// Bounds on the duration.
     pub duration: Vec<DurationBound>,
     /// Precondition.
     pub condition: Option<Formula>,
@@ -399,7 +399,7 @@ pub enum InitialValue {
 /// The metric of a problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Metric {
-    /// True if it is minimised, false if it is maximised.
+    /// True to minimise, false to maximise.
     pub minimise: bool,
     /// The expression that is optimised.
     pub value: Term,

@@ -12,7 +12,7 @@ use crate::diagnostic::{Diagnostic, Span};
 /// Maximum nesting depth; bounds the stack of all later recursion.
 pub const MAX_DEPTH: usize = 200;
 
-/// Names, each once, case-folded. Shared by the files of one task.
+/// Interner of case-folded names, shared by the files of a task.
 #[derive(Debug, Default)]
 pub struct Symbols {
     names: Vec<Box<str>>,
@@ -107,7 +107,7 @@ pub struct Node {
 /// The nodes of a file in the order of the text.
 #[derive(Debug, Default)]
 pub struct Tree {
-    /// The nodes; top-level ones follow each other by `next`.
+    /// Nodes; top-level ones are linked by `next`.
     pub nodes: Vec<Node>,
 }
 
@@ -119,7 +119,7 @@ impl Tree {
         Children { nodes: &self.nodes, at: first, end }
     }
 
-    /// The nodes that stand in no list.
+    /// Top-level nodes.
     pub fn roots(&self) -> Children<'_> {
         Children { nodes: &self.nodes, at: 0, end: self.nodes.len() }
     }
@@ -203,7 +203,7 @@ struct Builder<'a> {
     bytes: &'a [u8],
     source: u32,
     tree: Tree,
-    /// Nodes that are not closed yet, outermost first.
+    /// Open nodes, outermost first.
     open: Vec<usize>,
     /// The last parenthesis that closed an action or the whole definition.
     last_close: Option<u32>,
@@ -223,8 +223,7 @@ struct Builder<'a> {
     findings: &'a mut Vec<Diagnostic>,
 }
 
-/// True for blanks that PDDL does not know, as in copied texts: no-break, thin, ideographic and zero-width
-/// ones.
+/// True for non-PDDL blanks, as in copied texts: no-break, thin, ideographic and zero-width ones.
 fn is_odd_blank(sign: char) -> bool {
     !sign.is_ascii() && sign.is_whitespace()
         || matches!(sign, '\u{200b}'..='\u{200d}' | '\u{2060}' | '\u{feff}')
@@ -298,7 +297,7 @@ impl Builder<'_> {
         }
     }
 
-    /// A word ends at a delimiter; a question mark begins the next one, so that `at?x` is read as two.
+    /// End of a word: a delimiter, or a question mark, so that `at?x` is two words.
     fn word_end(&self, start: usize) -> usize {
         let rest = &self.bytes[start + 1..];
         let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?,\"".contains(byte);
@@ -447,7 +446,7 @@ impl Builder<'_> {
             .fold(0, |column, &byte| if byte == b'\t' { column / 8 * 8 + 8 } else { column + 1 })
     }
 
-    /// True if the list that opens at `at` begins with one of these words.
+    /// True if the list at `at` begins with one of these words.
     fn begins(&self, at: usize, words: &[&str]) -> bool {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();

@@ -48,7 +48,7 @@ pub(crate) struct AStarLimits<'a> {
 }
 
 impl<'a> AStar<'a> {
-    /// The search of a task whose search costs are exact up to their scale.
+    /// Search of a task whose search costs are exact up to scale.
     pub(crate) fn new(task: &'a Compiled) -> AStar<'a> {
         AStar {
             task,
@@ -62,12 +62,12 @@ impl<'a> AStar<'a> {
         }
     }
 
-    /// Counts of the search so far.
+    /// Counts so far.
     pub(crate) fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Searches to the end; `on_bound` hears every greater lower bound on the cost of all plans, in the search's costs.
+    /// Searches to the end; `on_bound` gets every improved lower bound, in search costs.
     pub(crate) fn run(&mut self, limits: AStarLimits<'_>, on_bound: &mut dyn FnMut(u32)) -> End {
         let (mut state, mut proven) = (self.task.initial.clone(), None);
         let (first, _) = self.store.insert(&state, NO_STATE, 0, 0);
@@ -165,7 +165,7 @@ impl<'a> AStar<'a> {
         id.map(|id| (through, id))
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     fn bytes(&self) -> usize {
         let open = self.entries * ENTRY_BYTES + self.open.len() * BUCKET_BYTES;
         self.store.bytes()[0] + self.bounds.bytes() + open + self.heuristic.bytes()

@@ -1,5 +1,5 @@
-//! Making a plan cheaper: useless steps go, steps that belong together move together, and windows of the plan are
-//! planned again (in the spirit of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
+//! Plan improvement: action elimination, block reordering, and replanning of windows (in the spirit
+//! of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
 
 mod undo;
 
@@ -19,7 +19,7 @@ const FIRST_EVALUATIONS: u32 = 12;
 /// Maximum distance estimate of a kept state, per cent of the remaining budget.
 const TRUST_PERCENT: u64 = 80;
 
-/// The work of improving one plan after another.
+/// Improver of one plan after another.
 pub struct Improve<'a> {
     task: &'a Compiled,
     successors: &'a Successors,
@@ -78,7 +78,7 @@ impl<'a> Improve<'a> {
         plan.iter().map(|&op| u64::from(self.costs[op as usize])).sum()
     }
 
-    /// Work done so far, comparable with that of a search.
+    /// Work so far, in the units of a search.
     pub(crate) fn work(&self) -> u64 {
         self.work
     }
@@ -131,7 +131,8 @@ impl<'a> Improve<'a> {
         self.work() > self.work_limit || self.evaluated >= self.evaluation_limit || (self.stop)()
     }
 
-    /// Removes a step, with all later ones that then lose a precondition, where the goal is still reached.
+    /// Action elimination: removes a step with all later ones that lose a precondition, if the goal
+    /// is still reached.
     fn eliminate(&mut self, plan: &mut Vec<u32>) {
         let task = self.task;
         let mut state = task.initial.clone();
@@ -211,7 +212,7 @@ impl<'a> Improve<'a> {
         *plan = order;
     }
 
-    /// Plans every window of this size again, each overlapping the one before by half.
+    /// Replans every window of this size; consecutive windows overlap by half.
     fn windows(&mut self, plan: &mut Vec<u32>, size: usize, evaluations: u32, all: bool) {
         let task = self.task;
         let mut needs = Needs::new(task, plan);

@@ -34,11 +34,11 @@ pub(crate) struct Strategy {
     pub towards_landmarks: bool,
     /// Cost bound: only plans cheaper than this (in the search's costs) are of interest.
     pub bound: u32,
-    /// Metric bound: only plans that end in a state with a smaller metric are of interest.
+    /// Metric bound: only plans with a final state below this value are accepted.
     pub better_than: Option<f64>,
-    /// Give up after this much work (see [`Relaxed::work`]).
+    /// Work limit (see [`Relaxed::work`]).
     pub work_limit: u64,
-    /// Give up after this many evaluations.
+    /// Evaluation limit.
     pub evaluation_limit: u64,
 }
 
@@ -85,7 +85,7 @@ pub struct Allowed<'c> {
     pub evaluations: u64,
     /// Memory taken.
     pub memory: MemoryLimit,
-    /// Set once the result of the search is no longer needed.
+    /// Set once the search's result is no longer needed.
     pub cancelled: &'c AtomicBool,
 }
 
@@ -106,7 +106,7 @@ pub(crate) struct Search<'a, 's> {
     store: Store,
     relaxed: Relaxed,
     lookahead: Lookahead,
-    /// Relaxed-plan lists, then landmark lists; each: all operators, preferred ones.
+    /// Open lists: all operators and preferred ones, by heuristic and by landmarks.
     lists: [OpenList; 4],
     best: [u32; 2],
     /// Accepted landmarks by state.
@@ -138,7 +138,7 @@ impl Counts {
         self.work += other.work;
     }
 
-    /// Counts added since earlier ones.
+    /// Difference to earlier counts.
     pub(crate) fn since(self, before: Counts) -> Counts {
         Counts {
             evaluated: self.evaluated - before.evaluated,
@@ -155,7 +155,7 @@ pub const UNSEEN_A_ROUND: usize = 16;
 const STATE_WORK: u64 = 20;
 
 impl<'a, 's> Search<'a, 's> {
-    /// A search that has not begun.
+    /// Search before its first step.
     pub(crate) fn new(shared: &'s Shared<'a>, strategy: Strategy) -> Search<'a, 's> {
         let task = shared.task;
         Search {
@@ -183,7 +183,7 @@ impl<'a, 's> Search<'a, 's> {
         self.relaxed.work + (self.counts.evaluated + self.counts.expanded) * STATE_WORK
     }
 
-    /// Counts of the search so far.
+    /// Counts so far.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
@@ -226,7 +226,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         let lists: usize = self.lists.iter().map(OpenList::bytes).sum();
         self.store.bytes()[0] + lists + self.status.bytes() + self.relaxed.bytes()

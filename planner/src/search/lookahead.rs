@@ -1,5 +1,5 @@
-//! Lookahead states: as much of a relaxed plan as can really be applied, mended where an operator no longer fits
-//! (Vidal 2004, "A lookahead strategy for heuristic search planning").
+//! Lookahead states: the applicable part of a relaxed plan, repaired where an operator no longer
+//! fits (Vidal 2004, "A lookahead strategy for heuristic search planning").
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::heuristics::relaxed::{REFILL, Relevant};
@@ -177,7 +177,7 @@ pub(super) fn count(needed: &mut [i32], task: &Compiled, operator: u32, by: i32)
     }
 }
 
-/// True if an operator deletes a fact that another one needs.
+/// True if an operator deletes a precondition of another.
 fn takes_from(task: &Compiled, operator: u32, other: u32) -> bool {
     let effects = task.effects.get(operator as usize).iter().filter(|e| e.from == e.to);
     let mut effects = effects.map(|effect| effect.fact);

@@ -22,7 +22,8 @@ const PAIR_TABLE_BYTES: usize = 256 << 20;
 const FOLLOWED_WORDS: [usize; 2] = [2, 8];
 /// Bits of a key that hold the depth of a state.
 const DEPTH_BITS: u32 = 12;
-/// Work that a state costs, in the units of the heuristics, and in a narrow search, which soon ends or does not help.
+/// Work per state, in the units of the heuristics; the next constant is that of a narrow search,
+/// which soon ends or does not help.
 const STATE_WORK: u64 = 30;
 const NARROW_STATE_WORK: u64 = 100;
 
@@ -104,7 +105,7 @@ pub struct Search<'a, 's> {
     memory: Rows<Memory>,
     /// Facts of the followed relaxed plan that have held since its anchor state, by state.
     done: Rows<u64>,
-    /// Relaxed plans that are followed: their facts.
+    /// Facts of the followed relaxed plans.
     anchors: Vec<Vec<u32>>,
     relaxed: Relaxed,
     novelty: Novelty,
@@ -116,7 +117,7 @@ pub struct Search<'a, 's> {
 }
 
 impl<'a, 's> Search<'a, 's> {
-    /// A search that has not begun.
+    /// Search before its first step.
     pub fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> Search<'a, 's> {
         let task = shared.task;
         Search {
@@ -138,7 +139,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Counts of the search so far.
+    /// Counts so far.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
@@ -235,7 +236,7 @@ impl<'a, 's> Search<'a, 's> {
         None
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.store.bytes()[0]
             + self.status.bytes()

@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, VecDeque};
 /// Open-list entry of a state not yet generated: parent and operator.
 pub(crate) type Entry = (u32, u32);
 
-/// Keys below this have a bucket each; others share a map.
+/// Number of keys with a bucket of their own; larger keys share a map.
 const BUCKETS: usize = 1 << 14;
 
 /// Entries of a piece of a queue.
 const PIECE: usize = 4096;
 
-/// Entries in the order of their coming, in pieces: a queue that grows is not copied.
+/// FIFO queue in chunks, which grows without copying.
 #[derive(Default)]
 struct Queue {
     pieces: VecDeque<VecDeque<Entry>>,
@@ -44,7 +44,7 @@ impl Queue {
     }
 }
 
-/// One open list.
+/// Bucket-based open list.
 #[derive(Default)]
 pub(crate) struct OpenList {
     buckets: Vec<Queue>,
@@ -71,7 +71,7 @@ impl OpenList {
         self.lowest = self.lowest.min(bucket);
     }
 
-    /// Takes an entry with the least key: the first one that came, or (`newest`) the last.
+    /// Pops an entry with minimum key: the first inserted, or (`newest`) the last.
     pub(crate) fn pop(&mut self, newest: bool) -> Option<Entry> {
         if self.len == 0 {
             return None;

@@ -1,4 +1,4 @@
-//! The searches for a first plan, and the order of their turns, as data.
+//! Portfolio of searches for a first plan, and the order of their turns.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use serde::Serialize;
 pub enum Engine {
     /// Lazy greedy best-first search with h_FF and landmark count in alternating open lists (Richter and Westphal 2010).
     LazyGreedy {
-        /// Operator costs count in the heuristic, or every step counts one.
+        /// True if operator costs count in the heuristic; false: unit costs.
         costs: bool,
         /// Uses lookahead states along relaxed plans (Vidal 2004).
         lookahead: bool,
@@ -19,14 +19,14 @@ pub enum Engine {
     },
     /// Best-first width search: novelty beside goal count and relaxed plan (Lipovetzky and Geffner 2017).
     Width {
-        /// States that are not novel are pruned.
+        /// True if states that are not novel are pruned.
         prunes: bool,
     },
     /// Planning as satisfiability with parallel steps (Rintanen, Heljanko and Niemelä 2006).
     Satisfiability,
 }
 
-/// The conclusion from the end of an exhausted search.
+/// Conclusion from an exhausted search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Proof {
@@ -92,14 +92,14 @@ pub const PORTFOLIO: [Configuration; 7] = [
     },
 ];
 
-/// Turns of the rounds, by place in the portfolio: the first round is a short one, then the others follow in turn. Within a round
-/// every search may do the same work.
+/// Portfolio indices of each round's turns; the first round is short. Within a round, every search
+/// has the same work limit.
 pub const ROUNDS: [&[usize]; 3] = [&[0, 6], &[0, 5, 2, 3, 6], &[1, 5, 2, 4, 6]];
 /// Divisor of the work of a search in the short round.
 pub const SHORT_SHARE: u64 = 6;
 /// Factor on the work of each later round.
 pub const ROUND_FACTOR: u64 = 3;
-/// Place of the first search.
+/// Index of the first search.
 pub const FIRST: usize = 0;
 
 /// Turns of a round.

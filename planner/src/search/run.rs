@@ -64,7 +64,7 @@ pub enum ClassicalEnd {
     Exhausted,
     /// Stopped from outside or by the evaluation limit.
     Stopped,
-    /// Out of memory.
+    /// Memory limit reached.
     Memory,
 }
 
@@ -123,7 +123,7 @@ const WORK_PER_OPERATOR: u64 = 1500;
 const SOFT_SHARE: u64 = 20;
 /// Work of the first search before the next is tried, by default.
 pub const FIRST_WORK: u64 = 60_000_000;
-/// Weights of the searches for better plans, one after another (Richter and Westphal 2010).
+/// Weights of the searches for better plans, in order (Richter and Westphal 2010).
 const WEIGHTS: [u32; 4] = [5, 3, 2, 1];
 
 const GREEDY: Strategy = Strategy {
@@ -143,7 +143,7 @@ const GREEDY: Strategy = Strategy {
 /// need less.
 const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 
-/// A search for a first plan that can be gone on with.
+/// Resumable search for a first plan.
 enum Kept<'a, 's> {
     Lazy(Box<lazy::Search<'a, 's>>),
     Novelty(Box<novelty::Search<'a, 's>>),
@@ -210,7 +210,7 @@ struct Run<'a, 's> {
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
     best: Option<Vec<u32>>,
-    /// Plans taken, each better than the one before.
+    /// Number of adopted plans, each better than the one before.
     plans: u64,
     on_plan: &'s mut dyn FnMut(&[u32], f64),
 }
@@ -254,7 +254,7 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// The first plan, and whether a search without lookahead may still find a shorter one quickly.
+    /// First plan, and true if a search without lookahead may quickly find a shorter one.
     ///
     /// Several searches take turns, each going on where it stopped, with more and more work each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
@@ -301,7 +301,7 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// The turns from this one on that may be taken side by side, in a round of so many.
+    /// Turns from this one on that may run in parallel, within a round.
     fn side_by_side(&self, turn: usize, round: usize) -> Range<usize> {
         // What is left for a turn must be known before the one before it has ended.
         let counts = self.options.evaluation_limit.is_some() || self.shared.memory.counted().is_some();
@@ -309,8 +309,8 @@ impl<'a, 's> Run<'a, 's> {
         turn..turn + threads.min(round - turn % round)
     }
 
-    /// Runs searches for a first plan in parallel, with a work limit for each; returns their
-    /// results up to the first plan.
+    /// Runs searches for a first plan in parallel, each with a work limit; results up to the first
+    /// plan.
     fn take_turns(
         &self,
         kept: &mut [Option<Kept<'a, 's>>; PORTFOLIO.len()],

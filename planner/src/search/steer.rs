@@ -8,7 +8,7 @@ use crate::heuristics::relaxed::Relevant;
 
 use super::lookahead::{Lookahead, MOST_STEPS, count};
 
-/// Number of operators that may be made applicable one for another.
+/// Maximum depth of operators enabled for each other.
 const DEPTH: u32 = 4;
 /// Number of passes over all conditions of an operator.
 const ROUNDS: usize = 4;
@@ -94,8 +94,8 @@ impl Lookahead {
         task.applicable(operator, &self.state)
     }
 
-    /// Applies operators until a numeric condition holds, if possible without breaking other
-    /// conditions in `keep`; true if any was applied.
+    /// Applies operators until a numeric condition holds, preferably preserving `keep`; true if any
+    /// was applied.
     fn approach(&mut self, task: &Compiled, fact: u32, keep: &[u32], depth: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || task.holds(fact, &self.state) {

@@ -1,4 +1,4 @@
-//! States met so far, packed into words, each once.
+//! Generated states, packed into words, without duplicates.
 
 use crate::classical::compiled::Compiled;
 use crate::memory::{Rows, soon};
@@ -17,7 +17,7 @@ struct Place {
 /// Packed states with parent, operator and cost.
 pub(crate) struct Store {
     places: Vec<Place>,
-    /// Words of the packed variables; the numbers follow, one word each.
+    /// Number of words of the packed variables; numbers follow, one word each.
     packed_words: usize,
     /// Position of the numbers in an unpacked state.
     numbers: usize,
@@ -49,7 +49,7 @@ fn hash(words: &[u64]) -> u64 {
 }
 
 impl Store {
-    /// Empty, for the states of a task (derived variables are not stored).
+    /// Empty store for a task's states (without derived variables).
     pub(crate) fn new(task: &Compiled) -> Store {
         let mut order: Vec<usize> = (0..task.basic).collect();
         let bits = |v: usize| 32 - task.domains[v].saturating_sub(1).leading_zeros();
@@ -175,7 +175,7 @@ impl Store {
         self.ways[id as usize].expanded = expanded;
     }
 
-    /// The operators from the first state to this one.
+    /// Operators on the path from the initial state.
     pub(crate) fn plan_to(&self, mut id: u32) -> Vec<u32> {
         let mut plan = Vec::new();
         while self.ways[id as usize].parent != NO_STATE {

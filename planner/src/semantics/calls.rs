@@ -131,7 +131,7 @@ fn parameters(task: &Task, symbol: Symbol) -> &[Parameter] {
     }
 }
 
-/// The instances with these arguments; `None`: any that the parameter allows.
+/// Instances with these arguments; `None`: any object of the parameter's type.
 fn instances_with(
     task: &Task,
     symbol: Symbol,

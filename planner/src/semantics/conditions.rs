@@ -11,12 +11,12 @@ use crate::plan::number_text;
 use crate::state::State;
 use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
-/// The part of a condition that does not hold.
+/// Unmet part of a condition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Why {
     /// Condition part, with objects for its variables.
     pub condition: String,
-    /// Both sides, if the part compares two numbers.
+    /// Both sides, for a numeric comparison.
     pub compared: Option<Compared>,
     /// Values that the part depends on, such as `(fuel r)` and `3`.
     pub values: Vec<(String, String)>,
@@ -29,13 +29,13 @@ pub struct Why {
 pub struct Compared {
     /// Expression on the left, in PDDL.
     pub left: String,
-    /// Its value; `None` if it is undefined.
+    /// Value of the left side; `None` if undefined.
     pub left_value: Option<f64>,
     /// The relation that is required between the left and the right side.
     pub comparison: Comparison,
     /// Expression on the right, in PDDL.
     pub right: String,
-    /// Its value; `None` if it is undefined.
+    /// Value of the right side; `None` if undefined.
     pub right_value: Option<f64>,
 }
 
@@ -96,7 +96,7 @@ impl Semantics<'_> {
         })
     }
 
-    /// True if `test` holds for some objects in place of the variables.
+    /// True if `test` holds for some binding of the variables.
     pub(crate) fn some_binding(
         &self,
         variables: &[Quantified],

@@ -38,7 +38,7 @@ impl Semantics<'_> {
     }
 }
 
-/// One rule's body being joined.
+/// State of joining one axiom's body.
 struct Join<'j, 'a> {
     semantics: &'j Semantics<'a>,
     state: &'j State,
@@ -142,7 +142,7 @@ impl<'j, 'a> Join<'j, 'a> {
         domain.is_some_and(|domain| domain.binary_search(&object).is_ok())
     }
 
-    /// Binds the variables of an atom to each of its true instances in turn.
+    /// Binds the variables of an atom to each true instance in turn.
     fn join(
         &mut self,
         atom: &'j Atom,
@@ -226,7 +226,7 @@ impl<'j, 'a> Join<'j, 'a> {
         bound
     }
 
-    /// The variables of a condition that are not quantified in it.
+    /// Free variables of a condition.
     fn slots_in(&self, condition: &Condition, inner: &mut Vec<Slot>, found: &mut dyn FnMut(Slot)) {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -283,7 +283,7 @@ fn expression_slots(expression: &Expression, found: &mut dyn FnMut(Slot)) {
     }
 }
 
-/// True if a body uses its own rule's predicate.
+/// True if an axiom's body uses its head's predicate.
 fn mentions(condition: &Condition, rule: &Rule) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, rule)),

@@ -1,4 +1,4 @@
-//! Conditions and terms as PDDL text, with objects for their variables.
+//! PDDL text of conditions and terms, with objects for variables.
 
 use super::{Binding, Semantics, UNBOUND};
 use crate::diagnostic::Span;
@@ -75,7 +75,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// A condition as PDDL. Quantified variables are called by their names.
+    /// PDDL text of a condition, with the names of quantified variables.
     pub fn condition_text(&self, condition: &Condition, binding: &Binding) -> String {
         let all = |head: &str, parts: &[Condition]| {
             let parts: String =

@@ -18,7 +18,7 @@ pub struct Changes {
     pub added: Vec<Fact>,
     /// Numbers that change.
     pub numbers: Vec<(GroundFluent, Assignment, f64, Span)>,
-    /// Numbers that lose their value.
+    /// Numbers that become undefined.
     pub cleared: Vec<GroundFluent>,
     /// Object functions that get or lose a value.
     pub objects: Vec<(GroundFluent, Option<ObjectId>, Span)>,
@@ -94,7 +94,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// The instances of effects at end whose conditions at start hold now.
+    /// Instances of end effects whose start conditions hold now.
     pub fn remember(
         &self,
         state: &State,
@@ -113,7 +113,7 @@ impl Semantics<'_> {
         Ok(pending)
     }
 
-    /// Drops the instances whose conditions over all do not hold now.
+    /// Drops the instances whose over-all conditions do not hold now.
     pub fn keep(
         &self,
         state: &State,
@@ -314,7 +314,7 @@ impl Semantics<'_> {
     }
 }
 
-/// True if the condition of an effect at end also refers to times before the end.
+/// True if an end effect's condition refers to earlier times.
 fn is_remembered(effect: &Effect) -> bool {
     let Timed { start, over_all, .. } = &effect.when;
     !start.is_true() || !over_all.is_true()

@@ -1,4 +1,4 @@
-//! Semantics of conditions, expressions and effects: the one implementation of applying an action.
+//! Semantics of conditions, expressions and effects, shared by all parts that apply actions.
 //!
 //! The validator, the monitor and the executive use it directly. PDDL 2.1 (Fox and Long 2003), section 8, says what the
 //! temporal parts mean.
@@ -25,7 +25,7 @@ pub use conditions::{Compared, Why};
 pub use effects::{Changes, Clash, Pending};
 pub use reads::{Together, Touched};
 
-/// A slot that no object is bound to.
+/// Mark of an unbound slot.
 pub(crate) const UNBOUND: ObjectId = ObjectId(u32::MAX);
 
 /// Values for the slots of an action, rule or formula.
@@ -75,7 +75,7 @@ impl CallFailure {
     }
 }
 
-/// A step that does not fit the task.
+/// Step that does not fit the task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
     /// The mismatch, in a sentence.
@@ -148,7 +148,7 @@ impl<'a> Semantics<'a> {
         !self.is_stopped()
     }
 
-    /// The initial state with its derived facts.
+    /// Initial state with derived facts.
     pub fn initial(&self) -> Result<State, CallFailure> {
         let mut state = State::initial(self.task);
         self.derive(&mut state)?;

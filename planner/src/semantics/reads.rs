@@ -1,4 +1,4 @@
-//! Read and write sets of happenings, to find out which happenings disturb each other.
+//! Read and write sets of happenings, for detecting interference (mutex).
 //!
 //! PDDL 2.1, section 8.1: two actions may happen at the same time only if neither touches what the other reads, and
 //! neither undoes what the other does ("no moving targets").
@@ -60,8 +60,8 @@ impl Touched {
     }
 }
 
-/// Joint read and write set of several participants of a happening: one lookup finds whether another disturbs
-/// any of them.
+/// Joint read and write set of several participants of a happening: one lookup finds interference
+/// with any of them.
 #[derive(Debug, Default)]
 pub struct Together {
     facts: FxHashSet<Fact>,
@@ -76,7 +76,7 @@ pub struct Together {
 }
 
 impl Together {
-    /// Takes one in.
+    /// Adds a participant.
     pub fn extend(&mut self, touched: &Touched) {
         self.facts.extend(touched.facts.iter().cloned());
         self.fluents.extend(touched.fluents.iter().cloned());
@@ -280,7 +280,7 @@ impl Semantics<'_> {
     }
 }
 
-/// All predicates that a derived one depends on.
+/// All predicates on which a derived one depends.
 pub(crate) fn depends_on(task: &Task, derived: PredicateId, into: &mut FxHashSet<PredicateId>) {
     if !into.insert(derived) {
         return;

@@ -70,7 +70,7 @@ pub fn plan_optimally(
     Ok(with_culprits(task, attachments, options, stop, outcome))
 }
 
-/// The task in flat arrays, or why sums of costs do not decide which plan is best, with a mend.
+/// Compiled task, or the reason why summed costs do not decide optimality, with a remedy.
 fn prepared(task: &Task, grounded: &GroundTask) -> Result<Compiled, (&'static str, &'static str)> {
     let improve = "improve plans instead (`--anytime`), which says when a plan is proven best";
     if !is_classical(grounded) {
@@ -94,7 +94,7 @@ fn prepared(task: &Task, grounded: &GroundTask) -> Result<Compiled, (&'static st
     }
 }
 
-/// The first part of a task that takes time or asks attachments.
+/// Finding on the first part of a task with durations or attachments.
 fn beyond_the_proof(task: &Task) -> Option<Diagnostic> {
     let finding = |what: String, span: Span, label: &str| {
         let message = format!("optimal plans are proven for actions that take no time: {what}");
@@ -114,14 +114,14 @@ fn beyond_the_proof(task: &Task) -> Option<Diagnostic> {
         })
 }
 
-/// Finding about a metric for which the proof does not hold.
+/// Finding about a metric that the proof does not cover.
 fn of_the_metric(task: &Task, fault: &str, help: &str) -> Diagnostic {
     let span = task.metric.as_ref().map_or(task.goal_span, |metric| metric.span);
     let message = format!("optimal plans are proven for sums of constant costs: {fault}");
     Diagnostic::error("not-proven-optimal", message, span, "this metric").with_help(help)
 }
 
-/// One search of a grounded task.
+/// Search of a grounded task.
 struct Search<'a> {
     task: &'a Task,
     /// The task without preferences and constraints.

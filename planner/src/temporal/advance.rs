@@ -1,4 +1,4 @@
-//! State transitions of the temporal search: a compressed action, a start, an end, or a timed effect.
+//! State transitions of the temporal search: compressed actions, snap actions, and timed effects.
 
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -15,11 +15,11 @@ use super::world::{Act, Moment, Span, World};
 /// Snap action of a step or of a relaxed operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
-    /// Start and end as one operator.
+    /// Compressed: start and end as one operator.
     Whole,
     /// The start of an action that then stays open.
     Start,
-    /// The end of an open action.
+    /// End of an action in progress.
     End,
     /// A timed effect, or an axiom.
     Free,
@@ -52,7 +52,7 @@ impl Open {
 pub struct Gates(Vec<u64>);
 
 impl Gates {
-    /// All open, for the effects at the end of an action.
+    /// All gates open, for an action's end effects.
     fn open(effects: &[Effect]) -> Gates {
         let remembered =
             effects.iter().rposition(|effect| effect.when.as_ref().is_some_and(|when| is_remembered(when)));
@@ -68,7 +68,7 @@ impl Gates {
     }
 }
 
-/// True if the condition of an effect at the end also refers to times before the end.
+/// True if an end effect's condition refers to earlier times.
 fn is_remembered(when: &When) -> bool {
     !when.at_start.is_empty() || !when.over_all.is_empty()
 }
@@ -79,13 +79,13 @@ fn is_remembered(when: &When) -> bool {
 pub struct Situation {
     /// Facts and numbers.
     pub state: Values,
-    /// Actions in progress, in the order of their starts.
+    /// Actions in progress, by start.
     pub open: Vec<Open>,
     /// Timed effects that have happened.
     pub timed: usize,
 }
 
-/// One step of the search.
+/// Step of the search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     /// The action; meaningless for timed effects.
@@ -283,7 +283,8 @@ impl World<'_> {
         Ok(Some(last))
     }
 
-    /// True if everything in progress can go on in a state; notes which end effects cannot happen any more.
+    /// True if all actions in progress can continue in a state; records end effects that cannot
+    /// happen any more.
     fn goes_on(&self, situation: &mut Situation) -> Result<bool, Failure> {
         for open in &mut situation.open {
             let moment = Moment {
@@ -320,8 +321,8 @@ impl World<'_> {
         Ok(ended.open.is_empty().then_some(ended))
     }
 
-    /// True if a plan may end in a situation: the goal holds after the last timed effect (PDDL 2.2; Edelkamp
-    /// and Hoffmann 2004).
+    /// True if a plan may end in a state: the goal holds after the last timed effect (PDDL 2.2;
+    /// Edelkamp and Hoffmann 2004).
     pub fn is_goal(&self, situation: &Situation) -> Result<bool, Failure> {
         if !situation.open.is_empty() || !self.keeps_goal(situation) {
             return Ok(false);
@@ -431,7 +432,7 @@ impl<'w, 'a> Watch<'w, 'a> {
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
 
-    /// Access of the conditions noted as read, together with these effects.
+    /// Access of the recorded reads together with these effects.
     fn access<'e>(&mut self, effects: impl Iterator<Item = &'e Effect>) -> Access {
         let (world, read) = (self.world, &mut self.read);
         for effect in effects {
@@ -490,7 +491,7 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 }
 
-/// Resources that the axioms of each derived variable read in the end; empty for other variables.
+/// Basic resources behind each derived variable; empty for other variables.
 pub(super) fn derived_roots(world: &World) -> Vec<Vec<u32>> {
     let variables = world.ground.variables.len();
     let mut direct: Vec<Vec<u32>> = vec![Vec::new(); variables];

@@ -1,4 +1,4 @@
-//! Durative actions as instantaneous ones for the classical search: done in one go, or as a start and an end.
+//! Classical compilation of durative actions: compressed, or split into start and end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -83,7 +83,7 @@ pub(crate) fn keep_for(world: &World, steps: &[Step], goal: &Conjunction) -> Vec
     }
 }
 
-/// Starts with their ends.
+/// Pairs of starts and ends.
 fn pairs(steps: &[Step]) -> Vec<(usize, usize)> {
     let mut open: Vec<usize> = Vec::new();
     let mut pairs = Vec::new();
@@ -177,7 +177,7 @@ fn ask_but_for(asked: &mut Asked, condition: &Conjunction, start: &[crate::groun
     asked.ask(&Conjunction { facts, ..condition.clone() });
 }
 
-/// Resources that each derived variable is derived from; `None` for other variables.
+/// Resources behind each derived variable; `None` for other variables.
 fn derived_supports(world: &World) -> Vec<Option<Touched>> {
     let mut supports: Vec<Option<Touched>> =
         world.ground.variables.iter().map(|v| v.stratum.map(|_| Touched::default())).collect();

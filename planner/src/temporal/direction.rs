@@ -1,4 +1,4 @@
-//! Directions in which effects move numeric conditions.
+//! Direction in which effects change numeric conditions.
 
 use crate::ground::{Change, ComparisonId, Expression, Outcome, Relation};
 

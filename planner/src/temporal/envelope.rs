@@ -123,7 +123,7 @@ fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> 
         && writers.iter().all(|writer| between(writer) == first)
 }
 
-/// True if an expression is the same in every state.
+/// True for a state-independent expression.
 pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
     match expression {
         Expression::Constant(_) => true,

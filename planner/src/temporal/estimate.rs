@@ -47,7 +47,7 @@ pub(super) struct Work {
     labels: Vec<f64>,
     supporters: Vec<(u32, f32)>,
     wanted: Vec<bool>,
-    /// State of each operator that needs more than one proposition.
+    /// State of each operator with more than one precondition.
     waiting: Vec<Waiting>,
     /// Label of the preconditions and own cost of each used operator.
     fired: Vec<(f64, f64)>,
@@ -61,7 +61,7 @@ pub(super) struct Work {
     remaining: [Vec<f64>; 2],
     /// The most seconds that any operator was found to take.
     dearest_s: f64,
-    /// Propositions and operators looked at since the beginning: a measure of work that no clock is part of.
+    /// Number of visited propositions and operators: a deterministic measure of work.
     pub(super) spent: u64,
 }
 
@@ -327,7 +327,7 @@ impl Relaxed {
         Ok(Some(seconds.map_or((0.0, later_s), |seconds| (seconds, seconds))))
     }
 
-    /// Contribution of an operator to the measure of plans beside time, in equivalent seconds.
+    /// Contribution of an operator to the measure besides time, in equivalent seconds.
     fn counted_s(&self, world: &World, state: &Values, index: u32) -> Result<f64, Failure> {
         let operator = &self.operators[index as usize];
         match self.counted.get(operator.act as usize) {
@@ -455,7 +455,7 @@ impl Relaxed {
     }
 }
 
-/// True if the operator's action changes numbers by the same amounts in every state.
+/// True if the operator's action changes numbers by constants.
 fn changes_by_constants(world: &World, operator: &Operator) -> bool {
     let Some(act) = world.acts.get(operator.act as usize) else { return false };
     let mut effects = act.start_effects.iter().chain(act.end_effects);

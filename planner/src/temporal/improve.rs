@@ -32,7 +32,7 @@ use super::world::World;
 pub(crate) struct Limits {
     /// Improve until stopped or proven best.
     pub anytime: bool,
-    /// End with the first plan.
+    /// Return the first plan, without improvement.
     pub first: bool,
     /// Only plans below this.
     pub bound: f64,
@@ -70,7 +70,7 @@ pub(crate) enum Reason {
     Enough,
     /// Asked to stop, or the limit of evaluations is reached.
     Stopped,
-    /// Out of memory.
+    /// Memory limit reached.
     Memory,
 }
 
@@ -89,14 +89,14 @@ const WEIGHTS: [f64; 2] = [3.0, 1.0];
 /// Evaluations of the first, short search for a plan, at least and at most, and evaluated states times operators.
 const FIRST_TRY: (u64, u64) = (50, 500);
 const FIRST_WORK: u64 = 2_000_000;
-/// Evaluations of a search for plans in which actions overlap themselves, at least.
+/// Minimum number of evaluations of a search with self-overlapping actions.
 const LEAST_OVERLAPPED: u64 = 2_000;
 /// Evaluations of a search for a first plan before linear programs are tried.
 const SHORT: u64 = 500;
-/// Evaluations of one repair in the large neighbourhood search, at least.
+/// Minimum number of evaluations of one repair in the large neighbourhood search.
 const REPAIR: u64 = 200;
 
-/// Searches for plans; `on_plan` hears of each that is better than the one before.
+/// Searches for plans; `on_plan` gets each that improves on the one before.
 pub(crate) fn search_plans(
     world: &World,
     measure: &Measure,
@@ -140,7 +140,7 @@ pub(crate) fn search_plans(
     Ok(progress)
 }
 
-/// Searches for a first plan by linear programs; whether that is the end of searching.
+/// Searches for a first plan by linear programs; true if this ends the search.
 fn by_programs(
     world: &World,
     measure: &Measure,
@@ -161,7 +161,8 @@ fn by_programs(
     Ok(true)
 }
 
-/// Looks, for as long again, for a plan in which actions run twice at once, where none without is left to be found.
+/// Searches, with the same effort again, for a plan with self-overlapping actions, if no other plan
+/// is left to find.
 fn overlapped(
     world: &World,
     measure: &Measure,
@@ -186,7 +187,7 @@ struct Pass {
     apart: Vec<bool>,
     /// True if nothing may be pruned.
     exact: bool,
-    /// The number of times one action may run at once.
+    /// Maximum number of simultaneous instances of an action.
     at_once: usize,
     /// True if the search for a first plan ends after [`SHORT`] states.
     is_short: bool,
@@ -197,7 +198,7 @@ impl Pass {
         Pass { apart: apart.to_vec(), exact, at_once: 1, is_short: false }
     }
 
-    /// Goes on from the plans and the bound of the passes before. Whether no further one can do better.
+    /// Continues from the plans and bound of earlier passes; true if no further pass can do better.
     fn run(
         &self,
         world: &World,
@@ -280,7 +281,7 @@ struct Run<'r, 'w, 'a> {
     tours: OnceCell<Option<Tours<'w, 'a>>>,
 }
 
-/// The best plan so far.
+/// Best plan so far.
 struct Best {
     measured: f64,
     /// Sum of the times at which the goals are achieved.

@@ -76,7 +76,7 @@ fn pairs(world: &World, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<(usize, 
     pairs
 }
 
-/// The actions of the same kind about the objects of one or the other, parameter by parameter.
+/// Actions of the same kind whose arguments each come from one of two actions.
 fn instead<'w>(world: &'w World, first: u32, second: u32) -> impl Iterator<Item = u32> + use<'w> {
     let [one, other] = [first, second].map(|act| world.acts[act as usize].origin);
     let is_instead = move |act: &Act| {

@@ -33,7 +33,7 @@ const FAR: f64 = 1e9;
 const MOST_WORK: u64 = 10_000_000;
 /// Bytes that states may take together.
 const MOST_BYTES: u64 = 100 << 20;
-/// States that are evaluated for better plans, besides as many as the first one took.
+/// Extra evaluations for better plans, besides as many as the first one took.
 const MORE: u64 = 100;
 /// Least difference that counts as better.
 const TOLERANCE: f64 = 1e-6;
@@ -92,11 +92,11 @@ struct Node {
     open: Vec<Running>,
     timed: usize,
     costs: Option<Linear>,
-    /// Time of the last happening, and of the last one of an action.
+    /// Time variable of the last happening, and that of the last action's happening.
     last: Option<u32>,
     last_own: Option<u32>,
     program: Program,
-    /// Actions with the variables of their starts and ends.
+    /// Actions with the time variables of their starts and ends.
     steps: Vec<(u32, u32, Option<u32>)>,
 }
 
@@ -292,7 +292,7 @@ fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
 }
 
 impl Node {
-    /// Advances time to a happening: checks invariants of running actions and applies their
+    /// Advances time to a happening: checks the invariants of running actions and applies
     /// continuous effects.
     fn pass(&mut self, world: &World, now: u32) -> Option<()> {
         let now = Linear::variable(now);
@@ -412,7 +412,7 @@ impl Node {
         Some(())
     }
 
-    /// True if the condition of an effect holds; `None` where that depends on times, or on earlier states.
+    /// Truth of an effect's condition; `None` if it depends on times or earlier states.
     fn decides(&self, world: &World, when: &When, duration: Option<&Linear>) -> Option<bool> {
         if !when.at_start.is_empty() || !when.over_all.is_empty() {
             return None;

@@ -19,7 +19,7 @@ struct Around {
     when: Timed<Condition>,
 }
 
-/// Effects found so far.
+/// Effects collected so far.
 #[derive(Default)]
 struct Found {
     effects: Timed<Vec<Effect>>,
@@ -345,7 +345,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Derived predicates follow from others.
+    /// Reports an effect on a derived predicate.
     fn changeable(&mut self, atom: &crate::task::Atom, name: Name) {
         if self.task.predicate(atom.predicate).stratum.is_none() {
             return;
@@ -424,7 +424,7 @@ impl Checker<'_> {
         }
     }
 
-    /// The fluent that an assignment changes, with the types of its value (`None` for a number).
+    /// Fluent changed by an assignment, with the types of its values (`None` for a number).
     fn changed_fluent(
         &mut self,
         fluent: &ast::Term,
@@ -495,7 +495,7 @@ impl Checker<'_> {
     }
 }
 
-/// The kind of change in which two effects contradict each other: of a number or of an object.
+/// Kind of contradiction between two effects: number or object.
 fn contradict(one: &Effect, other: &Effect) -> Option<&'static str> {
     if let (Change::Object(fluent, value), Change::Object(other_fluent, other_value)) =
         (&one.change, &other.change)

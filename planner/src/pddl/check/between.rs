@@ -50,7 +50,7 @@ impl Checker<'_> {
     }
 }
 
-/// The comparisons on which conditions over all rest, through derived predicates too.
+/// Comparisons in over-all conditions, including those behind derived predicates.
 fn over_all(task: &Task) -> Vec<(&[Expression; 2], Span)> {
     let mut conditions = Vec::new();
     for action in &task.actions {
@@ -89,7 +89,7 @@ fn closed<'t>(task: &'t Task, conditions: &[&'t Condition]) -> Vec<&'t Condition
     all
 }
 
-/// Degree of an expression in the numbers that change at rates; `None` where something is divided by one.
+/// Degree of an expression in the continuously changing numbers; `None` if one is a divisor.
 fn degree(expression: &Expression, flowing: &FxHashSet<FunctionId>) -> Option<u32> {
     let all = |parts: &[Expression]| -> Option<Vec<u32>> {
         parts.iter().map(|part| degree(part, flowing)).collect()

@@ -199,7 +199,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A connective all of whose parts are of one time: the time may as well stand outside.
+    /// Connective whose parts share one time specifier, which may as well stand outside.
     fn one_time(&mut self, formula: &Formula, scope: &mut Scope) -> Option<Timed<Condition>> {
         let mut times = Vec::new();
         collect_times(formula, &mut times);
@@ -240,7 +240,7 @@ fn at(when: When, condition: Condition) -> Timed<Condition> {
     timed
 }
 
-/// A conjunction without nested ones.
+/// Conjunction without nested conjunctions.
 pub(super) fn all_of(parts: Vec<Condition>) -> Condition {
     let mut flat = Vec::with_capacity(parts.len());
     for part in parts {
@@ -266,7 +266,7 @@ fn opposite(comparison: Comparison) -> Comparison {
     }
 }
 
-/// The times of the leaves, `None` for one without.
+/// Time specifiers of the leaves; `None` for a leaf without one.
 fn collect_times(formula: &Formula, into: &mut Vec<Option<When>>) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| collect_times(part, into)),

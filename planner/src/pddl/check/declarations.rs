@@ -186,7 +186,7 @@ impl Checker<'_> {
             Arc::new(names.map(|(index, own)| (own.name.clone(), ObjectId(index as u32))).collect());
     }
 
-    /// The declared types of a name; `object` where none is given or known.
+    /// Declared types of a name; `object` if none is given or known.
     fn type_ids(&mut self, names: &[Name]) -> Vec<TypeId> {
         let mut types: Vec<TypeId> = names.iter().filter_map(|&name| self.find_type(name)).collect();
         if types.is_empty() {
@@ -209,7 +209,7 @@ impl Checker<'_> {
         declared.iter().map(|typed| self.parameter(typed)).collect()
     }
 
-    /// Parameters that are looked up by name: two of one name are a fault.
+    /// Named parameters; duplicates are reported.
     pub(super) fn scoped_parameters(&mut self, declared: &[ast::Typed], scope: &mut Scope) -> Vec<Parameter> {
         for (index, typed) in declared.iter().enumerate() {
             let Some(first) = declared[..index].iter().find(|first| first.name.symbol == typed.name.symbol)
@@ -367,7 +367,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Types of modules are not checked by the planners that these files were written for: an unknown one is anything.
+    /// Types of a module parameter; unknown ones become `object`, as the planners that such files
+    /// were written for do not check them.
     fn known_types(&mut self, typed: &ast::Typed) -> ast::Typed {
         let mut known = typed.clone();
         known.types.retain(|name| self.types.contains_key(&name.symbol));

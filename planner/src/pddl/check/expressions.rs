@@ -10,7 +10,7 @@ use crate::task::{Call, Expression, Fluent, FunctionId, Parameter, PredicateId, 
 
 /// Checked term: object or number.
 pub(super) enum Value {
-    /// An object of one of these types.
+    /// Object of one of these types.
     Object(Term, Vec<TypeId>),
     /// A number.
     Number(Expression),
@@ -106,7 +106,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A function with its arguments.
+    /// Function application.
     pub(super) fn fluent(
         &mut self,
         name: Name,
@@ -135,7 +135,7 @@ impl Checker<'_> {
         self.arguments("predicate", name, &parameters, declared, arguments, span, scope)
     }
 
-    /// A call of a module of the wanted kind.
+    /// Call of a module of the wanted kind.
     pub(super) fn call(&mut self, call: &ast::Call, kind: CallKind, scope: &Scope) -> Option<Call> {
         let module = self.find_module(call.name)?;
         let known = self.task.module(module);
@@ -253,7 +253,7 @@ impl Checker<'_> {
         self.push(finding.with_help(help));
     }
 
-    /// A term by what it yields.
+    /// Term as an object or a number.
     pub(super) fn value(&mut self, term: &ast::Term, place: Place, scope: &Scope) -> Option<Value> {
         let object = |(term, types)| Value::Object(term, types);
         match term {
@@ -371,7 +371,7 @@ impl Checker<'_> {
         })
     }
 
-    /// A constant divisor must not be zero.
+    /// Reports division by a constant zero.
     pub(super) fn divides(&mut self, divisor: &Expression, span: Span) {
         if constant(divisor) == Some(0.0) {
             let finding =
@@ -432,7 +432,7 @@ fn article(kind: CallKind) -> &'static str {
     }
 }
 
-/// The whole list in which a declared name stands first.
+/// List that begins with a declared name.
 fn declared_list(checker: &Checker<'_>, name: Span) -> Span {
     let text = checker.task.sources.get(name.source as usize).map_or("", |source| source.text.as_str());
     let start = text[..name.start as usize].rfind('(').unwrap_or(name.start as usize);

@@ -32,7 +32,7 @@ impl Checker<'_> {
     }
 }
 
-/// A constraint of a kind that no search keeps.
+/// Finding on a constraint of a kind that no search supports.
 fn not_planned(constraint: &Trajectory) -> Option<Diagnostic> {
     let name = match constraint.operator {
         Modal::AlwaysWithin => "always-within",
@@ -62,7 +62,7 @@ pub(crate) fn defeated(task: &Task) -> Vec<Diagnostic> {
     task.actions.iter().filter_map(finding).collect()
 }
 
-/// Ground atoms that hold in every state in which the condition holds.
+/// Ground atoms implied by the condition.
 fn certain_atoms<'c>(condition: &'c Condition, into: &mut Vec<&'c Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| certain_atoms(part, into)),

@@ -83,7 +83,7 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     (task, Findings { sources, list: findings })
 }
 
-/// True if a finding is about a text whose parentheses could not be read as intended.
+/// True if a finding is about a text with unreadable parentheses.
 fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
 }
@@ -101,7 +101,7 @@ fn is_misspelt(finding: &Diagnostic) -> bool {
     matches!(finding.code, "undeclared-predicate" | "undeclared-function") && is_near
 }
 
-/// True if two places are in one section, which begins with `(:` at the start of a line.
+/// True if two spans are in one section, which begins with `(:` at the start of a line.
 fn same_section(sources: &[Source], one: Span, other: Span) -> bool {
     if one.source != other.source {
         return false;
@@ -118,7 +118,7 @@ struct Variable {
     types: Vec<TypeId>,
 }
 
-/// The variables in scope, innermost last, and the slots given out so far.
+/// Variables in scope, innermost last, and the number of slots assigned.
 #[derive(Default)]
 struct Scope {
     variables: Vec<Variable>,
@@ -144,10 +144,10 @@ struct Checker<'a> {
     preferences: FxHashMap<Symbol, u32>,
     /// Objects that fit, by alternatives of types.
     fitting: FxHashMap<Vec<TypeId>, Arc<[ObjectId]>>,
-    /// Undeclared names reported already, by kind, with the finding that further uses are added to and the nearest
+    /// Reported undeclared names by kind: the finding that collects further uses, and the nearest
     /// declared name.
     reported: FxHashMap<(&'static str, Symbol), (usize, Option<String>)>,
-    /// Functions that only another variant of the domain has, which the initial state gives values.
+    /// Functions of another variant of the domain, to which the initial state gives values.
     left_out: FxHashSet<Symbol>,
 }
 
@@ -282,7 +282,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Objects that are of one of the types.
+    /// Objects of any of the types.
     fn fitting(&mut self, types: &[TypeId]) -> Arc<[ObjectId]> {
         if let Some(objects) = self.fitting.get(types) {
             return objects.clone();
@@ -325,7 +325,7 @@ impl<'a> Checker<'a> {
         types.iter().map(|&id| self.task.type_of(id).name.as_str()).collect::<Vec<_>>().join(" or ")
     }
 
-    /// True if an object could be of one of the first and of one of the second types at once.
+    /// True if an object could be of a type of each list.
     fn overlap(&self, one: &[TypeId], other: &[TypeId]) -> bool {
         let is = |own: &Type, types: &[TypeId]| own.ancestors.iter().any(|ancestor| types.contains(ancestor));
         self.task.types.iter().any(|own| is(own, one) && is(own, other))

@@ -8,7 +8,7 @@ use crate::pddl::ast::{Name, Symbol};
 use crate::pddl::nearest;
 use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, Task, Term, TypeId};
 
-/// More uses of one undeclared name that are shown.
+/// Maximum number of further uses shown for an undeclared name.
 const MORE_USES: usize = 2;
 
 impl Checker<'_> {

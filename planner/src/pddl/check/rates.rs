@@ -1,11 +1,11 @@
-//! Numbers change at rates that stay the same between two happenings.
+//! Checks that rates of change are constant between happenings.
 
 use super::Checker;
 use crate::diagnostic::Diagnostic;
 use crate::model::walk::{self, Part};
 
 impl Checker<'_> {
-    /// No rate is read off a number that itself changes at a rate.
+    /// Reports rates that depend on continuously changing numbers.
     pub(super) fn steady_rates(&mut self) {
         let rates = || self.task.actions.iter().flat_map(|action| &action.continuous);
         let mut found = Vec::new();

@@ -49,7 +49,7 @@ impl Feature {
     }
 }
 
-/// Uses of features, with their places.
+/// Used features with their spans.
 type Uses = Vec<(Feature, Span)>;
 
 impl Checker<'_> {

@@ -101,7 +101,7 @@ impl Checker<'_> {
     }
 }
 
-/// True if the rules of `from` use `to`, directly or through others.
+/// True if the rules of `from` use `to`, directly or transitively.
 fn reaches(uses: &[Use], from: usize, to: usize) -> bool {
     let mut found = vec![from];
     let mut next = 0;

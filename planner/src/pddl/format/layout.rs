@@ -3,20 +3,20 @@
 use super::tree::{Node, What};
 use crate::pddl::parse::ACTION_PARTS;
 
-/// Letters in a line, where that can be had.
+/// Preferred maximum line width, characters.
 pub const WIDTH: usize = 120;
 /// Indentation of a part within its list.
 const STEP: usize = 2;
 /// Blanks before the comments of neighbouring lines.
 const BEFORE_COMMENT: usize = 2;
 
-/// Lists with parts that stand in lines of their own.
+/// Lists whose parts stand on lines of their own.
 const ACTIONS: [&str; 4] = [":action", ":durative-action", ":process", ":event"];
 
 /// Keywords whose arguments begin on the same line, however long they are.
 const STAYING: [&str; 6] = ["not", "at", "over", "preference", ":goal", ":metric"];
 
-/// Sections that are tables: where their author put several blanks between words of a line, these stay.
+/// Table-like sections, in which the author's multiple blanks are kept.
 const TABLES: [&str; 7] =
     [":modules", ":types", ":objects", ":constants", ":predicates", ":functions", ":init"];
 
@@ -61,7 +61,7 @@ impl Page {
         self.line.indent + self.line.text.chars().count()
     }
 
-    /// Lays out a node at the end of a line that must leave room for `closing` parentheses.
+    /// Lays out a node at the end of a line with room for `closing` parentheses.
     fn node(&mut self, node: &Node<'_>, closing: usize) {
         match &node.what {
             What::Word(word) => self.line.text.push_str(word),
@@ -137,7 +137,7 @@ impl Page {
     }
 }
 
-/// Indentation of the parts of a list in lines of their own.
+/// Indentation of a list's parts on lines of their own.
 enum Indent {
     /// One step deeper than the line in which the list begins.
     Body,

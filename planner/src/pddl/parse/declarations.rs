@@ -374,7 +374,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `(at 5 (p a))`, not a fact of a predicate `at`.
+    /// True for a timed literal `(at 5 (p a))`, false for a fact of a predicate `at`.
     fn is_timed(&self, node: usize) -> bool {
         let mut children = self.children(node).skip(1);
         let time =

@@ -6,7 +6,7 @@ use crate::pddl::ast::{Arithmetic, Call, Comparison, DurationBound, Formula, Mod
 use crate::pddl::lex::Kind;
 use crate::pddl::nearest;
 
-/// Words that begin a formula and are no predicates.
+/// Connectives, which begin a formula and are no predicates.
 const CONNECTIVES: &[&str] = &["and", "or", "not", "imply", "forall", "exists"];
 /// Inequality operators of other languages.
 const UNEQUAL: &[&str] = &["!=", "/=", "<>", "~="];
@@ -49,7 +49,7 @@ fn modal(word: &str) -> Option<(Modal, usize, usize)> {
 }
 
 impl Parser<'_> {
-    /// When a part of a durative action holds: `(at start …)`, `(over all …)`, `(at end …)`.
+    /// Time specifier of a part of a durative action: `(at start …)`, `(over all …)`, `(at end …)`.
     pub(super) fn timing(&self, node: usize) -> Option<(When, Option<usize>)> {
         let mut children = self.children(node);
         let first = self.word(children.next()?)?;
@@ -132,7 +132,8 @@ impl Parser<'_> {
         }
     }
 
-    /// Modal operators have formulas as arguments, predicates of the same name have not.
+    /// True for a modal operator, whose arguments are formulas, unlike those of a predicate with
+    /// the same name.
     fn is_modal(&self, rest: &[usize]) -> bool {
         rest.last().is_some_and(|&last| self.word(last).is_none())
     }
@@ -336,8 +337,8 @@ impl Parser<'_> {
         Some(Term::Apply { name, arguments: arguments?, span: self.span(node) })
     }
 
-    /// A side of a comparison, the value of an assignment, a duration, a metric: a number, or an object where the
-    /// other side is one.
+    /// Numeric expression, or an object where the other side is one: side of a comparison, assigned
+    /// value, duration, metric.
     pub(super) fn number(&mut self, node: usize) -> Option<Term> {
         let span = self.span(node);
         match self.tree.nodes[node].kind {
@@ -454,7 +455,7 @@ fn mirrored(comparison: Comparison) -> Comparison {
     }
 }
 
-/// A finite number that begins like one (`inf`, `nan` and `infinity` are names).
+/// Parses a finite number (`inf`, `nan` and `infinity` are names).
 fn number(word: &str) -> Option<f64> {
     let first = word.trim_start_matches(['+', '-', '.']).chars().next()?;
     first.is_ascii_digit().then(|| word.parse::<f64>().ok()).flatten().filter(|number| number.is_finite())

@@ -218,7 +218,7 @@ impl<'a> Parser<'a> {
         Some(self.children(define).skip(2).collect())
     }
 
-    /// A list like `(domain name)` holds one name.
+    /// Reports anything after the name in a list such as `(domain name)`.
     fn nothing_after_name(&mut self, list: usize, kind: &str) {
         if let Some(extra) = self.children(list).nth(2) {
             self.expected("`)`", extra, format!("a {kind} has one name; join its words with `-`"));
@@ -249,7 +249,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The keyword of a section; or a finding, and the keyword that is meant if one is near enough.
+    /// Keyword of a section; or a finding, and the keyword probably meant.
     fn section_keyword(&mut self, section: usize, known: &[&'static str]) -> Option<&'a str> {
         let keyword = self.head(section).filter(|_| self.is_list(section));
         if keyword.is_none_or(|keyword| !keyword.starts_with(':')) {
@@ -544,13 +544,13 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// A feature that is understood but not supported.
+/// Finding on a supported syntax of an unsupported feature.
 fn refused(keyword: &str, feature: &str, span: Span) -> Diagnostic {
     let message = format!("`{keyword}` is not supported ({feature})");
     Diagnostic::error("not-supported", message, span, "not supported")
 }
 
-/// A text for a message, on one line and not too long.
+/// Text shortened to one line, for a message.
 pub(super) fn shortened(text: &str) -> String {
     let mut line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     if line.chars().count() > 60 {

@@ -9,7 +9,7 @@ use crate::ground::Fact;
 use super::goals::in_order;
 use super::order::{Use, order, uses};
 
-/// Literals that the clauses of one step may have at most.
+/// Maximum number of literals in one step's clauses.
 const MOST_LITERALS: usize = 2_000_000;
 
 /// Literal at a step, or at the state after it.
@@ -25,7 +25,7 @@ impl Said {
     }
 }
 
-/// The clauses of one step, to be repeated.
+/// Clauses of one step, to be repeated for each step.
 pub(super) struct Form {
     /// Variables per step: facts, operators, and auxiliary ones for facts deleted within the step.
     pub stride: usize,
@@ -36,7 +36,7 @@ pub(super) struct Form {
     step: Lists<Said>,
     /// Operators that add a fact, by fact.
     pub adders: Lists<u32>,
-    /// Operators in the order of their application within a step.
+    /// Operators in their order of application within a step.
     pub order: Vec<u32>,
     /// Goal facts in a reasonable order (Koehler and Hoffmann 2000).
     pub goals: Vec<u32>,
@@ -88,12 +88,12 @@ impl Form {
         (moment * self.stride) as u32 + fact
     }
 
-    /// The variable of an operator at a step, which is applied between the moment of the same number and the next.
+    /// Variable of an operator at a step, between the state of the same number and the next.
     pub(super) fn operator(&self, operator: u32, step: usize) -> u32 {
         (step * self.stride + self.facts) as u32 + operator
     }
 
-    /// Literals of one step.
+    /// Number of literals of one step.
     pub(super) fn size(&self) -> usize {
         self.always.all().len() + self.step.all().len()
     }
@@ -102,7 +102,7 @@ impl Form {
         Said { literal: Literal::new(self.operator(operator, 0), true), later: false }
     }
 
-    /// Variables have one value at a time, and of facts that exclude each other one holds.
+    /// Adds the exclusions: one value per variable, and at most one fact per mutex group.
     fn exclude(&mut self, task: &Compiled, mutex_groups: &[Vec<Fact>]) {
         for (&offset, &size) in task.offsets.iter().zip(&task.domains) {
             self.always.push((offset..offset + size).map(|fact| is(fact, false)));

@@ -1,5 +1,5 @@
-//! Plans as values that satisfy clauses, for several horizons side by side (Rintanen, Heljanko and Niemelä 2006). Strong
-//! where many operators can share a step and estimates mislead; only for small tasks.
+//! Planning as satisfiability for several horizons in parallel (Rintanen, Heljanko and Niemelä
+//! 2006). Strong where many operators share a step and heuristics mislead; for small tasks only.
 
 mod form;
 #[doc(hidden)]
@@ -41,7 +41,7 @@ pub struct Search<'a, 's> {
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
     started: bool,
-    /// `None` for tasks of another kind.
+    /// SAT encoding; `None` for unsupported tasks.
     form: Option<Form>,
     open: Vec<Horizon>,
     /// Steps of the next horizon.
@@ -50,18 +50,18 @@ pub struct Search<'a, 's> {
 }
 
 impl<'a, 's> Search<'a, 's> {
-    /// A search that has not begun.
+    /// Search before its first step.
     pub fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
         let counts = Counts::default();
         Search { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
     }
 
-    /// Effort of the search so far.
+    /// Counts so far.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Bytes taken.
+    /// Memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.open.iter().map(|horizon| horizon.solver.bytes()).sum()
     }

@@ -3,7 +3,7 @@
 
 use crate::classical::compiled::Compiled;
 
-/// Use of a fact by an operator that is applied in parallel with others.
+/// Use of a fact by an operator of a parallel step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Use {
     pub fact: u32,

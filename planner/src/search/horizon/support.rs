@@ -48,7 +48,7 @@ impl Support<'_> {
         solver.value(Literal::new(self.form.operator(operator, step), true))
     }
 
-    /// Begins again with the goals.
+    /// Restarts the agenda from the goals.
     fn begin(&mut self, solver: &Solver) -> u64 {
         let (facts, agenda) = (self.task.facts, &mut *self.agenda);
         agenda.conflicts = solver.conflicts();

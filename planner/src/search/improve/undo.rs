@@ -10,12 +10,12 @@ use rustc_hash::FxHashMap;
 use super::Improve;
 use crate::classical::compiled::Compiled;
 
-/// Greatest number of steps of one kind that are cancelled together.
+/// Maximum number of steps of one kind that are cancelled together.
 const MOST_TOGETHER: u32 = 6;
 /// Words of all the states along a plan, at most.
 const MOST_WORDS: usize = 1 << 24;
 
-/// An operator that cancels another one, with the number of applications of each.
+/// Operator that cancels another one, with the number of applications of each.
 #[derive(Clone, Copy)]
 struct Opposite {
     operator: u32,

@@ -24,14 +24,14 @@ use crate::report::Event;
 use crate::stop::Stop;
 use crate::{standing, weigh, written};
 
-/// An agent at work on one goal.
+/// Agent pursuing one goal.
 pub struct Agent<'a> {
     robot: Arc<dyn Robot>,
     record: &'a Record,
     stop: Stop,
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
-    /// The call that failed and left no plan.
+    /// Failed call after which no plan was found.
     failed: Option<Call>,
     totals: Totals,
     /// Goal in PDDL for the comparison of plans; `None` if the domain has attachments, as the
@@ -42,7 +42,7 @@ pub struct Agent<'a> {
 /// Totals of a run so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Totals {
-    /// Views taken.
+    /// Number of views taken.
     pub views: usize,
     /// Plans made.
     pub plans: usize,
@@ -50,7 +50,7 @@ pub struct Totals {
     pub distance_m: f64,
     /// Longest planning call on the wall clock, without the time of attachments, seconds.
     pub planning_s: f64,
-    /// Longest time that the attachments of one planning call took, seconds.
+    /// Longest time in attachments during one planning call, seconds.
     pub geometry_s: f64,
 }
 
@@ -113,7 +113,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// One iteration of the loop. Returns the reason the run ends here, if it does.
+    /// One iteration of the loop; returns the reason if the run ends here.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
             if let Some(late_s) = round.situation.time_left_s.map(|left_s| -left_s).filter(|s| *s > 0.0) {
@@ -145,7 +145,8 @@ impl<'a> Agent<'a> {
         Ok(None)
     }
 
-    /// Does the rest of the plan, applied to the current state, still reach the goal? If not, the condition that broke.
+    /// Checks that the rest of the plan, applied to the current state, still reaches the goal;
+    /// otherwise returns the violated condition.
     fn monitor(&self, world: &World<'_>, round: &Round) -> Result<(), Trigger> {
         if world.takes_steps_unasked() && !self.rest().steps.is_empty() {
             return Ok(());
@@ -285,7 +286,7 @@ impl<'a> Agent<'a> {
         self.intend(round, plan, reason, asked_of(statistics))
     }
 
-    /// Takes a plan up and says so.
+    /// Adopts a plan and reports it.
     fn intend(
         &mut self,
         round: &Round,

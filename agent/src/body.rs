@@ -31,7 +31,7 @@ enum Told {
     Program(program::TruthFile),
 }
 
-/// True place of an object.
+/// True position of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruePlace {
     /// Centre of the object's body, in the map, metres.
@@ -43,7 +43,7 @@ pub struct TruePlace {
 }
 
 impl Body {
-    /// Any body; the example `own_body` is one from beginning to end.
+    /// Wraps any body; the example `own_body` shows a complete one.
     pub fn new(robot: Arc<dyn Robot>) -> Self {
         Self { robot, scene: None, truth: None }
     }

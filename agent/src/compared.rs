@@ -9,7 +9,7 @@ pub struct Compared<'c> {
     pub of: Vec<&'c str>,
     /// Right-hand side, if it is a number.
     pub wanted: Option<f64>,
-    /// True if less is wanted, not more.
+    /// True if smaller values are wanted.
     pub less: bool,
     /// True if the comparison must hold for all values of its variables.
     pub of_all: bool,

@@ -1,4 +1,4 @@
-//! Exit codes, which scripts depend on, and the one place where an error becomes text.
+//! Exit codes, on which scripts depend, and the conversion of errors to text.
 
 use std::process::ExitCode;
 
@@ -7,9 +7,9 @@ use descry_domains::error::WorldError;
 /// Exit of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
-    /// Achieved, plan found, valid, no finding.
+    /// Success: achieved, plan found, valid, no findings.
     Done = 0,
-    /// An honest no: not found after every useful view, plan invalid, findings.
+    /// Truthful negative: not found after every useful view, plan invalid, findings.
     No = 1,
     /// Bad input or usage.
     BadInput = 2,
@@ -49,13 +49,13 @@ impl From<Exit> for ExitCode {
 /// Error of a command, ready to be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
-    /// Unusable input; the text points at the place and offers a mend.
+    /// Unusable input; the text points at the place and suggests a remedy.
     #[error("{0}")]
     BadInput(String),
     /// The robot or a store failed for good.
     #[error("{0}")]
     Broken(String),
-    /// The run was stopped; the text says how to go on.
+    /// The run was stopped; the text tells how to resume it.
     #[error("{said}")]
     Stopped {
         /// Message about kept results, and how to resume.
@@ -63,7 +63,7 @@ pub enum CommandError {
         /// Signal that stopped the run.
         signal: u8,
     },
-    /// A fault of descry itself.
+    /// Internal error of descry.
     #[error("{0}\n  this is a bug of descry; please report it with the command and its input")]
     Bug(String),
 }
@@ -79,7 +79,7 @@ impl CommandError {
         Self::Broken(error.to_string())
     }
 
-    /// The exit code that this error ends the process with.
+    /// Exit code for this error.
     pub fn exit(&self) -> Exit {
         match self {
             Self::BadInput(_) => Exit::BadInput,

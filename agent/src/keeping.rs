@@ -15,7 +15,7 @@ use crate::exit::CommandError;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Keeping {
-    /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; none: the run's folder.
+    /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; `None`: the run's folder.
     pub memory: Option<String>,
     /// Durability of the record; `None`: data counts as recorded once on the disk.
     pub durability: Option<Kept>,

@@ -1,4 +1,4 @@
-//! Numbers as people read them.
+//! Numbers in words for people.
 
 /// A count with its noun in the singular or plural: `3 steps`.
 pub fn count(n: usize, of: &str) -> String {
@@ -34,7 +34,7 @@ pub fn is_share(value: f64) -> bool {
     value > 0.0 && value < 1.0
 }
 
-/// A number of a domain: a share with the digits of shares, another one with at most three behind the point.
+/// Number of a domain as text: shares with their digits, others with at most three decimals.
 pub fn number(value: f64) -> String {
     if is_share(value) {
         return share(value);

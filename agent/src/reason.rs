@@ -22,7 +22,7 @@ pub struct Reason {
     /// itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search_ended_after: Option<u64>,
-    /// True if no plan reaches the goal in the time that is left.
+    /// True if no plan reaches the goal in the remaining time.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_late: bool,
 }
@@ -48,7 +48,7 @@ pub enum Trigger {
 /// The obstacle that keeps steps from reaching the goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Break {
-    /// The step at fault; none: the goal is missed.
+    /// Step whose condition fails; `None`: the goal is missed.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "written::maybe")]
     pub step: Option<Call>,
     /// True if other steps precede; the values are then those expected after these steps.

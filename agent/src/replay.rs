@@ -26,17 +26,17 @@ const OWN: [&str; 7] = ["wall_s", "planning_s", "geometry_s", "run", "true_posit
 pub struct Replayed {
     /// The run's folder.
     pub run: String,
-    /// Damage of the record. A damaged record is not played.
+    /// Damage of the record; a damaged record is not replayed.
     pub damage: Vec<Fault>,
     /// True if everything recorded was reproduced.
     pub same: bool,
-    /// Documents that are the same, by kind.
+    /// Number of equal documents, by kind.
     pub compared: Vec<(&'static str, usize)>,
     /// Recorded verdict, if the run reached one.
     pub verdict: Option<Value>,
-    /// Place where the run was cut off.
+    /// Place at which the run was interrupted.
     pub cut_off: Option<String>,
-    /// Differences, one line each.
+    /// Differences, one per line.
     pub differences: Vec<String>,
 }
 
@@ -185,7 +185,7 @@ fn compare_reports(recorded: Option<&Report>, found: Option<&Report>) -> Vec<Str
         .collect()
 }
 
-/// Folder of the replay's own record: the one that was asked for, or a temporary one.
+/// Folder of the replay's own record: the requested one, or a temporary one.
 struct Scratch {
     folder: PathBuf,
     goes: bool,

@@ -26,7 +26,7 @@ pub enum Event {
         said: String,
         /// The goal in PDDL.
         pddl: String,
-        /// The place where the body starts.
+        /// Start place of the body.
         start: String,
         /// The number of viewpoints in the candidate set.
         candidates: usize,
@@ -35,7 +35,7 @@ pub enum Event {
     Planned {
         /// Number of the planning round, from 1.
         round: usize,
-        /// The reason the previous plan no longer works, in a sentence.
+        /// Reason why the previous plan is no longer valid, in a sentence.
         because: String,
         /// Reason with its values; absent in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -168,7 +168,7 @@ pub struct Report {
     pub goal: String,
     /// The goal in PDDL.
     pub pddl_goal: String,
-    /// The verdict at the end of the run.
+    /// Verdict of the run.
     pub verdict: Verdict,
     /// "yes", "no" or "cannot tell", for a question.
     pub answer: Option<String>,
@@ -202,7 +202,7 @@ pub struct Report {
     pub true_room: Option<String>,
     /// Everything that was seen on the surface.
     pub objects: Vec<Believed>,
-    /// Views that were taken.
+    /// Number of views taken.
     pub views: usize,
     /// Plans after the first.
     pub replans: usize,
@@ -216,7 +216,7 @@ pub struct Report {
     /// planned or the time is unknown.
     #[serde(default)]
     pub planning_s: f64,
-    /// The longest time that the attachments of one planning call took, seconds.
+    /// Longest time in attachments during one planning call, seconds.
     #[serde(default)]
     pub geometry_s: f64,
     /// The run's folder.
@@ -270,7 +270,7 @@ impl Report {
     }
 }
 
-/// A time in which little happens: milliseconds below a second.
+/// Short duration as text, in milliseconds below a second.
 pub fn brief(time_s: f64) -> String {
     match time_s {
         s if s >= 1.0 => format!("{s:.1} s"),

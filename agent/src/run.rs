@@ -174,7 +174,7 @@ pub async fn go_on(
     Ok(report)
 }
 
-/// Lets an agent pursue a goal with a body on tape, into a record.
+/// Runs the agent with a body on tape, into a record.
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
@@ -231,7 +231,7 @@ fn show_true_position(report: &mut Report, body: &Body) {
     report.true_room = true_place.and_then(|p| p.room);
 }
 
-/// The answer that a verdict gives to a yes/no question.
+/// Answer to a yes-no question for a verdict.
 fn answer(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Achieved => "yes",

@@ -15,12 +15,12 @@ use serde_json::Value;
 
 use crate::exit::CommandError;
 
-/// Name of the blob of doubts beside the event of a plan.
+/// Name of the blob with the doubts, attached to a plan's event.
 pub const BLOB: &str = "in-doubt";
-/// The kind under which the facts are recorded on which the end of a run rests.
+/// Record kind of the facts on which the end of a run rests.
 pub const RESTS: &str = "rests-on";
 
-/// An object, kind or surface that is in doubt.
+/// Doubtful object, kind or surface.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InDoubt {
@@ -32,7 +32,7 @@ pub struct InDoubt {
     /// restriction.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub within: String,
-    /// Confidence reached so far, 0 to 1; records of earlier versions do not say.
+    /// Confidence reached so far, 0 to 1; absent in records of earlier versions.
     pub sure: Option<f64>,
     /// Confidence that is required, 0 to 1.
     pub wanted: f64,
@@ -51,12 +51,12 @@ pub struct InDoubt {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
-    /// The place of one object is in doubt.
+    /// Doubt about the place of one object.
     #[default]
     Thing,
-    /// The set of objects of one kind is in doubt.
+    /// Doubt about the set of objects of one kind.
     Kind,
-    /// The objects on one surface are in doubt.
+    /// Doubt about the objects on one surface.
     Surface,
 }
 
@@ -76,23 +76,23 @@ pub struct Seen {
     /// Part of the hidden probability at unexplained measurements.
     #[serde(default)]
     pub measured: f64,
-    /// Evidence for a first look at this place, where looks in vain are counted; records of earlier versions
-    /// do not say.
+    /// Data of a first look at this place, if looks in vain are penalised; absent in records of
+    /// earlier versions.
     #[serde(default)]
     pub first: Option<FirstLook>,
 }
 
-/// The facts on which the end of a run rests.
+/// Facts on which the end of a run rests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rests {
     /// The reason the run ended.
     pub ended: End,
-    /// Message of the limit or failure; empty: none.
+    /// Message of the limit or failure; empty without one.
     pub said: String,
     /// Reasons for no plan.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_plan: Vec<NoPlan>,
-    /// The doubts that remain at the end.
+    /// Remaining doubts at the end.
     pub in_doubt: Vec<InDoubt>,
 }
 
@@ -105,7 +105,7 @@ pub enum End {
     /// No plan reaches the goal.
     #[serde(rename = "no plan")]
     NoPlan,
-    /// The search for a plan came to no end.
+    /// Planning was cut off.
     #[serde(rename = "undecided")]
     Undecided,
     /// A limit of looks, plans or time was reached.
@@ -129,7 +129,7 @@ pub fn rests(round: &Round, of: &Ended) -> Rests {
     Rests { ended, said, no_plan, in_doubt: in_doubt(round) }
 }
 
-/// The doubts of a round as a blob that is kept beside an event.
+/// Doubts of a round as a blob for an event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.

@@ -23,7 +23,7 @@ use crate::exit::CommandError;
 use crate::reason::Break;
 use crate::written::{self, call_of};
 
-/// Name of the blob of the comparison beside the event of a plan.
+/// Name of the blob with the comparison, attached to a plan's event.
 pub const BLOB: &str = "weighed";
 /// The maximum number of combinations of objects that are tried.
 const MOST_TRIED: usize = 600;
@@ -35,7 +35,7 @@ pub const MOST_STEPS: usize = 6;
 const SHORTER_S: f64 = 0.05;
 /// Maximum duration of a detour, in multiples of the step it replaces.
 const FAR: f64 = 2.0;
-/// Gains below this count as none.
+/// Minimum gain; smaller ones count as none.
 const GAINED: f64 = 1e-6;
 
 /// Comparison of a plan with its alternatives.
@@ -58,7 +58,7 @@ pub struct Weighed {
     pub through: Option<Way>,
     /// Remaining steps of the previous plan, if different from the new one.
     pub left: Option<Way>,
-    /// Values of the numbers that count after the rest of the previous plan, if all goes as expected.
+    /// Expected values of the numbers after the rest of the previous plan.
     pub left_numbers: Vec<Expected>,
 }
 
@@ -79,22 +79,21 @@ pub struct Way {
     /// The calls.
     #[serde(with = "written::calls")]
     pub steps: Vec<Call>,
-    /// Duration of each step, seconds; records of earlier versions do not say.
+    /// Duration of each step, seconds; absent in records of earlier versions.
     #[serde(default)]
     pub each_s: Vec<f64>,
     /// Total duration of the steps in sequence, seconds.
     pub takes_s: f64,
-    /// Total gain: by how much the steps bring the numbers that count nearer to their bounds.
+    /// Total gain: approach of the numbers to their bounds.
     pub gains: f64,
-    /// True if the goal is expected to hold after the steps; records of earlier versions do not say.
+    /// True if the goal is expected to hold after the steps; absent in records of earlier versions.
     #[serde(default)]
     pub reaches: Option<bool>,
     /// Totals with the rest of the plan appended; `None` if infeasible, or in records of earlier
     /// versions.
     #[serde(default)]
     pub whole: Option<Whole>,
-    /// The obstacle that keeps the rest of the plan from following, if any; records of earlier versions do
-    /// not say.
+    /// Obstacle to the rest of the plan, if any; absent in records of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocked: Option<Break>,
 }
@@ -122,7 +121,7 @@ impl Way {
     }
 }
 
-/// The comparison as a blob that is kept beside the event.
+/// Comparison as a blob for an event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.
@@ -141,7 +140,7 @@ pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
     Weighed { left: left_way, left_numbers, ..weighed }
 }
 
-/// The numbers that count in a round, and their values now.
+/// Numbers relevant in a round, with their current values.
 struct Scale<'r> {
     semantics: Semantics<'r>,
     state: State,
@@ -149,7 +148,7 @@ struct Scale<'r> {
     counting: Vec<(FunctionId, bool)>,
     /// Text that compares these numbers: the goal, or else the steps' conditions.
     asked: String,
-    /// Objects of the goal about which the steps that ask for these numbers make facts true; `None` if the
+    /// Objects of the goal that the steps with conditions on these numbers affect; `None` if the
     /// goal itself names the numbers.
     aims: Option<Vec<String>>,
 }
@@ -320,7 +319,7 @@ impl<'r> Scale<'r> {
         }
     }
 
-    /// Candidate continuations after other steps that bring the rest of a plan about.
+    /// Candidate continuations that connect alternative steps with the rest of a plan.
     fn ends(&self, other: &Other, rest: &[Step]) -> Vec<Vec<Step>> {
         let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
         let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
@@ -354,7 +353,7 @@ impl<'r> Scale<'r> {
         ends
     }
 
-    /// Steps that can be taken in a state, and lead from an object of a step to one of another.
+    /// Applicable steps that lead from an object of one step to one of another.
     fn led(&self, there: &State, from: &Step, to: &Step, about: &Step) -> Vec<Step> {
         let pairs = from.arguments.iter().flat_map(|from| to.arguments.iter().map(move |to| (from, to)));
         let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, about));

@@ -30,7 +30,7 @@ pub enum Tried {
     Found(Plan),
     /// None exists, with the reason.
     None(String),
-    /// The search came to no result.
+    /// The search was inconclusive.
     Open,
 }
 
@@ -162,7 +162,7 @@ fn size(plan: &Plan) -> String {
 }
 
 impl Answer {
-    /// The answer in sentences, beside the plan that was found.
+    /// Answer in sentences, next to the found plan.
     pub fn said(&self, found: Option<&Plan>) -> String {
         let action = &self.action;
         let mut lines = Vec::new();

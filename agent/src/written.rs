@@ -36,16 +36,16 @@ pub mod call {
     }
 }
 
-/// A call, or none.
+/// Optional call.
 pub mod maybe {
     use super::*;
 
-    /// Writes a call or none.
+    /// Serialises an optional call.
     pub fn serialize<S: Serializer>(call: &Option<Call>, to: S) -> Result<S::Ok, S::Error> {
         call.as_ref().map(Call::to_string).serialize(to)
     }
 
-    /// Reads a call or none.
+    /// Deserialises an optional call.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Call>, D::Error> {
         let text = Option::<String>::deserialize(from)?;
         text.map(|text| read_call(&text)).transpose().map_err(D::Error::custom)

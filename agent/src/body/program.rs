@@ -12,10 +12,10 @@ use crate::shell;
 
 /// Placeholder in a command line for the seed.
 pub const SEED: &str = "{seed}";
-/// Placeholder in a command line for a file to which the program writes the true positions of objects.
+/// Placeholder in a command line for a file to which the program writes ground truth.
 pub const TRUTH: &str = "{truth}";
-/// Placeholder in a command line for the kinds of objects that are left out of the program's world, with
-/// commas between, as one word of the shell.
+/// Placeholder in a command line for the absent kinds of objects, comma-separated, as one shell
+/// word.
 pub const WITHOUT: &str = "{without}";
 
 /// Temporary file to which a program writes ground truth for reports; removed with the body.
@@ -28,7 +28,7 @@ impl TruthFile {
         Self(std::env::temp_dir().join(format!("descry-truth-{}-{number}.json", std::process::id())))
     }
 
-    /// Path of the file, once it has been written.
+    /// Path of the file once written.
     pub fn path(&self) -> &Path {
         &self.0
     }

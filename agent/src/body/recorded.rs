@@ -11,7 +11,7 @@ use descry_robots::{Base, Camera, Description, Footprint, Frames, Pixels, Speeds
 use super::tape;
 use crate::exit::CommandError;
 
-/// The clouds of a record, one a station.
+/// Clouds of a record, one per station.
 struct Clouds {
     record: Record,
     documents: Vec<Document>,
@@ -83,7 +83,7 @@ fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
     name
 }
 
-/// Description of the body that made a record, or the usual one if the record has none.
+/// Description of the body that made a record, or a default.
 fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, place: &str) -> Description {
     let usual = Settings::default();
     let unknown = || Description {

@@ -1,4 +1,4 @@
-//! The tape of a body in the record of its run.
+//! Tape of a body, stored in the record of its run.
 
 use std::sync::Arc;
 
@@ -11,9 +11,9 @@ use serde_json::Value;
 
 use crate::exit::CommandError;
 
-/// The kind under which a body's answers are recorded.
+/// Record kind of a body's answers.
 pub const ANSWER: &str = "answer";
-/// The kind under which the description of a body is recorded.
+/// Record kind of a body's description.
 pub const BODY: &str = "body";
 /// The blob that holds the map of the room.
 const MAP: &str = "map";

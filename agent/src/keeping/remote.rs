@@ -98,7 +98,7 @@ mod driver {
             Ok(record)
         }
 
-        /// Checks that the store answers and has no run of this name yet.
+        /// Checks that the store answers and has no run with this name.
         ///
         /// # Errors
         /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] if the name is taken.
@@ -154,22 +154,22 @@ mod driver {
     use crate::exit::CommandError;
 
     impl Address {
-        /// Says that this descry has no driver.
+        /// Error: built without the driver.
         pub fn write(&self, _options: Options) -> Result<Record, CommandError> {
             self.read_only()
         }
 
-        /// Says that this descry has no driver.
+        /// Error: built without the driver.
         pub fn check_free(&self, _options: Options) -> Result<(), CommandError> {
             self.read_only().map(|_| ())
         }
 
-        /// Says that this descry has no driver.
+        /// Error: built without the driver.
         pub fn runs(&self) -> Result<Vec<String>, CommandError> {
             self.read_only().map(|_| Vec::new())
         }
 
-        /// Says that this descry has no driver.
+        /// Error: built without the driver.
         pub fn read_only(&self) -> Result<Record, CommandError> {
             let text = format!(
                 "{self}: this descry was built without MongoDB\n  build it with: cargo build --release --features mongodb"

@@ -23,7 +23,7 @@ pub struct Beginning {
     /// Memory of earlier runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub past: Option<Past>,
-    /// Name and text of the scene, if the body stood in one that has a text.
+    /// Name and text of the scene, if the body was in one with a text.
     pub scene: Option<(String, String)>,
 }
 
@@ -46,7 +46,7 @@ impl Beginning {
         record.put(draft).map(|_| ()).map_err(CommandError::broken)
     }
 
-    /// Beginning of a record's run; none if the record has none.
+    /// Beginning of a record's run, if any.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if it cannot be read.

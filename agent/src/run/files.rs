@@ -18,7 +18,7 @@ use crate::report::Report;
 pub(super) const HEADER: &str = "run.json";
 /// Report of a run, in its folder.
 const REPORT: &str = "report.json";
-/// The kind under which the report of a run is recorded.
+/// Record kind of a run's report.
 const REPORTED: &str = "report";
 /// Key of the checksum over the rest of a file.
 const CHECKSUM: &str = "crc32";
@@ -92,7 +92,7 @@ pub fn lost_of_header(folder: &Path) -> Option<String> {
     Some(format!("whether the run was cut off and gone on with: {why}"))
 }
 
-/// Loss of all records of a run that was started; none for a record outside the folder of a run.
+/// Loss of all records of a started run; `None` for a record outside a run's folder.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -166,7 +166,7 @@ pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
     write_json(&folder.join(REPORT), report)
 }
 
-/// Writes a file whole or not at all, however the process ends.
+/// Writes a file atomically.
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     let bug = |e: serde_json::Error| CommandError::Bug(e.to_string());
     let mut value = serde_json::to_value(value).map_err(bug)?;

@@ -1,4 +1,4 @@
-//! The folder of a run: made by one process, and locked as long as that one writes.
+//! Folder of a run: created by one process, and locked while that process writes.
 
 use std::fs::{File, TryLockError, create_dir, create_dir_all};
 use std::io::ErrorKind;
@@ -10,7 +10,7 @@ use descry_domains::symbol::symbol;
 use super::files::is_run;
 use crate::exit::CommandError;
 
-/// The folder of a run that this process writes, and no other.
+/// Folder of a run, locked by this process.
 pub struct Folder {
     path: PathBuf,
     _lock: File,
@@ -20,7 +20,7 @@ pub struct Folder {
 const LOCK: &str = "run.lock";
 
 impl Folder {
-    /// The folder of a new run: the one that was asked for, or a new one under `runs/`.
+    /// Folder of a new run: the requested one, or a numbered one under `runs/`.
     ///
     /// # Errors
     /// [`CommandError::BadInput`] if it holds a run already, if another process makes one there, or if it cannot be made.
@@ -31,7 +31,7 @@ impl Folder {
         }
     }
 
-    /// The folder of that name, for a new run.
+    /// Creates a new run's folder of this name.
     ///
     /// # Errors
     /// As [`Folder::of_new_run`].

@@ -28,9 +28,9 @@ struct Programs {
     into: Arc<Record>,
     robot: Arc<TapedRobot>,
     played: Mutex<VecDeque<Exchange>>,
-    /// True if programs are run for questions that the record does not answer.
+    /// True if programs are run for questions without a recorded answer.
     run: bool,
-    /// Reason for which a replay could go no further.
+    /// Reason why a replay could not continue.
     ended: Mutex<Option<String>>,
 }
 
@@ -140,7 +140,7 @@ pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -
     Err(CommandError::BadInput(text))
 }
 
-/// The programs of a domain in whose places no function answers.
+/// Programs of a domain that no function replaces.
 fn unbound(domain: &Domain) -> Vec<(&str, &[String])> {
     let config = &domain.config;
     let calls = config.attachments.iter().map(|(name, p)| ("attachments", name, Some(&p.program)));

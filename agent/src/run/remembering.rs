@@ -12,9 +12,9 @@ use crate::exit::CommandError;
 use crate::keeping::{Address, is_address};
 use crate::run::files::is_run;
 
-/// The longest wait for another process that writes to the same store.
+/// Maximum wait for another process that writes to the store.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
-/// The interval at which the other process is checked.
+/// Interval between checks for the other process.
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Memory of earlier runs in a store; empty for a new store.

@@ -21,13 +21,13 @@ pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 
 pub struct GoingOn<'a> {
     /// The run's folder.
     pub folder: &'a Path,
-    /// Expected goal, if the caller gave one.
+    /// Expected goal, if the caller states one.
     pub said: Option<&'a str>,
     /// Current address of the body, if changed since the beginning.
     pub robot: Option<&'a str>,
     /// True if the programs named by the record may be run.
     pub allow_programs: bool,
-    /// Binds functions in the places of programs.
+    /// Binds functions in place of programs.
     pub prepare: &'a Prepare<'a>,
 }
 

@@ -32,8 +32,8 @@ impl Instead {
     }
 }
 
-/// Merges consecutive steps of one action that lead from object to object (a to b, b to c) into one
-/// step; `None` if no steps can be merged.
+/// Merges consecutive steps of one action that lead from object to object (a to b, b to c) into
+/// one; `None` if none can be merged.
 pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     let mut all: Vec<Step> = Vec::new();
     for step in steps {

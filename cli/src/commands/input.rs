@@ -218,7 +218,8 @@ impl AttachmentArguments {
         Ok(attachments)
     }
 
-    /// What goes with every call of a module: what is asked for, or else what the module writes.
+    /// Readings sent with every call of a module: the requested ones, or else those that the module
+    /// writes.
     fn reads(&self, task: &Task, name: &str, module: &Module) -> Result<Vec<String>, CommandError> {
         let mut asked: Option<Vec<String>> = None;
         for given in &self.attach_reads {
@@ -256,7 +257,7 @@ fn named<'g>(option: &str, given: &'g str, expected: &str) -> Result<(&'g str, &
     given.split_once('=').ok_or_else(message)
 }
 
-/// The module that a name binds: its own, or that of its function.
+/// Module bound by a name: its own, or its function's.
 fn called<'t>(task: &'t Task, option: &str, name: &str) -> Result<&'t Module, CommandError> {
     let function = |module: &'t Module| module.function.split('@').next().unwrap_or_default();
     let names = |module: &&Module| {
@@ -270,7 +271,7 @@ fn called<'t>(task: &'t Task, option: &str, name: &str) -> Result<&'t Module, Co
     })
 }
 
-/// A name that is not known, with the nearest one or all of them.
+/// Error of an unknown name, with the nearest known one or all of them.
 fn misspelt(what: &str, name: &str, known: Vec<&str>) -> CommandError {
     let help = match descry_planner::nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),

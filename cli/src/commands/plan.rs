@@ -143,7 +143,8 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
     Ok(signal.map_or(exit, Exit::of_signal))
 }
 
-/// Searches for a plan, and says on the way what was found or proven so far. Tells besides whether the metric has no best value.
+/// Searches for a plan and reports results and bounds meanwhile; returns also true if the metric
+/// has no best value.
 fn searched(
     arguments: &Arguments,
     task: &Task,
@@ -185,7 +186,7 @@ fn searched(
     Ok((found, endless))
 }
 
-/// Time between two bounds that are said.
+/// Minimum interval between reported bounds.
 const BETWEEN_BOUNDS: Duration = Duration::from_secs(1);
 
 /// A proven bound on the metric, or on the number of steps.
@@ -263,8 +264,8 @@ fn told(configuration: &descry_planner::portfolio::Configuration) -> String {
     )
 }
 
-/// What the process has in use: what lies in main memory, or no more to be had once its address space is nearly used up.
-/// `None` where the system does not tell.
+/// Memory of the process, bytes: resident, or the maximum once the address space is nearly used up;
+/// `None` if unknown.
 fn used_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kilobytes = |name: &str| {
@@ -277,11 +278,11 @@ fn used_bytes() -> Option<u64> {
     Some(if used_up { u64::MAX } else { resident })
 }
 
-/// The part of the address space that is kept for what is taken between two looks.
+/// Reserve of the address space for allocations between two checks, as a divisor.
 const ADDRESS_RESERVE: u64 = 16;
 static ADDRESS_SPACE_BYTES: OnceLock<Option<u64>> = OnceLock::new();
 
-/// The limit of the address space, where there is one.
+/// Limit of the address space, if any.
 fn address_space_bytes() -> Option<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -395,7 +396,7 @@ fn show(
     Ok(())
 }
 
-/// That the metric may have no best value, where a plan shows it.
+/// Note that the metric may have no best value, if the plan shows this.
 fn ever_better(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<String> {
     let (step, gain) = endless(task, attachments, plan)?;
     let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();
@@ -418,7 +419,8 @@ fn write_plan(path: &Path, plan: &Plan) -> Result<(), CommandError> {
         .map_err(|e| CommandError::BadInput(format!("--out {}: {e}", path.display())))
 }
 
-/// Tells of constraints that no search keeps: neither a plan nor the proof that there is none.
+/// Reports constraints that no search supports, so that there is neither a plan nor a proof of
+/// unsolvability.
 fn untried(findings: &Findings, as_json: bool, started: Instant) -> Result<Exit, CommandError> {
     input::narrate(&input::drawn(findings));
     if as_json {

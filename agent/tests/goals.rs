@@ -275,7 +275,7 @@ fn random_goals_are_answered_by_looks_and_as_the_truth_says() {
     assert!(answered > 0 && wrong == 0, "{answered} answered, {wrong} wrong");
 }
 
-/// The confidence that is asked for allows one wrong answer in five; seeds by `GOALS=0..500`.
+/// Requested confidence that allows one wrong answer in five; seeds by `GOALS=0..500`.
 #[test]
 #[ignore = "slow: 500 runs"]
 fn five_hundred_random_goals_are_answered_by_looks_and_as_the_truth_says() {

@@ -1,4 +1,4 @@
-//! Tests of the public interface of perception: one program, so that what all tests share is built and linked
+//! Tests of perception's public interface, in one program, so that shared code is built and linked
 //! once.
 
 mod boxes;

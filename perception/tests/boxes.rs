@@ -1,4 +1,4 @@
-//! Known boxes on a table: that they are known from views that err, and told from what is like them.
+//! Known boxes on a table: recognised in inaccurate views, and distinguished from similar ones.
 
 use crate::recognising::{cup_a, options, seen_from};
 use crate::tabletop::{self, Draws, Thing, look, on_ring};
@@ -22,7 +22,7 @@ fn known_box([width_m, depth_m, height_m]: [f64; 3]) -> ObjectModel {
     }
 }
 
-/// The probability that a view from a distance takes a turned box, standing alone, for a known one.
+/// Probability that a view from a distance takes a rotated, free-standing box for a known one.
 fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad: f64, away_m: f64) -> f64 {
     let half = [0.5 * width_m, 0.5 * depth_m];
     let thing = Thing::Block { x: 0.05, y: 0.02, half, height: height_m, turn_rad };
@@ -34,7 +34,7 @@ fn taken_for(known_m: [f64; 3], [width_m, depth_m, height_m]: [f64; 3], turn_rad
     found[0].probability_of("box")
 }
 
-/// Most of the visible part of a low box is its top, which says nothing against its sides.
+/// Most of a low box's visible part is its top, which is no evidence against its sides.
 #[test]
 fn a_known_box_is_known_however_low() {
     for size_m in [[0.12, 0.08, 0.16], [0.25, 0.18, 0.06], [0.18, 0.11, 0.045]] {
@@ -61,8 +61,8 @@ fn a_known_box_is_known_whichever_side_is_down() {
     }
 }
 
-/// The rectangle that bounds a box from above is some millimetres too wide in views whose poses err: the
-/// lengths of the sides are told by the rays that pass the box.
+/// The bounding rectangle of a box is some millimetres too wide in views with pose errors; the
+/// lengths of the sides follow from the rays that pass the box.
 #[test]
 fn a_box_is_told_by_its_sides_from_one_like_it() {
     check_alike(1..=1);
@@ -127,7 +127,7 @@ fn a_box_of_a_kind_whose_sizes_have_ranges_is_of_it() {
     }
 }
 
-/// A circle fits to the side of a low box that is seen from far off, and must not be cut out of its top.
+/// A circle fits the side of a low distant box, and must not be cut out of its top.
 #[test]
 fn a_low_box_far_off_is_in_one_piece() {
     check_low(1..=2);
@@ -164,8 +164,8 @@ fn check_low(seeds: std::ops::RangeInclusive<u64>) {
     assert!(broken.is_empty(), "height, seed, pieces: {broken:?}");
 }
 
-/// The camera, far off, passes closely over the top of a tall box and may see its front alone, or in pieces:
-/// it may be the known one.
+/// The distant camera looks just over the top of a tall box and may see its front alone, or in
+/// pieces: it may be the known box.
 #[test]
 fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
     let size_m = [0.20, 0.15, 0.25];
@@ -182,8 +182,8 @@ fn a_box_of_which_only_a_part_is_seen_is_not_excluded() {
     }
 }
 
-/// Sides are measured to centimetres from far off: a box that is a little shorter may be another, and is not
-/// sure to be the known one.
+/// From afar, sides are measured to centimetres: a slightly shorter box may be another one, and
+/// must not be named with certainty.
 #[test]
 fn a_box_of_nearly_the_size_is_not_surely_the_known_one() {
     for (known_m, there_m) in [

@@ -1,4 +1,4 @@
-//! Known bodies on, in or under other things, and bodies made of parts.
+//! Known bodies on, in or under other objects, and bodies made of parts.
 
 use crate::recognising::{cup_a, options};
 use crate::tabletop::{Draws, Thing, disturbed, look, on_ring};
@@ -66,7 +66,7 @@ fn larger_cup_at(base: f64) -> Thing {
     Thing::Raised { x: 0.052, y: 0.016, radius: 0.041, height: 0.12, base }
 }
 
-/// The percepts of several views of some things.
+/// Percepts from several views of some objects.
 fn percepts(things: &[Thing], views: usize, seed: u64) -> Vec<Percept> {
     let mut draws = Draws(seed);
     let views: Vec<_> = (0..views)
@@ -83,7 +83,7 @@ fn percepts(things: &[Thing], views: usize, seed: u64) -> Vec<Percept> {
     Descry::default().recognise(&scene, &merged.visibility, &models())
 }
 
-/// Names a case, what stands there, and the least and greatest probability that a known object is there.
+/// Case: name, objects, and minimum and maximum probability that a known object is present.
 type Case = (&'static str, Vec<Thing>, &'static str, [f64; 2]);
 
 fn check(cases: Vec<Case>, seed: u64) {

@@ -1,4 +1,4 @@
-//! Clouds whose bytes are no measurements: an answer or a refusal in bounded time and memory, and never a panic.
+//! Clouds with garbage bytes: an answer or a refusal in bounded time and memory, never a panic.
 
 use descry_perception::files::read_cloud;
 use descry_perception::segment::{SceneOptions, segment};
@@ -7,7 +7,7 @@ use descry_perception::{Cloud, Visibility};
 use nalgebra::Point3;
 use proptest::prelude::*;
 
-/// A coordinate of any bits, most of them as a table has them.
+/// Coordinate with arbitrary bits, mostly as of a table.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![3 => -0.5_f32..0.5, 1 => any::<u32>().prop_map(f32::from_bits)]
 }

@@ -1,4 +1,5 @@
-//! Five real views of a room, their poses disturbed by 5 cm and 3 degrees, brought back pair by pair and all together.
+//! Five real views of a room with poses disturbed by 5 cm and 3 degrees, registered in pairs and
+//! jointly.
 
 use descry_perception::merge::{MergeOptions, Merged, merge};
 use descry_perception::nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -12,7 +13,7 @@ fn folder() -> PathBuf {
     folder
 }
 
-/// Every view at its recorded pose.
+/// Views at their recorded poses.
 fn views(folder: &std::path::Path) -> Vec<View> {
     let camera = Intrinsics { width: 640, height: 480, fx: 518.0, fy: 519.0, cx: 325.5, cy: 253.5 };
     let poses = std::fs::read_to_string(folder.join("pose.txt")).unwrap();
@@ -54,7 +55,7 @@ fn disturbance(number: usize) -> Isometry3<f64> {
     )
 }
 
-/// Mean distance between where two poses put the points, metres.
+/// Mean distance between the points under two poses, metres.
 fn apart_m(points: &[Point3<f32>], a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
     let put = |pose: &Isometry3<f64>, p: &Point3<f32>| pose * p.cast::<f64>();
     points.iter().map(|p| (put(a, p) - put(b, p)).norm()).sum::<f64>() / points.len() as f64

@@ -1,4 +1,4 @@
-//! Files of clouds: round trips, what strangers write, and files that are broken.
+//! Cloud files: round trips, files of other programs, and damaged files.
 
 use descry_perception::files::{self, Loaded, pcd, ply};
 use descry_perception::nalgebra::{Point3, Vector3};
@@ -145,7 +145,7 @@ fn what_far_points_look_like_is_said() {
     check(1e30, here, &["damaged", "order of bytes"]);
 }
 
-/// The error names the place, what was expected and a way out.
+/// Checks that an error names the place, the expected content and a remedy.
 fn check_error(text: &str, parts: &[&str]) {
     let error = read(text).unwrap_err();
     assert!(parts.iter().all(|p| error.contains(p)), "{error} lacks one of {parts:?}");
@@ -249,7 +249,7 @@ fn ply_of_strangers() {
     assert_eq!(files::read_cloud(&big).unwrap().cloud.points, vec![Point3::new(1.5, -2.0, 3.0)]);
 }
 
-/// The cloud of a file is these points; returns it with its notes.
+/// Checks that a file's cloud has these points; returns it with its notes.
 fn check_points(bytes: &[u8], points: &[[f32; 3]]) -> Loaded {
     let loaded = files::read_cloud(bytes).unwrap_or_else(|e| panic!("{e}"));
     let found: Vec<[f32; 3]> = loaded.cloud.points.iter().map(|p| (*p).into()).collect();
@@ -322,7 +322,7 @@ fn clouds_of_lines_of_numbers() {
     check_error("x,y,z\n1,2\n", &["line 2", "3 numbers, as there are names"]);
 }
 
-/// An array as NumPy stores it.
+/// Array in NumPy's file format.
 fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}\n");
     [b"\x93NUMPY\x01\x00", &(text.len() as u16).to_le_bytes()[..], text.as_bytes(), data].concat()
@@ -346,7 +346,7 @@ fn clouds_of_arrays() {
     assert!(error(b"\x93NUMPY\x01\x00\xff\xff{").contains("header of NPY"));
 }
 
-/// A survey of one point with its colour.
+/// LAS file with one coloured point.
 fn las(format: u8, count: u32) -> Vec<u8> {
     let mut bytes = vec![0; 227];
     bytes[..4].copy_from_slice(b"LASF");

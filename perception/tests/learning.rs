@@ -1,4 +1,5 @@
-//! Learning objects, each step by itself, in a simulated room: what is new, how looks lie to each other, the model grown, known again.
+//! Steps of object learning in a simulated room: change detection, registration, modelling,
+//! recognition.
 
 use crate::household;
 use std::f64::consts::PI;
@@ -76,7 +77,7 @@ fn what_comes_and_goes_is_noticed_and_what_was_hidden_is_learned() {
     assert!(back.appeared.len() == 1 && near(&back.appeared[0].centre(), left.0, left.1));
 }
 
-/// The view with errors that are larger than those of the sensor that is assumed, and the same in patches of pixels.
+/// View with noise larger than the assumed sensor's, and constant within patches of pixels.
 fn with_patchy_noise(mut view: View, draws: &mut Draws) -> View {
     const PATCH: usize = 12;
     let columns = SMALL.width.div_ceil(PATCH);
@@ -138,7 +139,8 @@ fn nothing_is_gone_at_the_edge_of_what_stands_where_views_are_turned() {
     assert!(!places.is_empty() && places.iter().all(is_of_it), "{places:?}");
 }
 
-/// The view with a wall behind the room where nothing came back, as far off as a camera of depth measures at all and as uncertain.
+/// View with a wall behind the room in place of missing returns, at the maximum range and as
+/// uncertain.
 fn with_far_wall(mut view: View, draws: &mut Draws) -> View {
     const WALL_M: f64 = 5.0;
     let pose = view.world_from_camera;
@@ -267,7 +269,7 @@ fn looks_at_a_plain_desk_stay_where_surfaces_hold_them() {
     assert!(off < 0.004, "{off}");
 }
 
-/// Looks at one body on the table from exact poses, and its pixels in the first.
+/// Views of one body on the table from exact poses, its pixels in the first, and its true surface.
 fn turntable(name: &str, looks: usize) -> (Vec<View>, Vec<bool>, Cloud) {
     let place = standing(0.0, 0.0, 0.5);
     let room = room(&[(name, place)]);

@@ -24,7 +24,7 @@ fn options() -> MergeOptions {
     }
 }
 
-/// Views from a ring with truths; localisation errs by the given spreads.
+/// Views on a ring with true poses; localisation errs by the given standard deviations.
 fn views(angles: &[f64], sigma_m: f64, sigma_rad: f64, seed: u64) -> (Vec<View>, Vec<Isometry3<f64>>) {
     let mut draws = Draws(seed);
     angles
@@ -37,7 +37,7 @@ fn views(angles: &[f64], sigma_m: f64, sigma_rad: f64, seed: u64) -> (Vec<View>,
         .unzip()
 }
 
-/// Largest disagreement between two used views about where a place near the table's middle is, metres.
+/// Maximum disagreement between two used views about a point near the table's centre, metres.
 fn disagreement_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
     let places = [
         Point3::new(0.3, 0.1, TABLE_M),
@@ -67,7 +67,7 @@ fn offset_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
 
 const RING: [f64; 5] = [0.0, 1.1, 2.4, 3.6, 5.0];
 
-/// Only what is over the region is merged, and it comes out as it does with all the rest around it.
+/// Limiting a merge to a region gives the same points there as without the limit.
 #[test]
 fn of_a_region_what_is_beside_it_is_left_away() {
     let (views, _) = views(&[0.0, 1.2, 2.4], 0.02, 0.01, 7);
@@ -231,7 +231,7 @@ fn more_further_views_are_laid_on_those_before_them() {
 
 /// Merges that many views one after another, for each seed with errors of localisation, metres and radians.
 fn check_further(arrangements: &[(u64, f64, f64)], count: usize) {
-    /// Few; and before, as and after all are merged together anew.
+    /// Numbers of views around the limits of joint merging.
     const AT_ONCE: [usize; 5] = [2, 5, 9, 10, 11];
     let angles: Vec<f64> = (0..count).map(|i| 2.4 * i as f64).collect();
     for &(seed, sigma_m, sigma_rad) in arrangements {
@@ -263,7 +263,8 @@ fn check_further(arrangements: &[(u64, f64, f64)], count: usize) {
     }
 }
 
-/// Two views from opposite sides share few surfaces, and where localisation has them is where they contradict each other: they belong together.
+/// Two views from opposite sides share few surfaces and contradict each other at their localised
+/// poses; they are merged nevertheless.
 #[test]
 fn two_views_from_opposite_sides_come_together() {
     let of_seed = |seed: u64| {

@@ -36,7 +36,7 @@ fn check(points: &[Point3<f32>], k: usize, radius_m: f32) {
     check_bulk(points, &tree, k);
 }
 
-/// The bulk search, seen through what is made of it: the mean distance to the neighbours decides who is an outlier.
+/// Checks the bulk search through outlier removal by mean neighbour distances.
 fn check_bulk(points: &[Point3<f32>], tree: &Neighbours, k: usize) {
     let mut means = Vec::new();
     for q in points.iter().filter(|p| p.iter().all(|c| c.is_finite())) {

@@ -1,4 +1,4 @@
-//! Number of pieces that things on a table are seen in, from one view.
+//! Number of pieces into which objects on a table are segmented in one view.
 
 use crate::tabletop::{Draws, Thing, look, on_ring};
 use descry_perception::Visibility;
@@ -6,7 +6,7 @@ use descry_perception::nalgebra::{Unit, Vector3};
 use descry_perception::segment::{SceneOptions, segment};
 use descry_perception::surface::SurfaceOptions;
 
-/// Seen from +x, so far off and so high.
+/// Number of pieces seen from +x at a distance and height.
 fn pieces(things: &[Thing], (away_m, high_m): (f64, f64), seed: u64) -> usize {
     let pose = on_ring(0.0, away_m, high_m);
     let view = look(things, &pose, &pose, &mut Draws(seed));
@@ -16,7 +16,7 @@ fn pieces(things: &[Thing], (away_m, high_m): (f64, f64), seed: u64) -> usize {
     scene.expect("there is a table").segments.len()
 }
 
-/// Counts the pieces in four draws from each of two places; so many must be right.
+/// Counts the pieces in four random views from each of two places; at least `least` must be right.
 fn check(what: &str, things: &[Thing], expected: usize, least: usize) {
     let views = [(1.1, 1.3), (1.5, 1.15)];
     let counts = views.map(|from| [1, 2, 3, 4].map(|seed| pieces(things, from, seed)));

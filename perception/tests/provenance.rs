@@ -1,4 +1,4 @@
-//! Every constant of segmenting, recognising, fitting round bodies, surfaces and merging says where its value is from.
+//! Origins of the constants of segmentation, recognition, round bodies, surfaces and merging.
 
 use crate::constants;
 use constants::{PARTS, all, faults, read, table};

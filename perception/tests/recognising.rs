@@ -1,4 +1,4 @@
-//! Single things on a table: what they are, and what must stay in doubt.
+//! Single objects on a table: identities, and what must stay in doubt.
 
 use crate::tabletop::{Draws, TABLE_M, Thing, look, on_ring};
 use descry_perception::merge::{MergeOptions, merge};
@@ -35,7 +35,7 @@ pub fn options() -> SceneOptions {
     SceneOptions { surface, ..SceneOptions::default() }
 }
 
-/// One view from its true pose, as a cloud in the world.
+/// View from its true pose, as a cloud in the world.
 pub fn seen_from(things: &[Thing], angle_rad: f64, away_m: f64) -> (Cloud, Visibility) {
     let pose = on_ring(angle_rad, away_m, 1.4);
     let view: View = look(things, &pose, &pose, &mut Draws(11));
@@ -237,8 +237,8 @@ fn views_that_lie_beside_each_other_show_one_thing_with_its_handle() {
     }
 }
 
-/// The percepts of views of a cup, each from an angle, displaced by an offset, and with the cup gone or
-/// there.
+/// Percepts from views of a cup, each from an angle, with a displacement, and with the cup present
+/// or gone.
 fn cup_in(views: &[(f64, [f64; 2], bool)]) -> Vec<Percept> {
     let mut draws = Draws(5);
     let look_from = |&(angle, [x, y], there): &(f64, [f64; 2], bool)| {
@@ -285,7 +285,8 @@ fn a_view_that_looks_past_what_others_see_says_nothing_of_it() {
     );
 }
 
-/// A carton as high as the white cylinder: some circle fits a part of its side.
+/// A carton as high as the white cylinder: some circle fits a part of its side, but it is no
+/// cylinder.
 #[test]
 fn a_carton_in_one_piece_is_no_cylinder_however_its_views_lie() {
     let carton = Thing::Block { x: 0.0, y: 0.0, half: [0.035, 0.095], height: 0.28, turn_rad: 0.3 };
@@ -326,7 +327,8 @@ fn a_carton_in_one_piece_is_no_cylinder_however_its_views_lie() {
     }
 }
 
-/// In one view a wide circle fits the edge of a carton that faces the camera.
+/// In a single view, a wide circle fits the edge of a carton that faces the camera, but is no
+/// cylinder's side.
 #[test]
 fn a_circle_that_is_too_wide_is_no_side_of_a_cylinder() {
     check_cartons(4);

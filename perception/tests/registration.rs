@@ -1,4 +1,4 @@
-//! Registration brings back what was moved, and says so when it cannot.
+//! Registration recovers known motions, and reports failures.
 
 use descry_perception::nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use descry_perception::register::{

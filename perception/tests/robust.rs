@@ -1,4 +1,4 @@
-//! Odd clouds: a clear error or a sane answer, and the same one for every number of threads.
+//! Unusual clouds: a clear error or a plausible answer, equal for every number of threads.
 
 use descry_perception::cluster::{self, ClusterError};
 use descry_perception::merge::{MergeOptions, merge};
@@ -13,7 +13,7 @@ use descry_perception::{Cloud, Grid, Hull, Neighbours, Recogniser, View, outlier
 
 const NAN: Point3<f32> = Point3::new(f32::NAN, f32::NAN, f32::NAN);
 
-/// A table with a can on it, seen with some noise; every thirteenth pixel has no return.
+/// Noisy table with a can; every thirteenth pixel has no return.
 fn table() -> Vec<Point3<f32>> {
     let mut state = 1u32;
     let mut noise = || {

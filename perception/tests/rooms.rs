@@ -1,4 +1,4 @@
-//! The map of a building: poses, planes and what is open, held to a simulated truth.
+//! Map of a building (poses, planes, openings) compared with simulated ground truth.
 
 use crate::corridor;
 use crate::corridor::{Building, CAMERA_HEIGHT_M, Rig, along, around, field_of_view, with_people};
@@ -95,7 +95,7 @@ fn the_loop_closes() {
     assert!(after.0 < 0.2 && after.0 < 0.5 * before.0 && after.1 < before.1, "{before:?} {after:?}");
 }
 
-/// A wall without texture shows nothing: the way along it is what odometry says, and its spread says so.
+/// An untextured wall shows nothing: motion along it follows odometry, with its standard deviation.
 #[test]
 fn nothing_seen_leaves_odometry() {
     let bare = Station { points: Vec::new(), odom_from_level: Isometry2::identity() };
@@ -247,8 +247,8 @@ fn a_survey_is_saved_loaded_and_extended() {
     assert_eq!(Cells::new(0.0).unwrap_err(), CellsError::Edge { edge_m: 0.0 });
 }
 
-/// The results where there are not two orientations: (corners, walls found at least, whether most are square
-/// to each other).
+/// Results for buildings without two main orientations: corners, minimum number of found walls, and
+/// true if most are perpendicular or parallel.
 #[test]
 fn rooms_that_are_not_square() {
     let ring = |n: usize, r: f64| -> Vec<Point2<f64>> {
@@ -290,7 +290,8 @@ fn rooms_that_are_not_square() {
     }
 }
 
-/// Round posts are cylinders with their place and radius, square ones and cupboards are none; they are on the map when it is saved and loaded.
+/// Round posts become cylinders with position and radius, square ones and cupboards do not; saving
+/// and loading keeps them.
 #[test]
 fn pillars_are_cylinders() {
     let at = Point2::new;
@@ -344,7 +345,7 @@ fn the_next_pose_shows_what_is_not_known_yet() {
     assert!(gain(&left) < gain(&next), "{} {}", gain(&left), gain(&next));
 }
 
-/// A few poses show together what can be seen; each shows less once the others were taken; those that are kept stay.
+/// A few poses jointly cover the visible floor; each gains less after the others; kept ones stay.
 #[test]
 fn a_few_outlooks_show_what_can_be_seen() {
     let truths = &drive().truths;
@@ -387,8 +388,7 @@ fn a_few_outlooks_show_what_can_be_seen() {
     }));
 }
 
-/// A station is located by the part of the survey that it shows; where it shows none, the believed pose is
-/// kept.
+/// A station is localised by the visible part of the survey; without any, the believed pose stays.
 #[test]
 fn a_station_is_located_in_a_survey() {
     let Drive { stations, truths, .. } = drive();
@@ -409,7 +409,7 @@ fn a_station_is_located_in_a_survey() {
     assert!(seen().locate(&stations[0], &nowhere, &rectify).is_err());
 }
 
-/// Unusable options and poses are reported, and do not affect a map.
+/// Invalid options and poses are reported, and leave a map unchanged.
 #[test]
 fn bad_options_and_poses_are_told() {
     let stations = &drive().stations[..2];

@@ -7,7 +7,7 @@ use descry_perception::noise::{KINECT as ASSUMED, Residuals, Sensor};
 use descry_perception::surface::{SurfaceOptions, find_surface};
 use descry_perception::{Intrinsics, Visibility};
 
-/// The sensor fitted to four views of a table with a box on it.
+/// Sensor estimated from four views of a table with a box.
 fn fitted(device: &Device) -> Sensor {
     let things = [Thing::Block { x: 0.3, y: 0.1, half: [0.1, 0.06], height: 0.25, turn_rad: 0.4 }];
     let mut draws = Draws(5);

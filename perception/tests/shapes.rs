@@ -1,4 +1,4 @@
-//! Shape models from laser scans: the cells of the paper's tables, and what must not go wrong.
+//! Shape models from laser scans: the cells of the paper's tables, and failure cases.
 
 use crate::lab;
 use crate::lab::{
@@ -19,7 +19,7 @@ use std::sync::OnceLock;
 
 const EXPERIMENT: u64 = 7;
 
-/// The 25 models of one experiment.
+/// 25 models of one experiment.
 fn learnt() -> &'static [Alignment] {
     static LEARNT: OnceLock<Vec<Alignment>> = OnceLock::new();
     LEARNT.get_or_init(|| models(EXPERIMENT, &Run::default(), &SolverOptions::default()))
@@ -37,7 +37,7 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     values.clone().sum::<f64>() / values.count() as f64
 }
 
-/// The table of the paper's cells, `lab/paper.rs`, holds what its text says.
+/// The table of `lab/paper.rs` agrees with the paper's text.
 #[test]
 #[ignore = "data: the paper in ../shared/papers"]
 fn the_table_is_that_of_the_paper() {
@@ -88,7 +88,8 @@ fn hulls_are_as_large_as_in_the_paper() {
     }
 }
 
-/// Fig. 8: off the diagonal the ranges meet the paper's; on it none is worse; one threshold tells all apart.
+/// Fig. 8: ranges off the diagonal match the paper's, those on it are no worse, and one threshold
+/// separates all.
 #[test]
 fn model_alignment_tells_all_objects_apart() {
     let (mut same, mut other) = (0.0_f64, f64::INFINITY);
@@ -128,7 +129,7 @@ fn a_moved_scan_is_brought_back() {
     }
 }
 
-/// Both solvers make the same objective as small, but for the odd hollow that one falls into and the other misses.
+/// Both solvers reach the same objective, apart from occasional local minima of either.
 #[test]
 fn least_squares_are_no_worse_than_the_simplex() {
     let map = map_of_the_lab(&mut Draws(EXPERIMENT));
@@ -148,7 +149,8 @@ fn least_squares_are_no_worse_than_the_simplex() {
     }
 }
 
-/// Two scans from opposite sides must not be punished for what neither can see: at true poses a box violates next to nothing.
+/// Two scans from opposite sides have no penalty for parts invisible to either: at true poses, a
+/// box has nearly no violation.
 #[test]
 fn the_interior_error_is_gated() {
     let map = map_of_the_lab(&mut Draws(1));
@@ -227,8 +229,8 @@ fn what_is_known_is_named_and_what_is_not_is_not() {
     check(instance(2, 3), &twice, &both);
 }
 
-/// A thing two centimetres wider or narrower than a known one may be the known one, as far as the laser
-/// tells, and is not named.
+/// An object two centimetres wider or narrower than a known one may be the known one for the laser,
+/// and is not named.
 #[test]
 fn what_is_like_a_known_thing_is_not_named() {
     let map = map_of_the_lab(&mut Draws(EXPERIMENT));
@@ -244,7 +246,7 @@ fn what_is_like_a_known_thing_is_not_named() {
     check(&lab::rounded(52.0, 52.0, 17.6), "red-chair");
 }
 
-/// A single scan never names another object with certainty, and the right one is among those that it leaves.
+/// A single scan never names a wrong object with certainty, and keeps the right one possible.
 #[test]
 fn a_single_scan_leaves_the_right_object() {
     let shapes = known();
@@ -264,7 +266,8 @@ fn a_single_scan_leaves_the_right_object() {
     }
 }
 
-/// Cuts readings and bound of a scan on its left: the end of the thing was taken for background, and the bound lies on it.
+/// Cuts a scan's readings and bound on its left, as if the end of the object had been taken for
+/// background.
 fn cut_left(posed: &mut PosedScan, share: f64) {
     let scan = &mut posed.scan;
     scan.left_object_rad -= share * (scan.left_object_rad - scan.right_object_rad);
@@ -273,7 +276,7 @@ fn cut_left(posed: &mut PosedScan, share: f64) {
     scan.points.retain(|p| p.y.atan2(p.x) <= bound);
 }
 
-/// Ends that were taken for background contradict the other scans; the model does without them and says which they are.
+/// Ends taken for background contradict the other scans; the model excludes and reports them.
 #[test]
 fn ends_that_contradict_the_others_are_opened() {
     let options = SolverOptions::default();
@@ -324,7 +327,8 @@ fn the_next_scan_is_from_the_other_side() {
     assert!(next_scan(&model, &[], &options).is_empty());
 }
 
-/// A wall 3 m ahead of a laser that looks over half a turn in steps of a degree; a thing of the given depth between two angles (degrees).
+/// Sweep over half a turn in steps of a degree: a wall 3 m ahead, and an object at the given depth
+/// between two angles (degrees).
 fn sweep(thing: (i32, i32), thing_m: f64) -> Scan {
     let degrees: Vec<i32> = (-90..=90).collect();
     Scan {
@@ -337,7 +341,7 @@ fn sweep(thing: (i32, i32), thing_m: f64) -> Scan {
     }
 }
 
-/// Takes the thing out of a scan: everything nearer than 2.5 m is no background.
+/// Object of a scan: everything nearer than 2.5 m is foreground.
 fn observed(scan: &Scan) -> Result<Observation, ObserveError> {
     let near = Point2::new(1.0, 0.0);
     let options = ObserveOptions { within_m: 2.0, ..ObserveOptions::default() };
@@ -447,7 +451,7 @@ fn a_damaged_model_is_refused() {
     assert_eq!(serde_json::from_str::<KnownShape>(&text).unwrap(), shape);
 }
 
-/// One scan, or one reading, makes a model that violates nothing; it is no more than it is.
+/// One scan, or one reading, makes a model without violation, and no more.
 #[test]
 fn few_scans_and_few_readings_are_no_panic() {
     let one = ObjectScan {

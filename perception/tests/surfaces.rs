@@ -1,5 +1,6 @@
-//! Rooms with tables: which level surfaces there are, and what tells the floor from a table. A time-of-flight camera sees them: its noise grows
-//! with the depth, some pixels have no return, some at edges lie between near and far.
+//! Level surfaces in rooms with tables, and the distinction of floor and table, seen by a
+//! time-of-flight camera: noise grows with depth, some returns are missing, and edges have mixed
+//! pixels.
 
 use crate::tabletop::pile::Pile;
 use crate::tabletop::{Draws, TABLE_M};
@@ -43,7 +44,7 @@ fn room(parts: &[&[Block]]) -> Vec<Block> {
     parts.concat()
 }
 
-/// Depth along the ray, in units of the ray, at which it enters a block.
+/// Depth along a ray, in units of the ray, at which the ray enters a block.
 fn enters(block: &Block, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
     let (mut enter, mut leave) = (0.05, f64::INFINITY);
     for k in 0..3 {
@@ -92,7 +93,7 @@ fn look(room: &[Block], world_from_camera: Isometry3<f64>, mirrored: f64, draws:
     }
 }
 
-/// Looks from some places at a target, all in the world.
+/// Views from several places at a target, in the world.
 struct Looks<'a> {
     room: &'a [Block],
     eyes: &'a [[f64; 3]],
@@ -179,7 +180,7 @@ fn the_floor_is_never_a_table() {
     assert_eq!((told.role, told.because), (Role::Support, Sign::Asked));
 }
 
-/// The number of things apart from each other: a sparse one may come in pieces.
+/// Number of separate objects; a sparse one may be in pieces.
 fn things(scene: &Scene) -> usize {
     let mut apart: Vec<Point3<f64>> = Vec::new();
     for segment in &scene.segments {

@@ -43,7 +43,7 @@ fn found(cloud: &Cloud, seen: &Visibility) -> Vec<Percept> {
     Descry::default().recognise(&scene, seen, &models())
 }
 
-/// The view as it is, its camera at a pose.
+/// Percepts of the original view with its camera at a pose.
 fn in_rows(pose: &Isometry3<f64>) -> Vec<Percept> {
     let view = View { world_from_camera: *pose, ..VIEW.clone() };
     found(&view.cloud.transformed(pose), &Visibility::from_views(std::slice::from_ref(&view)))
@@ -60,7 +60,7 @@ fn bare() -> Vec<Point3<f32>> {
     VIEW.cloud.points.iter().copied().filter(is_finite).collect()
 }
 
-/// The same things in the same places with nearly the same probabilities.
+/// Checks that percepts have the same names and places with nearly the same probabilities.
 fn check(what: &str, pose: &Isometry3<f64>, percepts: &[Percept], off: f64) {
     static AS_IT_IS: LazyLock<Vec<Percept>> = LazyLock::new(|| in_rows(&Isometry3::identity()));
     assert_eq!(AS_IT_IS.len(), 4);

@@ -1,5 +1,5 @@
-//! Promises of the planner, tested from outside: one program, so that what all tests share is built and
-//! linked once.
+//! Tests of the planner's public interface, in one program, so that shared code is built and linked
+//! once.
 
 mod attachments;
 mod broken;

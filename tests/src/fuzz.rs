@@ -1,4 +1,4 @@
-//! Readers of bytes from outside, each with a judge of what it makes of them, and inputs that differ a little from good ones.
+//! Readers of external bytes, each with a judge of its results, and inputs mutated from valid ones.
 //!
 //! A judge panics where a reader has a fault: by itself, or since what it read contradicts itself. Bad input is no fault.
 
@@ -11,9 +11,9 @@ pub use mutate::{Draw, mutate};
 /// A reader under test.
 #[derive(Clone, Copy)]
 pub struct Target {
-    /// Its name, which that of its program in `fuzz/` is too.
+    /// Name, also of the program in `fuzz/`.
     pub name: &'static str,
-    /// Reads an input and judges what came of it.
+    /// Reads an input and judges the result.
     pub judge: fn(&[u8]),
     /// Good inputs, and bad ones that once mattered.
     pub corpus: fn() -> Vec<Vec<u8>>,

@@ -1,3 +1,3 @@
-//! Tests of the whole, and what fuzzing feeds the readers of bytes from outside.
+//! Tests of the whole, and inputs for fuzzing the readers of external bytes.
 
 pub mod fuzz;

@@ -23,7 +23,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The code of a file without its comment lines.
+/// Code of a file without comment lines.
 fn code(path: &Path) -> String {
     let text = fs::read_to_string(path).expect("a source file is text");
     text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
@@ -54,7 +54,7 @@ fn check_absent(folder: &str, words: &[&str], allowed: &[&str]) {
     }
 }
 
-/// A crate, and those of ours that it may use.
+/// Crates, each with the crates it may use.
 const FLOORS: &[(&str, &str)] = &[
     ("planner", ""),
     ("perception", ""),
@@ -225,7 +225,7 @@ const PACKAGED: [&str; 11] = [
     "cli",
 ];
 
-/// A crate that is packaged holds everything that it is compiled from; what stands elsewhere is linked into it.
+/// Every packaged crate contains all its sources; files elsewhere are linked into it.
 #[test]
 fn what_is_compiled_into_a_crate_lies_in_it() {
     for package in PACKAGED {
@@ -282,7 +282,7 @@ fn every_test_that_the_architecture_names_is_there() {
     }
 }
 
-/// Methods that take a text apart, or look for a part of it.
+/// Methods that split or search a text.
 const TAKING_APART: [&str; 13] = [
     "strip_prefix",
     "strip_suffix",
@@ -306,7 +306,7 @@ fn is_prose(text: &str) -> bool {
     has_word && !text.contains(is_sign) || text.contains("--")
 }
 
-/// The texts by which a line takes a text apart.
+/// Literals by which a line splits or searches a text.
 fn taken_apart(line: &str) -> Vec<&str> {
     let by = |method: &&str| {
         let (_, rest) = line.split_once(&format!(".{method}(\""))?;
@@ -315,7 +315,8 @@ fn taken_apart(line: &str) -> Vec<&str> {
     TAKING_APART.iter().filter_map(by).collect()
 }
 
-/// Reasons, steps and verdicts are values from the planner to the page: nobody reads them out of sentences that we wrote.
+/// Reasons, steps and verdicts are values from the planner to the page; no crate parses our own
+/// sentences.
 #[test]
 fn no_crate_parses_sentences_of_our_own() {
     // What others write: the limits of a process, as Linux tells them.
@@ -349,7 +350,7 @@ fn no_crate_parses_sentences_of_our_own() {
     }
 }
 
-/// Crates whose modules and type names are looked at.
+/// Crates with the maximum size of a module cycle: six, or the present size if larger.
 const CRATES: [&str; 10] = [
     "domains",
     "agent",

@@ -1,4 +1,4 @@
-//! The reference of file formats: its tables of keys are those of the types that read the files.
+//! Reference of file formats: the tables of keys equal the types that read the files.
 //!
 //! Between `<!-- keys FILE TYPE -->` and `<!-- end -->` a page has the table of a type, after `<!-- ability NAME -->` the words of an
 //! ability. `UPDATE_DOCS=1 cargo test -p descry-tests
@@ -12,7 +12,7 @@ use quote::ToTokens;
 use syn::punctuated::Punctuated;
 use syn::{Attribute, Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Meta, Stmt, Token};
 
-/// Where the types are that read what people and their programs write.
+/// Files with the types that read users' files.
 const FORMATS: &[&str] = &[
     "domains/src/config.rs",
     "perception/src/recognise/model.rs",
@@ -36,10 +36,10 @@ const FORMATS: &[&str] = &[
     "experiments/src/kinds/tasks/score.rs",
 ];
 
-/// Types that have no keys of their own: numbers and texts that are read in a way of their own.
+/// Types without keys: numbers and texts with special parsers.
 const WITHOUT_KEYS: &[&str] = &["Doorway", "NothingSaid", "NumberOrPair", "OtherBody", "Range", "Steps"];
 
-/// Where the constants are that stand for what a key is if it is left out.
+/// Files with the constants used as defaults of keys.
 const CONSTANTS: &[&str] = &["domains/src/load.rs", "domains/src/abilities/searching/policies/mod.rs"];
 
 fn root() -> PathBuf {
@@ -51,7 +51,7 @@ fn items(file: &str) -> Vec<Item> {
     syn::parse_file(&text).unwrap_or_else(|e| panic!("{file}: {e}")).items
 }
 
-/// What the lines before an item say, as one line of a table.
+/// Doc comment of an item, as one line of a table.
 fn meaning(attributes: &[Attribute]) -> String {
     let lines = attributes.iter().filter_map(|attribute| match &attribute.meta {
         Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
@@ -71,7 +71,7 @@ fn meaning(attributes: &[Attribute]) -> String {
     }
 }
 
-/// What serde is told of an item: words, and the value of some.
+/// Serde attributes of an item: names, and values of some.
 fn told(attributes: &[Attribute]) -> Vec<(String, Option<String>)> {
     let serde = attributes.iter().filter(|attribute| attribute.path().is_ident("serde"));
     let words = serde.flat_map(|attribute| {
@@ -94,7 +94,7 @@ fn value_of(told: &[(String, Option<String>)], word: &str) -> Option<Option<Stri
     told.iter().find(|(name, _)| name == word).map(|(_, value)| value.clone())
 }
 
-/// A name as a file has it.
+/// Name of an item as written in files.
 fn renamed(name: &str, how: Option<&str>) -> String {
     let words = |mark: char| {
         let split = name.chars().enumerate().flat_map(|(n, c)| {
@@ -112,7 +112,7 @@ fn renamed(name: &str, how: Option<&str>) -> String {
     }
 }
 
-/// A type in words.
+/// Type in words.
 fn kind(ty: &syn::Type) -> String {
     let text = ty.to_token_stream().to_string().replace(' ', "");
     in_words(&text)
@@ -153,7 +153,7 @@ fn in_words(text: &str) -> String {
     }
 }
 
-/// The same of more than one.
+/// Plural of a type in words.
 fn several(text: &str) -> String {
     match in_words(text).as_str() {
         one @ ("number" | "whole number" | "text") => format!("{one}s"),
@@ -162,7 +162,7 @@ fn several(text: &str) -> String {
     }
 }
 
-/// The value that a function of that name gives, in this file or else in another with formats, if it is short.
+/// Value returned by a default function, in this file or another format file, if short.
 fn default_of(here: &[Item], function: &str) -> Option<String> {
     let name = function.rsplit("::").next()?.trim();
     let in_items = |items: &[Item]| {
@@ -178,7 +178,7 @@ fn default_of(here: &[Item], function: &str) -> Option<String> {
     in_items(here).or_else(|| FORMATS.iter().find_map(|file| in_items(&items(file))))
 }
 
-/// The value of a constant.
+/// Value of a constant.
 fn constant(name: &str) -> Option<String> {
     let all = CONSTANTS.iter().flat_map(|file| items(file));
     let found = all.filter_map(|item| match item {
@@ -188,7 +188,7 @@ fn constant(name: &str) -> Option<String> {
     found.last()
 }
 
-/// The variant of a type of one of the files with formats that stands where nothing is said.
+/// Default variant of an enumeration in one of the format files.
 fn default_variant(name: &str) -> Option<String> {
     let found = FORMATS.iter().flat_map(|file| items(file)).find_map(|item| match item {
         Item::Enum(item) if item.ident == name => Some(item),
@@ -198,14 +198,14 @@ fn default_variant(name: &str) -> Option<String> {
     Some(name_of_variant(&found, variant))
 }
 
-/// A variant as a file has it.
+/// Name of a variant as written in files.
 fn name_of_variant(of: &ItemEnum, variant: &syn::Variant) -> String {
     let how = value_of(&told(&of.attrs), "rename_all").flatten();
     let own = value_of(&told(&variant.attrs), "rename").flatten();
     own.unwrap_or_else(|| renamed(&variant.ident.to_string(), how.as_deref()))
 }
 
-/// The value of a field in what `Default` gives for a type.
+/// Value of a field in a type's `Default`.
 fn default_field(items: &[Item], of: &str, field: &str) -> Option<String> {
     let own = items.iter().find_map(|item| match item {
         Item::Impl(item) => {
@@ -270,7 +270,7 @@ fn table_of_struct(items: &[Item], item: &ItemStruct) -> String {
     text
 }
 
-/// What stands for nothing in a type.
+/// Words for a type's empty value.
 fn none_of(ty: &syn::Type) -> String {
     if ty.to_token_stream().to_string().starts_with("Option") {
         return "nothing".into();
@@ -306,7 +306,7 @@ fn table_of_enum(item: &ItemEnum) -> String {
     text
 }
 
-/// The table of a type.
+/// Table of a type.
 fn table(file: &str, name: &str) -> String {
     let items = items(file);
     let made = items.iter().find_map(|item| match item {
@@ -320,7 +320,7 @@ fn table(file: &str, name: &str) -> String {
 const BEGIN: &str = "<!-- keys ";
 const END: &str = "<!-- end -->";
 
-/// A page with its tables made anew, and the types that they are of.
+/// Page with regenerated tables, and the types shown.
 fn renewed(page: &str) -> (String, BTreeSet<(String, String)>) {
     let (mut text, mut rest, mut named) = (String::new(), page, BTreeSet::new());
     while let Some((before, after)) = rest.split_once(BEGIN) {
@@ -360,7 +360,7 @@ fn words_of(name: &str) -> String {
     text
 }
 
-/// A page with the tables of its abilities made anew.
+/// Page with regenerated ability tables.
 fn with_abilities(page: &str) -> String {
     let (mut text, mut rest) = (String::new(), page);
     while let Some((before, after)) = rest.split_once(BEGIN_ABILITY) {
@@ -387,7 +387,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// Holds a page to its types, or writes it anew; the types that it shows.
+/// Compares a page with its types, or rewrites it; returns the types shown.
 fn check(page: &Path) -> BTreeSet<(String, String)> {
     let text = fs::read_to_string(page).expect("a page is text");
     let (renewed, shown) = renewed(&with_abilities(&text));
@@ -400,7 +400,7 @@ fn check(page: &Path) -> BTreeSet<(String, String)> {
     shown
 }
 
-/// Whether what is read from a file is made into it.
+/// True if a field is read from files.
 fn is_read(attributes: &[Attribute]) -> bool {
     let derived = attributes.iter().filter(|attribute| attribute.path().is_ident("derive"));
     derived.map(|derive| derive.to_token_stream().to_string()).any(|text| text.contains("Deserialize"))
@@ -426,7 +426,7 @@ fn every_table_is_that_of_its_type_and_every_type_has_one() {
     }
 }
 
-/// The types that a page's tables name.
+/// Types named in a page's tables.
 fn named_in(page: &str) -> BTreeSet<String> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let what = rows.filter_map(|row| row.split(" | ").nth(1));
@@ -450,7 +450,7 @@ fn every_type_that_a_table_names_has_a_table() {
     assert!(!named.is_empty() && missing.is_empty(), "no table shows {missing:?}");
 }
 
-/// The names in a list of a file: a constant whose entries are pairs that begin with a name.
+/// Names in a list of a file: a constant of pairs that begin with a name.
 fn names_in(file: &str, list: &str) -> Vec<String> {
     let found = items(file).into_iter().find_map(|item| match item {
         Item::Const(item) if item.ident == list => Some(*item.expr),

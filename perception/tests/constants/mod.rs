@@ -1,4 +1,4 @@
-//! Constants of perception and the sources of their values, as the code states them.
+//! Constants of perception with the stated origins of their values.
 //!
 //! The documentation of a constant says what it is, with its unit, and ends with `From: ` and one of [`KINDS`]; after a comma, what it was
 //! fitted on, which paper it stands in, or what it was chosen by. A constant on the line after another shares its documentation; a number in
@@ -8,11 +8,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
-/// Files and folders of `src` whose constants have to say so.
+/// Files and folders of `src` whose constants must state an origin.
 pub const PARTS: [&str; 9] =
     ["scale", "quantile", "polygon", "noise", "segment", "recognise", "round", "surface", "merge"];
 
-/// The kinds of sources of a value, and whether each needs further words.
+/// Kinds of origins, and true if the kind needs further words.
 const KINDS: [(&str, bool); 8] = [
     // Stated there, for the same purpose.
     ("paper", true),
@@ -32,10 +32,10 @@ const KINDS: [(&str, bool); 8] = [
     ("mark", false),
 ];
 
-/// Numbers that are no quantities: ends, halves and doubles, shares in per cent, metres in millimetres.
+/// Numbers exempt from names: ends, halves and doubles, shares in per cent, metres in millimetres.
 const PLAIN: [f64; 6] = [0.0, 0.5, 1.0, 2.0, 100.0, 1000.0];
 
-/// A constant, or a number that options have unless told otherwise.
+/// Constant, or default of an option.
 #[derive(Clone, Debug)]
 pub struct Constant {
     /// Below `src`.
@@ -46,7 +46,7 @@ pub struct Constant {
     pub value: String,
     /// The description, without the source of the value.
     pub what: String,
-    /// The source of the value; empty if none is given.
+    /// Origin of the value; empty if none is given.
     pub from: String,
 }
 
@@ -54,7 +54,7 @@ pub struct Constant {
 #[derive(Clone, Debug, Default)]
 pub struct Found {
     pub constants: Vec<Constant>,
-    /// File, line from 1, and a number that has no name.
+    /// Unnamed numbers: file, line from 1, and number.
     pub nameless: Vec<(String, usize, String)>,
 }
 
@@ -65,7 +65,7 @@ impl Constant {
         Constant { file: file.to_owned(), line, name: name.to_owned(), value: value.to_owned(), what, from }
     }
 
-    /// The kind of the source, of [`KINDS`], if one is given.
+    /// Kind of the origin, of [`KINDS`], if one is given.
     fn kind(&self) -> &str {
         self.from.split([',', ' ']).next().unwrap_or_default()
     }
@@ -83,7 +83,7 @@ impl Constant {
         Some(format!("{}:{}: {} {why}", self.file, self.line, self.name))
     }
 
-    /// The unit that the end of the name gives.
+    /// Unit given by the end of the name.
     fn unit(&self) -> &'static str {
         let name = self.name.to_lowercase();
         let units =
@@ -112,7 +112,7 @@ pub fn all(src: &Path) -> Found {
     found
 }
 
-/// Reads the constants of a file before its tests.
+/// Reads the constants of a file above its tests.
 pub fn read(file: &str, text: &str) -> Found {
     let lines: Vec<&str> = text.lines().take_while(|line| *line != "#[cfg(test)]").collect();
     let mut found = Found::default();
@@ -178,7 +178,7 @@ fn constant(line: &str) -> Option<(&str, String)> {
         .then(|| (name, value.trim().to_owned()))
 }
 
-/// Fields that a line gives a number.
+/// Fields to which a line assigns a number.
 fn fields(line: &str) -> impl Iterator<Item = (&str, &str)> {
     let pairs = line.split(['{', ',', '}']).filter_map(|part| part.trim().split_once(": "));
     pairs.filter(|(_, value)| value.replace('_', "").parse::<f64>().is_ok())
@@ -211,7 +211,7 @@ fn quantities(line: &str) -> Vec<&str> {
         .collect()
 }
 
-/// The floating-point numbers of some code, with their values.
+/// Floating-point literals in code, with their values.
 fn floats(code: &str) -> Vec<(&str, f64)> {
     let bytes = code.as_bytes();
     let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
@@ -251,7 +251,7 @@ fn floats(code: &str) -> Vec<(&str, f64)> {
     found
 }
 
-/// All of it as a table in Markdown, and how many there are of each kind of origin.
+/// All constants as a Markdown table, with the number of each kind of origin.
 pub fn table(found: &Found) -> String {
     let mut table =
         "| file | name | value | unit | what it is | from |\n|---|---|---|---|---|---|\n".to_owned();

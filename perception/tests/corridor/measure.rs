@@ -4,24 +4,24 @@ use super::{Building, CAMERA_HEIGHT_M, Opening};
 use descry_perception::mapping::{RoomMap, Station, Survey, UprightCylinder};
 use descry_perception::nalgebra::{Isometry2, Point2, Rotation2, Vector2};
 
-/// Heights at which something is in a body's way, metres.
+/// Height range of obstacles to the body, metres.
 pub const BODY_M: std::ops::RangeInclusive<f64> = 0.15..=1.6;
-/// Depth up to which points make the map, metres.
+/// Maximum depth of points used for the map, metres.
 pub const MAP_FAR_M: f64 = 5.0;
 const STEP_M: f64 = 0.1;
 
 /// Walls held to the truth.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Score {
-    /// Share of the length of found walls that stands where something upright stands.
+    /// Share of the found walls' length that is at a true upright surface.
     pub precision: f64,
     /// Share of the length of the corridor's walls that was found.
     pub recall: f64,
-    /// Mean angle between found walls and true ones, weighted by length, degrees.
+    /// Mean angle between found and true walls, weighted by length, degrees.
     pub angle_deg: f64,
-    /// Mean distance of found walls from true ones, metres.
+    /// Mean distance of found from true walls, metres.
     pub offset_m: f64,
-    /// Open doors that no wall closes, and those that there are.
+    /// Numbers of open doors left open by the found walls, and of all open doors.
     pub openings: (usize, usize),
     /// Walls found.
     pub walls: usize,
@@ -36,7 +36,7 @@ pub fn survey(stations: &[Station], poses: &[Isometry2<f64>]) -> Survey {
     survey
 }
 
-/// Poses turned and shifted as a whole so that they lie best on the true ones.
+/// Poses rigidly aligned with the true ones.
 pub fn on_truth(poses: &[Isometry2<f64>], truths: &[Isometry2<f64>]) -> Vec<Isometry2<f64>> {
     let n = poses.len() as f64;
     let mean = |p: &[Isometry2<f64>]| p.iter().map(|p| p.translation.vector).sum::<Vector2<f64>>() / n;
@@ -67,8 +67,9 @@ fn between(a: &(Point2<f64>, Point2<f64>), b: &(Point2<f64>, Point2<f64>)) -> f6
     u.perp(&v).abs().asin()
 }
 
-/// Holds all that is upright on a map to a building; they agree if nearer than `within_m`. A door is looked for where the stop of the drive nearest to it has it: `poses` and
-/// `truths` are of the same stops.
+/// Compares the upright surfaces of a map with a building; they match within `within_m`. A door is
+/// searched where the nearest station of the drive places it; `poses` and `truths` belong to the
+/// same stations.
 pub fn score(
     map: &RoomMap,
     building: &Building,
@@ -132,16 +133,17 @@ pub fn score(
 /// Pillars held to the truth.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PillarScore {
-    /// Found, those of them that are none, and those that there are.
+    /// Number of found pillars; further fields: false ones, and true ones in all.
     pub found: usize,
     pub wrong: usize,
     pub all: usize,
-    /// Means over those that are right, metres.
+    /// Mean errors over the correct pillars, metres.
     pub off_m: f64,
     pub radius_off_m: f64,
 }
 
-/// Holds the cylinders of a map to the pillars of a building: one is right within 10 cm of a pillar's axis.
+/// Compares the cylinders of a map with the pillars of a building; one is correct within 10 cm of a
+/// pillar's axis.
 pub fn score_pillars(cylinders: &[UprightCylinder], building: &Building) -> PillarScore {
     let mut score = PillarScore { all: building.pillars.len(), ..PillarScore::default() };
     let mut left = building.pillars.clone();

@@ -1,4 +1,5 @@
-//! A building with a stereo camera driven through it: upright walls, tables and cylinders seen column by column, so that the truth is exact.
+//! Simulated building with a driven stereo camera: upright walls, tables and cylinders rendered by
+//! column, with exact ground truth.
 
 #![allow(dead_code)]
 
@@ -18,7 +19,7 @@ pub const DOOR_M: f64 = 2.1;
 pub const DOOR_WIDE_M: f64 = 0.9;
 /// Width of a corridor, metres.
 pub const WIDE_M: f64 = 2.2;
-/// Side of a piece of wall that has texture or has none, metres.
+/// Side of wall patches with or without texture, metres.
 const TEXTURE_M: f64 = 0.3;
 
 /// An upright rectangle.
@@ -28,11 +29,11 @@ pub struct Panel {
     pub b: Point2<f64>,
     /// Lower and upper end, metres.
     pub z: (f64, f64),
-    /// Share of it that has texture.
+    /// Share of the wall with texture.
     pub texture: f64,
 }
 
-/// A table: half sides along the axes, and its height, metres.
+/// Table: half sides along the axes, and height, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Table {
     pub middle: Point2<f64>,
@@ -45,7 +46,7 @@ pub struct Table {
 pub struct Pillar {
     pub middle: Point2<f64>,
     pub radius_m: f64,
-    /// Share of it that has texture.
+    /// Share of the cylinder with texture.
     pub texture: f64,
 }
 
@@ -64,7 +65,8 @@ pub struct Building {
     pub pillars: Vec<Pillar>,
     /// Open doors.
     pub openings: Vec<Opening>,
-    /// Walls of the corridor itself, for measuring: without lintels, rooms behind doors and furniture.
+    /// Walls of the corridor itself, for measuring, without lintels, rooms behind doors and
+    /// furniture.
     pub walls: Vec<(Point2<f64>, Point2<f64>)>,
 }
 
@@ -75,7 +77,8 @@ impl Building {
         self.walls.push((a, b));
     }
 
-    /// Adds a wall with open doors whose middles lie so far from `a`; behind each lies a small room on the side of `behind`.
+    /// Adds a wall with open doors at the given distances from `a`; behind each is a small room on
+    /// the side of `behind`.
     fn wall_with_doors(
         &mut self,
         (a, b): (Point2<f64>, Point2<f64>),
@@ -115,7 +118,8 @@ impl Building {
         }
     }
 
-    /// A rectangular loop of corridor: `long_m` by `short_m` along its middle line, the middle at the origin; doors on both sides, some tables.
+    /// Rectangular corridor loop, `long_m` by `short_m` along its centre line, centred at the
+    /// origin, with doors on both sides and some tables.
     pub fn corridor_loop(long_m: f64, short_m: f64, seed: u64) -> Building {
         let mut building = Building::default();
         let mut draws = Draws(seed);
@@ -145,7 +149,8 @@ impl Building {
         building
     }
 
-    /// A box from the floor up, no wall when measured: a square post, a cupboard.
+    /// Adds a box from the floor up that counts as no wall when measured: a square post or a
+    /// cupboard.
     pub fn post(&mut self, middle: Point2<f64>, half: [f64; 2], turn_rad: f64, height_m: f64) {
         let at = Isometry2::new(middle.coords, turn_rad);
         let [x, y] = half;
@@ -176,7 +181,7 @@ impl Building {
         hall
     }
 
-    /// A closed room around corners given anticlockwise.
+    /// Closed room with anticlockwise corners.
     pub fn room(corners: &[Point2<f64>], texture: impl Fn(usize) -> f64) -> Building {
         let mut building = Building::default();
         for (i, a) in corners.iter().enumerate() {
@@ -189,13 +194,13 @@ impl Building {
 /// The errors of the camera and the wheels, and the path that is driven.
 #[derive(Clone, Copy, Debug)]
 pub struct Rig {
-    /// Every so many columns and rows are looked at.
+    /// Stride of sampled columns and rows.
     pub stride: usize,
     /// Spread of disparities, pixels.
     pub disparity_sigma_px: f64,
     /// Share of pixels whose disparity is anything.
     pub mismatched: f64,
-    /// Share of a step by which odometry errs.
+    /// Odometry error, as a share of the step.
     pub drift: f64,
     /// Spread of the heading's error a step, radians.
     pub turn_sigma_rad: f64,
@@ -212,19 +217,19 @@ pub const CAMERA: Intrinsics =
     Intrinsics { width: 640, height: 480, fx: 550.0, fy: 550.0, cx: 319.5, cy: 239.5 };
 const BASE_M: f64 = 0.1;
 pub const CAMERA_HEIGHT_M: f64 = 1.2;
-/// Farther away nothing is matched, metres.
+/// Maximum stereo range, metres.
 pub const FAR_M: f64 = 8.0;
 
-/// The part of the camera's field of view that is used for rectification.
+/// Camera's field of view as used for rectification.
 pub fn field_of_view() -> FieldOfView {
     let half_rad = (320.0_f64 / 550.0).atan();
     FieldOfView { right_rad: -half_rad, left_rad: half_rad, near_m: 0.5, far_m: FAR_M }
 }
 
-/// Floor, ceiling and tables have texture of their own.
+/// Number of textured levels: floor, ceiling and tables.
 const LEVELS: usize = 3;
 
-/// A repeatable number from 0 to 1 for a place.
+/// Deterministic pseudo-random number from 0 to 1 for a place.
 fn hash(panel: usize, u: i64, v: i64) -> f64 {
     let key = (panel as u64) << 48 ^ ((u as u64) & 0xff_ffff) << 24 ^ ((v as u64) & 0xff_ffff);
     Draws(key.wrapping_mul(0x9E37_79B9_7F4A_7C15)).next()
@@ -234,7 +239,7 @@ fn is_textured(panel: usize, share: f64, u_m: f64, v_m: f64) -> bool {
     hash(panel, (u_m / TEXTURE_M).floor() as i64, (v_m / TEXTURE_M).floor() as i64) < share
 }
 
-/// The place where a column's ray meets a panel or a pillar; pillars are numbered after the panels and level
+/// Hit of a column's ray on a panel or pillar; pillars are numbered after panels and level
 /// surfaces.
 struct Hit {
     depth: f64,
@@ -300,7 +305,7 @@ impl Building {
         hits
     }
 
-    /// Depth of what a pixel shows; `None` where there is no texture.
+    /// Depth at a pixel; `None` without texture.
     fn depth(&self, truth: &Isometry2<f64>, side: f64, up: f64, hits: &[Hit]) -> Option<f64> {
         let upright = hits.iter().find(|h| {
             let z = CAMERA_HEIGHT_M + h.depth * up;
@@ -349,7 +354,7 @@ impl Building {
 }
 
 impl Rig {
-    /// A step as the wheels tell it.
+    /// Step as measured by the wheels.
     pub fn measured(&self, step: &Isometry2<f64>, draws: &mut Draws) -> Isometry2<f64> {
         let way = step.translation.vector;
         let off = Vector2::new(draws.normal(), 0.5 * draws.normal()) * (self.drift * way.norm());
@@ -378,7 +383,8 @@ pub fn along(corners: &[Point2<f64>], step_m: f64, turn_rad: f64) -> Vec<Isometr
     poses
 }
 
-/// Once around the loop, anticlockwise from the middle of a long side, and some metres of it again.
+/// Poses once around the loop, anticlockwise from the middle of a long side, plus a repeated
+/// stretch.
 pub fn around(long_m: f64, short_m: f64, again_m: f64, step_m: f64) -> Vec<Isometry2<f64>> {
     let (x, y) = (0.5 * long_m, 0.5 * short_m);
     let at = Point2::new;
@@ -386,7 +392,7 @@ pub fn around(long_m: f64, short_m: f64, again_m: f64, step_m: f64) -> Vec<Isome
     along(&corners, step_m, FRAC_PI_2 / 6.0)
 }
 
-/// Puts a share of the points onto people who stand anywhere in the view, others in each view.
+/// Moves a share of the points onto people standing at random in the view, different in each view.
 pub fn with_people(points: &[Point3<f32>], share: f64, draws: &mut Draws) -> Vec<Point3<f32>> {
     const POINTS_EACH: usize = 400;
     let mut points = points.to_vec();

@@ -1,4 +1,4 @@
-//! Rigid household objects of our own making: each stands with its base on z = 0.
+//! Hand-made rigid household objects, each with its base on z = 0.
 
 use super::solid::{Paint, Part, Solid};
 use descry_perception::nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -217,7 +217,7 @@ fn milk() -> Body {
 }
 
 impl Body {
-    /// Another object of the same sort: of another size, with another pattern and other colours.
+    /// Variant of the object with another size, pattern and colours.
     pub fn varied(&self, scale: f64, seed: u64) -> Body {
         let solid = |solid: Solid| match solid {
             Solid::Block(half) => Solid::Block(half.map(|v| v * scale)),

@@ -1,4 +1,4 @@
-//! Household objects without number: sorts of things whose sizes, colours and patterns are drawn.
+//! Generated household objects: sorts with random sizes, colours and patterns.
 
 use super::bodies::{Body, at, bow, cone, cubes, part, tilted};
 use super::solid::{Paint, Part, Solid};
@@ -23,10 +23,10 @@ fn paint(draws: &mut Draws) -> Paint {
     if printed { cubes(base, spread, coarse_m, seed) } else { Paint::Plain(base) }
 }
 
-/// The name of a sort of thing, and the function that draws one.
+/// Name and generator of a sort of object.
 type Sort = (&'static str, fn(&mut Draws) -> Vec<Part>);
 
-/// An object of one of ten sorts.
+/// Random object of one of ten sorts.
 pub fn made(seed: u64) -> Body {
     let mut draws = Draws(seed ^ 0x0b1ec7);
     let sorts: [Sort; 10] = [
@@ -150,7 +150,8 @@ fn house(draws: &mut Draws) -> Vec<Part> {
     ]
 }
 
-/// A cupboard, a shelf, a box that is larger than what is learned: half its depth, width and height between two bounds, metres.
+/// Random piece of furniture (cupboard, shelf, large box), larger than learned objects: half depth,
+/// width and height between two bounds, metres.
 pub fn furniture(low: [f64; 3], high: [f64; 3], seed: u64) -> Body {
     let mut draws = Draws(seed ^ 0xf0e1);
     let half: [f64; 3] = std::array::from_fn(|k| between(&mut draws, low[k], high[k]));

@@ -1,4 +1,4 @@
-//! Household objects in a room, seen by a camera of depth and colour: analytic rays, so that the truth is exact.
+//! Household objects in a room, seen by an RGB-D camera: analytic rays, with exact ground truth.
 
 #![allow(dead_code)]
 
@@ -23,22 +23,23 @@ pub const CAMERA_M: f64 = 1.8;
 pub const CAMERA: Intrinsics =
     Intrinsics { width: 640, height: 480, fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
 
-/// A room with things in it. `owner` of what a ray meets is the index of the thing, or `None` for the room.
+/// Room with objects. `owner` of a hit is the index of the object, or `None` for the room.
 pub struct Room {
     parts: Vec<Placed>,
     things: usize,
     seed: u64,
 }
 
-/// A part, its frame from the world, the middle and radius of a ball around it, and its owner.
+/// Part with its frame from the world, bounding ball (centre, radius), and owner.
 type Placed = (Part, Isometry3<f64>, Point3<f64>, f64, Option<usize>);
 
 /// The options of a room.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoomOptions {
-    /// A round table, free on all sides, with a printed sheet on it; otherwise a plain desk with chairs around it.
+    /// True for a free-standing round table with a printed sheet; false for a plain desk with
+    /// chairs.
     pub controlled: bool,
-    /// Fixes where the furniture stands.
+    /// Seed of the furniture's places.
     pub seed: u64,
 }
 
@@ -127,7 +128,7 @@ impl Room {
         self.parts.push((part, pose.inverse(), middle, part.solid.reach_m(), owner));
     }
 
-    /// Puts an object into the room; its number.
+    /// Adds an object to the room; returns its index.
     pub fn put(&mut self, body: &Body, world_from_body: Isometry3<f64>) -> usize {
         for part in &body.parts {
             self.add(*part, world_from_body, Some(self.things));
@@ -162,9 +163,8 @@ impl Room {
         best
     }
 
-    /// The view of the camera from its true pose: depth with the noise of Nguyen et al., neighbours erring
-    /// together, and colour; `labels` of the cloud are the truth: 0 the room, else the number of the thing
-    /// and one.
+    /// RGB-D view from the true pose, with the spatially correlated noise of Nguyen et al.; the
+    /// cloud's `labels` are ground truth: 0 for the room, else object index plus one.
     pub fn look(
         &self,
         camera: &Intrinsics,
@@ -176,7 +176,7 @@ impl Room {
         self.look_at(camera, truth, stated, sigmas, seed, (Point3::origin(), f64::INFINITY))
     }
 
-    /// The same of the rays that pass within a distance (metres) of a place; of the others nothing comes back.
+    /// View with returns only from rays that pass within a distance (metres) of a point.
     pub fn look_at(
         &self,
         camera: &Intrinsics,
@@ -232,7 +232,7 @@ impl Room {
         }
     }
 
-    /// Surface points of one thing with their normals in the world, those that can be seen from somewhere outside, about `step_m` apart.
+    /// Outer surface points of an object with their normals in the world, about `step_m` apart.
     pub fn surface(body: &Body, step_m: f64) -> Cloud {
         let mut room = Room { parts: Vec::new(), things: 0, seed: 0 };
         room.put(body, Isometry3::identity());
@@ -293,7 +293,7 @@ fn pixel(
     ((camera.fx * 0.075 / disparity) as f32, colour, owner)
 }
 
-/// A draw that is nearly normal, of unit spread: three parts of one.
+/// Approximately normal random number with unit variance, from three uniform ones.
 fn quick(draws: &mut Draws) -> f64 {
     let whole = (draws.next() * (1_u64 << 51) as f64) as u64;
     let part = |k: u32| ((whole >> (17 * k)) & 0x1ffff) as f64 / 131_072.0;
@@ -307,7 +307,7 @@ struct Met {
     owner: Option<usize>,
 }
 
-/// Errors that neighbours share: draws on a coarse grid, between them by proportion, of unit spread.
+/// Spatially correlated noise of unit variance: interpolated from a coarse grid.
 struct Field {
     values: Vec<f64>,
     columns: usize,
@@ -333,7 +333,7 @@ impl Field {
     }
 }
 
-/// A camera at a place that looks at another.
+/// Pose of a camera at a point that looks at another.
 pub fn looking(eye: Point3<f64>, target: Point3<f64>) -> Isometry3<f64> {
     let forward = (target - eye).normalize();
     let right = forward.cross(&Vector3::z()).normalize();

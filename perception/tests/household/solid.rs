@@ -1,24 +1,24 @@
-//! Solids that a ray meets in closed form, and what their surface is painted with.
+//! Solids with closed-form ray intersection, and their surface colours.
 
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 
-/// A solid in its own frame.
+/// Solid in its own frame.
 #[derive(Clone, Copy, Debug)]
 pub enum Solid {
     /// Half sides, about the origin.
     Block([f64; 3]),
-    /// A frustum along z from 0 to its height; with a wall it is open at the top.
+    /// Frustum along z from 0 to its height; open at the top if it has a wall.
     Cone { low_m: f64, high_m: f64, height_m: f64, wall_m: Option<f64> },
     /// Half axes, about the origin.
     Ball([f64; 3]),
-    /// A rod from one point to another, round at its ends.
+    /// Rod between two points, with round ends.
     Rod { from: [f64; 3], to: [f64; 3], radius_m: f64 },
 }
 
-/// Colour by place on the solid.
+/// Colour by position on the solid.
 #[derive(Clone, Copy, Debug)]
 pub enum Paint {
-    /// One colour.
+    /// Uniform colour.
     Plain([u8; 3]),
     /// Random cubes of colours around a mean, of two sizes, metres.
     Cubes { base: [u8; 3], spread: f64, coarse_m: f64, fine_m: f64, seed: u64 },
@@ -32,7 +32,7 @@ pub struct Part {
     pub here_from_part: Isometry3<f64>,
 }
 
-/// The place where a ray meets a surface.
+/// Intersection of a ray with a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
     /// Ray parameter.
@@ -50,7 +50,7 @@ fn nearer(best: Option<Hit>, hit: Hit) -> Option<Hit> {
 }
 
 impl Solid {
-    /// Radius of a ball about the solid's origin that holds it, metres.
+    /// Radius of a bounding ball about the solid's origin, metres.
     pub fn reach_m(&self) -> f64 {
         match *self {
             Solid::Block(half) | Solid::Ball(half) => Vector3::from(half).norm(),
@@ -119,7 +119,7 @@ fn side(low: f64, high: f64, height: f64, from: f64, eye: &Point3<f64>, ray: &Ve
     side_from(low, high, height, from, eye, ray)
 }
 
-/// The side between the heights `from` and `height`, with the radii `low` and `high` there.
+/// Side between the heights `from` and `height`, with radii `low` and `high`.
 fn side_from(
     low: f64,
     high: f64,
@@ -151,7 +151,7 @@ fn side_from(
     best
 }
 
-/// A ring at a height, with its inner and outer radius.
+/// Ring at a height, with inner and outer radius.
 fn disc(
     z: f64,
     inner: f64,
@@ -196,7 +196,7 @@ fn rod(from: [f64; 3], to: [f64; 3], radius: f64, eye: &Point3<f64>, ray: &Vecto
 }
 
 impl Paint {
-    /// Colour at a place of the solid's frame, 0 to 255.
+    /// Colour at a point of the solid's frame, 0 to 255.
     pub fn at(&self, p: &Point3<f64>) -> [f64; 3] {
         match *self {
             Paint::Plain(colour) => colour.map(f64::from),
@@ -212,7 +212,7 @@ impl Paint {
     }
 }
 
-/// Three draws from -1 to 1 that belong to the cube around a place.
+/// Three pseudo-random numbers from -1 to 1 for the cube at a point.
 fn cube(p: &Point3<f64>, size_m: f64, seed: u64) -> [f64; 3] {
     let mut key = seed;
     for c in p.iter() {

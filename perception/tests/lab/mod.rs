@@ -1,4 +1,5 @@
-//! A lab with a planar laser in it: rays against outlines, so that the truth is exact. Objects have the hull area and perimeter of Modayil and Kuipers, Fig. 7.
+//! Simulated lab with a planar laser: rays against outlines, with exact ground truth. Objects have
+//! the hull area and perimeter of Modayil and Kuipers, Fig. 7.
 
 #![allow(dead_code)]
 
@@ -12,7 +13,7 @@ use descry_perception::laser::{
 use descry_perception::nalgebra::{Isometry2, Point2, Vector2};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Noisy hulls grow: outlines are made smaller by so much.
+/// Shrink factor of outlines, as noise enlarges hulls.
 const SHRUNK: f64 = 0.985;
 
 /// Closed outlines, metres, around the object's own origin.
@@ -47,20 +48,21 @@ pub fn four_legs(apart_cm: f64, thick_cm: f64) -> Outline {
     Outline([(half, half), (-half, half), (-half, -half), (half, -half)].map(|(x, y)| leg(x, y)).to_vec())
 }
 
-/// A rectangle with rounded corners that has a given hull area (cm²) and perimeter (cm): one for each radius of the corners that is not too small.
+/// Rounded rectangle with a given hull area (cm²), perimeter (cm) and corner radius.
 pub fn rounded_with(area_cm2: f64, perimeter_cm: f64, radius_cm: f64) -> Outline {
     let middle = (perimeter_cm + (8.0 - TAU) * radius_cm) / 4.0;
     let longer = (middle * middle - area_cm2 - (4.0 - PI) * radius_cm * radius_cm).max(0.0).sqrt();
     rounded(middle + longer, middle - longer, radius_cm)
 }
 
-/// The five objects of the paper, in its order.
+/// Five objects of the paper, in its order.
 pub const NAMES: [&str; 5] = ["recycle-bin", "big-chair", "garbage-can", "red-chair", "dell-box"];
 
-/// Corner radius of the simulated recycle-bin, centimetres: what its published area and perimeter leave open.
+/// Corner radius of the simulated recycle-bin, centimetres, undetermined by its published area and
+/// perimeter.
 pub const RECYCLE_RADIUS_CM: f64 = 11.0;
 
-/// The outline of one of them.
+/// Outline of an object.
 pub fn object(index: usize) -> Outline {
     match index {
         0 => rounded_with(932.0, 113.7, RECYCLE_RADIUS_CM),
@@ -71,7 +73,7 @@ pub fn object(index: usize) -> Outline {
     }
 }
 
-/// A room of 7 by 6 metres with furniture, its middle the map's origin.
+/// Room of 7 by 6 metres with furniture, centred at the map's origin.
 fn room() -> Vec<Vec<Point2<f64>>> {
     let block = |x: f64, y: f64, w: f64, h: f64| {
         vec![Point2::new(x, y), Point2::new(x + w, y), Point2::new(x + w, y + h), Point2::new(x, y + h)]
@@ -112,7 +114,7 @@ pub struct Run {
     pub scans: (usize, usize),
     /// Spread of the laser's stated position along each axis, metres.
     pub pose_sigma_m: f64,
-    /// Spread of its stated heading, radians.
+    /// Standard deviation of the stated heading, radians.
     pub pose_sigma_rad: f64,
     /// Share of readings whose background subtraction comes out wrong.
     pub wrong: f64,
@@ -133,7 +135,7 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// Places an outline at random.
+    /// Lab with an outline at a random place.
     pub fn with(outline: &Outline, draws: &mut Draws) -> Lab {
         let place = Vector2::new(draws.next() - 0.5, draws.next() - 0.5) * 0.6;
         let map_from_object = Isometry2::new(place, TAU * draws.next());
@@ -141,7 +143,8 @@ impl Lab {
         Lab { room: room(), object: outline.0.iter().map(put).collect(), map_from_object }
     }
 
-    /// A scan of a SICK LMS 200: 180 degrees, a reading a degree, spread 5 mm, told in centimetres.
+    /// Scan of a SICK LMS 200: 180 degrees, one reading per degree, standard deviation 5 mm,
+    /// centimetre resolution.
     pub fn sweep(&self, map_from_laser: &Isometry2<f64>, stated: &Isometry2<f64>, draws: &mut Draws) -> Scan {
         let angles_rad: Vec<f64> = (-90..=90).map(|d| f64::from(d).to_radians()).collect();
         let from = Point2::from(map_from_laser.translation.vector);
@@ -164,7 +167,7 @@ impl Lab {
         )
     }
 
-    /// Scans on a circle around the object, with the poses that they were really taken from.
+    /// Scans on a circle around the object, with their true poses.
     pub fn circle(&self, run: &Run, draws: &mut Draws) -> Vec<(Scan, Isometry2<f64>)> {
         let (least, most) = run.scans;
         let count = least + (draws.next() * (most - least + 1) as f64) as usize;
@@ -181,7 +184,7 @@ impl Lab {
 }
 
 impl Run {
-    /// A pose as localisation tells it.
+    /// Pose as stated by localisation.
     pub fn stated(&self, truth: &Isometry2<f64>, draws: &mut Draws) -> Isometry2<f64> {
         let off = Vector2::new(draws.normal(), draws.normal()) * self.pose_sigma_m;
         Isometry2::new(
@@ -226,17 +229,17 @@ pub fn map_of_the_lab(draws: &mut Draws) -> Occupancy {
     map
 }
 
-/// One observation of an object: what scans said of it, and where they were really taken from.
+/// Observation of an object: scans and their true poses.
 pub struct Observed {
-    /// Scans at their stated poses, without those that were ignored.
+    /// Used scans at their stated poses.
     pub scans: Vec<PosedScan>,
-    /// The true poses of these.
+    /// True poses of these scans.
     pub map_from_lasers: Vec<Isometry2<f64>>,
     /// Scans that were ignored.
     pub ignored: usize,
 }
 
-/// The object's readings by background subtraction, around where the robot was told that it is.
+/// Object's readings by background subtraction, near its stated position.
 pub fn observed(
     lab: &Lab,
     sweeps: &[(Scan, Isometry2<f64>)],
@@ -290,13 +293,14 @@ pub fn models(experiment: u64, run: &Run, options: &SolverOptions) -> Vec<Alignm
     .collect()
 }
 
-/// All models under the names of their objects.
+/// Models with the names of their objects.
 pub fn named(models: &[Alignment]) -> Vec<KnownShape> {
     let name = |i: usize| NAMES[i / INSTANCES];
     models.iter().enumerate().map(|(i, a)| KnownShape::new(name(i), a.model.clone())).collect()
 }
 
-/// Least and greatest f_C, and the root of the violation a pair of scans, between instances of two objects (Fig. 8). An instance is not held against itself.
+/// Minimum and maximum f_C, and root violation per pair of scans, between instances of two objects
+/// (Fig. 8), without self-comparison.
 pub fn f_c_range(models: &[Alignment], a: usize, b: usize, options: &FitOptions) -> [(f64, f64); 2] {
     let mut ranges = [(f64::INFINITY, 0.0_f64); 2];
     for i in 0..INSTANCES {
@@ -310,17 +314,18 @@ pub fn f_c_range(models: &[Alignment], a: usize, b: usize, options: &FitOptions)
     ranges
 }
 
-/// A scan of an instance put off and found again on another model (Fig. 9).
+/// Displaced scan of an instance, relocalised on another model (Fig. 9).
 pub struct Relocalised {
-    /// Error of the middle of the thing, in the laser's frame, metres.
+    /// Error of the object's centre, laser frame, metres.
     pub position_m: f64,
-    /// Error of its heading, radians.
+    /// Error of the object's heading, radians.
     pub angle_rad: f64,
-    /// The fit at the end.
+    /// Final fit.
     pub fit: ModelFit,
 }
 
-/// The paper's procedure: the instance is aligned with the model, one of its scans is moved by `paper::MOVED` and localised.
+/// The paper's procedure: aligns the instance with the model, displaces one of its scans by
+/// `paper::MOVED` and relocalises it.
 pub fn relocalised(
     model: &ShapeModel,
     instance: &ShapeModel,

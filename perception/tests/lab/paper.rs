@@ -1,6 +1,6 @@
-//! Measurements of Modayil and Kuipers, objects in the order of their tables.
+//! Measurements of Modayil and Kuipers, in the order of their tables.
 
-/// Fig. 7: area and its spread (cm²), perimeter and its spread (cm).
+/// Fig. 7: area and its standard deviation (cm²), perimeter and its standard deviation (cm).
 pub const FEATURES: [[f64; 4]; 5] = [
     [932.0, 39.0, 113.7, 2.3],
     [3288.0, 42.0, 210.4, 1.3],
@@ -9,7 +9,7 @@ pub const FEATURES: [[f64; 4]; 5] = [
     [4257.0, 80.0, 252.3, 1.7],
 ];
 
-/// Fig. 8: least and greatest f_C (m²) between instances of two classes, row by row up to the class itself.
+/// Fig. 8: minimum and maximum f_C (m²) between instances of two classes, as a lower triangle.
 pub const F_C: [&[(f64, f64)]; 5] = [
     &[(0.001, 0.004)],
     &[(1.412, 2.005), (0.001, 0.005)],
@@ -52,11 +52,12 @@ pub const LOCALISATION: [[[f64; 4]; 4]; 5] = [
     ],
 ];
 
-/// Fig. 5: no exterior error is as long after alignment, metres.
+/// Fig. 5: upper bound of exterior errors after alignment, metres.
 pub const EXTERIOR_M: f64 = 0.01;
-/// Section V-C: no position is farther off after localisation, metres; typically less than `TYPICAL_M`.
+/// Section V-C: maximum position error after localisation, metres; typically below `TYPICAL_M`.
 pub const FARTHEST_M: f64 = 0.03;
 /// See [`FARTHEST_M`].
 pub const TYPICAL_M: f64 = 0.01;
-/// Section V-C: by how much a scan is moved along x, along y (m), and turned (rad) before it is localised.
+/// Section V-C: displacement of a scan along x, along y (m), and rotation (rad) before
+/// relocalisation.
 pub const MOVED: [f64; 3] = [0.1, 0.1, 0.1];

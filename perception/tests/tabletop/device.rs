@@ -1,4 +1,4 @@
-//! Depth cameras that look at the table: the one that is assumed, and others.
+//! Simulated depth cameras: the assumed one, and others.
 
 use super::{Draws, Thing, nearest};
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
@@ -8,12 +8,12 @@ use descry_perception::{Intrinsics, View};
 #[derive(Clone, Copy, Debug)]
 pub struct Device {
     pub camera: Intrinsics,
-    /// Spread along the ray at 0.4 m, metres, and what it grows by with the square of the depth beyond.
+    /// Axial standard deviation at 0.4 m, metres, and its growth with the squared depth beyond.
     pub axial: [f64; 2],
     /// Spread across the ray, pixels.
     pub lateral_px: f64,
-    /// Distance of the projector, metres: disparity is told in eighths of a pixel. Without one it tells times of flight: a distance errs
-    /// by a wave that all pixels share, and a pixel on a depth edge tells something between.
+    /// Baseline to the projector, metres, for disparity in eighths of a pixel. `None`: time of
+    /// flight, with a common periodic distance error and mixed pixels at depth edges.
     pub base_m: Option<f64>,
     /// Share of the returns that are lost, in patches.
     pub holes: f64,
@@ -29,7 +29,7 @@ pub const KINECT: Device = Device {
 };
 
 impl Device {
-    /// The view from the true pose, given with the stated pose.
+    /// View from the true pose, labelled with the stated pose.
     pub fn look(
         &self,
         things: &[Thing],
@@ -41,7 +41,7 @@ impl Device {
         self.see(hit, truth, stated, draws).0
     }
 
-    /// The view where `hit` gives the end of a ray from an eye, and the label of that end.
+    /// View rendered by `hit`, which gives the end of a ray from the eye and its label.
     pub(super) fn see(
         &self,
         hit: impl Fn(&Point3<f64>, &Vector3<f64>) -> Option<(f64, u32)>,
@@ -92,8 +92,8 @@ impl Device {
         (view, said)
     }
 
-    /// Takes the returns away that are likeliest to be lost: in patches, where faces are steep, at depth edges, and in spots that are
-    /// dark from wherever they are seen.
+    /// Removes the returns most likely to be lost: in patches, on steep faces, at depth edges, and
+    /// on dark spots that are dark from all sides.
     fn lose(&self, depths: &mut [f32], truth: &Isometry3<f64>, draws: &mut Draws) {
         const PATCH_PX: usize = 10;
         let (width, height) = (self.camera.width, self.camera.height);
@@ -132,7 +132,7 @@ impl Device {
     }
 }
 
-/// 1 in one of eight cubes of four centimetres of the world, else 0.
+/// 1 in one of eight 4-cm cubes of the world, else 0.
 fn dark(p: &Point3<f64>) -> f64 {
     let cell = |k: usize| {
         ((p[k] / 0.04 + 0.3).floor() as i64 as u64).wrapping_mul([0x9E37_79B9, 0x85EB_CA6B, 0xC2B2_AE35][k])

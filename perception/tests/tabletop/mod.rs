@@ -1,4 +1,4 @@
-//! A table with cups and boxes, seen by a depth camera: analytic rays, so that the truth is exact.
+//! Table with cups and boxes, seen by a depth camera: analytic rays, with exact ground truth.
 
 #![allow(dead_code)]
 
@@ -12,19 +12,19 @@ use device::KINECT;
 /// Height of the table's top, metres.
 pub const TABLE_M: f64 = 0.72;
 
-/// Something on the table. Places are of the middle of the base, metres on the table.
+/// Object on the table; positions are base centres, metres on the table.
 #[derive(Clone, Copy, Debug)]
 pub enum Thing {
-    /// Open at the top, wall 3 mm; with a handle towards an angle if there is one.
+    /// Open cup with a 3 mm wall, and a handle at an angle if there is one.
     Cup { x: f64, y: f64, radius: f64, height: f64, handle_rad: Option<f64> },
     /// Closed round body.
     Tin { x: f64, y: f64, radius: f64, height: f64 },
     /// A piece of a round side: `half_rad` to both sides of a direction.
     Sherd { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, half_rad: f64 },
-    /// Half sides along its own axes, turned.
+    /// Box with half sides along its own rotated axes.
     Block { x: f64, y: f64, half: [f64; 2], height: f64, turn_rad: f64 },
-    /// Turned on a wheel: height and radius from its foot up, times a scale; open ones have a wall of 3 mm. With a handle towards an
-    /// angle, and a spout across from it.
+    /// Body of revolution with a scaled profile of heights and radii; open ones have a 3 mm wall.
+    /// With a handle at an angle and a spout opposite to it.
     Turned {
         x: f64,
         y: f64,
@@ -34,14 +34,15 @@ pub enum Thing {
         handle_rad: Option<f64>,
         spout: bool,
     },
-    /// An open cup whose foot is at a height above the table, on or in something else.
+    /// Open cup with its foot at a height above the table, on or in another object.
     Raised { x: f64, y: f64, radius: f64, height: f64, base: f64 },
-    /// A cup, or closed a tin, on its side: its foot behind the middle, its rim before it along a direction; a handle lies beside it.
+    /// Cup (or closed tin) lying on its side, with foot and rim on opposite ends along a direction,
+    /// and a handle at its side.
     Lying { x: f64, y: f64, radius: f64, height: f64, towards_rad: f64, open: bool, handle: bool },
 }
 
 impl Thing {
-    /// The middle of its base, metres on the table.
+    /// Centre of the base, metres on the table.
     pub fn place(&self) -> (f64, f64) {
         match *self {
             Thing::Cup { x, y, .. }
@@ -54,7 +55,7 @@ impl Thing {
         }
     }
 
-    /// The reach of the thing from its place, metres.
+    /// Horizontal extent of the object from its centre, metres.
     pub fn reach_m(&self) -> f64 {
         let grip = |handle_rad: Option<f64>| if handle_rad.is_some() { 0.03 } else { 0.0 };
         match *self {
@@ -70,7 +71,7 @@ impl Thing {
         }
     }
 
-    /// Free space between two things, metres; less than nothing where they may overlap.
+    /// Free space between two objects, metres; negative if they may overlap.
     pub fn gap_m(&self, other: &Thing) -> f64 {
         let ((ax, ay), (bx, by)) = (self.place(), other.place());
         (ax - bx).hypot(ay - by) - self.reach_m() - other.reach_m()
@@ -97,7 +98,7 @@ impl Draws {
     }
 }
 
-/// A camera on a ring around the table's middle (the origin), looking at it.
+/// Camera on a ring around the table's centre (the origin), looking at it.
 pub fn on_ring(angle_rad: f64, radius_m: f64, height_m: f64) -> Isometry3<f64> {
     let eye = Point3::new(radius_m * angle_rad.cos(), radius_m * angle_rad.sin(), height_m);
     let forward = (Point3::new(0.0, 0.0, TABLE_M + 0.05) - eye).normalize();
@@ -116,8 +117,8 @@ pub fn disturbed(pose: &Isometry3<f64>, sigma_m: f64, sigma_rad: f64, draws: &mu
     )
 }
 
-/// The view of the camera of paper 004 from its true pose, with the noise of Nguyen et al., given with the
-/// stated pose.
+/// View of the paper's camera from the true pose, with the noise of Nguyen et al., labelled with
+/// the stated pose.
 pub fn look(things: &[Thing], truth: &Isometry3<f64>, stated: &Isometry3<f64>, draws: &mut Draws) -> View {
     KINECT.look(things, truth, stated, draws)
 }
@@ -142,7 +143,7 @@ fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     [(TABLE_M, Some(half_m)), (0.0, None)].into_iter().filter_map(level).fold(f64::INFINITY, f64::min)
 }
 
-/// The distance along a ray to the first place where the ray meets a thing.
+/// Distance along a ray to its first hit on an object.
 fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
     // What a ray passes by, seen from above, it does not meet.
     let across = (ray.x * ray.x + ray.y * ray.y).sqrt();
@@ -209,7 +210,7 @@ fn meets(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f64> {
     best.is_finite().then_some(best)
 }
 
-/// The distances along a ray at which it meets a body turned on a lathe, each offered.
+/// Offers the distances along a ray of all hits on a body of revolution.
 fn meets_turned(thing: &Thing, eye: &Point3<f64>, ray: &Vector3<f64>, offer: &mut dyn FnMut(f64)) {
     let Thing::Turned { x, y, knots, scale, open, handle_rad, spout } = *thing else { return };
     let here = Point3::new(eye.x - x, eye.y - y, eye.z - TABLE_M);
@@ -251,7 +252,8 @@ fn tube(
     })
 }
 
-/// The side of a turned body about the origin, a wall within: frusta between its knots.
+/// Side of a body of revolution about the origin, with its wall: frusta between the profile's
+/// points.
 fn turned<'a>(
     eye: &'a Point3<f64>,
     ray: &'a Vector3<f64>,

@@ -1,27 +1,27 @@
-//! Piles: things beside and on each other, touching, so that little of the table is left to see.
+//! Piles of touching, stacked objects that hide most of the table.
 
 use super::device::{Device, KINECT};
 use super::{Draws, HALF_M, Thing, bare, meets, on_ring};
 use descry_perception::nalgebra::{Isometry3, Point3, Vector3};
 use descry_perception::{Intrinsics, View};
 
-/// Half side of the square that the things stand in, metres.
+/// Half side of the square that contains the objects, metres.
 const HEAP_M: f64 = 0.33;
 /// Half sides of a table whose border is out of view, metres.
 const DESK_M: [f64; 2] = [2.5, 2.5];
-/// Share of the returns in view that are of things.
+/// Minimum share of the visible returns on objects.
 const COVERED: f64 = 0.7;
 /// Profile of a bowl: height and radius from the foot up, metres.
 const BOWL: [[f64; 2]; 4] = [[0.0, 0.035], [0.015, 0.055], [0.04, 0.072], [0.06, 0.08]];
 
-/// A thing, and how high above the table the top lies that it stands on, metres.
+/// Object with the height of its support above the table, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     pub thing: Thing,
     pub base_m: f64,
 }
 
-/// Things on a table.
+/// Objects on a table.
 pub struct Pile {
     pub things: Vec<Placed>,
     /// Half sides of the table's top, metres.
@@ -59,7 +59,7 @@ impl Placed {
         }
     }
 
-    /// True if the two would be in one place.
+    /// True if two objects would overlap.
     fn meets(&self, other: &Placed) -> bool {
         const TOUCH_M: f64 = 0.003;
         let level = self.base_m < other.top_m() - 1e-6 && other.base_m < self.top_m() - 1e-6;
@@ -67,7 +67,7 @@ impl Placed {
         level && furthest(&a, &b) < TOUCH_M && furthest(&b, &a) < TOUCH_M
     }
 
-    /// True if it rests on the other's top and hangs over by hardly anything.
+    /// True if an object rests on the other's top with hardly any overhang.
     fn rests_on(&self, other: &Placed) -> bool {
         const OVER_M: f64 = 0.02;
         let own = self.footprint();
@@ -76,8 +76,7 @@ impl Placed {
     }
 }
 
-/// The greatest distance, over the edges of one outline, of the nearest point of the other outline beyond the
-/// edge, metres.
+/// Maximum separation of two outlines over the edge normals of the first (separating axis), metres.
 fn furthest(of: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
     let edges = of.iter().zip(of.iter().cycle().skip(1));
     let beyond = |(a, b): (&[f64; 2], &[f64; 2])| {
@@ -89,7 +88,7 @@ fn furthest(of: &[[f64; 2]], other: &[[f64; 2]]) -> f64 {
     edges.map(beyond).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// A thing of a kind that heaps are made of, somewhere: at first flat boxes.
+/// Random object of a pile at a random place; flat boxes first.
 fn drawn(placed: usize, draws: &mut Draws) -> Thing {
     const FLAT: usize = 7;
     let [x, y] = [0, 1].map(|_| HEAP_M * (2.0 * draws.next() - 1.0));
@@ -117,7 +116,7 @@ fn drawn(placed: usize, draws: &mut Draws) -> Thing {
 }
 
 impl Pile {
-    /// 12 to 20 things; the border of every third table may be in view.
+    /// Random pile of 12 to 20 objects; the table's border may be visible in every third.
     pub fn drawn(draws: &mut Draws) -> Pile {
         let half_m = if draws.next() < 0.33 { HALF_M } else { DESK_M };
         let count = 12 + (9.0 * draws.next()) as usize;
@@ -138,8 +137,8 @@ impl Pile {
         Pile { things, half_m }
     }
 
-    /// The view of the camera of paper 004, cropped to where things cover most of the image. Labels are 10
-    /// for the table, 0 for the floor, and ten times the number for the things from 2 on.
+    /// View of the paper's camera, cropped to the area dominated by objects. Labels: 10 the table,
+    /// 0 the floor, and ten times the number for objects, from 2 on.
     pub fn look(&self, draws: &mut Draws) -> View {
         let angle = std::f64::consts::TAU * draws.next();
         let pose = on_ring(angle, 0.7 + 0.3 * draws.next(), super::TABLE_M + 0.5 + 0.4 * draws.next());
@@ -151,7 +150,7 @@ impl Pile {
         view
     }
 
-    /// The distance along a ray to its end, and the label of the thing there.
+    /// Distance along a ray to its hit, and the label of the hit.
     fn nearest(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<(f64, u32)> {
         let on_thing = (2..).zip(&self.things).filter_map(|(number, placed)| {
             let lowered = eye - Vector3::z() * placed.base_m;
@@ -164,7 +163,7 @@ impl Pile {
         first.0.is_finite().then_some(first)
     }
 
-    /// Share of the image that shows things.
+    /// Share of the image that shows objects.
     fn covers(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> f64 {
         const STEP: usize = 16;
         let eye = Point3::from(pose.translation.vector);
@@ -179,7 +178,7 @@ impl Pile {
     }
 }
 
-/// The middle of the camera's image, a share of it each way.
+/// Central crop of the camera's image, a share of each side.
 fn cropped(share: f64) -> Intrinsics {
     let camera = KINECT.camera;
     let [width, height] = [camera.width, camera.height].map(|n| (n as f64 * share) as usize);

@@ -9,7 +9,7 @@ use descry_perception::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 const CAMERA: Intrinsics = Intrinsics { width: 320, height: 240, fx: 262.0, fy: 262.0, cx: 159.5, cy: 119.5 };
-/// A box: its low and its high corner.
+/// Box by minimum and maximum corner.
 type Block = [[f64; 3]; 2];
 const BOARD: Block = [[-0.8, -0.4, 0.695], [0.8, 0.4, 0.72]];
 const FLOOR: Block = [[-9.0, -9.0, -0.1], [9.0, 9.0, 0.0]];
@@ -17,9 +17,10 @@ const FLOOR: Block = [[-9.0, -9.0, -0.1], [9.0, 9.0, 0.0]];
 /// The faults of the camera.
 #[derive(Clone, Copy, Default)]
 struct Faults {
-    /// Farthest that a depth is off, as a share of its square.
+    /// Maximum depth error, as a share of the squared depth.
     noise: f64,
-    /// Pixels lost to either side of a jump in depth, and to the right of one that falls away.
+    /// Pixels lost on either side of a depth edge; further field: lost pixels to the right of a
+    /// falling edge.
     lost: usize,
     shadow: usize,
 }
@@ -30,7 +31,7 @@ fn outline() -> Vec<Point3<f64>> {
     corners.iter().map(|c| Point3::new(c[0], c[1], high[2])).collect()
 }
 
-/// The distance along a ray to the first of some blocks; infinite if the ray meets none.
+/// Distance along a ray to the first block; infinite without a hit.
 fn hit(blocks: &[Block], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let each = blocks.iter().map(|[low, high]| {
         let (mut near, mut far) = (0.0_f64, f64::INFINITY);
@@ -43,7 +44,7 @@ fn hit(blocks: &[Block], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     each.fold(f64::INFINITY, f64::min)
 }
 
-/// The view of a camera that looks from one place at another.
+/// View of a camera at one point that looks at another.
 fn view(blocks: &[Block], eye: [f64; 3], at: [f64; 3], faults: Faults) -> View {
     let (eye, at) = (Point3::from(eye), Point3::from(at));
     let forward = (at - eye).normalize();
@@ -78,7 +79,8 @@ fn view(blocks: &[Block], eye: [f64; 3], at: [f64; 3], faults: Faults) -> View {
     }
 }
 
-/// Lays a view of some blocks whose place is told wrongly on the board, and gives how far off its middle then is, metres.
+/// Aligns a misplaced view of some blocks with the board's outline; returns the remaining error of
+/// the board's centre, metres.
 fn laid(view: &View, told_from_true: &Isometry3<f64>) -> (Vector3<f64>, Located) {
     let told = View { world_from_camera: told_from_true * view.world_from_camera, ..view.clone() };
     let up = Some(Vector3::z_axis());
@@ -92,7 +94,7 @@ fn laid(view: &View, told_from_true: &Isometry3<f64>) -> (Vector3<f64>, Located)
     (located.map_from_world * (told_from_true * middle) - middle, located)
 }
 
-/// Looks at the board with what else is there, its place told wrongly by so much, and expects it back within the given distance.
+/// Checks that a misplaced view of the board with other blocks is aligned to within a distance.
 fn check(others: &[Block], eye: [f64; 3], faults: Faults, within_m: f64) {
     let blocks = [others, &[BOARD, FLOOR]].concat();
     for (x_m, y_m, yaw_deg) in [(0.0, 0.0, 0.0), (0.04, -0.03, 2.0), (-0.06, 0.05, -4.0)] {

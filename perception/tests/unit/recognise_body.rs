@@ -5,7 +5,7 @@ use descry_perception::recognise::body::*;
 const CUP: Frustum =
     Frustum { x: 0.2, y: -0.1, base_m: 0.0, top_m: 0.1, foot_m: 0.03, rim_m: 0.04, wall_m: Some(0.003) };
 
-/// Checks how far a ray comes that begins somewhere and goes to somewhere else, as a share of that way.
+/// Checks at which share of a ray between two points the ray hits the body.
 fn check(body: &impl Body, from: [f64; 3], to: [f64; 3], share: f64) {
     let ray = Ray { from, along: [0, 1, 2].map(|k| to[k] - from[k]) };
     let met = body.depth_m(&ray);

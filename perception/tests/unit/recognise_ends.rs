@@ -19,8 +19,8 @@ fn there() -> Cuboid {
     Cuboid { x: 0.02, y: -0.01, turn: (sin, cos), low: [-0.1, -0.045, 0.0], high: [0.1, 0.045, 0.12] }
 }
 
-/// Views of the box on a plane, each from a direction, relative to its longer side, and a height; each is
-/// misaligned by `aside_m`.
+/// Views of a box on a plane, each from a direction relative to its longer side and a height; each
+/// is misaligned by `aside_m`.
 fn seen_from(eyes: &[(f64, f64)], aside_m: f64) -> Visibility {
     let (width, height) = (320, 240);
     let intrinsics = Intrinsics { width, height, fx: 400.0, fy: 400.0, cx: 160.0, cy: 120.0 };
@@ -45,7 +45,7 @@ fn seen_from(eyes: &[(f64, f64)], aside_m: f64) -> Visibility {
     Visibility { maps: eyes.iter().zip(0..).map(map).collect(), held: true }
 }
 
-/// The likelihoods of both sides, sought from a footprint that is too short by `short_m` at one end of each.
+/// Likelihoods of both sides, from an initial footprint too short by `short_m` at one end of each.
 fn told(eyes: &[(f64, f64)], aside_m: f64, short_m: f64) -> [Side; 2] {
     let seen = seen_from(eyes, aside_m);
     let asker = Asker::of(&seen, Isometry3::identity(), &[], APART_M);

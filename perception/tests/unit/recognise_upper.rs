@@ -5,7 +5,8 @@ use descry_perception::recognise::rays::Pixel;
 use descry_perception::recognise::rays::ViewRays;
 use descry_perception::recognise::upper::*;
 
-/// A view of a body from so high and aside, a pixel a step of a hundredth, as if every ray met just that; some share of them another thing.
+/// View of a body from a height and horizontal distance with a pixel per 0.01, in which every ray
+/// hits the body; the given number of pixels shows another object.
 fn view(body: &Frustum, high_m: f64, other: usize) -> ViewRays {
     let from = [0.8, 0.0, high_m];
     let falls = (0.1 - high_m) / 0.8;

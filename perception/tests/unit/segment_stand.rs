@@ -4,7 +4,7 @@ use descry_perception::segment::Segment;
 use descry_perception::segment::stand::*;
 use nalgebra::Point3;
 
-/// Points of an upright wall: its radius at the foot and at the rim, between two heights and two angles, degrees.
+/// Points of an upright wall: radii at foot and rim, between two heights and two angles, degrees.
 fn wall([foot_m, rim_m]: [f64; 2], [low_m, high_m]: [f64; 2], [from, to]: [f64; 2]) -> Vec<Point3<f64>> {
     let at = |k: usize| {
         let (turn, rise) = ((k % 60) as f64 / 59.0, (k / 60) as f64 / 19.0);
@@ -15,7 +15,7 @@ fn wall([foot_m, rim_m]: [f64; 2], [low_m, high_m]: [f64; 2], [from, to]: [f64; 
     (0..1200).map(at).collect()
 }
 
-/// Checks the height of the support of the first of two things, and its spread, metres.
+/// Checks the height of the first object's support, and its standard deviation, metres.
 fn check(what: &str, first: Vec<Point3<f64>>, second: Vec<Point3<f64>>, (base_m, sigma_m): (f64, f64)) {
     let part = |points: Vec<Point3<f64>>| Segment {
         indices: (0..points.len() as u32).collect(),

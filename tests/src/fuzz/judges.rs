@@ -1,4 +1,4 @@
-//! Judges of the readers: each reads an input and checks what must hold of the result.
+//! Judges of the readers: each reads an input and checks invariants of the result.
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
@@ -21,7 +21,7 @@ use descry_robots::program::{Limits, ProgramRobot};
 use descry_robots::sim::SceneSpec;
 use descry_robots::{Place, Pose2, Robot, Watch};
 
-/// Between the parts of an input that is several files: a line with the name of the file that follows.
+/// Separator between the files of a multi-file input: a line with the next file's name.
 pub const FILE: &str = ";;; file ";
 
 /// The files of an input, by name.
@@ -32,7 +32,8 @@ fn files(text: &str) -> BTreeMap<&str, &str> {
         .collect()
 }
 
-/// A domain and a problem: findings can be drawn, the format keeps what it prints, and a plan that is found is valid.
+/// PDDL domain and problem: findings can be rendered, formatting is idempotent, and found plans are
+/// valid.
 pub fn pddl(input: &[u8]) {
     let text = String::from_utf8_lossy(input);
     let files = files(&text);
@@ -62,7 +63,7 @@ pub fn pddl(input: &[u8]) {
     }
 }
 
-/// A domain's folder: what loads can be checked, and its findings drawn.
+/// Domain folder: a loaded domain can be checked, and its findings rendered.
 pub fn domain(input: &[u8]) {
     let text = String::from_utf8_lossy(input);
     let owned = |(name, text): (&str, &str)| (name.to_string(), (name.to_string(), text.to_string()));
@@ -73,7 +74,7 @@ pub fn domain(input: &[u8]) {
     }
 }
 
-/// A scene: what is read is arranged, or the reason told.
+/// Scene: a readable scene is arranged, or the reason for failing is given.
 pub fn scene(input: &[u8]) {
     let text = String::from_utf8_lossy(input);
     match SceneSpec::parse("scene.toml", &text) {
@@ -91,7 +92,7 @@ thread_local! {
     };
 }
 
-/// A sentence: what is offered in its place is understood.
+/// Sentence: suggested alternatives are understood.
 pub fn phrase(input: &[u8]) {
     let said = String::from_utf8_lossy(input);
     let read = |said: &str| -> Result<Goal, GoalError> {
@@ -105,7 +106,7 @@ pub fn phrase(input: &[u8]) {
     }
 }
 
-/// A cloud: written and read again it has as many points.
+/// Cloud: writing and reading again keeps the number of points.
 pub fn cloud(input: &[u8]) {
     match read_cloud(input) {
         Ok(loaded) => {
@@ -124,7 +125,7 @@ pub fn depth(input: &[u8]) {
     }
 }
 
-/// The one segment of a record: it is read, and verifying changes nothing.
+/// Single segment of a record: readable, and unchanged by verification.
 pub fn record(input: &[u8]) {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let segment = folder.path().join("segments/00000001.mcap");
@@ -141,7 +142,7 @@ pub fn record(input: &[u8]) {
     assert_eq!(std::fs::read(&segment).expect("it is there"), input, "reading has changed a segment");
 }
 
-/// A body's side of a conversation: whatever it says, requests end.
+/// Messages of a body: every request ends, whatever they are.
 pub fn body(input: &[u8]) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
     let address = listener.local_addr().expect("it is bound").to_string();

@@ -1,4 +1,4 @@
-//! Modules of a crate, the paths between them, and the types that they declare, read off the source.
+//! Modules of a crate, their dependencies, and their declared types, from the source.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,11 +8,11 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
 use quote::ToTokens;
 
-/// Modules of a crate by their paths, the root by an empty one, each with the modules that it names.
+/// Modules of a crate by path (empty for the root), each with the modules it names.
 pub struct Modules(BTreeMap<String, BTreeSet<String>>);
 
 impl Modules {
-    /// Those of a crate's sources below a folder.
+    /// Modules of the sources below a folder.
     pub fn of(folder: &Path, files: &[PathBuf]) -> Self {
         let words: BTreeMap<String, Vec<String>> =
             files.iter().map(|file| (module(folder, file), words(&parsed(file)))).collect();
@@ -29,7 +29,7 @@ impl Modules {
         self.0.iter().map(|(module, others)| (module.as_str(), others))
     }
 
-    /// The largest set of modules each of which leads to every other.
+    /// Largest strongly connected set of modules.
     pub fn largest_circle(&self) -> Vec<&str> {
         let mut graph = DiGraphMap::<&str, ()>::new();
         for (module, others) in self.each() {
@@ -41,7 +41,7 @@ impl Modules {
         largest
     }
 
-    /// A circle as lines, each a module and those of the circle that it names.
+    /// Cycle as text: each module with the cycle's modules that it names.
     pub fn drawn(&self, circle: &[&str]) -> String {
         let line = |module: &&str| {
             let within: Vec<&str> =
@@ -56,7 +56,7 @@ fn shown(module: &str) -> &str {
     if module.is_empty() { "(root)" } else { module }
 }
 
-/// Path of a file's module within its crate.
+/// Module path of a file.
 fn module(folder: &Path, file: &Path) -> String {
     let below = file.strip_prefix(folder).expect("a source lies below its folder").with_extension("");
     let mut parts: Vec<String> = below.iter().map(|part| part.to_string_lossy().into_owned()).collect();
@@ -66,7 +66,7 @@ fn module(folder: &Path, file: &Path) -> String {
     parts.join("::")
 }
 
-/// A file without its tests.
+/// Parsed file without its tests.
 fn parsed(file: &Path) -> syn::File {
     let text = fs::read_to_string(file).expect("a source file is text");
     let mut parsed = syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
@@ -87,7 +87,8 @@ fn words(file: &syn::File) -> Vec<String> {
     text.split_whitespace().map(str::to_string).collect()
 }
 
-/// Paths within the crate that a module names: those from `crate`, `super` and `self`, and those from the modules that it declares.
+/// Paths within the crate that a module names: from `crate`, `super`, `self`, and from declared
+/// child modules.
 fn named(own: &str, words: &[String]) -> Vec<Vec<String>> {
     let own: Vec<String> = own.split("::").filter(|part| !part.is_empty()).map(str::to_string).collect();
     let declared: BTreeSet<&String> =
@@ -110,7 +111,8 @@ fn named(own: &str, words: &[String]) -> Vec<Vec<String>> {
     paths
 }
 
-/// Takes in the paths that go on from one at the head of some words; returns how many words they are.
+/// Collects the paths that continue from the head of a token list; returns the number of tokens
+/// read.
 fn branches(words: &[String], mut path: Vec<String>, paths: &mut Vec<Vec<String>>) -> usize {
     let mut at = 0;
     loop {
@@ -139,7 +141,7 @@ fn branches(words: &[String], mut path: Vec<String>, paths: &mut Vec<Vec<String>
     }
 }
 
-/// The module that a path leads to: the longest beginning of it that is one.
+/// Module that a path leads to: its longest prefix that is a module.
 fn nearest(path: &[String], known: &BTreeSet<&String>) -> Option<String> {
     (0..=path.len()).rev().map(|n| path[..n].join("::")).find(|start| known.contains(start))
 }

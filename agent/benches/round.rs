@@ -95,7 +95,7 @@ impl Looked {
         merge(&self.views(), &perceive::options(&*self.body.robot, None).0).expect("the views merge")
     }
 
-    /// The goal of the main job.
+    /// Goal of the main job.
     fn goal(&self) -> Goal {
         let lexicon = Lexicon::new(&self.domain, &Places::of_body(&*self.body.robot));
         goal::read("find cup A", &self.domain, &lexicon).expect("the goal is understood")

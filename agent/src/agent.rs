@@ -320,7 +320,7 @@ impl<'a> Agent<'a> {
         self.say_with(&event, vec![standing::blob(round)?]).map(|_| ())
     }
 
-    /// The steps of the plan that are still to be done.
+    /// Steps of the plan that are still to be done.
     fn rest(&self) -> Plan {
         self.plan.clone().unwrap_or_default()
     }

@@ -38,7 +38,7 @@ pub struct TruePlace {
     pub position_m: [f64; 3],
     /// Surface that the object stands on; `None` in the hand.
     pub on: Option<String>,
-    /// The room that this is in.
+    /// Room that this is in.
     pub room: Option<String>,
 }
 

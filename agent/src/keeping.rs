@@ -24,7 +24,7 @@ pub struct Keeping {
     pub max_bytes: Option<u64>,
     /// Maximum age of recorded data, seconds on the body's clock.
     pub max_age: Option<f64>,
-    /// Least room to be left on the disk, bytes.
+    /// Minimum room to be left on the disk, bytes.
     pub min_free: Option<u64>,
 }
 

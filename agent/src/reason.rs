@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::numbers::{is_share, number, share_of};
 use crate::written;
 
-/// The reason a plan was made.
+/// Reason a plan was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
     /// The event that made the plan necessary.
@@ -64,7 +64,7 @@ impl Reason {
         Reason { trigger, search_ended_after: None, is_late: false }
     }
 
-    /// The reason in a sentence.
+    /// Reason in a sentence.
     pub fn told(&self, saying: &Saying) -> String {
         let mut said = match &self.trigger {
             Trigger::Begin => "there is no plan yet".to_string(),

@@ -24,11 +24,11 @@ pub enum Event {
     Goal {
         /// Words as given.
         said: String,
-        /// The goal in PDDL.
+        /// Goal in PDDL.
         pddl: String,
         /// Start place of the body.
         start: String,
-        /// The number of viewpoints in the candidate set.
+        /// Number of viewpoints in the candidate set.
         candidates: usize,
     },
     /// A new plan was made.
@@ -151,7 +151,7 @@ pub fn timed(step: &Step, saying: &Saying) -> String {
     }
 }
 
-/// The reason a step failed, in a sentence.
+/// Reason a step failed, in a sentence.
 pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
     match unkept {
         Some(condition) => {
@@ -166,13 +166,13 @@ pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
 pub struct Report {
     /// Words as given.
     pub goal: String,
-    /// The goal in PDDL.
+    /// Goal in PDDL.
     pub pddl_goal: String,
     /// Verdict of the run.
     pub verdict: Verdict,
     /// "yes", "no" or "cannot tell", for a question.
     pub answer: Option<String>,
-    /// The reason for the verdict, in a sentence.
+    /// Reason for the verdict, in a sentence.
     pub why: String,
     /// The requested object, if the goal is about a single one.
     pub object: Option<String>,

@@ -40,12 +40,12 @@ use crate::report::{Event, Report};
 use crate::shell;
 use crate::stop::Stop;
 
-/// The task of a run.
+/// Task of a run.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
     /// Domain: vocabulary and actions.
     pub domain: &'a Domain,
-    /// The goal that is pursued.
+    /// Goal that is pursued.
     pub goal: &'a Goal,
     /// Persistent belief from earlier runs.
     pub past: Option<&'a Past>,

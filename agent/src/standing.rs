@@ -85,7 +85,7 @@ pub struct Seen {
 /// Facts on which the end of a run rests.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rests {
-    /// The reason the run ended.
+    /// Reason the run ended.
     pub ended: End,
     /// Message of the limit or failure; empty without one.
     pub said: String,
@@ -96,7 +96,7 @@ pub struct Rests {
     pub in_doubt: Vec<InDoubt>,
 }
 
-/// The reason a run ended.
+/// Reason a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum End {
     /// The goal held.

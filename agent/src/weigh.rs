@@ -103,7 +103,7 @@ pub struct Way {
 pub struct Whole {
     /// Cost of the steps in sequence by the plan metric, seconds.
     pub takes_s: f64,
-    /// The number of steps.
+    /// Number of steps.
     pub steps: usize,
     /// True if the goal is expected to hold after the steps.
     pub reaches: bool,
@@ -115,7 +115,7 @@ impl Way {
         self.gains / self.takes_s.max(1e-9)
     }
 
-    /// The last argument of the last step: the object that the alternative is about.
+    /// Last argument of the last step: the object that the alternative is about.
     pub fn about(&self) -> Option<&str> {
         self.steps.last()?.arguments.last().map(String::as_str)
     }
@@ -380,7 +380,7 @@ impl<'r> Scale<'r> {
         !self.semantics.task.init.timed.is_empty()
     }
 
-    /// The first obstacle that the monitor finds in steps done in sequence.
+    /// First obstacle that the monitor finds in steps done in sequence.
     fn stuck(&self, steps: &[Step]) -> Option<Break> {
         let (mut state, mut begins_s, mut timed) = (self.state.clone(), 0.0, Vec::new());
         for step in steps {

@@ -195,7 +195,7 @@ fn home(goal: &Goal, is_question: bool, draws: &mut Draws) -> Domain {
     domain
 }
 
-/// The result of pursuing a goal.
+/// Result of pursuing a goal.
 struct Fared {
     pddl: String,
     verdict: Verdict,

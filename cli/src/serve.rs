@@ -46,7 +46,7 @@ struct Agent {
 
 struct Inner {
     goals: Goals,
-    /// The goal being pursued, and its process.
+    /// Goal being pursued, and its process.
     current: Option<(Goal, Arc<Child>)>,
     /// True if the current goal is to be cancelled instead of resumed.
     is_cancelled: bool,

@@ -22,7 +22,7 @@ targets = ["cup A"]
 truly = "found"
 "#;
 
-/// The results of a batch that do not depend on where it ran.
+/// Results of a batch that do not depend on where it ran.
 fn results(folder: &Path, out: &str) -> Vec<String> {
     ["jobs.csv", "summary.json", "tables.md"]
         .map(|name| {

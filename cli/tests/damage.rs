@@ -51,7 +51,7 @@ fn forget(value: &mut Value, keys: &[&str]) {
     }
 }
 
-/// The files of a run, by their path in its folder.
+/// Files of a run, by their path in its folder.
 fn files(run: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for sub in ["", "record", "record/segments"] {

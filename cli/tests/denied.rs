@@ -133,12 +133,12 @@ id=$(printf %s "$asked" | sed 's/.*"id":\([0-9]*\).*/\1/'); echo "{\"id\":$id,\"
 done
 "#;
 
-/// The domain *home* with custom phrases. A question opens no door: the one between the rooms is open.
+/// Domain *home* with custom phrases. A question opens no door: the one between the rooms is open.
 fn own() -> TempDir {
     written(PHRASES, &[])
 }
 
-/// The domain *home* with words and an action of its own.
+/// Domain *home* with words and an action of its own.
 fn wiping() -> TempDir {
     let folder = written(&format!("{PHRASES}{MORE}"), &WORDS);
     let path = folder.path().join("own/domain.toml");

@@ -142,7 +142,7 @@ fn uri(path: &Path) -> String {
     format!("file://{}", path.display())
 }
 
-/// The position `further` bytes behind the first occurrence of a text; the texts are ASCII.
+/// Position `further` bytes behind the first occurrence of a text; the texts are ASCII.
 fn place(text: &str, sought: &str, further: usize) -> Value {
     let at = text.find(sought).unwrap_or_else(|| panic!("{sought} is not there")) + further;
     let line = text[..at].matches('\n').count();

@@ -21,7 +21,7 @@ fn documents(folder: &Path, place: &str) -> Vec<Value> {
     std::mem::take(records)
 }
 
-/// The number of records of each kind.
+/// Number of records of each kind.
 fn kinds(folder: &Path, place: &str) -> Vec<(String, Value)> {
     let shown = check(folder, &["memory", "show", place, "--json"], 0);
     let kinds = shown["stats"]["kinds"].as_object().expect("kinds").clone();

@@ -90,7 +90,7 @@ fn what_was_learned_is_known_after_a_restart() {
     );
 }
 
-/// The names of the learned shapes in a store.
+/// Names of the learned shapes in a store.
 fn learned(folder: &Path, store: &Path) -> Vec<String> {
     let asked = ["memory", "query", &store.display().to_string(), "--newest", "--limit", "1", "--json"];
     let found: Value = crate::binary::check(folder, &asked, 0);

@@ -34,7 +34,7 @@ fn check_found(report: &Value, goal: &str) {
 
 type Foot = [[f64; 2]; 2];
 
-/// The last map of a run.
+/// Last map of a run.
 fn last_map(run: &str) -> Value {
     let maps = descry(&["memory", "query", run, "--kind", "map", "--json"]);
     maps["records"].as_array().unwrap().last().unwrap()["body"].clone()
@@ -61,7 +61,7 @@ fn feet_of(body: &Value) -> Vec<Foot> {
     feet
 }
 
-/// The direction of a base line, and its length, metres.
+/// Direction of a base line, and its length, metres.
 fn way([a, b]: &Foot) -> ([f64; 2], f64) {
     let way = [b[0] - a[0], b[1] - a[1]];
     let length_m = way[0].hypot(way[1]);

@@ -128,7 +128,7 @@ fn the_tutorial_holds_word_for_word() {
     follow(&page("docs/tutorial.md"), folder.path());
 }
 
-/// The text of a page of the repository.
+/// Text of a page of the repository.
 pub fn page(path: &str) -> String {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
     std::fs::read_to_string(&file).unwrap_or_else(|e| panic!("{path}: {e}"))

@@ -132,7 +132,7 @@ pub(crate) fn does(domain: &Domain, skill: &str) -> bool {
     doer(domain, skill).is_some()
 }
 
-/// The first action of the domain that uses a skill.
+/// First action of the domain that uses a skill.
 pub(crate) fn doer<'a>(domain: &'a Domain, skill: &str) -> Option<&'a descry_planner::task::Action> {
     let is_it = |text: &String| text.split_whitespace().next() == Some(skill);
     let mut actions = domain.vocabulary.task.actions.iter();

@@ -209,7 +209,7 @@ impl Asker<'_> {
         ))
     }
 
-    /// The reason no drive can be taken; none if one can.
+    /// Reason no drive can be taken; none if one can.
     fn no_drive(&self) -> Option<String> {
         let culprit = culprit::of_drives(self.domain, self.round)?;
         Some(format!("no drive can be taken: {}", culprit::told(&culprit, &|t| self.saying.say(t))))

@@ -4,7 +4,7 @@ use descry_memory::remember::Remembered;
 use descry_planner::NoPlan;
 use serde::{Deserialize, Serialize};
 
-/// The reason a run ended.
+/// Reason a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Ended {
     /// The goal holds.
@@ -55,7 +55,7 @@ pub struct Believed {
     /// Spoken name of the supporting surface.
     #[serde(default)]
     pub on: Option<String>,
-    /// The room that this is in.
+    /// Room that this is in.
     #[serde(default, rename = "in")]
     pub room: Option<String>,
     /// True if the goal asks about the object.

@@ -36,7 +36,7 @@ pub enum GoalError {
         found: String,
         /// The domain's name.
         domain: String,
-        /// The names that would have been understood.
+        /// Names that would have been understood.
         suggestions: String,
     },
     /// The requested confidence is no probability.

@@ -56,7 +56,7 @@ pub struct KnownDoor {
     pub door: descry_robots::Door,
 }
 
-/// The object in the hand.
+/// Object in the hand.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Held {
     /// Track number that the object had.
@@ -107,7 +107,7 @@ pub struct Known {
     pub doors: Vec<KnownDoor>,
     /// Indices of the doors believed shut.
     pub shut: BTreeSet<usize>,
-    /// The object in the hand.
+    /// Object in the hand.
     pub held: Option<Held>,
     /// Persistent belief from earlier runs.
     pub past: Option<Past>,

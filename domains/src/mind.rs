@@ -145,7 +145,7 @@ impl RecordedView {
 }
 
 impl Mind {
-    /// The records of all views that still hold.
+    /// Records of all views that still hold.
     pub(crate) fn views_held(&self) -> Vec<RecordId> {
         self.regions.iter().flat_map(|r| &r.looks).map(|look| look.record).collect()
     }

@@ -9,7 +9,7 @@ pub struct Goal {
     pub said: String,
     /// Matched phrase of `domain.toml`.
     pub phrase: String,
-    /// The goal condition in PDDL.
+    /// Goal condition in PDDL.
     pub pddl: String,
     /// Subjects of the condition.
     pub asked: Asked,
@@ -38,7 +38,7 @@ pub struct Filled {
     pub name: String,
 }
 
-/// The objects that a goal's condition speaks of.
+/// Objects that a goal's condition speaks of.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Asked {
     /// Requested things, each with the surfaces or rooms it is asked about; `None`: anywhere.

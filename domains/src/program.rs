@@ -35,7 +35,7 @@ const LAST_WORDS: usize = 5;
 const MOST_WORD_BYTES: u64 = 1 << 10;
 /// Maximum length of an answer line, bytes; enough for some ten thousand proposals.
 const MOST_LINE_BYTES: u64 = 1 << 20;
-/// The number of lines of answer that are read ahead.
+/// Number of lines of answer that are read ahead.
 const LINES_AHEAD: usize = 16;
 /// Maximum memory of a program's process, bytes.
 const MOST_DATA_BYTES: u64 = 4 << 30;

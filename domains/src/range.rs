@@ -9,9 +9,9 @@ use crate::situation::Situation;
 pub struct Range {
     /// Value as believed now.
     pub believed: f64,
-    /// Least value that further looks may leave.
+    /// Minimum value that further looks may leave.
     pub least: f64,
-    /// Greatest value that further looks may bring.
+    /// Maximum value that further looks may bring.
     pub greatest: f64,
 }
 

@@ -15,7 +15,7 @@ type Form = (Vec<(String, String)>, String);
 #[derive(Debug, Default)]
 pub struct Saying {
     forms: BTreeMap<String, Form>,
-    /// The names of symbols, by type.
+    /// Names of symbols, by type.
     names: BTreeMap<String, BTreeMap<String, String>>,
     /// Types whose objects people speak of.
     spoken: Vec<String>,

@@ -77,7 +77,7 @@ impl Situation {
         found.ok_or_else(|| CallError::Failed(format!("`{name}` is not a pose to look from")))
     }
 
-    /// The surface of a symbol.
+    /// Surface of a symbol.
     ///
     /// # Errors
     /// [`CallError::Failed`] if there is none.
@@ -93,7 +93,7 @@ impl Situation {
         find(self.things.iter().map(|t| &t.symbol), name, "something that is looked for")
     }
 
-    /// The door of a symbol.
+    /// Door of a symbol.
     ///
     /// # Errors
     /// [`CallError::Failed`] if there is none.
@@ -160,7 +160,7 @@ impl Situation {
         find(self.kinds.iter().map(|t| &t.symbol), name, "a kind of which all are looked for")
     }
 
-    /// The objects on a surface.
+    /// Objects on a surface.
     pub fn on_surface(&self, on: usize) -> impl Iterator<Item = &Track> {
         let standing = self.travel.standing.get_or_init(|| {
             let by_symbol: HashMap<&str, usize> =
@@ -176,7 +176,7 @@ impl Situation {
         standing[on].iter().map(|&n| &self.belief.tracks[n])
     }
 
-    /// The surface that an object stands on.
+    /// Surface that an object stands on.
     pub fn surface_of(&self, track: &Track) -> Option<usize> {
         self.surfaces.iter().position(|s| s.symbol == track.on)
     }

@@ -67,7 +67,7 @@ struct Made {
 }
 
 impl Derived {
-    /// The value of a type.
+    /// Value of a type.
     pub fn get<T: Any + Send + Sync>(&self, make: &dyn Fn() -> T) -> &T {
         let made =
             self.0.get_or_init(|| Box::new(Made { value: Box::new(make()), others: Derived::default() }));

@@ -10,7 +10,7 @@ use descry_planner::{Findings, Source, Span};
 /// Declarations of a domain's PDDL text.
 #[derive(Debug, Clone)]
 pub struct Vocabulary {
-    /// The domain with an empty problem.
+    /// Domain with an empty problem.
     pub task: Task,
     changed: BTreeSet<String>,
     given: BTreeSet<String>,

@@ -10,7 +10,7 @@ const BEFORE_M: f64 = 0.05;
 /// Maximum thickness of a wall, metres: the distance of two rooms' outlines from the centre of the
 /// door between them.
 const THICK_M: f64 = 0.3;
-/// Least side of a cell of the index, metres, and the maximum number of cells along a side.
+/// Minimum side of a cell of the index, metres, and the maximum number of cells along a side.
 const CELL_M: f64 = 2.0;
 const MOST_CELLS: f64 = 256.0;
 

@@ -54,7 +54,7 @@ const NOTHING_LEFT: &str = "no look that is left promises to settle anything";
 pub struct Setting<'a> {
     /// Domain: vocabulary and actions.
     pub domain: &'a Domain,
-    /// The goal that is pursued.
+    /// Goal that is pursued.
     pub goal: &'a Goal,
     /// The body, which is only asked.
     pub robot: Arc<dyn Robot>,
@@ -182,7 +182,7 @@ impl<'a> World<'a> {
         })
     }
 
-    /// The number of viewpoints in the candidate set.
+    /// Number of viewpoints in the candidate set.
     pub fn poses(&self) -> usize {
         self.mind.known.candidates.len()
     }
@@ -609,7 +609,7 @@ pub struct Job {
     pub limit_s: f64,
 }
 
-/// The name in the domain's text.
+/// Name in the domain's text.
 fn domain_name(domain: &Domain) -> &str {
     &domain.vocabulary.task.domain
 }

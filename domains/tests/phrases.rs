@@ -13,11 +13,11 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 struct Said {
     say: String,
-    /// The goal in PDDL.
+    /// Goal in PDDL.
     means: Option<String>,
     /// A goal that means the same.
     same: Option<String>,
-    /// The goal that is offered instead.
+    /// Goal that is offered instead.
     offers: Option<String>,
     /// A part of what is answered otherwise.
     tells: Option<String>,

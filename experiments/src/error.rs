@@ -60,7 +60,7 @@ pub enum ExperimentError {
         missing: usize,
         /// Number of all jobs.
         all: usize,
-        /// The first of them.
+        /// First of them.
         first: String,
     },
     /// The disk is full; journalled jobs are kept.
@@ -68,7 +68,7 @@ pub enum ExperimentError {
         "{folder}: the disk is full, and {job} failed: {because}\n  free some room and run it again: what is done is not done again"
     )]
     NoRoom {
-        /// The folder of the results.
+        /// Folder of the results.
         folder: String,
         /// The job that failed and does not count.
         job: String,

@@ -19,7 +19,7 @@ const SEED: u64 = 4;
 /// A measured value with its interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// The value itself.
+    /// Value.
     pub value: f64,
     /// 95 % interval; none if the sample is too small.
     pub interval: Option<[f64; 2]>,
@@ -60,7 +60,7 @@ pub fn rate(hits: usize, n: usize) -> Option<Estimate> {
     Some(Estimate { value: p, interval: Some([(middle - half).max(0.0), (middle + half).min(1.0)]), n })
 }
 
-/// The mean with its bootstrap interval; none without observations.
+/// Mean with its bootstrap interval; none without observations.
 pub fn mean(observations: &[Observation]) -> Option<Estimate> {
     let sums = sums(observations.iter().map(|o| (o.group, [o.value, 1.0])));
     estimate(observations.len(), &sums, |[total, n]| total / n)
@@ -85,19 +85,19 @@ fn at_an_end(found: Estimate, groups: usize) -> Estimate {
     }
 }
 
-/// The mean of `a - b`; none without pairs.
+/// Mean of `a - b`; none without pairs.
 pub fn difference(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a - p.b, 1.0])));
     estimate(pairs.len(), &sums, |[total, n]| total / n)
 }
 
-/// The share of `b` that `a` saves, `1 - mean(a) / mean(b)`; none if the mean of `b` is zero.
+/// Share of `b` that `a` saves, `1 - mean(a) / mean(b)`; none if the mean of `b` is zero.
 pub fn saving(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
     estimate(pairs.len(), &sums, |[a, b]| 1.0 - a / b)
 }
 
-/// The median (the mean of the two middle values); none without values.
+/// Median (the mean of the two middle values); none without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

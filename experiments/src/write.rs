@@ -18,7 +18,7 @@ use crate::job::{Finished, Numbered, Row};
 use crate::kinds::kind::Kind;
 use crate::source::Source;
 
-/// The results of an experiment.
+/// Results of an experiment.
 #[derive(Debug, Clone)]
 pub struct Results {
     /// Content of `summary.json`.

@@ -14,11 +14,11 @@ use descry_agent::standing::{self, End, InDoubt, Of, Rests};
 /// Evidence behind a verdict.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Basis {
-    /// The record of the run's end, with its content.
+    /// Record of the run's end, with its content.
     pub ended: Option<(RecordId, End)>,
     /// Open doubts at the end.
     pub in_doubt: Vec<InDoubt>,
-    /// The record of the last belief.
+    /// Record of the last belief.
     pub belief: Option<RecordId>,
     /// Last percepts of each surface.
     pub surfaces: Vec<Perceived>,
@@ -31,9 +31,9 @@ pub struct Basis {
 pub struct Perceived {
     /// The surface's symbol.
     pub on: String,
-    /// The record of what was recognised there.
+    /// Record of what was recognised there.
     pub record: RecordId,
-    /// The records of the views that were merged for it.
+    /// Records of the views that were merged for it.
     pub looks: Vec<RecordId>,
 }
 

@@ -174,7 +174,7 @@ impl Chapter {
         self.steps.iter().any(|step| step.action == action && step.duration_s > takes_s + 0.05)
     }
 
-    /// The state of the run after each step.
+    /// State of the run after each step.
     pub fn stood(&self) -> impl Iterator<Item = &Standing> {
         self.deeds.iter().filter_map(|deed| if let Deed::Stands(now) = deed { Some(now) } else { None })
     }

@@ -12,7 +12,7 @@ use descry_planner::task::{Action, Call, Change, Expression};
 use super::chapters::Chapter;
 use super::wording::listed;
 
-/// The domain of a run, its wording, and the run's plans.
+/// Domain of a run, its wording, and the run's plans.
 pub struct Words<'a> {
     pub domain: &'a Domain,
     pub saying: &'a Saying,

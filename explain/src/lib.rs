@@ -213,7 +213,7 @@ const COUNTED: &str = "Beside the time that a plan takes, the planner counts for
 
 /// The question behind a run, as far as its plans depend on it.
 pub struct Asked<'a> {
-    /// The goal in PDDL.
+    /// Goal in PDDL.
     pub goal: String,
     /// The policy that chose the next look; none if the planner chose.
     pub policy: Option<String>,

@@ -30,7 +30,7 @@ const MOST_PLACES: usize = 4;
 
 /// The goal, and the expectations of the plan.
 pub struct Hopes<'a> {
-    /// The goal in PDDL.
+    /// Goal in PDDL.
     pub goal: &'a str,
     /// The numbers that the plan was expected to improve.
     pub hoped: &'a [Expected],
@@ -150,8 +150,8 @@ fn in_vain(note: &Note) -> Option<String> {
     }
 }
 
-/// The best candidate before a look, if the look ruled it out: its former probability, and a clause on the
-/// change.
+/// Best candidate before a look, if the look ruled it out: its former probability, and a clause on
+/// the change.
 pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, String)> {
     let (track, was) = before.best(thing).filter(|(_, was)| *was >= MAY_BE)?;
     let now = after.belief.tracks.iter().find(|now| now.id == track.id);
@@ -193,7 +193,8 @@ fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
     places(after) < places(before)
 }
 
-/// The object now at or beside the position of a former one; none if the nearest is farther than `BESIDE_M`.
+/// Object now at or beside the position of a former one; none if the nearest is farther than
+/// `BESIDE_M`.
 pub fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
     let apart_m = |other: &Track| (other.position_m - track.position_m).norm();
     let nearest = after.belief.tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
@@ -220,14 +221,14 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Stri
     })
 }
 
-/// The objects with their probabilities of being the requested one; without the object in the hand if it may
-/// have been dropped.
+/// Objects with their probabilities of being the requested one; without the object in the hand if
+/// it may have been dropped.
 fn seen_objects<'s>(doubt: &'s InDoubt, after: &'s Standing) -> impl Iterator<Item = (&'s Track, f64)> {
     let seen = after.belief.tracks.iter().filter(|track| !track.on.is_empty() || doubt.lost <= HARDLY);
     seen.map(|track| (track, track.probability_of(&doubt.about)))
 }
 
-/// The object with the highest probability of being the requested one.
+/// Object with the highest probability of being the requested one.
 pub fn best_seen<'s>(doubt: &'s InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
     seen_objects(doubt, after).max_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -319,7 +320,8 @@ pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     })
 }
 
-/// The surfaces behind that probability, most probable first, with a mention of unexplained measurements.
+/// Surfaces behind that probability, most probable first, with a mention of unexplained
+/// measurements.
 fn hidden_places(doubt: &InDoubt) -> String {
     let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
     places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));

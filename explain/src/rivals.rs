@@ -275,7 +275,8 @@ fn figures(way: &Way, asked: &Asked<'_>) -> String {
     format!("{} [+{gains} in {:.1} s, {} a second]", steps(way, asked), way.takes_s, rate(way.rate()))
 }
 
-/// The steps of an alternative; where there are several, each with its seconds if the record holds them.
+/// Steps of an alternative; where there are several, each with its seconds if the record holds
+/// them.
 fn steps(way: &Way, asked: &Asked<'_>) -> String {
     if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
         return asked.say_all(&way.steps, ", ");

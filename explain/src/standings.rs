@@ -30,7 +30,7 @@ impl Standing {
         self.doubts.iter().find(|doubt| doubt.of == other.of && doubt.about == other.about)
     }
 
-    /// The objects in the area of a doubt.
+    /// Objects in the area of a doubt.
     pub fn asked_about<'a>(&'a self, doubt: &'a InDoubt) -> impl Iterator<Item = &'a Track> {
         let is_there = |track: &Track| {
             let mut asked = doubt.seen.iter().filter(|seen| seen.share.is_some());
@@ -39,7 +39,7 @@ impl Standing {
         self.belief.tracks.iter().filter(move |track| is_there(track))
     }
 
-    /// The object with the highest probability of a name or kind, with that probability.
+    /// Object with the highest probability of a name or kind, with that probability.
     pub fn best(&self, name: &str) -> Option<(&Track, f64)> {
         let all = self.belief.tracks.iter().map(|track| (track, track.probability_of(name)));
         all.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -64,15 +64,15 @@ impl<'a> Standings<'a> {
         Ok(Standings { record, states, beliefs: found.iter().filter_map(belief).collect() })
     }
 
-    /// The state of the run at an event; none if the record holds none, as for earlier versions, or if it is
-    /// damaged.
+    /// State of the run at an event; none if the record holds none, as for earlier versions, or if
+    /// it is damaged.
     pub fn at(&self, event: &Document) -> Option<Standing> {
         event.blobs.iter().find(|blob| blob.name == standing::BLOB)?;
         let data = self.record.store().blob(event.id, standing::BLOB).ok()?;
         Some(self.with(event, serde_json::from_slice(&data).ok()?))
     }
 
-    /// The state at the end of the run; none if the record does not hold it.
+    /// State at the end of the run; none if the record does not hold it.
     pub fn last(&self) -> Option<Standing> {
         let rests = self.record.newest(standing::RESTS).ok()??;
         let said: standing::Rests = serde_json::from_value(rests.body.clone()).ok()?;

@@ -213,7 +213,7 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
         .then(|| format!("{plans} came to {their} end without the certainty that was hoped for{misled}"))
 }
 
-/// The objects mistaken for the requested one during a plan, each with its highest probability.
+/// Objects mistaken for the requested one during a plan, each with its highest probability.
 fn misled(chapter: &Chapter) -> Vec<(f64, String)> {
     let all: Vec<&Standing> = chapter.before.iter().chain(chapter.stood()).collect();
     let lost = |pair: &[&Standing]| {

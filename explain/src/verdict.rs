@@ -109,7 +109,7 @@ impl Looks {
         Ok(Looks(clouds.iter().filter_map(part).collect()))
     }
 
-    /// The number of viewpoints that showed a surface.
+    /// Number of viewpoints that showed a surface.
     fn places(&self, on: &str) -> usize {
         let on = symbol(on);
         let from = self.0.iter().filter(|(_, shown)| shown.contains(&on)).map(|(from, _)| from);
@@ -206,7 +206,7 @@ fn object(track: &Track, asked: Option<&str>, words: &Wording<'_>) -> String {
     format!("what {on} at {at} is {} with a probability of {}{others}{seen}.", first.0, share(first.1))
 }
 
-/// The reason for which the run ended, and the remaining probability.
+/// Reason for which the run ended, and the remaining probability.
 fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Wording<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
@@ -254,7 +254,7 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Wording<'_>
     said
 }
 
-/// The reason for which there is no plan. Refusals of calls that no plan uses are left out if there are
+/// Reason for which there is no plan. Refusals of calls that no plan uses are left out if there are
 /// others.
 fn why_no_plan(rests: &Rests, words: &Wording<'_>) -> String {
     if rests.no_plan.is_empty() {

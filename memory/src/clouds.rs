@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::borrow::Cow;
 
-/// The name of a cloud's blob.
+/// Name of a cloud's blob.
 pub(crate) const CLOUD: &str = "cloud";
 
 /// The sensor behind a cloud, and the uncertainty of its pose.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::borrow::Cow;
 
-/// The number of a record, unique in its store; never reused.
+/// Number of a record, unique in its store; never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct RecordId(pub u64);
@@ -19,9 +19,9 @@ impl std::fmt::Display for RecordId {
 /// An axis-aligned box, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
-    /// Least corner.
+    /// Minimum corner.
     pub min_m: [f64; 3],
-    /// Greatest corner.
+    /// Maximum corner.
     pub max_m: [f64; 3],
 }
 

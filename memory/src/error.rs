@@ -12,7 +12,7 @@ pub enum Error {
         "no room left on the disk of {place}: free some, or bound the record by age, bytes or free space; nothing that was acknowledged is lost"
     )]
     Full {
-        /// The file that was being written.
+        /// File that was being written.
         place: PathBuf,
     },
     /// The data exceeds the size limit of the record, and too little can be pruned. Nothing of it
@@ -22,7 +22,7 @@ pub enum Error {
         megabytes(*bound), megabytes(*coming), megabytes(*staying), held_text(held), megabytes(staying + coming)
     )]
     Bounded {
-        /// The folder or address of the record.
+        /// Folder or address of the record.
         place: String,
         /// The bound, bytes.
         bound: u64,
@@ -38,7 +38,7 @@ pub enum Error {
     File {
         /// Failed operation, as "cannot read".
         what: &'static str,
-        /// The file or folder.
+        /// File or folder.
         place: PathBuf,
         /// The system's reason.
         because: std::io::Error,
@@ -90,7 +90,7 @@ pub enum Error {
     /// The index failed.
     #[error("the index of {place}: {because}")]
     Index {
-        /// The folder of the record.
+        /// Folder of the record.
         place: PathBuf,
         /// SQLite's reason.
         because: rusqlite::Error,
@@ -114,7 +114,7 @@ pub enum Error {
     /// No such record, or one that was pruned.
     #[error("there is no record {id}: it was pruned or never written; pin what must stay")]
     Missing {
-        /// The number asked for.
+        /// Number asked for.
         id: u64,
     },
     /// A record without such a blob.
@@ -134,7 +134,7 @@ pub enum Error {
     NotNear {
         /// Subject of the search.
         what: String,
-        /// The time asked for, nanoseconds.
+        /// Time asked for, nanoseconds.
         stamp_ns: i64,
         /// Tolerance, nanoseconds.
         tolerance_ns: i64,

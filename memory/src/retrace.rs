@@ -30,8 +30,8 @@ impl Retrace {
         Ok(Retrace { robot: robot.into(), newest_ns, steps: Mutex::default() })
     }
 
-    /// The record that equals a draft, if it is the next of its kind. After the first mismatch, all drafts of
-    /// that kind are new.
+    /// Record that equals a draft, if it is the next of its kind. After the first mismatch, all
+    /// drafts of that kind are new.
     pub fn next(&self, store: &dyn Store, draft: &Draft) -> Result<Option<RecordId>, Error> {
         let same = |found: &Document| Ok(draft.document(found.id, &found.robot)? == *found);
         self.next_like(store, &draft.kind, same)

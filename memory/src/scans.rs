@@ -7,7 +7,7 @@ use nalgebra::Isometry2;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-/// The name of a sweep's blob.
+/// Name of a sweep's blob.
 pub(crate) const SCAN: &str = "scan";
 /// Tolerance on the even spacing of angles, radians.
 const EVEN_RAD: f64 = 1e-6;

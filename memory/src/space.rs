@@ -83,7 +83,8 @@ impl Opaque {
         (within(x, sx) && within(y, sy) && within(z, sz)).then(|| ((x * sy + y) * sz + z) as usize)
     }
 
-    /// The first and last step of a line of sight within the box; none if the line misses the box. In voxels.
+    /// First and last step of a line of sight within the box; none if the line misses the box. In
+    /// voxels.
     fn clip(&self, from: &Vector3<f64>, step: &Vector3<f64>, last: f64) -> Option<(i64, i64)> {
         let (mut enters, mut leaves) = (0.0_f64, last);
         for axis in 0..3 {

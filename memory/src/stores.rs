@@ -72,7 +72,7 @@ pub struct Report {
 pub struct Fault {
     /// The damaged record, if known.
     pub record: Option<RecordId>,
-    /// The file or collection.
+    /// File or collection.
     pub place: String,
     /// Description.
     pub what: String,

@@ -44,7 +44,7 @@ pub fn log(stamp_ns: i64, level: LogLevel, name: &str, message: &str) -> Blob<'s
     blob("log", Form::Log, line(stamp_ns, level, name, message))
 }
 
-/// The steps of a plan as a log line, in a log of its own.
+/// Steps of a plan as a log line, in a log of its own.
 pub fn plan(stamp_ns: i64, steps: &str) -> Blob<'static> {
     blob("plan", Form::Log, line(stamp_ns, LogLevel::Info, "plan", steps))
 }

@@ -117,7 +117,7 @@ fn segment(dir: &Path) -> PathBuf {
     dir.join("segments/00000001.mcap")
 }
 
-/// The files among the segments, with their content.
+/// Files among the segments, with their content.
 fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let paths = fs::read_dir(dir.join("segments")).unwrap().map(|entry| entry.unwrap().path());
     paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect()

@@ -65,8 +65,8 @@ pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<Str
     ))
 }
 
-/// The size of the picture, and the pixel of each point: its own in an organised cloud, its projection from
-/// above otherwise.
+/// Size of the picture, and the pixel of each point: its own in an organised cloud, its projection
+/// from above otherwise.
 fn places(cloud: &Cloud, surface: &Surface) -> (u32, u32, Vec<Option<(u32, u32)>>) {
     if let Some(grid) = cloud.grid {
         let at = |n: usize| {

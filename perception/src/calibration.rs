@@ -8,7 +8,7 @@ pub type Claim = (f64, bool);
 /// Bin of a reliability diagram.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// Least stated probability (inclusive).
+    /// Minimum stated probability (inclusive).
     pub low: f64,
     /// Upper edge of the bin (exclusive except in the last bin).
     pub high: f64,
@@ -16,7 +16,7 @@ pub struct Bin {
     pub count: usize,
     /// Mean stated probability of the claims.
     pub stated: f64,
-    /// The share that came true.
+    /// Share that came true.
     pub came_true: f64,
 }
 

@@ -39,7 +39,7 @@ pub enum CameraError {
     Focal {
         /// `fx` or `fy`.
         name: &'static str,
-        /// The value that was given.
+        /// Value that was given.
         value: f64,
     },
 }

@@ -53,9 +53,9 @@ pub enum CloudError {
     /// An attribute has another length than the points.
     #[error("{attribute} has {found} entries where the cloud has {points} points: give one entry a point")]
     Length {
-        /// The name of the attribute.
+        /// Name of the attribute.
         attribute: &'static str,
-        /// The number of entries of the attribute.
+        /// Number of entries of the attribute.
         found: usize,
         /// Points in the cloud.
         points: usize,
@@ -122,7 +122,7 @@ impl Cloud {
         }
     }
 
-    /// The number of points that are finite in all three coordinates.
+    /// Number of points that are finite in all three coordinates.
     pub fn count_finite(&self) -> usize {
         self.points.iter().filter(|p| is_finite(p)).count()
     }

@@ -9,7 +9,7 @@ pub enum ClusterError {
     /// Step that is not positive.
     #[error("a step of {step_m} m: give a positive length, such as 0.02")]
     Step {
-        /// The value that was given.
+        /// Value that was given.
         step_m: f32,
     },
     /// Point beyond the countable range of cells.

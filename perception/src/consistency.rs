@@ -116,7 +116,7 @@ impl fmt::Display for Fault {
 pub struct Inconsistency {
     /// The likeliest fault.
     pub fault: Fault,
-    /// The probability of the fault.
+    /// Probability of the fault.
     pub probability: f64,
     /// Displacement that the fault causes for objects on the surface, metres.
     pub spread_m: f64,
@@ -217,7 +217,7 @@ impl MapSurface {
         Point3::new(mean.x, mean.y, self.height_m)
     }
 
-    /// Greatest distance of a corner from the centre, metres.
+    /// Maximum distance of a corner from the centre, metres.
     fn radius_m(&self) -> f64 {
         let centre = self.centre().xy();
         self.outline_m.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max)

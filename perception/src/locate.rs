@@ -15,7 +15,7 @@ use nalgebra::{
 
 /// Length of an edge per sample, metres.
 const BIN_M: f64 = 0.02;
-/// A sample wants this many endings.
+/// Minimum number of endings for a sample.
 const FEWEST: usize = 2;
 /// Maximum distance of a sample from its edge, iteration by iteration: where the view cuts the surface off or
 /// an object hides its end, samples lie farther in than the edge.

@@ -99,7 +99,7 @@ pub fn normal_cdf(x: f64) -> f64 {
     libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2) / 2.0
 }
 
-/// Spread of a depth camera's range at a distance (Nguyen et al.), metres.
+/// Standard deviation of a depth camera's range at a distance (Nguyen et al.), metres.
 pub(crate) fn range_sigma_m(distance_m: f64) -> f64 {
     if distance_m > 0.0 { KINECT.frontal_sigma_m(distance_m) } else { KINECT.axial_m }
 }

@@ -9,7 +9,7 @@ use nalgebra::{Point3, Vector3};
 pub(crate) use organised::organised_where;
 pub use organised::{OrganisedOptions, organised};
 
-/// The surface at each point.
+/// Surface at each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normals {
     /// Unit normals towards the viewpoint; NaN where the neighbourhood is not a surface (collinear,

@@ -2,7 +2,7 @@
 
 use crate::neighbours::Neighbours;
 
-/// The result of [`statistical`].
+/// Result of [`statistical`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
     /// Indices of the kept points, ascending; missing returns are dropped.

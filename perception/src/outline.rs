@@ -163,7 +163,7 @@ impl Turner {
     /// the noise.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
-        /// Least share of the points that moves an edge.
+        /// Minimum share of the points that moves an edge.
         const LEAST_SHARE: f64 = 0.03;
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
@@ -236,8 +236,8 @@ struct Side {
 }
 
 impl Side {
-    /// The position of the side when turned, from the points' positions across the side and the outward reach
-    /// of each block: less is farther out.
+    /// Position of the side when turned, from the points' positions across the side and the outward
+    /// reach of each block: less is farther out.
     fn turn(&mut self, places: &[f32], reaches: impl Iterator<Item = f32>, way: impl Fn(f32) -> f32) -> f32 {
         // The side lies no farther in than the points that were outermost before.
         let before = self.outermost.iter().map(|&i| way(places[i]));

@@ -18,7 +18,7 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// The plane through `at` with a unit `normal`.
+    /// Plane through `at` with a unit `normal`.
     pub fn through(at: &Point3<f64>, normal: Vector3<f64>) -> Plane {
         Plane { normal, offset_m: normal.dot(&at.coords) }
     }
@@ -39,7 +39,7 @@ impl Plane {
     }
 }
 
-/// The plane to look for, and the effort of the search.
+/// Plane to look for, and the effort of the search.
 #[derive(Clone, Debug)]
 pub struct PlaneOptions {
     /// Maximum distance of an inlier from the plane, metres.
@@ -84,7 +84,7 @@ pub enum PlaneError {
     /// Fewer than three points are finite.
     #[error("{found} finite points: a plane needs three")]
     TooFew {
-        /// The number that was found.
+        /// Number that was found.
         found: usize,
     },
     /// No sample gave a plane as requested.
@@ -98,7 +98,7 @@ pub enum PlaneError {
     /// Tolerance that is not positive.
     #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
     Tolerance {
-        /// The value that was given.
+        /// Value that was given.
         tolerance_m: f32,
     },
 }

@@ -100,7 +100,7 @@ pub(crate) fn for_each<T: Send, S>(
     slices.clear();
 }
 
-/// The result of the first number in the range that has any.
+/// Result of the first number in the range that has any.
 pub(crate) fn find_first<R: Send>(
     range: Range<usize>,
     result: impl Fn(usize) -> Option<R> + Sync,

@@ -14,7 +14,7 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     *values.select_nth_unstable_by(rank(values.len(), share), f64::total_cmp).1
 }
 
-/// The value in the middle; 0 for none.
+/// Value in the middle; 0 for none.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(&mut values.collect::<Vec<f64>>(), 0.5)
 }

@@ -84,7 +84,7 @@ pub struct RegisterOptions {
     pub start_target_from_source: Isometry3<f64>,
     /// Maximum correspondence distance, metres.
     pub within_m: f32,
-    /// Most rounds of pairing and moving.
+    /// Maximum number of rounds of pairing and moving.
     pub rounds: usize,
     /// Settled if a round shifts the middle of the matched points by less, metres …
     pub settle_m: f64,
@@ -93,7 +93,7 @@ pub struct RegisterOptions {
     /// Residual length (metres) beyond which the weight falls as `1 / (1 + (r/s)²)` (Cauchy), so
     /// that points without a true partner have little influence; `None`: unit weights.
     pub robust_m: Option<f64>,
-    /// Fewest partners to go on with.
+    /// Minimum number of partners to go on with.
     pub least: usize,
 }
 
@@ -112,10 +112,10 @@ impl Default for RegisterOptions {
     }
 }
 
-/// The reason registration ended.
+/// Reason registration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Termination {
-    /// The last round moved less than asked.
+    /// Converged: the last iteration moved less than the threshold.
     Settled,
     /// All rounds were used while the source still moved.
     OutOfRounds,
@@ -136,7 +136,7 @@ impl std::fmt::Display for Termination {
 /// Pose of the source, with quality measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// The pose found.
+    /// Pose found.
     pub target_from_source: Isometry3<f64>,
     /// Points of the source with a partner at that pose.
     pub matched: usize,
@@ -147,7 +147,7 @@ pub struct Fit {
     pub residual_m: f64,
     /// Rounds used.
     pub rounds: usize,
-    /// The reason registration ended.
+    /// Reason registration ended.
     pub ending: Termination,
     /// Displacement of the correspondences' centroid from the initial pose, metres.
     pub moved_m: f64,
@@ -190,9 +190,9 @@ pub enum RegisterError {
     /// Length option that is not positive.
     #[error("{name} is {value_m} m: give a positive length")]
     Length {
-        /// The name of the option.
+        /// Name of the option.
         name: &'static str,
-        /// The value that was given.
+        /// Value that was given.
         value_m: f64,
     },
     /// Non-finite initial pose.

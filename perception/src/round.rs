@@ -52,7 +52,7 @@ pub struct Round {
     pub radius_m: f64,
     /// Growth of the radius with height, metres a metre.
     pub slope: f64,
-    /// The middle height, metres above the surface.
+    /// Middle height, metres above the surface.
     pub middle_m: f64,
     /// Standard deviation of axis position and of radius, metres.
     pub place_sigma_m: f64,

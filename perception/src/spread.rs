@@ -53,11 +53,11 @@ pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64;
     ]
 }
 
-/// The direction of least spread.
+/// Direction of least spread.
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
     pub normal: [f64; 3],
-    /// Least eigenvalue as a share of the sum: 0 is flat, 1/3 isotropic.
+    /// Minimum eigenvalue as a share of the sum: 0 is flat, 1/3 isotropic.
     pub share: f64,
 }
 
@@ -79,7 +79,7 @@ pub fn least(c: &[f64; 6]) -> Option<Least> {
     least
 }
 
-/// Least eigenvalues of several covariances side by side.
+/// Minimum eigenvalues of several covariances side by side.
 ///
 /// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
 #[inline(always)]

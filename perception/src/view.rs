@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 /// View: cloud and camera pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
-    /// The time of the view, nanoseconds in the clock of the recording.
+    /// Time of the view, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
     /// The cloud in the camera's optical frame (x right, y down, z forward), metres.
     pub cloud: Cloud,
     /// Camera, if known; enables the distinction of free and unobserved space.
     pub intrinsics: Option<Intrinsics>,
-    /// The pose of the camera as stated by localisation.
+    /// Pose of the camera as stated by localisation.
     pub world_from_camera: Isometry3<f64>,
     /// Standard deviation of the camera's position along each axis, metres.
     pub pose_sigma_m: f64,

@@ -86,8 +86,8 @@ impl DepthMap {
         Point3::from(self.camera_from_world.inverse().translation.vector)
     }
 
-    /// The state of a point of the world in this camera's view. A point within `tolerance_m` of the measured
-    /// surface counts as surface.
+    /// State of a point of the world in this camera's view. A point within `tolerance_m` of the
+    /// measured surface counts as surface.
     ///
     /// Free needs every return in the 3×3 pixels around to lie beyond the point: a depth edge is no proof.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
@@ -194,7 +194,7 @@ impl Visibility {
         Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect(), held: false }
     }
 
-    /// The best knowledge of a point: free in any look outweighs surface, hidden and never.
+    /// Best knowledge of a point: free in any look outweighs surface, hidden and never.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
         let mut best = Seen::Never;
         for map in &self.maps {

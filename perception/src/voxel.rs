@@ -9,7 +9,7 @@ pub enum VoxelError {
     /// Edge length that is not positive.
     #[error("a voxel edge of {edge_m} m: give a positive length, such as 0.01")]
     Edge {
-        /// The value that was given.
+        /// Value that was given.
         edge_m: f32,
     },
     /// Point beyond the two million voxels that an axis can number.
@@ -18,7 +18,7 @@ pub enum VoxelError {
          are these millimetres (scale by 0.001), or a stray return?"
     )]
     TooFar {
-        /// The index of the point.
+        /// Index of the point.
         index: usize,
         /// The farthest coordinate of the point.
         distance_m: f32,
@@ -88,7 +88,7 @@ pub const NONE: u32 = u32::MAX;
 pub struct Assigned {
     /// Voxel number of each point, counted by first occurrence; [`NONE`] for missing returns.
     pub voxel: Vec<u32>,
-    /// The number of voxels.
+    /// Number of voxels.
     pub voxels: usize,
 }
 
@@ -188,7 +188,7 @@ impl Table {
         number
     }
 
-    /// The number that a key has.
+    /// Number that a key has.
     pub(crate) fn find(&self, key: u64) -> Option<u32> {
         let mut at = self.home(key);
         loop {

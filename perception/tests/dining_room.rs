@@ -37,7 +37,7 @@ fn views(folder: &std::path::Path) -> Vec<View> {
     poses.lines().filter(|l| !l.trim().is_empty()).enumerate().map(load).collect()
 }
 
-/// The points nearer than 4 m, voxelled at 2 cm.
+/// Points nearer than 4 m, voxelled at 2 cm.
 fn prepared(view: &View) -> Prepared {
     let small = voxel::downsample(&view.cloud.filter(|p| p.z < 4.0), 0.02).unwrap();
     Prepared::with_normals(&small.points, 20).unwrap()

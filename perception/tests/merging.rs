@@ -54,7 +54,7 @@ fn disagreement_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
     places.iter().map(apart).fold(0.0, f64::max)
 }
 
-/// The distance of the middle of the table from the truth in the merged frame, metres.
+/// Distance of the middle of the table from the truth in the merged frame, metres.
 fn offset_m(merged: &Merged, truths: &[Isometry3<f64>]) -> f64 {
     let middle = Point3::new(0.0, 0.0, TABLE_M);
     let used: Vec<usize> = (0..truths.len()).filter(|&i| merged.fits[i].used).collect();

@@ -24,7 +24,8 @@ fn fitted(device: &Device) -> Sensor {
     residuals.fit(&ASSUMED)
 }
 
-/// Spread of a depth of 1.4 m along the ray: noise, steps of disparity, and rays that wander on a table seen at about 50 degrees.
+/// Standard deviation of a depth of 1.4 m along the ray: noise, steps of disparity, and rays that
+/// wander on a table seen at about 50 degrees.
 fn true_sigma_m(device: &Device) -> f64 {
     let z: f64 = 1.4;
     let noise = device.axial[0] + device.axial[1] * (z - 0.4).powi(2);

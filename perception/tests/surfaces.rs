@@ -63,7 +63,7 @@ fn pose(eye: [f64; 3], target: [f64; 3]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(eye.coords), UnitQuaternion::from_rotation_matrix(&turn))
 }
 
-/// The view of a camera; a share of the pixels that hit the floor shows mirror images.
+/// View of a camera; a share of the pixels that hit the floor shows mirror images.
 fn look(room: &[Block], world_from_camera: Isometry3<f64>, mirrored: f64, draws: &mut Draws) -> View {
     let eye = Point3::from(world_from_camera.translation.vector);
     let depth = |u: f64, v: f64| {

@@ -41,7 +41,7 @@ impl fmt::Display for CallKind {
     }
 }
 
-/// The value of a fact or fluent.
+/// Value of a fact or fluent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum FactValue {
@@ -202,7 +202,7 @@ pub enum CallError {
     /// No answer within the time limit.
     #[error("no answer within {limit_s} s")]
     TimedOut {
-        /// The time limit.
+        /// Time limit.
         limit_s: f64,
     },
     /// The process behind the attachment ended.

@@ -26,7 +26,7 @@ pub type Failure = Box<AttachmentError>;
 
 /// Data that all calls of a module share.
 struct Asked<'a> {
-    /// The name of the attachment; empty for a module that is never called.
+    /// Name of the attachment; empty for a module that is never called.
     attachment: String,
     module: Arc<str>,
     kind: CallKind,

@@ -69,7 +69,7 @@ impl<T> Rows<T> {
         Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }
     }
 
-    /// The number of rows.
+    /// Number of rows.
     pub fn len(&self) -> usize {
         self.len
     }

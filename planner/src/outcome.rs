@@ -62,7 +62,7 @@ pub struct Statistics {
 pub enum Outcome {
     /// A plan, validated.
     Solved {
-        /// The best plan found.
+        /// Best plan found.
         plan: Plan,
         /// Statistics.
         statistics: Statistics,

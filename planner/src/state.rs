@@ -44,12 +44,12 @@ impl State {
         self.facts[predicate.index()].contains(arguments)
     }
 
-    /// The value of a numeric function.
+    /// Value of a numeric function.
     pub fn number(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<f64> {
         self.numbers[function.index()].get(arguments).copied()
     }
 
-    /// The value of an object function.
+    /// Value of an object function.
     pub fn object(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<ObjectId> {
         self.objects[function.index()].get(arguments).copied()
     }

@@ -122,7 +122,7 @@ pub struct Parameter {
     pub name: String,
     /// Types of which a fitting object has at least one.
     pub types: Vec<TypeId>,
-    /// The objects that fit, in rising order.
+    /// Objects that fit, in rising order.
     pub objects: Arc<[ObjectId]>,
     /// Span of the declaration.
     pub span: Span,
@@ -177,7 +177,7 @@ pub struct Module {
 pub enum Written {
     /// A number.
     Number(Fluent),
-    /// The value of an object function.
+    /// Value of an object function.
     Object(Fluent),
     /// The truth of an atom.
     Truth(Atom),
@@ -300,15 +300,15 @@ impl PartialEq for Quantified {
 pub enum Expression {
     /// A constant.
     Number(f64),
-    /// The value of a numeric function; may be undefined.
+    /// Value of a numeric function; may be undefined.
     Fluent(Fluent),
     /// A sum.
     Add(Vec<Expression>),
-    /// The first less the second.
+    /// Difference of two numbers.
     Subtract(Box<[Expression; 2]>),
     /// A product.
     Multiply(Vec<Expression>),
-    /// The first by the second.
+    /// Quotient of two numbers.
     Divide(Box<[Expression; 2]>),
     /// The negative.
     Negative(Box<Expression>),

@@ -19,7 +19,7 @@ impl Attachment for Expected {
     }
 }
 
-/// The place of pose `pN` on a line: N metres from the start, every other one behind it.
+/// Place of pose `pN` on a line: N metres from the start, every other one behind it.
 fn place_m(name: &str) -> f64 {
     let number: f64 = name.trim_start_matches('p').parse().unwrap_or(0.0);
     if number % 2.0 == 0.0 { number } else { -number }

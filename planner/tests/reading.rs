@@ -39,7 +39,7 @@ fn folders(path: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// The domain files that a problem file belongs to.
+/// Domain files that a problem file belongs to.
 fn domains_of(problem: &Path, files: &[PathBuf]) -> Vec<PathBuf> {
     let stem =
         |path: &Path| path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();

@@ -53,7 +53,7 @@ pub struct Door {
     pub along_rad: f64,
     /// Width of the opening, metres.
     pub width_m: f64,
-    /// The rooms on either side.
+    /// Rooms on either side.
     pub between: [String; 2],
 }
 

@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", self.drawn())]
 pub struct InputError {
-    /// The file or folder, as given.
+    /// File or folder, as given.
     pub file: String,
     /// Line, from 1; 0 for an error of the whole file.
     pub line: usize,

@@ -35,9 +35,9 @@ pub struct TrueObject {
     pub name: String,
     /// Kind.
     pub kind: String,
-    /// The surface of the object; none in the hand, on the floor or taken away.
+    /// Surface of the object; none in the hand, on the floor or taken away.
     pub surface: Option<String>,
-    /// The room of the object, if the scene names rooms; none if taken away.
+    /// Room of the object, if the scene names rooms; none if taken away.
     #[serde(default)]
     pub room: Option<String>,
     /// True while it is held by the body.

@@ -112,7 +112,7 @@ mod driver {
             Err(CommandError::BadInput(text))
         }
 
-        /// The names of the runs in the store.
+        /// Names of the runs in the store.
         ///
         /// # Errors
         /// [`CommandError::Broken`] if no server answers.

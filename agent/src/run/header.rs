@@ -30,9 +30,9 @@ pub struct Settings {
 pub struct Header {
     /// Version of descry.
     pub version: String,
-    /// The goal in words.
+    /// Goal in words.
     pub goal: String,
-    /// The goal in PDDL.
+    /// Goal in PDDL.
     pub pddl_goal: String,
     /// Start time, seconds since 1970.
     pub started_unix_s: u64,

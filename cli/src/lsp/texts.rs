@@ -39,7 +39,7 @@ impl Texts {
         self.open.remove(&path_of(uri));
     }
 
-    /// The text of a file, open or on the disk.
+    /// Text of a file, open or on the disk.
     pub fn text(&self, path: &Path) -> Option<String> {
         if let Some(text) = self.open.get(path) {
             return Some(text.clone());
@@ -58,7 +58,7 @@ impl Texts {
         self.open.keys()
     }
 
-    /// The files of a folder with these extensions, open or on the disk, sorted by name.
+    /// Files of a folder with these extensions, open or on the disk, sorted by name.
     pub fn of_folder(&self, folder: &Path, endings: &[&str]) -> Vec<PathBuf> {
         let on_disk = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
         let open = self.open.keys().filter(|path| path.parent() == Some(folder)).cloned();
@@ -142,7 +142,7 @@ impl<'a> Lines<'a> {
         Lines { text, starts }
     }
 
-    /// The position of a byte offset.
+    /// Position of a byte offset.
     pub fn position(&self, at: usize) -> Position {
         let at = at.min(self.text.len());
         let line = self.starts.partition_point(|&start| start <= at) - 1;

@@ -56,7 +56,7 @@ pub fn part_of(path: &Path) -> Option<&str> {
     if name == "domain.toml" { Some(name) } else { path.parent()?.file_name()?.to_str() }
 }
 
-/// The folder of the domain that a file is a part of.
+/// Folder of the domain that a file is a part of.
 fn folder_of(texts: &Texts, path: &Path) -> Option<PathBuf> {
     let is_domain =
         |folder: &&Path| ["domain.pddl", "domain.toml"].iter().all(|name| texts.has(&folder.join(name)));
@@ -68,7 +68,7 @@ fn folder_of(texts: &Texts, path: &Path) -> Option<PathBuf> {
     parent.parent().filter(|_| is_part).filter(is_domain).map(Path::to_path_buf)
 }
 
-/// The files of a domain's folder, each named by its path.
+/// Files of a domain's folder, each named by its path.
 pub fn files(texts: &Texts, folder: &Path) -> Files {
     let mut files = Files::new();
     let mut put = |path: PathBuf, key: String| {
@@ -93,7 +93,7 @@ pub fn source(texts: &Texts, path: &Path) -> Option<Source> {
     Some(Source::new(path.display().to_string(), texts.text(path)?))
 }
 
-/// The domain that a problem names, searched among the files beside it, then above it.
+/// Domain that a problem names, searched among the files beside it, then above it.
 pub fn domain_of(texts: &Texts, path: &Path, problem: &str) -> Option<PathBuf> {
     let mut symbols = Symbols::default();
     let name = parse::problem(problem, 1, &mut symbols, &mut Vec::new()).domain?;
@@ -112,7 +112,7 @@ fn named_so(text: &str, wanted: &str) -> bool {
     name.is_some_and(|name| symbols.name(name.symbol) == wanted)
 }
 
-/// The domain of a plan: the only one beside it or above it.
+/// Domain of a plan: the only one beside it or above it.
 pub fn domain_of_plan(texts: &Texts, path: &Path) -> Option<PathBuf> {
     let is_domain = |path: &PathBuf| {
         let text = texts.text(path).unwrap_or_default();

@@ -137,7 +137,7 @@ fn section(text: &str, at: usize) -> std::ops::Range<usize> {
     start..end
 }
 
-/// The variables in a part of a text, each at its first occurrence.
+/// Variables in a part of a text, each at its first occurrence.
 fn variables(text: &str, part: std::ops::Range<usize>) -> Vec<(usize, &str)> {
     let mut found: Vec<(usize, &str)> = Vec::new();
     for (at, _) in text[part.clone()].match_indices('?') {

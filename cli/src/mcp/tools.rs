@@ -336,7 +336,7 @@ impl Values<'_> {
         Ok(())
     }
 
-    /// The file of a PDDL or plan argument: one to be written with the given text, or the named file.
+    /// File of a PDDL or plan argument: one to be written with the given text, or the named file.
     fn source(&mut self, name: &'static str, text: &str) -> Result<String, String> {
         if text.contains('(') {
             let file = match name {

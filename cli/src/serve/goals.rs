@@ -34,12 +34,12 @@ pub(super) enum State {
 pub(super) struct Goal {
     /// Number, from 1.
     pub(super) id: u64,
-    /// The goal in words.
+    /// Goal in words.
     pub(super) goal: String,
     /// True if it takes precedence over goals that are not urgent.
     pub(super) urgent: bool,
     pub(super) state: State,
-    /// The folder of its run, once it has one.
+    /// Folder of its run, once it has one.
     pub(super) run: Option<String>,
     /// The process that pursues it.
     pub(super) process: Option<u32>,
@@ -211,7 +211,7 @@ impl Goals {
         self.all.values()
     }
 
-    /// The next goal to pursue: urgent ones first, then interrupted ones, then the oldest.
+    /// Next goal to pursue: urgent ones first, then interrupted ones, then the oldest.
     pub(super) fn next(&self) -> Option<Goal> {
         let waits = |goal: &&Goal| matches!(goal.state, State::Queued | State::Interrupted);
         let turn = |goal: &&Goal| (!goal.urgent, goal.state != State::Interrupted, goal.id);

@@ -33,7 +33,7 @@ pub fn start(folder: &Path, arguments: &[&str]) -> Child {
     command(folder, arguments).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it starts")
 }
 
-/// The first line of its standard error.
+/// First line of its standard error.
 pub fn first_line(child: &mut Child) -> String {
     let mut line = String::new();
     BufReader::new(child.stderr.as_mut().expect("it speaks")).read_line(&mut line).expect("it is text");

@@ -19,7 +19,7 @@ pub struct Hypothesis {
     pub ground: Basis,
 }
 
-/// The reason a hypothesis is possible.
+/// Reason a hypothesis is possible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Basis {
     /// Unobserved place.

@@ -14,7 +14,7 @@ use crate::origin::{self, Origin};
 use crate::slots::put_in;
 use crate::{actions, judge};
 
-/// The object files as sources of findings.
+/// Object files as sources of findings.
 pub(super) fn objects(domain: &Domain) -> Vec<Source> {
     let files = domain.files.iter().filter(|(key, _)| key.starts_with("objects/"));
     files.map(|(_, (shown, text))| Source::new(shown.clone(), text.clone())).collect()

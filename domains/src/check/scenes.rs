@@ -9,7 +9,8 @@ use crate::lexicon::TOLD_APART;
 use crate::load::Domain;
 use crate::symbol::symbol;
 
-/// The number of the first scene among the sources of the findings, behind `domain.pddl` and `domain.toml`.
+/// Number of the first scene among the sources of the findings, behind `domain.pddl` and
+/// `domain.toml`.
 const FIRST_SCENE: usize = 2;
 
 /// The scenes as sources of findings.

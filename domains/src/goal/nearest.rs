@@ -75,7 +75,7 @@ pub(super) fn nearest(words: &[String], domain: &Domain, lexicon: &Lexicon) -> N
     Nearest { goals: shown.into_iter().map(|c| c.text).collect(), left }
 }
 
-/// The names among the words, the longest first: exact, or mistyped.
+/// Names among the words, the longest first: exact, or mistyped.
 fn mentions(words: &[String], domain: &Domain, lexicon: &Lexicon, is_exact: bool) -> Vec<Mention> {
     let mut types = spoken_types(domain);
     types.push("kind");

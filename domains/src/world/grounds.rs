@@ -21,7 +21,7 @@ const RECALLED: f64 = 0.9;
 /// Distances from a door at which the body may open it, metres, in order of preference.
 const BEFORE_DOOR_M: [f64; 4] = [0.8, 0.9, 0.7, 1.0];
 
-/// The objects of the problem, by type.
+/// Objects of the problem, by type.
 pub(super) fn objects(s: &Situation, lexicon: &Lexicon, domain: &Domain) -> Vec<(String, Vec<String>)> {
     let mut objects: Vec<(String, Vec<String>)> = vec![
         ("pose".into(), s.candidates.iter().map(|c| c.symbol.clone()).collect()),

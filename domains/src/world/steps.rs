@@ -39,7 +39,7 @@ impl World<'_> {
         choice
     }
 
-    /// The first of several alternatives that can be done at once.
+    /// First of several alternatives that can be done at once.
     pub(super) fn first_of(&self, round: &Round, all: &[Vec<Deed>]) -> Option<Choice> {
         all.iter().find_map(|deeds| self.directly(round, deeds, false)).map(Choice::Steps)
     }

@@ -125,7 +125,7 @@ pub(super) fn live(trial: &Trial<'_>, scratch: &Path, stop: &Stop) -> Result<Liv
 /// A body in its world, before a run.
 struct Staged {
     body: Body,
-    /// The goal as parsed for this body.
+    /// Goal as parsed for this body.
     goal: Goal,
     /// Share of the target that is visible from the start.
     share: Option<f64>,

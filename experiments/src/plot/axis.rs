@@ -29,7 +29,7 @@ impl Scale {
         Self { low, high, from, to, step }
     }
 
-    /// The position of a value, clamped to the ends.
+    /// Position of a value, clamped to the ends.
     pub fn at(&self, value: f64) -> f64 {
         let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.from + share * (self.to - self.from)

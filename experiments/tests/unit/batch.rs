@@ -75,7 +75,7 @@ fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {
     }
 }
 
-/// The result files, without the journals.
+/// Result files, without the journals.
 fn results(folder: &Path) -> BTreeMap<String, String> {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     files

@@ -7,7 +7,7 @@ use descry_experiments::kinds::*;
 use descry_experiments::{Row, Source};
 use std::path::Path;
 
-/// The text of a shipped experiment: by its file name in the domain tabletop, or with the domain's name
+/// Text of a shipped experiment: by its file name in the domain tabletop, or with the domain's name
 /// before it.
 fn shipped(name: &str) -> String {
     let (domain, file) = name.split_once('/').unwrap_or(("tabletop", name));

@@ -74,7 +74,7 @@ impl Record {
         })
     }
 
-    /// The view of a recorded cloud, with the camera's pose in `world`.
+    /// View of a recorded cloud, with the camera's pose in `world`.
     ///
     /// # Errors
     /// As [`Record::view_at`].

@@ -526,7 +526,7 @@ fn segment_path(dir: &Path, number: u64) -> PathBuf {
     segment_dir(dir).join(format!("{number:08}.mcap"))
 }
 
-/// The folder of a record: the given one, or `record` in the folder of a run.
+/// Folder of a record: the given one, or `record` in the folder of a run.
 fn folder(named: &Path) -> Result<PathBuf, Error> {
     let found = [named.to_owned(), named.join("record")].into_iter().find(|dir| segment_dir(dir).is_dir());
     found.ok_or_else(|| Error::NoRecord { place: named.to_owned(), expected: "segments" })

@@ -81,8 +81,8 @@ fn said(status: StatusCode, why: &str) -> Response<Body> {
     response
 }
 
-/// The reason to refuse a request: a `Host` other than this machine, or a cross-site origin; none if it is
-/// allowed.
+/// Reason to refuse a request: a `Host` other than this machine, or a cross-site origin; none if it
+/// is allowed.
 pub fn refusal(headers: &HeaderMap, named: Option<&str>, port: u16) -> Option<&'static str> {
     let own = |host: &str| {
         let names = ["127.0.0.1", "localhost"];

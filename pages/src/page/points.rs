@@ -81,7 +81,7 @@ pub fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     }
 }
 
-/// The first point of each cell.
+/// First point of each cell.
 fn thinned(
     cloud: &Cloud,
     map_from_camera: &Isometry3<f64>,

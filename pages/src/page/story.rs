@@ -28,10 +28,10 @@ const ABOVE_M: f64 = 0.6;
 /// map frame, metres.
 #[derive(Debug, Serialize)]
 pub struct Story {
-    /// The goal as the user phrased it.
+    /// Goal as the user phrased it.
     pub goal: String,
     pddl: String,
-    /// The goal in the domain's wording.
+    /// Goal in the domain's wording.
     wanted: Option<String>,
     report: Option<Report>,
     begun_unix_s: Option<u64>,
@@ -128,7 +128,7 @@ struct Look {
 pub struct Looks(BTreeMap<String, Look>);
 
 impl Looks {
-    /// The points of a look, by its key.
+    /// Points of a look, by its key.
     pub fn points(&self, key: &str) -> Option<Arc<Packed>> {
         self.0.get(key)?.points.clone()
     }
@@ -301,7 +301,7 @@ fn planned(step: &Step, at_s: f64, saying: &Saying) -> PlanStep {
     PlanStep { call, said, from_s: at_s + step.start_s.unwrap_or(0.0), lasts_s: step.duration_s }
 }
 
-/// The steps begun, each with its end: its failure, or the next event about something else.
+/// Steps begun, each with its end: its failure, or the next event about something else.
 fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     let events: Vec<(f64, Event)> =
         events.iter().filter_map(|d| Some((all.s(d.stamp_ns), part(&d.body)?))).collect();

@@ -21,7 +21,7 @@ const NEAR_M: [f64; 5] = [0.04, 0.03, 0.02, 0.015, 0.012];
 const PAST_M: f64 = 0.04;
 /// Minimum number of points for fitting a plane. From: chosen.
 const FEWEST: usize = 40;
-/// Fewest rays that say anything of the surface. From: chosen.
+/// Minimum number of rays that say anything of the surface. From: chosen.
 const FEWEST_RAYS: usize = 80;
 
 /// Ray of a look, with its intersection with the surface plane in the optical frame.

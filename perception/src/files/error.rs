@@ -1,6 +1,6 @@
 //! Errors of files, with the place and a mend.
 
-/// The place of an error in a file.
+/// Place of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A line of text, counted from 1.
@@ -22,7 +22,7 @@ impl std::fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: expected {expected}, found {found}; {mend}")]
 pub struct FileError {
-    /// The place of the error.
+    /// Place of the error.
     pub place: Place,
     /// The expected content.
     pub expected: String,

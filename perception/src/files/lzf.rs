@@ -5,7 +5,7 @@ const MAX_OFFSET: usize = 1 << 13;
 const MAX_MATCH: usize = 264;
 const HASH_BITS: u32 = 15;
 
-/// The reason a stream cannot be unpacked.
+/// Reason a stream cannot be unpacked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LzfError {
     #[error("the stream ends inside a run")]

@@ -59,7 +59,7 @@ impl Scalar {
         }
     }
 
-    /// The value of `raw`, little endian, zero-extended.
+    /// Value of `raw`, little endian, zero-extended.
     fn value(self, raw: [u8; 8]) -> f64 {
         let low = u64::from_le_bytes(raw);
         match self {
@@ -90,7 +90,7 @@ struct Element {
 }
 
 impl Element {
-    /// Least bytes of a row.
+    /// Minimum bytes of a row.
     fn least_bytes(&self, stored: Stored) -> usize {
         match stored {
             Stored::Ascii => 2 * self.properties.len(),

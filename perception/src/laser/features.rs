@@ -48,7 +48,7 @@ impl FeatureClass {
     }
 }
 
-/// The class that features are nearest to.
+/// Class that features are nearest to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nearest<'a> {
     /// The class.

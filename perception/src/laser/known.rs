@@ -97,7 +97,7 @@ impl RecogniseOptions {
 /// Known shape not ruled out by features or width.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeCandidate {
-    /// The index in the list of known shapes.
+    /// Index in the list of known shapes.
     pub index: usize,
     /// Distance of features or width from the class, in standard deviations.
     pub distance: f64,
@@ -124,7 +124,7 @@ pub struct Recognition {
     pub verdict: Verdict,
     /// The known shapes that were aligned, the best fit first.
     pub candidates: Vec<ShapeCandidate>,
-    /// The number of known shapes that features or width ruled out.
+    /// Number of known shapes that features or width ruled out.
     pub ruled_out: usize,
     /// Names that are not ruled out, best fit first.
     pub may_be: Vec<String>,

@@ -35,7 +35,7 @@ pub enum ScanError {
     Angle {
         /// Index of the reading.
         index: usize,
-        /// The value of the angle, radians.
+        /// Value of the angle, radians.
         angle_rad: f64,
     },
     /// Non-finite pose.

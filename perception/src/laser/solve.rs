@@ -52,7 +52,7 @@ pub struct SolverOptions {
     pub objective: Objective,
     /// Maximum iterations of least squares per round.
     pub most_iterations: usize,
-    /// Most evaluations of the simplex, for each of three numbers a pose.
+    /// Maximum number of evaluations of the simplex, for each of three numbers a pose.
     pub most_evaluations: usize,
     /// Relative decrease of the objective below which the solver has converged.
     pub settle: f64,

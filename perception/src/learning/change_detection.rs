@@ -31,7 +31,7 @@ pub struct NoticeOptions {
     pub cluster_step_m: f32,
     /// Minimum number of pixels of a dynamic cluster in its best view.
     pub least_pixels: usize,
-    /// Greatest error of localisation between two visits, metres.
+    /// Maximum error of localisation between two visits, metres.
     pub search_m: f32,
 }
 
@@ -62,11 +62,11 @@ pub struct MetaRoom {
 /// Appeared cluster.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appeared {
-    /// The points of the object, world frame, from all views of the visit.
+    /// Points of the object, world frame, from all views of the visit.
     pub cloud: Cloud,
     /// Index of the view that shows most of the object: the first training view.
     pub view: usize,
-    /// The pixels of the object in that view, row by row (O_0).
+    /// Pixels of the object in that view, row by row (O_0).
     pub mask: Vec<bool>,
     /// True if most of the cluster is well in front of the former structure, also to either side
     /// within the cameras' rotation error; otherwise it may be an edge of static structure.
@@ -355,7 +355,7 @@ impl MetaRoom {
 struct Change {
     /// Pixels in front of the static structure.
     before: Mask,
-    /// The pixels far before the static structure, to either side as well, as far as the camera may be
+    /// Pixels far before the static structure, to either side as well, as far as the camera may be
     /// turned.
     apart: Mask,
     /// Pixels behind the static structure, which may always have been there.
@@ -393,7 +393,7 @@ fn bare(cloud: &Cloud) -> Cloud {
     Cloud::from_points(cloud.points.clone())
 }
 
-/// The points of some views, world frame.
+/// Points of some views, world frame.
 fn together(views: &[View], poses: &[Isometry3<f64>]) -> Cloud {
     let mut all = Cloud::default();
     for (view, pose) in views.iter().zip(poses) {

@@ -70,7 +70,7 @@ impl Frame {
         cosine.clamp(0.0, 1.0).acos()
     }
 
-    /// The pixels of a mask as a cloud of the world, with normals and colours.
+    /// Pixels of a mask as a cloud of the world, with normals and colours.
     pub fn cloud(&self, mask: &Mask) -> Cloud {
         Cloud {
             points: mask.pixels().map(|i| self.points[i]).collect(),

@@ -81,7 +81,7 @@ impl Measured {
         Ok(fused.select(&grow::kept(&fused.points)?))
     }
 
-    /// The index of the point of least variance in each cube, ascending.
+    /// Index of the point of least variance in each cube, ascending.
     fn least(&self, cloud: &Cloud, variances: &[f64], cube_m: f32) -> Result<Vec<u32>, LearningError> {
         let assigned = voxel::assign(&cloud.points, cube_m)?;
         let mut best = vec![u32::MAX; assigned.voxels];

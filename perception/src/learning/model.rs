@@ -172,7 +172,7 @@ fn tolerance_m(q: &Point3<f64>) -> f64 {
     0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)))
 }
 
-/// Fewest pixels that an object is learned from.
+/// Minimum number of pixels that an object is learned from.
 const LEAST_PIXELS: usize = 50;
 /// Spacing to which points carried from view to view are thinned, metres.
 const CARRIED_M: f32 = 0.004;

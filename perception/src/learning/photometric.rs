@@ -20,7 +20,7 @@ const BLURS: [usize; 3] = [5, 2, 1];
 const ROUNDS: usize = 5;
 /// Side of the squares from which one texture feature and one surface point each are taken, pixels.
 const CELL_PX: usize = 12;
-/// Least change of lightness a pixel at a mark, of 255.
+/// Minimum change of lightness a pixel at a mark, of 255.
 const CONTRAST: f32 = 3.0;
 /// Scale of lightness differences between views; larger ones get little weight.
 const LIGHTNESS: f32 = 8.0;

@@ -17,7 +17,7 @@ pub(super) struct PlaneRules {
     pub hidden_share: f64,
 }
 
-/// Most planes looked for in a frame.
+/// Maximum number of planes looked for in a frame.
 const MOST: usize = 8;
 /// Minimum number of pixels of a plane, as a share of the nearby pixels, and absolute.
 const LEAST: (f64, usize) = (0.015, 200);

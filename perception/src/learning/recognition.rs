@@ -95,7 +95,7 @@ struct Known {
 const KINDS: [DescriptorKind; 2] = [DescriptorKind::Shape, DescriptorKind::Pattern];
 /// Distance of the points that a first sight looks at, metres.
 const COARSE_M: f32 = 0.01;
-/// Fewest points of a model.
+/// Minimum number of points of a model.
 const LEAST_POINTS: usize = 60;
 /// Votes of a model that are looked at, refined, and judged.
 const LOOKED_AT: usize = 60;

@@ -70,7 +70,7 @@ struct Rays<'a> {
     map: &'a DepthMap,
     world_from_camera: nalgebra::Isometry3<f64>,
     up: Vector3<f64>,
-    /// The height of the camera above the plane, metres.
+    /// Height of the camera above the plane, metres.
     eye_m: f64,
     shown: Vec<Shown>,
 }

@@ -55,7 +55,7 @@ pub enum CellsError {
     Damaged {
         /// Index of the station.
         index: usize,
-        /// The number of points of the station.
+        /// Number of points of the station.
         count: u32,
     },
 }
@@ -130,7 +130,7 @@ pub struct NormalOptions {
     pub least_share: f64,
     /// Radius of a region around the point's own cube, in cubes.
     pub reach: i64,
-    /// Fewest regions that are evidence enough.
+    /// Minimum number of regions that are evidence enough.
     pub least_regions: usize,
     /// Minimum ratio of the length of the mean cross product (Eq. 4) to the mean length; below it,
     /// the products do not agree on a direction.

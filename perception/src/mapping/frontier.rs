@@ -72,7 +72,7 @@ impl NextPose {
 
 /// Number of headings tried at a place.
 const HEADINGS: usize = 12;
-/// Most squares along a ray.
+/// Maximum number of squares along a ray.
 const MOST_STEPS: usize = 2000;
 /// Number of rays around a place.
 pub(super) const RAYS: usize = 180;

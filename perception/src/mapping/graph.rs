@@ -55,7 +55,7 @@ pub enum GraphError {
     Station {
         /// Index of the edge.
         edge: usize,
-        /// The first node of the edge.
+        /// First node of the edge.
         from: usize,
         /// The second node of the edge.
         to: usize,

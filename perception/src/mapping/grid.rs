@@ -37,7 +37,7 @@ impl From<Sightlines> for Vec<(i32, i32, u32, u32)> {
 const BEARINGS: usize = 720;
 /// Maximum length of followed lines of sight, metres.
 const FARTHEST_M: f64 = 100.0;
-/// Most squares of a grid.
+/// Maximum number of squares of a grid.
 const MOST_SQUARES: usize = 1 << 28;
 /// Maximum share of a bearing's points nearer than its end point; nearer ones are mismatches.
 const STRAY: f64 = 0.1;

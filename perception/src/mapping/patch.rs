@@ -167,7 +167,7 @@ pub(super) fn placed(
     Patch { plane, middle, along, limits_m, area_m2, facets: members }
 }
 
-/// The median of each coordinate, as a direction.
+/// Median of each coordinate, as a direction.
 fn median_direction(members: &[u32], normal: impl Fn(u32) -> Vector3<f64>) -> Option<Vector3<f64>> {
     let axis = |k: usize| median(members.iter().map(|&m| normal(m)[k]));
     Vector3::new(axis(0), axis(1), axis(2)).try_normalize(1e-6)

@@ -176,7 +176,7 @@ impl RoomMap {
     }
 }
 
-/// Greatest height of the floor, metres.
+/// Maximum height of the floor, metres.
 const STEP_M: f64 = 0.1;
 
 impl Survey {

@@ -49,7 +49,7 @@ pub struct RectifyOptions {
     pub sigma_m: (f64, f64),
     /// Standard deviation of odometry: a share of the step, and an absolute part in metres.
     pub way_sigma: (f64, f64),
-    /// Spread of odometry's turn a step, radians.
+    /// Standard deviation of odometry's turn a step, radians.
     pub turn_sigma_rad: f64,
     /// Minimum share of the second plan that must match the first for [`Matcher::IcpEm`] to be
     /// accepted; else odometry is used.
@@ -98,7 +98,7 @@ impl RectifyOptions {
 /// Pose of the second of two stations in the frame of the first, with information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairFit {
-    /// The pose found.
+    /// Pose found.
     pub before_from_after: Isometry2<f64>,
     /// Matching share of the jointly visible part of the second plan.
     pub explained: f64,
@@ -288,7 +288,7 @@ impl<'a> Problem<'a> {
         self.shifted(&Isometry2::from_parts(self.prior.pose.translation, turned.rotation))
     }
 
-    /// The pose from rotation and translation together, starting at the best heading.
+    /// Pose from rotation and translation together, starting at the best heading.
     fn joint(&self) -> Isometry2<f64> {
         let mut pose = self.annealed(self.headed(), |pose, sigma_m| self.moved(pose, sigma_m));
         for _ in 0..ROUNDS {

@@ -83,7 +83,7 @@ pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spo
     keyed.into_iter().map(|(_, (sum, weight))| Spot { at: (sum / weight).into(), weight }).collect()
 }
 
-/// Fewest points in a square that are more than noise.
+/// Minimum number of points in a square that are more than noise.
 const FEWEST: f64 = 2.0;
 /// Maximum weight of a cell, points; further points are of the same place.
 const MOST: f64 = 8.0;

@@ -26,12 +26,12 @@ pub(super) const SECOND: Round =
 /// Alignment after a view was left out, in which the rest settles again. From: chosen.
 const SETTLE: Round = Round { from_m: 0.02, to_m: 0.012, passes: 4, asked: 1200, rest_weight: 0.2 };
 
-/// The views brought together: steps 3 and 4.
+/// Views brought together: steps 3 and 4.
 #[derive(Debug)]
 pub(super) struct Aligned {
     pub poses: Vec<Isometry3<f64>>,
     pub used: Vec<bool>,
-    /// The reason each unused view is left out.
+    /// Reason each unused view is left out.
     pub whys: Vec<Option<Misfit>>,
     pub found: Vec<Found>,
     /// The dominant planes that are level, world frame.
@@ -185,7 +185,7 @@ pub(super) fn only_levelled(
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-/// The objects that stand on the surface in some views.
+/// Objects that stand on the surface in some views.
 pub(super) struct Objects<'a> {
     pub prepared: &'a [Prepared],
     pub parts: &'a [Vec<Part>],

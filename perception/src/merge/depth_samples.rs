@@ -294,7 +294,7 @@ fn some(line: &[f32], from: usize) -> &[f32; LANES] {
     line[from..].first_chunk().unwrap_or(&[f32::NAN; LANES])
 }
 
-/// Spread of a return, metres.
+/// Standard deviation of a return, metres.
 #[inline(always)]
 fn sigma_m(depth: f32, range_sq: f32) -> f32 {
     /// Minimum squared ratio of depth to range; rays are at most 60° off axis. From: chosen.

@@ -11,7 +11,7 @@ pub enum MergeError {
     Option {
         /// The option.
         field: &'static str,
-        /// The value that was given.
+        /// Value that was given.
         value: f64,
         /// The expected values, in words.
         expected: &'static str,

@@ -53,7 +53,7 @@ pub struct Merger {
     ahead: Option<JoinHandle<Kept>>,
 }
 
-/// The state of the views that were merged last.
+/// State of the views that were merged last.
 #[derive(Default)]
 struct Kept {
     options: Option<MergeOptions>,
@@ -195,7 +195,7 @@ impl Kept {
         base
     }
 
-    /// The first views, together.
+    /// First views, together.
     fn anew(&self, views: &[View], options: &MergeOptions) -> Result<Base, MergeError> {
         let (prepared, maps) = (&self.prepared[..views.len()], &self.maps[..views.len()]);
         let mut steps = filter_and_thin(views, prepared, options)?;
@@ -276,7 +276,7 @@ impl Base {
     }
 }
 
-/// The number of first views that are merged together: few, or half as many more each time.
+/// Number of first views that are merged together: few, or half as many more each time.
 fn together(views: usize) -> usize {
     let more = std::iter::successors(Some(FEW), |n| Some((3 * n).div_ceil(2)));
     more.take_while(|n| *n <= views).last().unwrap_or(views)

@@ -19,7 +19,7 @@ pub(super) struct Round {
     pub from_m: f64,
     /// ... and at the last.
     pub to_m: f64,
-    /// Most passes.
+    /// Maximum number of passes.
     pub passes: usize,
     /// Maximum number of query points of each part per view, over all its partner views.
     pub asked: usize,
@@ -141,7 +141,7 @@ struct Asked {
     to: usize,
     /// Query points of the first view, with weights.
     points: Vec<(Surfel, f32)>,
-    /// The state of each point's partner.
+    /// State of each point's partner.
     partners: Vec<Partner>,
 }
 

@@ -25,7 +25,7 @@ pub struct ViewFit {
     /// True if the view was left out because it contradicts the others.
     #[serde(default)]
     pub is_at_odds: bool,
-    /// The reason the view converged, or was left out, in words.
+    /// Reason the view converged, or was left out, in words.
     pub why: String,
 }
 
@@ -36,7 +36,7 @@ pub struct Step {
     pub name: String,
     /// Number of points after the step.
     pub points: usize,
-    /// The result of the step, in words.
+    /// Result of the step, in words.
     pub result: String,
 }
 
@@ -56,7 +56,7 @@ pub struct Merged {
 }
 
 impl Merged {
-    /// The result in another frame: cloud, poses and visibility.
+    /// Result in another frame: cloud, poses and visibility.
     pub fn moved(mut self, there_from_world: &Isometry3<f64>) -> Merged {
         self.cloud = self.cloud.transformed(there_from_world);
         for fit in &mut self.fits {

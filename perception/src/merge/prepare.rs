@@ -31,8 +31,8 @@ pub(super) struct Prepared {
     pub points: Vec<Surfel>,
     /// Search tree of the points; `None`, and no points, if there are more than the tree can hold.
     pub tree: Option<Neighbours>,
-    /// The points of an organised cloud to be merged, at a coarser resolution, with normals in the camera
-    /// frame.
+    /// Points of an organised cloud to be merged, at a coarser resolution, with normals in the
+    /// camera frame.
     pub coarse: Option<Cloud>,
     /// The localised pose of the camera.
     pub prior: Isometry3<f64>,
@@ -146,7 +146,7 @@ pub(super) fn prepare(view: &View, options: &MergeOptions) -> Prepared {
     Prepared { points, tree, coarse, prior: view.world_from_camera, sigma_m, sigma_rad }
 }
 
-/// The first point of each voxel that has a normal.
+/// First point of each voxel that has a normal.
 fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
     /// Bits of a voxel along an axis. From: derived, three axes in 64 bits.
     const BITS: u32 = 21;
@@ -168,7 +168,7 @@ fn firsts(cloud: &Cloud, voxel_m: f64) -> Cloud {
     cloud.select(&firsts)
 }
 
-/// The points of a cloud to be merged, thinned, with normals from the nearest points.
+/// Points of a cloud to be merged, thinned, with normals from the nearest points.
 fn thinned(view: &View, within: &Within, options: &MergeOptions) -> Cloud {
     /// Number of points for a normal. From: chosen.
     const NEAREST: usize = 15;

@@ -142,7 +142,7 @@ pub(super) struct Window {
     pub turn_rad: f64,
 }
 
-/// The best placement of a view.
+/// Best placement of a view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
     /// World from world.
@@ -173,7 +173,7 @@ fn within_reach(view: &[Oriented], placed: &[Oriented], shift_m: f64) -> Vec<Ori
 struct Levelled {
     /// A sample of the view's points, at most about `TRIED`.
     tried: Vec<Oriented>,
-    /// The points near enough to be matched.
+    /// Points near enough to be matched.
     placed: Vec<Oriented>,
     middle: Vector3<f64>,
 }

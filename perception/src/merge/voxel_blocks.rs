@@ -34,7 +34,7 @@ impl Grid {
     }
 }
 
-/// The position of a block, in blocks: 20 bits per axis.
+/// Position of a block, in blocks: 20 bits per axis.
 type Place = u64;
 /// Bits of a coordinate in a key. From: derived, three axes in 64 bits.
 const PLACE_BITS: u32 = 20;
@@ -56,7 +56,7 @@ pub(super) struct VoxelBlocks<C> {
     /// Cells; a column has its `empty` cell before it is occupied.
     pub cells: Vec<C>,
     empty: C,
-    /// The number of occupied cells.
+    /// Number of occupied cells.
     pub occupied: usize,
     /// The voxels of each block that were asked for.
     pub touched: Vec<Mask>,

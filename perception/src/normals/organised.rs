@@ -5,7 +5,7 @@ use crate::cloud::{Cloud, Grid};
 use crate::pool;
 use nalgebra::{Point3, Vector3};
 
-/// The size of the neighbourhood of a pixel.
+/// Size of the neighbourhood of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrganisedOptions {
     /// Pixels to each side: 2 looks at 5 x 5.
@@ -13,9 +13,9 @@ pub struct OrganisedOptions {
     /// Maximum depth difference of a neighbour on the same surface, as a share of the depth (plus
     /// `base_m`).
     pub depth_step_share: f32,
-    /// Least depth difference that separates surfaces, metres.
+    /// Minimum depth difference that separates surfaces, metres.
     pub base_m: f32,
-    /// Fewest neighbours for a normal.
+    /// Minimum number of neighbours for a normal.
     pub least: usize,
 }
 

@@ -58,7 +58,7 @@ impl Frustum {
     /// Depths at which a ray crosses the infinite cone of the side, drawn in by `wall_m`, in order.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
-        /// Least height of a body, metres. From: rounding.
+        /// Minimum height of a body, metres. From: rounding.
         const LEAST_M: f64 = 1e-3;
         let slope = (self.rim_m - self.foot_m) / (self.top_m - self.base_m).max(LEAST_M);
         let (radius, widens) = (self.foot_m - wall_m + slope * from[2], slope * dz);

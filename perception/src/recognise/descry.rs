@@ -138,8 +138,8 @@ impl Descry {
     /// Percepts after alternative explanations of each segment: a known body on or in another
     /// object, or a body with a neck.
     ///
-    /// Percepts of such bodies replace that of the segment where pixels are by far likelier with them and they are more probably known
-    /// objects than the whole segment; if they are less probably so, the segment may still be one.
+    /// The percepts of an alternative replace the segment's if the pixels are far likelier under the
+    /// alternative, and if its bodies are more probably known objects than the whole segment is.
     fn explained(
         &self,
         setting: &Setting,

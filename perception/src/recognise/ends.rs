@@ -53,7 +53,7 @@ impl Side {
         self.tried().map(near).chain(beyond).fold(f64::NEG_INFINITY, f64::max).exp()
     }
 
-    /// The mean likelihood of the lengths of a range.
+    /// Mean likelihood of the lengths of a range.
     pub fn mean(&self, range: Range) -> f64 {
         let steps = 1 + ((range.high - range.low) / STEP_M) as u32;
         let length_m =
@@ -167,7 +167,7 @@ impl Boxed<'_> {
         Side { least_m, logs }
     }
 
-    /// The best placement of another box in each view, starting near the placement of this box.
+    /// Best placement of another box in each view, starting near the placement of this box.
     fn suited(&self, body: &Cuboid, from: &[Placed]) -> Vec<Placed> {
         pool::each(self.rays.views.len(), 1, |n| placed(&self.rays.views[n], body, from[n].shift_m, MERGED))
     }

@@ -32,11 +32,12 @@ pub(super) const UNSEEN: f64 = 0.08;
 const ROOT: f64 = 0.35;
 /// Log likelihood ratio from which an inside is reported as seen or absent. From: chosen.
 const SAID: f64 = 1.5;
-/// Number of body points for each point that a visible handle has, far and near, with lower and
-/// upper limit of the expected count. From: chosen.
+/// Number of body points per point required of a visible handle, for a far and for a near one.
+/// From: chosen.
 pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
+/// Lower and upper limit of the number of points required of a visible handle. From: chosen.
 pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
-/// Least height of a handle, metres. From: chosen.
+/// Minimum height of a handle, metres. From: chosen.
 const HANDLE_HIGH_M: f64 = 0.012;
 
 /// Margin around and above an object within which pixels are used, and distance beyond its edge at
@@ -469,7 +470,7 @@ fn sector_of(round: &Round, p: &Point3<f64>) -> usize {
 /// Largest protrusion of the body in one direction.
 pub(super) struct Protrusion {
     pub reach_m: f64,
-    /// The direction of the protrusion: sine and cosine.
+    /// Direction of the protrusion: sine and cosine.
     direction: (f64, f64),
     width_m: f64,
     points: usize,
@@ -489,7 +490,7 @@ impl Protrusion {
         const HEIGHTS: (f64, f64) = (0.08, 1.02);
         /// Number of sectors combined for a protrusion. From: chosen.
         const WINDOW: usize = 3;
-        /// Fewest points. From: chosen.
+        /// Minimum number of points. From: chosen.
         const FEWEST: usize = 3;
         /// Quantiles of a protrusion's points that define its extent across and in height.
         /// From: chosen.

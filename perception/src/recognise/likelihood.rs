@@ -8,7 +8,7 @@ use super::rays::BELL;
 use crate::noise::normal_cdf;
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 
-/// Least density and least chance that are assumed. From: chosen.
+/// Minimum density and least chance that are assumed. From: chosen.
 const LEAST_DENSITY: f64 = 1e-12;
 const LEAST_CHANCE: f64 = 1e-6;
 /// Minimum share of a family's objects of the measured size that are of a known kind. From: chosen.
@@ -54,7 +54,7 @@ pub(super) const WIDTHS: (f64, f64) = (0.10, 0.6);
 /// Median and log-normal spread of the tapers of everyday things, dimensionless. From: chosen, a
 /// guess; nothing was measured.
 const TAPERS: (f64, f64) = (0.95, 0.25);
-/// Least error of a taper, however well the side is measured. From: chosen.
+/// Minimum error of a taper, however well the side is measured. From: chosen.
 const RATIO_SIGMA: f64 = 0.05;
 
 pub(super) fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
@@ -89,7 +89,7 @@ pub(super) fn round_log(range: Option<Range>, m: &Measured) -> f64 {
 }
 
 pub(super) fn diameter_sigma_m(m: &Measured) -> f64 {
-    /// Least error, however good the camera, metres. From: chosen.
+    /// Minimum error, however good the camera, metres. From: chosen.
     const LEAST_M: f64 = 0.003;
     (2.0 * m.evidence.radius_sigma_m).hypot(LEAST_M)
 }
@@ -117,7 +117,7 @@ fn taper(m: &Measured) -> (f64, f64) {
     (m.evidence.taper, sigma.hypot(RATIO_SIGMA))
 }
 
-/// Spread of a measured side of a footprint, metres.
+/// Standard deviation of a measured side of a footprint, metres.
 fn side_sigma_m(m: &Measured) -> f64 {
     EDGE_M.hypot(2.0 * m.sigma_m)
 }
@@ -205,7 +205,7 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
 
 /// Log likelihood of the side's misfit to a form, metres.
 fn miss_log(miss_m: f64, m: &Measured) -> f64 {
-    /// Least error of a form, as a share of the spread of a measurement. From: chosen.
+    /// Minimum error of a form, as a share of the spread of a measurement. From: chosen.
     const OF_SIGMA: f64 = 0.7;
     let apart = m.apart_m();
     let floor = SHAPE_M.hypot(OF_SIGMA * m.sigma_m).hypot(apart);

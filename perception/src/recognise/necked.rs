@@ -85,7 +85,7 @@ pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: 
 
 /// Radius of a body about an axis between two heights, metres; `None` if too little is visible.
 fn radius_m(of: &Segment, axis: &Round, between_m: std::ops::Range<f64>) -> Option<f64> {
-    /// Fewest points. From: chosen.
+    /// Minimum number of points. From: chosen.
     const FEWEST: usize = 8;
     let points = of.points.iter().filter(|p| between_m.contains(&p.z));
     let mut from_axis_m: Vec<f64> = points.map(|p| distance(p.x - axis.x, p.y - axis.y)).collect();

@@ -31,7 +31,7 @@ pub enum Sighting {
     Unseen,
 }
 
-/// The evidence for and against each model. Fractions are between 0 and 1.
+/// Evidence for and against each model. Fractions are between 0 and 1.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Radius of the best upright round body at its widest, metres; 0 if none was fitted.
@@ -60,7 +60,7 @@ pub struct Evidence {
     pub handle_unseen: f64,
     /// Reach of the largest protrusion, metres.
     pub protrusion_m: f64,
-    /// The number of views that looked at the object.
+    /// Number of views that looked at the object.
     pub views: usize,
 }
 
@@ -92,15 +92,15 @@ pub struct Percept {
     pub points: usize,
     /// Share of the visible hull (sides and top) that some view saw or looked past.
     pub seen_fraction: f64,
-    /// The evidence for and against each model.
+    /// Evidence for and against each model.
     pub evidence: Evidence,
-    /// The points of the object: indices into the cloud that was segmented.
+    /// Points of the object: indices into the cloud that was segmented.
     #[serde(skip)]
     pub indices: Vec<u32>,
 }
 
 impl Percept {
-    /// Percept with each known object's probability at least that of a part.
+    /// Raises the probability of each known object to at least its probability in a part's percept.
     pub(super) fn at_least(mut self, part: &Percept) -> Percept {
         for ((_, own), (_, part)) in self.probabilities.iter_mut().zip(&part.probabilities) {
             *own = own.max(*part);

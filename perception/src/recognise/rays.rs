@@ -55,7 +55,7 @@ pub struct ViewRays {
 pub struct Pixel {
     pub along: [f64; 3],
     pub depth_m: f64,
-    /// Spread of the depth, metres.
+    /// Standard deviation of the depth, metres.
     pub sigma_m: f64,
     /// Density of the depth without a body, per metre.
     pub without: f64,

@@ -78,7 +78,7 @@ pub(super) fn settle<'a>(
 /// Part of the side shown by one view.
 struct Side {
     points: Vec<Point3<f64>>,
-    /// Spread of a measurement, metres.
+    /// Standard deviation of a measurement, metres.
     sigma_m: f64,
 }
 
@@ -220,7 +220,7 @@ impl Cells {
         [p.x, p.y].map(|m| floor(m / PLACE_M))
     }
 
-    /// The index of a point's cell in the rectangle.
+    /// Index of a point's cell in the rectangle.
     fn place(&self, p: &Point3<f64>) -> Option<usize> {
         if !(p.x > self.low.x && p.x < self.high.x && p.y > self.low.y && p.y < self.high.y) {
             return None;

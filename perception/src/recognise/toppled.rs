@@ -162,8 +162,8 @@ impl Found {
         HandleSeen { sighting, unseen, reach_m }
     }
 
-    /// Spread of the side without a possible handle, which is no evidence against roundness,
-    /// metres.
+    /// Standard deviation of the side without a possible handle, which is no evidence against
+    /// roundness, metres.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)

@@ -20,7 +20,7 @@ const LAID: (f64, usize) = (EDGE_M, 2);
 /// From: derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
-/// Least radius of a round body, metres. From: rounding.
+/// Minimum radius of a round body, metres. From: rounding.
 const LEAST_M: f64 = 0.01;
 
 /// Log likelihood of a body in a view, and its best shift along both axes of the surface, metres.

@@ -59,7 +59,7 @@ pub fn align(source: &Prepared, target: &Prepared, options: &RegisterOptions) ->
     })
 }
 
-/// The state of the iterations.
+/// State of the iterations.
 struct Progress {
     pose: Isometry3<f64>,
     centre: Point3<f64>,
@@ -91,7 +91,7 @@ fn check(source: &Prepared, target: &Prepared, options: &RegisterOptions) -> Res
     if finite { Ok(()) } else { Err(RegisterError::Start) }
 }
 
-/// The mean of the source's points under a pose.
+/// Mean of the source's points under a pose.
 fn middle(points: &[Point3<f32>], pose: &Isometry3<f64>) -> Point3<f64> {
     let sum = points.iter().fold(Vector3::zeros(), |sum, p| sum + p.coords.cast::<f64>());
     pose * Point3::from(sum / points.len().max(1) as f64)

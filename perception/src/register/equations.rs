@@ -140,7 +140,7 @@ impl Sums {
         Vector6::from(self.g)
     }
 
-    /// The normal matrix.
+    /// Normal matrix.
     pub(crate) fn information(&self) -> Matrix6<f64> {
         let mut full = Matrix6::zeros();
         let mut at = 0;

@@ -40,7 +40,7 @@ pub(crate) struct Found {
     miss_m2: f64,
 }
 
-/// The best round body about an axis along the surface.
+/// Best round body about an axis along the surface.
 ///
 /// Bounds of the points seen from above, the height that they rest on, and the spread of one measurement, metres.
 pub(crate) fn fit(points: &[Point3<f64>], bounds: &Rectangle, base_m: f64, sigma_m: f64) -> Option<Found> {

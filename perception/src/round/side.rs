@@ -85,7 +85,7 @@ impl SidePoints {
         SidePoints { origin: self.origin, x: pick(&self.x), y: pick(&self.y), z: pick(&self.z), len }
     }
 
-    /// Every n-th point as a judge, at most `count` of them.
+    /// Every n-th point, at most `count`, as the sample that scores circles.
     pub fn judges(&self, count: usize) -> Judges {
         let stride = self.len.div_ceil(count).max(1);
         let pick = |column: &[f32]| column[..self.len].iter().step_by(stride).copied().collect();

@@ -31,7 +31,7 @@ const BESIDE_M: f64 = 0.035;
 const FACING: f64 = 0.9;
 /// Minimum share of the voxels at the radius with radial normals. From: chosen.
 const ROUND_SHARE: f64 = 0.75;
-/// Fewest directions around an axis that must show the side: a third. From: chosen.
+/// Minimum number of directions around an axis that must show the side: a third. From: chosen.
 const LEAST_SECTORS: usize = 12;
 /// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;

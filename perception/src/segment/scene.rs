@@ -14,11 +14,11 @@ pub struct SceneOptions {
     /// Minimum height above the surface of an object's point, metres; rough surfaces raise it.
     /// From: chosen.
     pub clearance_m: f64,
-    /// Greatest height above the surface of a point that belongs to an object, metres.
+    /// Maximum height above the surface of a point that belongs to an object, metres.
     pub tallest_m: f64,
     /// Side of the voxels, metres. Objects that stand twice as far apart are always separate. From: chosen.
     pub voxel_m: f64,
-    /// Fewest points of an object. From: chosen.
+    /// Minimum number of points of an object. From: chosen.
     pub fewest_points: usize,
     /// Minimum height of an object's top above its support, metres. From: chosen.
     pub least_height_m: f64,
@@ -84,7 +84,7 @@ impl Segment {
 /// Surface with the objects on it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scene {
-    /// The surface that the objects stand on.
+    /// Surface that the objects stand on.
     pub surface: Surface,
     /// The objects, most points first.
     pub segments: Vec<Segment>,

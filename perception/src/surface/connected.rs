@@ -34,7 +34,7 @@ fn rank(cell: [i32; 2]) -> u64 {
 /// Cells of one column that hang together.
 struct Run {
     x: i32,
-    /// The first and the last.
+    /// First and the last.
     ends: [i32; 2],
     /// Index of the run's first cell among all cells in order, and its number of cells.
     at: usize,

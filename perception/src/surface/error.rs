@@ -3,7 +3,7 @@
 use super::level::Sign;
 use super::sample::FARTHEST_M;
 
-/// The reason no surface was found.
+/// Reason no surface was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
     /// Too few points to speak of a surface.
@@ -52,7 +52,7 @@ pub enum SurfaceError {
     Untold {
         /// Area of the largest, square metres.
         area_m2: f64,
-        /// The sign that leaves the role undecided.
+        /// Evidence that leaves the role undecided.
         because: Sign,
     },
     /// None of the requested surfaces is a support.

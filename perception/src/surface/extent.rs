@@ -54,7 +54,7 @@ pub(super) struct Hiding<'a> {
 /// A camera above a plane.
 struct Above<'a> {
     map: &'a DepthMap,
-    /// The height of the camera above the plane, metres.
+    /// Height of the camera above the plane, metres.
     high_m: f64,
     /// Corner of cell zero in the camera frame, metres; further fields: steps of one cell in x and
     /// in y.

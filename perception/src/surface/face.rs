@@ -19,7 +19,7 @@ const CELL_M: f64 = 0.03;
 const FULL: f64 = 2.0;
 const MANY: f64 = 1000.0;
 const WIDEST_CELL_M: f64 = 4.0 * CELL_M;
-/// Fewest samples of a piece of a plane. From: chosen.
+/// Minimum number of samples of a piece of a plane. From: chosen.
 const FEWEST_OF_PIECE: u32 = 5;
 
 /// Connected parts of a plane by decreasing returns; empty if no camera is above.

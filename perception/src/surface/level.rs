@@ -41,7 +41,7 @@ pub enum Sign {
     },
     /// Nothing lies lower, and a support lies above.
     Under {
-        /// The height of that surface above this one, metres.
+        /// Height of that surface above this one, metres.
         by_m: f64,
     },
     /// Nothing lies lower, and the surface is larger than tables.
@@ -53,14 +53,14 @@ pub enum Sign {
     LevelWithFloor,
     /// The surface is the top of something that stands on another surface.
     OnTop {
-        /// The height above that surface, metres.
+        /// Height above that surface, metres.
         by_m: f64,
     },
     /// The surface was seen through another one: a mirror image.
     Mirrored,
     /// The surface is a strip.
     Narrow {
-        /// The width of the strip, metres.
+        /// Width of the strip, metres.
         width_m: f64,
     },
     /// The surface is not level with the surfaces that hold most returns.
@@ -70,7 +70,7 @@ pub enum Sign {
     },
     /// Nothing lower was seen past the edge.
     NoEdge {
-        /// The mean height of the cameras above the surface, metres.
+        /// Mean height of the cameras above the surface, metres.
         eye_m: f64,
     },
     /// Nothing lies lower, and the viewpoint is unknown.
@@ -126,8 +126,8 @@ pub struct Surface {
     pub because: Sign,
     /// Height above the floor, metres, where the floor is in view.
     pub above_floor_m: Option<f64>,
-    /// The probability of the up direction that was assumed when the surface was found: one if the direction
-    /// was given, or no camera is known.
+    /// Probability of the up direction that was assumed when the surface was found: one if the
+    /// direction was given, or no camera is known.
     #[serde(default = "said")]
     pub up_chance: f64,
     /// Outlines of the other supports above this surface, metres in the world.
@@ -141,7 +141,7 @@ fn said() -> f64 {
 /// The outline and height of another surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Overhang {
-    /// The height above, metres.
+    /// Height above, metres.
     pub above_m: f64,
     /// Convex outline in the world, anticlockwise seen from above, metres.
     pub hull: Vec<Point3<f64>>,
@@ -202,7 +202,7 @@ impl Surface {
         low < APART_M && high > -APART_M && polygon::area(&common()) > COMMON * self.area_m2
     }
 
-    /// The surface in another frame.
+    /// Surface in another frame.
     pub fn moved(&self, there_from_world: &Isometry3<f64>) -> Surface {
         let up = there_from_world.rotation * self.up;
         let hull: Vec<Point3<f64>> = self.hull.iter().map(|p| there_from_world * p).collect();

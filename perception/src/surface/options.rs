@@ -14,11 +14,11 @@ pub struct SurfaceOptions {
     pub up: Option<Unit<Vector3<f64>>>,
     /// Most angle between the surface's normal and `up`, radians. From: chosen, 15°.
     pub tilt_rad: f64,
-    /// Least and greatest height of the surface along `up`, metres, if known.
+    /// Minimum and maximum height of the surface along `up`, metres, if known.
     pub height_band_m: Option<(f64, f64)>,
     /// The region of the surface as seen from above, if known: surfaces outside are not wanted.
     pub region: Option<Region>,
-    /// Least area of the surface, square metres. From: chosen.
+    /// Minimum area of the surface, square metres. From: chosen.
     pub least_area_m2: f64,
     /// Seed of the sampling. From: mark.
     pub seed: u64,

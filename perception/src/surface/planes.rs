@@ -7,7 +7,7 @@ use crate::scale::{self, floor};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rustc_hash::FxHashMap;
 
-/// Fewest points that make a surface. From: chosen.
+/// Minimum number of points that make a surface. From: chosen.
 pub(super) const FEWEST: usize = 50;
 /// Planes proposed in each round. From: chosen.
 const PROPOSALS: usize = 240;
@@ -99,7 +99,7 @@ pub(super) fn large_planes(
     }
 }
 
-/// The points of each cube.
+/// Points of each cube.
 struct Cubes {
     /// The cube of each point.
     of: Vec<u32>,
@@ -238,7 +238,7 @@ impl Judges {
     }
 }
 
-/// The best of planes through three neighbouring points.
+/// Best of planes through three neighbouring points.
 fn propose(
     left: &[Sample],
     cubes: &Cubes,

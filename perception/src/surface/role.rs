@@ -252,12 +252,12 @@ fn over(surface: &Surface, boards: &[&Surface]) -> Vec<Overhang> {
 }
 
 impl Surface {
-    /// The middle of its outline in the world.
+    /// Centre of the outline in the world.
     pub fn middle(&self) -> Point3<f64> {
         Point3::from(self.surface_from_world.inverse().translation.vector)
     }
 
-    /// Greatest extent of the outline, metres.
+    /// Maximum extent of the outline, metres.
     pub fn reach_m(&self) -> f64 {
         let pairs = self.hull.iter().flat_map(|a| self.hull.iter().map(move |b| (a - b).norm()));
         pairs.fold(0.0, f64::max)

@@ -56,7 +56,7 @@ const ANYHOW: f64 = 0.5;
 const THINGS: f64 = 10.0;
 const MANY: f64 = 0.05;
 
-/// The reason the up direction is undecided.
+/// Reason the up direction is undecided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Doubt {
     /// No plane is in view.

@@ -196,13 +196,13 @@ impl Building {
 pub struct Rig {
     /// Stride of sampled columns and rows.
     pub stride: usize,
-    /// Spread of disparities, pixels.
+    /// Standard deviation of disparities, pixels.
     pub disparity_sigma_px: f64,
     /// Share of pixels whose disparity is anything.
     pub mismatched: f64,
     /// Odometry error, as a share of the step.
     pub drift: f64,
-    /// Spread of the heading's error a step, radians.
+    /// Standard deviation of the heading's error a step, radians.
     pub turn_sigma_rad: f64,
 }
 
@@ -212,7 +212,7 @@ impl Default for Rig {
     }
 }
 
-/// The camera of a triclops: 640 x 480, base 10 cm, 1.2 m above the floor, level.
+/// Camera of a triclops: 640 x 480, base 10 cm, 1.2 m above the floor, level.
 pub const CAMERA: Intrinsics =
     Intrinsics { width: 640, height: 480, fx: 550.0, fy: 550.0, cx: 319.5, cy: 239.5 };
 const BASE_M: f64 = 0.1;
@@ -250,7 +250,7 @@ struct Hit {
 }
 
 impl Building {
-    /// The points that the camera measures from a pose, in the levelled frame of the camera.
+    /// Points that the camera measures from a pose, in the levelled frame of the camera.
     pub fn look(&self, truth: &Isometry2<f64>, rig: &Rig, draws: &mut Draws) -> Vec<Point3<f32>> {
         let mut points = Vec::new();
         for column in (0..CAMERA.width).step_by(rig.stride) {

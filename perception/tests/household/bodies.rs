@@ -44,7 +44,7 @@ pub(super) fn bow(x: f64, low: f64, high: f64, out: f64, radius_m: f64, paint: P
     knots.windows(2).map(rod).collect()
 }
 
-/// The names in the order of [`bodies`].
+/// Names in the order of [`bodies`].
 pub fn bodies() -> Vec<Body> {
     vec![
         muesli(),

@@ -61,7 +61,7 @@ impl Solid {
         }
     }
 
-    /// The first surface that the ray meets.
+    /// First surface that the ray meets.
     pub fn meet(&self, eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<Hit> {
         match *self {
             Solid::Block(half) => block(half, eye, ray),

@@ -110,9 +110,9 @@ fn ray<'a>(
 /// The differences of a run from the paper's.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
-    /// Least and greatest number of scans of an object.
+    /// Minimum and maximum number of scans of an object.
     pub scans: (usize, usize),
-    /// Spread of the laser's stated position along each axis, metres.
+    /// Standard deviation of the laser's stated position along each axis, metres.
     pub pose_sigma_m: f64,
     /// Standard deviation of the stated heading, radians.
     pub pose_sigma_rad: f64,
@@ -130,7 +130,7 @@ impl Default for Run {
 pub struct Lab {
     room: Vec<Vec<Point2<f64>>>,
     object: Vec<Vec<Point2<f64>>>,
-    /// The pose of the object in the map.
+    /// Pose of the object in the map.
     pub map_from_object: Isometry2<f64>,
 }
 

@@ -19,7 +19,7 @@ pub struct Device {
     pub holes: f64,
 }
 
-/// The camera of paper 004, with the noise of Nguyen et al.
+/// Camera of paper 004, with the noise of Nguyen et al.
 pub const KINECT: Device = Device {
     camera: Intrinsics { width: 640, height: 480, fx: 589.0, fy: 609.0, cx: 319.5, cy: 239.5 },
     axial: [0.0012, 0.0019],

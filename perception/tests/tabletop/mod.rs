@@ -133,7 +133,7 @@ fn nearest(things: &[Thing], eye: &Point3<f64>, ray: &Vector3<f64>) -> Option<f6
     best.is_finite().then_some(best)
 }
 
-/// The distance along a ray to the table's top or the floor; infinite if the ray meets neither.
+/// Distance along a ray to the table's top or the floor; infinite if the ray meets neither.
 fn bare(half_m: [f64; 2], eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
     let level = |(z, half): (f64, Option<[f64; 2]>)| {
         let t = (z - eye.z) / ray.z;

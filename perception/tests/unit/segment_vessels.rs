@@ -59,7 +59,7 @@ fn wall(from: usize, to: usize, shift_m: f64) -> Vec<Point3<f64>> {
     (0..4800).map(at).collect()
 }
 
-/// The number of parts that remain of two.
+/// Number of parts that remain of two.
 fn count(parts: [Vec<Point3<f64>>; 2]) -> usize {
     let mut from = 0;
     let parts = parts.map(|points| {

@@ -16,7 +16,7 @@ pub(super) enum Origin {
     Fact(VariableId, u32),
     /// The number.
     Number(NumericId),
-    /// The object that the variable's value means.
+    /// Object that the variable's value means.
     Object(VariableId),
     /// Constant, equal in every state.
     Constant(FactValue),

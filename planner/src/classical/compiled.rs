@@ -11,7 +11,7 @@ use super::numbers::{Numbers, is_plain};
 /// Candidate factors that make all costs whole numbers; if none does, costs are scaled by the first
 /// and rounded for the search. Plans report exact costs.
 const COST_SCALES: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
-/// Greatest distance from a whole number at which a number counts as whole.
+/// Maximum distance from a whole number at which a number counts as whole.
 const WHOLE: f64 = 1e-6;
 /// Costs above this are scaled down for the search.
 const LARGEST_COST: f64 = 1.0e6;
@@ -128,7 +128,7 @@ pub struct Compiled {
     pub axioms_with: Lists<u32>,
     /// Goal facts.
     pub goal: Vec<Fact>,
-    /// The first state, derived variables included.
+    /// First state, derived variables included.
     pub initial: Vec<u32>,
     /// Predicate or function by fact; `u32::MAX` for "none of these atoms".
     pub symbols: Vec<u32>,
@@ -170,7 +170,7 @@ fn contested(task: &GroundTask) -> Vec<bool> {
 }
 
 impl Compiled {
-    /// The task in flat arrays, for tasks that [`is_classical`].
+    /// Task in flat arrays, for tasks that [`is_classical`].
     pub fn new(task: &GroundTask) -> Compiled {
         let compared = std::iter::repeat_n(2, task.comparisons.len());
         let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).chain(compared).collect();
@@ -331,7 +331,7 @@ impl Compiled {
         self.goal.iter().all(|f| state[f.variable as usize] == f.value)
     }
 
-    /// The state after the operator, derived variables up to date.
+    /// State after the operator, derived variables up to date.
     pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut Vec<u32>) {
         next.clear();
         next.extend_from_slice(state);

@@ -282,13 +282,13 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// The number of a written numeric fluent.
+    /// Number of a written numeric fluent.
     pub(super) fn numeric(&mut self, named: &Named, binding: &[u32]) -> u32 {
         let arguments = named.terms.iter().map(|t| t.bound(binding)).collect();
         self.numeric_id(NumericFluent { function: named.index, arguments })
     }
 
-    /// The number of a numeric fluent by name.
+    /// Number of a numeric fluent by name.
     pub(super) fn numeric_id(&mut self, fluent: NumericFluent) -> u32 {
         let next = self.numerics.len() as u32;
         let id = *self.numeric_ids.entry(fluent.clone()).or_insert(next);

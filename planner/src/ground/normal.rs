@@ -18,7 +18,7 @@ pub(super) enum Term {
 }
 
 impl Term {
-    /// The object under a complete binding.
+    /// Object under a complete binding.
     pub(super) fn bound(self, binding: &[u32]) -> u32 {
         match self {
             Term::Slot(slot) => binding[slot as usize],
@@ -522,7 +522,7 @@ pub(super) fn normalise(task: &Task) -> Normal {
 /// Term that an effect module writes, over the module's parameters.
 pub(super) enum Target {
     Number(Named),
-    /// An atom.
+    /// Truth of an atom.
     Truth(Pattern),
     /// An object function: the pattern lacks the value.
     Object(Pattern),

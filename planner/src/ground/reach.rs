@@ -12,7 +12,7 @@ use super::normal::{Formula, Pattern, Term};
 
 /// A rule of the relaxed task.
 pub(super) struct Rule {
-    /// The objects of each slot.
+    /// Objects of each slot.
     pub domains: Vec<Arc<[ObjectId]>>,
     pub body: Vec<Pattern>,
     /// Conditions beyond the body, tested when everything is bound.

@@ -60,7 +60,7 @@ pub struct Variable {
 }
 
 impl Variable {
-    /// The number of values.
+    /// Number of values.
     pub fn domain_size(&self) -> u32 {
         self.values.len() as u32
     }
@@ -86,7 +86,7 @@ pub struct NumericFluent {
 pub enum Expression {
     /// A number.
     Constant(f64),
-    /// The value of a numeric fluent.
+    /// Value of a numeric fluent.
     Fluent(NumericId),
     /// The answer of an attachment.
     Call(CallId),
@@ -96,7 +96,7 @@ pub enum Expression {
     TotalTime,
     /// Number of a preference's violations; only in metrics.
     Violated(u32),
-    /// The sum of all.
+    /// Sum of all.
     Sum(Vec<Expression>),
     /// The product of all.
     Product(Vec<Expression>),

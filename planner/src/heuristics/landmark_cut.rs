@@ -204,7 +204,7 @@ impl LandmarkCut {
     }
 }
 
-/// The sum of two costs; a fact whose cost cannot be counted stays reachable.
+/// Sum of two costs; a fact whose cost cannot be counted stays reachable.
 fn sum(one: u32, other: u32) -> u32 {
     one.saturating_add(other).min(NONE - 1)
 }

@@ -10,9 +10,9 @@ use crate::classical::compiled::{Compiled, Lists};
 use crate::ground::Fact;
 use crate::memory::Rows;
 
-/// Most facts of a disjunctive landmark.
+/// Maximum number of facts of a disjunctive landmark.
 const MOST_ALTERNATIVES: usize = 4;
-/// Most landmarks.
+/// Maximum number of landmarks.
 const MOST_LANDMARKS: usize = 20_000;
 /// Number of examined operators after which first achievers are no longer distinguished from later
 /// ones.
@@ -271,7 +271,7 @@ impl<'a> Find<'a> {
     }
 }
 
-/// Most steps of looking for cycles among orderings.
+/// Maximum number of steps of looking for cycles among orderings.
 const ORDERING_WORK: usize = 5_000_000;
 
 /// Orders a landmark before others that it would have to delete: goals, and facts needed together

@@ -8,7 +8,7 @@ pub(crate) enum Part<'t> {
     Condition(&'t Condition),
     Expression(&'t Expression),
     Call(&'t Call),
-    /// The value of a function, read or changed.
+    /// Value of a function, read or changed.
     Fluent(&'t Fluent),
     /// Change by an effect.
     Change(&'t Change),

@@ -19,7 +19,7 @@ pub struct Name {
 /// Entry of a typed list, such as `?x - (either car truck)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Typed {
-    /// The name that is declared.
+    /// Name that is declared.
     pub name: Name,
     /// Types, the alternatives of an `either`; empty if untyped.
     pub types: Vec<Name>,
@@ -50,7 +50,7 @@ pub struct ModuleDeclaration {
     pub signature: Signature,
     /// The fluents that an effect module writes.
     pub writes: Vec<Term>,
-    /// The kind of the module.
+    /// Kind of the module.
     pub kind: CallKind,
     /// The token `fn@lib.so`.
     pub function: Name,
@@ -269,7 +269,7 @@ pub enum Effect {
     },
     /// `(increase (f a) e)`, …
     Assign {
-        /// The kind of change.
+        /// Kind of change.
         assignment: Assignment,
         /// The fluent that changes.
         fluent: Term,
@@ -287,7 +287,7 @@ pub enum Effect {
 /// Bound on a duration, `(<= ?duration e)`, at start or end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DurationBound {
-    /// The time at which the bound is evaluated.
+    /// Time at which the bound is evaluated.
     pub when: When,
     /// Comparison with `?duration` on the left-hand side.
     pub comparison: Comparison,
@@ -387,7 +387,7 @@ pub enum Initial {
     At(f64, Box<Initial>),
 }
 
-/// The value of a function in the initial state.
+/// Value of a function in the initial state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialValue {
     /// A number, and the word, which may be an object's name.

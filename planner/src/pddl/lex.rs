@@ -69,7 +69,7 @@ impl Symbols {
         self.find(name).is_some_and(|symbol| self.predicates.contains(&symbol))
     }
 
-    /// The number of symbols.
+    /// Number of symbols.
     pub fn len(&self) -> usize {
         self.names.len()
     }
@@ -80,7 +80,7 @@ impl Symbols {
     }
 }
 
-/// The kind of a node.
+/// Kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// `( … )`
@@ -205,7 +205,7 @@ struct Builder<'a> {
     tree: Tree,
     /// Open nodes, outermost first.
     open: Vec<usize>,
-    /// The last parenthesis that closed an action or the whole definition.
+    /// Last parenthesis that closed an action or the whole definition.
     last_close: Option<u32>,
     /// The action closed last, directly in the definition.
     last_action: Option<usize>,

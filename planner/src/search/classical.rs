@@ -68,7 +68,7 @@ pub(crate) fn plan_classical(
     })
 }
 
-/// The plan in the words of the task.
+/// Plan in the words of the task.
 pub(crate) fn named(task: &Task, grounded: &GroundTask, operators: &[u32]) -> Plan {
     let steps = operators.iter().map(|&operator| {
         let origin = &grounded.actions[operator as usize].origin;

@@ -25,7 +25,7 @@ impl Queue {
         }
     }
 
-    /// The first entry, or the `newest`.
+    /// First entry, or the `newest`.
     fn pop(&mut self, newest: bool) -> Option<Entry> {
         let piece = if newest { self.pieces.back_mut() } else { self.pieces.front_mut() }?;
         let entry = if newest { piece.pop_back() } else { piece.pop_front() };

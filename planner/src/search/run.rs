@@ -55,7 +55,7 @@ pub struct ClassicalOutcome {
     pub work: u64,
 }
 
-/// The reason a classical search ended.
+/// Reason a classical search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClassicalEnd {
     /// Search ended with a plan as requested.

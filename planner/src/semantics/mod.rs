@@ -90,7 +90,7 @@ pub struct Semantics<'a> {
     pub task: &'a Task,
     /// Attachments that implement its modules.
     pub attachments: &'a Attachments,
-    /// The name under which each module's attachment is registered.
+    /// Name under which each module's attachment is registered.
     bound: Vec<String>,
     object_names: Vec<Arc<str>>,
     module_names: Vec<Arc<str>>,

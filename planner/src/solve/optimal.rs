@@ -124,7 +124,7 @@ fn of_the_metric(task: &Task, fault: &str, help: &str) -> Diagnostic {
 /// Search of a grounded task.
 struct Search<'a> {
     task: &'a Task,
-    /// The task without preferences and constraints.
+    /// Task without preferences and constraints.
     searched: &'a Task,
     grounded: &'a GroundTask,
     flat: &'a Compiled,

@@ -177,7 +177,7 @@ impl World<'_> {
         Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
-    /// The state after the start, and the durations possible.
+    /// State after the start, and the durations possible.
     fn started(&self, from: &Situation, step: &Step) -> Result<Option<(Values, Span)>, Failure> {
         let act = &self.acts[step.act as usize];
         let mut moment = Moment {

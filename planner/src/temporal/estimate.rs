@@ -31,7 +31,7 @@ pub(crate) struct Estimate {
     pub plan: Vec<(u32, Part)>,
 }
 
-/// The state to estimate from.
+/// State to estimate from.
 pub(crate) struct From<'f> {
     /// Facts and numbers.
     pub state: &'f Values,

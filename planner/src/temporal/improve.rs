@@ -51,14 +51,14 @@ pub(crate) struct Progress {
     pub reason: Reason,
     /// Effort of the search.
     pub counts: Counts,
-    /// The number of plans found.
+    /// Number of plans found.
     pub plans: u64,
     /// Actions that might help if they overlap themselves, after exhausting every other
     /// possibility.
     pub overlapping: Vec<u32>,
 }
 
-/// The reason a search for plans ended.
+/// Reason a search for plans ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
     /// Search space exhausted: without a plan, none exists, unless self-overlapping actions allow
@@ -548,7 +548,7 @@ impl Run<'_, '_, '_> {
     }
 }
 
-/// Least difference that counts as better: above the rounding of sums of times.
+/// Minimum difference that counts as better: above the rounding of sums of times.
 fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
 }

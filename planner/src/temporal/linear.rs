@@ -35,7 +35,7 @@ const MOST_WORK: u64 = 10_000_000;
 const MOST_BYTES: u64 = 100 << 20;
 /// Extra evaluations for better plans, besides as many as the first one took.
 const MORE: u64 = 100;
-/// Least difference that counts as better.
+/// Minimum difference that counts as better.
 const TOLERANCE: f64 = 1e-6;
 /// Weight of the makespan as a tie-breaker for a metric without it.
 const TIME_WEIGHT: f64 = 1e-4;
@@ -100,7 +100,7 @@ struct Node {
     steps: Vec<(u32, u32, Option<u32>)>,
 }
 
-/// The next happening of a node.
+/// Next happening of a node.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Start(u32),

@@ -29,7 +29,7 @@ pub(crate) struct Manner {
     /// True to distinguish equal states with different temporal options; then nothing is lost, and
     /// exhaustion is a proof.
     pub exact: bool,
-    /// The number of times one action may be in progress at once.
+    /// Number of times one action may be in progress at once.
     pub at_once: usize,
 }
 

@@ -71,12 +71,12 @@ impl Order {
         }
     }
 
-    /// The earliest time of a happening.
+    /// Earliest time of a happening.
     pub fn earliest_s(&self, happening: u32) -> f64 {
         self.earliest_s[happening as usize]
     }
 
-    /// The number of happenings.
+    /// Number of happenings.
     pub fn len(&self) -> usize {
         self.earliest_s.len()
     }
@@ -154,7 +154,7 @@ impl Order {
         self.fixed.iter().any(|&(node, _)| node as usize == happening)
     }
 
-    /// The time of the last happening that is not given from outside.
+    /// Time of the last happening that is not given from outside.
     pub fn makespan_s(&self) -> f64 {
         let own = self.earliest_s.iter().enumerate().filter(|&(index, _)| !self.is_given(index));
         own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))

@@ -37,7 +37,7 @@ impl Linear {
         self.constant.is_finite()
     }
 
-    /// The sum with a multiple of another number.
+    /// Sum with a multiple of another number.
     pub fn plus(&self, factor: f64, other: &Linear) -> Linear {
         let mut terms = self.terms.clone();
         for &(variable, other) in &other.terms {
@@ -55,7 +55,7 @@ impl Linear {
         Linear::constant(0.0).plus(factor, self)
     }
 
-    /// The value under an assignment of the variables.
+    /// Value under an assignment of the variables.
     pub fn value(&self, values: &[f64]) -> f64 {
         self.terms
             .iter()
@@ -119,7 +119,7 @@ impl Program {
         self.bounds.len() as u32 - 1
     }
 
-    /// The number of comparisons that depend on variables.
+    /// Number of comparisons that depend on variables.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }

@@ -81,7 +81,7 @@ pub(super) struct Waiter {
     pub(super) step: f64,
 }
 
-/// Least duration of an operator, seconds.
+/// Minimum duration of an operator, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Seconds {
     /// Constant, seconds; infinite if the action can never be applied.

@@ -332,7 +332,7 @@ pub struct Base {
     pub situation: Situation,
     /// Additive costs so far.
     pub costs: f64,
-    /// The steps so far, in time.
+    /// Steps so far, in time.
     pub track: Track,
     /// Schedule for tasks whose times never shift.
     pub clock: Clock,
@@ -345,7 +345,7 @@ pub struct Track {
     pub order: Order,
     /// Start of each step's action, and its end if known; `None` for ends and timed effects.
     pub actions: Vec<Option<(u32, Option<u32>)>>,
-    /// The first happening since something was in progress without interruption.
+    /// First happening since something was in progress without interruption.
     epoch: usize,
     open: Vec<Started>,
     timed: usize,

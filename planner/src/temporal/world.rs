@@ -214,7 +214,7 @@ impl<'a> World<'a> {
         self.acts.iter().any(chooses_cost)
     }
 
-    /// The first state, with derived variables up to date.
+    /// First state, with derived variables up to date.
     pub fn initial(&self) -> Result<Values, Failure> {
         let mut state = self.ground.initial.clone();
         self.derive(&mut state)?;

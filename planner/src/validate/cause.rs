@@ -33,7 +33,7 @@ pub enum Cause {
     },
 }
 
-/// The time at which a condition of a step must hold.
+/// Time at which a condition of a step must hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
@@ -78,7 +78,7 @@ impl Moment {
     }
 }
 
-/// The reason a replay stopped.
+/// Reason a replay stopped.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub reason: String,

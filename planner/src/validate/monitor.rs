@@ -12,7 +12,7 @@ use crate::plan::Plan;
 use crate::semantics::{CallFailure, Semantics};
 use crate::task::Task;
 
-/// The reason the rest of a plan no longer reaches the goal.
+/// Reason the rest of a plan no longer reaches the goal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Broken {
     /// The step at fault, counted from 0 in the rest; `None` if the goal itself is missed.

@@ -63,12 +63,13 @@ macro_rules! attempt {
     };
 }
 
-/// The last moment of a replay.
+/// Last moment of a replay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
     /// The end of the last step.
     LastStep,
-    /// The last timed literal, or the end of the last step if that is later: where PDDL 2.2 judges the goal.
+    /// Last timed literal, or the end of the last step if that is later: where PDDL 2.2 judges the
+    /// goal.
     LastHappening,
 }
 
@@ -477,7 +478,7 @@ impl Replay<'_, '_> {
         Ok(Ok(changes))
     }
 
-    /// The state once a part of some changes has come about.
+    /// State once a part of some changes has come about.
     fn moved(&self, changes: &Changes, part: f64) -> Outcome<State> {
         let mut partly = changes.clone();
         partly.numbers.iter_mut().for_each(|(_, _, amount, _)| *amount *= part);

@@ -6,7 +6,7 @@ use crate::model::automaton::Automaton;
 use crate::semantics::{Binding, CallFailure, Semantics, Why};
 use crate::task::{Modal, Trajectory};
 
-/// The first hard constraint that is broken.
+/// First hard constraint that is broken.
 pub(super) fn broken_constraint(
     semantics: &Semantics<'_>,
     replayed: &Replayed,
@@ -31,7 +31,7 @@ pub(super) fn broken_constraint(
     Ok(None)
 }
 
-/// The number of violations of each preference.
+/// Number of violations of each preference.
 pub(super) fn violations(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Vec<f64>, CallFailure> {
     let mut counts = replayed.violations.clone();
     for (index, preference) in semantics.task.preferences.iter().enumerate() {

@@ -221,7 +221,7 @@ impl<'t> Oracle<'t> {
         self.holds(&self.task.goal, true, state, &mut Vec::new())
     }
 
-    /// The value of the metric.
+    /// Value of the metric.
     pub fn metric(&self, state: &State) -> Option<f64> {
         self.number(self.task.metric.as_ref()?, state, &[], 0.0)
     }
@@ -350,7 +350,8 @@ impl<'t> Oracle<'t> {
         duration_s >= least - 1e-3 && duration_s <= most + 1e-3
     }
 
-    /// The last state of a plan, if all of it can happen; `timed` tells a plan with times from a plain sequence.
+    /// Last state of a plan, if all of it can happen; `timed` tells a plan with times from a plain
+    /// sequence.
     pub fn replay(&self, plan: &[Step], timed: bool) -> Option<State> {
         let mut events: Vec<(f64, Event)> = Vec::new();
         for (index, step) in plan.iter().enumerate() {

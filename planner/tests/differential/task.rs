@@ -68,7 +68,7 @@ pub struct Effect {
 #[derive(Debug, Clone)]
 pub struct Action {
     pub parameters: Vec<usize>,
-    /// Least and greatest duration.
+    /// Minimum and maximum duration.
     pub duration: Option<[Number; 2]>,
     pub condition: [Option<Formula>; 3],
     pub effects: Vec<Effect>,

@@ -91,7 +91,7 @@ struct Action {
 struct Constraint {
     operator: &'static str,
     conditions: Vec<Formula>,
-    /// The index of its preference, if it is one.
+    /// Index of its preference, if it is one.
     preference: Option<usize>,
     forall: bool,
 }
@@ -209,7 +209,7 @@ impl Made {
         action.condition.holds(state, own).then_some(state & !deletes | adds)
     }
 
-    /// The value of a plan; `None` where it is no plan.
+    /// Value of a plan; `None` where it is no plan.
     fn value(&self, steps: &[(usize, usize)]) -> Option<f64> {
         let mut states = vec![self.initial];
         let mut value = steps.len() * self.per_step;
@@ -232,7 +232,7 @@ impl Made {
         self.goal.holds(states[states.len() - 1], 0).then_some(value as f64)
     }
 
-    /// The best value of the plans that begin so and have at most so many steps more.
+    /// Best value of the plans that begin so and have at most so many steps more.
     fn best(&self, steps: &mut Vec<(usize, usize)>, state: u8, left: usize) -> Option<f64> {
         let mut best = self.value(steps);
         if left == 0 {

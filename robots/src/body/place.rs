@@ -20,7 +20,7 @@ impl Pose2 {
         Pose2 { x_m, y_m, yaw_rad }
     }
 
-    /// The pose at (`x_m`, `y_m`) that faces `point`.
+    /// Pose at (`x_m`, `y_m`) that faces `point`.
     pub fn facing(x_m: f64, y_m: f64, point: &Point2<f64>) -> Self {
         Pose2 { x_m, y_m, yaw_rad: (point.y - y_m).atan2(point.x - x_m) }
     }
@@ -30,7 +30,7 @@ impl Pose2 {
         Point2::new(self.x_m, self.y_m)
     }
 
-    /// The pose in space: z is zero, upright.
+    /// Pose in space: z is zero, upright.
     pub fn isometry(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.x_m, self.y_m, 0.0),

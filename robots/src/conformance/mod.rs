@@ -132,7 +132,7 @@ fn above_zero(x: f64) -> bool {
     x.is_finite() && x > 0.0
 }
 
-/// The names of the frames of a body.
+/// Names of the frames of a body.
 fn frames(body: &Description) -> Vec<&str> {
     let camera = body.camera.as_ref().map(|camera| camera.frame.as_str());
     let laser = body.laser.as_ref().map(|laser| laser.frame.as_str());

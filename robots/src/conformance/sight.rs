@@ -133,8 +133,8 @@ fn view(look: &Sensed) -> View {
     }
 }
 
-/// The number of points within a surface's outline at which a view shows it, and at which it shows something
-/// behind it. Objects on or in front of the surface do not count.
+/// Number of points within a surface's outline at which a view shows it, and at which it shows
+/// something behind it. Objects on or in front of the surface do not count.
 fn shown(surface: &SurfaceHint, look: &Sensed) -> (usize, usize) {
     let middle = middle(surface);
     let (mut there, mut through) = (0, 0);

@@ -65,7 +65,7 @@ fn area(corners: &[Point2<f64>]) -> f64 {
     doubled.abs() / 2.0
 }
 
-/// The first two crossing edges, by their starting corners, counted from 1.
+/// First two crossing edges, by their starting corners, counted from 1.
 fn crossing(corners: &[Point2<f64>]) -> Option<(usize, usize)> {
     let n = corners.len();
     let edge = |i: usize| (corners[i], corners[(i + 1) % n]);

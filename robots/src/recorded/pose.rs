@@ -101,7 +101,7 @@ pub(crate) fn listed_poses(file: &str, text: &str) -> Result<Vec<MaybePose>, Inp
         .collect()
 }
 
-/// The pose of `tx ty tz qx qy qz qw` at a byte of a text.
+/// Pose of `tx ty tz qx qy qz qw` at a byte of a text.
 pub(crate) fn of_seven(
     file: &str,
     text: &str,
@@ -120,7 +120,8 @@ pub(crate) fn of_seven(
     Ok(Some(Isometry3::from_parts(Vector3::new(x, y, z).into(), rotation)))
 }
 
-/// The pose at a time between two poses that are at most `gap_s` apart, or at the time of one. Poses are in order of time, seconds.
+/// Pose at a time between two poses that are at most `gap_s` apart, or at the time of one. Poses
+/// are in order of time, seconds.
 pub(crate) fn interpolated(
     poses: &[(f64, Isometry3<f64>)],
     stamp_s: f64,

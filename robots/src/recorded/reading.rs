@@ -16,7 +16,8 @@ const TOLERANCE: f64 = 0.02;
 const LEAST_AGREEMENT: f64 = 0.6;
 /// Difference of two shares below which they count as equal. From: chosen.
 pub(crate) const MARGIN: f64 = 0.1;
-/// Least share of the points that must meet a measurement of the other view before a share says anything. From: chosen.
+/// Minimum share of the points that must meet a measurement of the other view before a share says
+/// anything. From: chosen.
 const LEAST_OVERLAP: f64 = 0.05;
 /// Share of points unchanged between two views, above which the pair is uninformative about motion.
 /// From: chosen.
@@ -90,7 +91,7 @@ impl Axes {
 /// Meaning of the numbers of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conventions {
-    /// Direction of the poses.
+    /// Convention of the poses: world-from-camera or camera-from-world.
     pub poses: Poses,
     /// Axes of the camera.
     pub axes: Axes,
@@ -150,7 +151,7 @@ fn rounded(scale: f64) -> f64 {
 /// Choices that the user has made.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Given {
-    /// Direction of the poses.
+    /// Convention of the poses: world-from-camera or camera-from-world.
     pub poses: Option<Poses>,
     /// Axes of the camera.
     pub axes: Option<Axes>,
@@ -203,7 +204,7 @@ impl StatedView {
         (0..pixels).step_by(step).map(at).filter(|(_, _, d)| d.is_finite() && *d > 0.0)
     }
 
-    /// Least and greatest stored depth around a pixel.
+    /// Minimum and maximum stored depth around a pixel.
     fn around(&self, pixel: usize) -> Option<(f64, f64)> {
         let (width, height) = (self.depth.width, self.depth.height);
         let (column, row) = (pixel % width, pixel / width);

@@ -97,7 +97,7 @@ pub trait Tape: Send + Sync {
     /// The reason for which it cannot be stored.
     fn keep(&self, entry: &Entry) -> Result<(), String>;
 
-    /// The pixels of a stored frame.
+    /// Pixels of a stored frame.
     ///
     /// # Errors
     /// The reason for which they cannot be read.

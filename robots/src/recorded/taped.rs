@@ -92,8 +92,8 @@ impl TapedRobot {
         &self.known
     }
 
-    /// The reason for which the replay stopped: the tape ends there, or differs from the requests. None if it
-    /// did not stop.
+    /// Reason for which the replay stopped: the tape ends there, or differs from the requests. None
+    /// if it did not stop.
     pub fn ended(&self) -> Option<String> {
         self.lock().ended.clone()
     }
@@ -124,7 +124,7 @@ impl TapedRobot {
         self.tape.keep(entry).map_err(|because| Failure::Broken { because })
     }
 
-    /// The next answer on the tape, if it matches this request.
+    /// Next answer on the tape, if it matches this request.
     fn next(&self, request: &Request) -> Result<Option<Entry>, Failure> {
         let mut state = self.lock();
         let on_tape = state.played.front().map(|entry| entry.done.clone());

@@ -30,7 +30,7 @@ const FIELD_OF_VIEW_DEG: (f64, f64) = (57.0, 43.0);
 const IMAGE: (usize, usize) = (640, 480);
 const CAMERA_HEIGHT_M: f64 = 1.4;
 
-/// The camera of the published set-up: 640x480, 57° x 43°.
+/// Camera of the published set-up: 640x480, 57° x 43°.
 pub fn intrinsics() -> Intrinsics {
     let (width, height) = IMAGE;
     let focal = |pixels: usize, field_deg: f64| 0.5 * pixels as f64 / (0.5 * field_deg.to_radians()).tan();
@@ -44,7 +44,7 @@ pub fn intrinsics() -> Intrinsics {
     }
 }
 
-/// The camera with its range.
+/// Camera with its range.
 pub fn camera() -> Camera {
     Camera {
         frame: "camera".into(),

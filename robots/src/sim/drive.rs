@@ -21,8 +21,8 @@ pub struct DriveStep {
     pub metres: f64,
 }
 
-/// The steps of a route: for each line a turn on the spot, then straight on; finally a turn to the goal's
-/// heading. Their durations add up to that of the route.
+/// Steps of a route: for each line a turn on the spot, then straight on; finally a turn to the
+/// goal's heading. Their durations add up to that of the route.
 pub fn steps(from: &Pose2, route: &Route, goal: &Pose2, speeds: &Speeds) -> Vec<DriveStep> {
     let mut steps = Vec::new();
     let mut heading_rad = from.yaw_rad;

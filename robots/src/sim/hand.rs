@@ -36,7 +36,7 @@ pub(crate) enum Taken {
     Nothing,
     /// The object is wider than the hand opens.
     TooWide(usize),
-    /// The object slipped and stands, perhaps slightly displaced.
+    /// Object slipped and stands, perhaps slightly displaced.
     Slid(usize),
     /// The object is in the hand.
     Held(usize),

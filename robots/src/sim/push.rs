@@ -28,7 +28,7 @@ const STEP_M: f64 = 0.005;
 pub enum Effect {
     /// There was no object.
     Nothing,
-    /// The object moved, until the distance was reached, an obstacle was felt, or the hand slid off.
+    /// Object moved, until the distance was reached, an obstacle was felt, or the hand slid off.
     Moved {
         /// Index of the object.
         object: usize,

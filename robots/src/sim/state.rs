@@ -98,9 +98,9 @@ impl State {
         }
     }
 
-    /// The first step that brings the footprint into an unmapped obstacle, and the obstacle's index. A
-    /// touched obstacle stops only steps towards it, and no turns: a turn on the spot shifts the modelled
-    /// true position of a base with a wrong estimate, although the base does not move.
+    /// First step that brings the footprint into an unmapped obstacle, and the obstacle's index. A
+    /// touched obstacle stops only steps towards it, and no turns: a turn on the spot shifts the
+    /// modelled true position of a base with a wrong estimate, although the base does not move.
     pub fn first_bump(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.map_from_base().translation.vector.xy().into();
         for (i, step) in steps.iter().enumerate() {
@@ -117,7 +117,7 @@ impl State {
         None
     }
 
-    /// The object in the hand.
+    /// Object in the hand.
     pub fn held(&self) -> Option<usize> {
         self.scene.objects.iter().position(|o| o.stands == Stand::Hand)
     }
@@ -147,8 +147,8 @@ impl State {
         }
     }
 
-    /// The first step that brings the footprint into a shut door, and the door's index. The base detects
-    /// doors where its map has them, so the planned pose counts.
+    /// First step that brings the footprint into a shut door, and the door's index. The base
+    /// detects doors where its map has them, so the planned pose counts.
     pub fn first_shut_door(&self, steps: &[drive::DriveStep], radius_m: f64) -> Option<(usize, usize)> {
         let mut before = self.estimate.point();
         for (i, step) in steps.iter().enumerate() {

@@ -94,7 +94,7 @@ pub struct Scene {
     pub title: String,
     /// The bounding rectangle of all rooms.
     pub room: RoomSpec,
-    /// The rooms with names.
+    /// Rooms with names.
     pub rooms: Vec<RoomSpec>,
     /// Walls between them.
     pub walls: Vec<Wall>,
@@ -147,13 +147,13 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// The first hit of a ray in the solid's own frame.
+    /// First hit of a ray in the solid's own frame.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         self.meet(o, d, before).map(|(hit, _)| hit)
     }
 
-    /// The first hit of a ray in the solid's own frame, with the index of the part.
+    /// First hit of a ray in the solid's own frame, with the index of the part.
     #[inline]
     pub fn meet(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<(Hit, usize)> {
         let mut nearest = None;
@@ -413,19 +413,19 @@ impl Scene {
         self.rooms.iter().find(|r| r.holds(p, 0.0)).map(|r| r.name.as_str())
     }
 
-    /// The surface of that name.
+    /// Surface of that name.
     pub fn surface(&self, name: &str) -> Option<&SurfaceSpec> {
         self.surfaces.iter().find(|s| s.name == name)
     }
 
-    /// The object of that name.
+    /// Object of that name.
     pub fn object(&self, name: &str) -> Option<&Object> {
         self.objects.iter().find(|o| o.name == name)
     }
 }
 
 impl Object {
-    /// The object as a solid for ray casting.
+    /// Object as a solid for ray casting.
     pub fn solid(&self, label: u16) -> Solid {
         let (parts, paints) = self.shape.painted(self.colour).into_iter().unzip();
         Solid {

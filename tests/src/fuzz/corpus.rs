@@ -10,7 +10,7 @@ use descry_perception::nalgebra::Point3;
 
 use super::judges::FILE;
 
-/// The files of a folder of the tree, sorted, with those of its folders.
+/// Files of a folder of the tree, sorted, with those of its folders.
 fn below(folder: &str) -> Vec<PathBuf> {
     fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -24,7 +24,7 @@ use descry_robots::{Place, Pose2, Robot, Watch};
 /// Separator between the files of a multi-file input: a line with the next file's name.
 pub const FILE: &str = ";;; file ";
 
-/// The files of an input, by name.
+/// Files of an input, by name.
 fn files(text: &str) -> BTreeMap<&str, &str> {
     text.split(FILE)
         .filter_map(|part| part.split_once('\n'))

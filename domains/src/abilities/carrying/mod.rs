@@ -148,7 +148,7 @@ fn hand_free(s: &Situation) -> Vec<String> {
     if s.held.is_none() { vec!["(hand-free)".into()] } else { Vec::new() }
 }
 
-/// The object in the hand.
+/// Object in the hand.
 fn held(s: &Situation) -> Option<&Track> {
     let held = s.held.as_ref()?;
     s.belief.tracks.iter().find(|t| t.id == held.track)
@@ -163,7 +163,7 @@ fn standing<'a>(s: &'a Situation, thing: &str, surface: &str) -> Option<&'a Trac
     there.max_by(|a, b| p(a).total_cmp(&p(b))).filter(|t| p(t) >= s.threshold)
 }
 
-/// The middle of an object's body.
+/// Middle of an object's body.
 fn middle(s: &Situation, track: &Track) -> Point3<f64> {
     let up = s.surface_of(track).map_or_else(Vector3::z, |on| s.surfaces[on].up);
     track.position_m + up * (0.5 * track.size_m[2])

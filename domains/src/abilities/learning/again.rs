@@ -18,7 +18,7 @@ use crate::surface::KnownSurface;
 
 /// Maximum range of depth returns used for recognition, metres.
 const RANGE_M: f64 = 3.0;
-/// The number of newest cameras from which the merged views are examined.
+/// Number of newest cameras from which the merged views are examined.
 const TOGETHER: usize = 3;
 /// Guesses of all views together that are looked at, the surest first.
 const GUESSES: usize = 12;
@@ -265,7 +265,7 @@ pub(super) fn explain(
     explained
 }
 
-/// Greatest extent of a percept together with near neighbours that may belong to the same object,
+/// Maximum extent of a percept together with near neighbours that may belong to the same object,
 /// metres.
 fn together_m(percept: &Percept, all: &[Percept]) -> f64 {
     let reach = |p: &Percept| 0.5 * p.size_m[0].hypot(p.size_m[1]);

@@ -26,7 +26,7 @@ const MISSED: [(f64, f64); 2] = [(0.02, 0.01), (f64::INFINITY, 0.15)];
 /// Probability that a stranger is taken for one of five known shapes, by looseness of the outline
 /// (metres): measured with 210 strangers, scanned until that looseness or until one shape was left.
 const TAKEN_FOR_KNOWN: [(f64, f64); 4] = [(0.01, 0.07), (0.02, 0.10), (0.16, 0.16), (f64::INFINITY, 0.60)];
-/// The number of known shapes in that measurement.
+/// Number of known shapes in that measurement.
 const MEASURED_WITH: f64 = 5.0;
 
 /// Objects found by the laser outside the map, and the named shapes.

@@ -56,7 +56,7 @@ impl<'a> Teller<'a> {
         known.unwrap_or_else(|| shape.into())
     }
 
-    /// The reason the run ended before the shape was sure.
+    /// Reason the run ended before the shape was sure.
     fn cut(&self, ended: &Ended) -> Option<(Verdict, String)> {
         match ended {
             Ended::Limit(why) => Some((Verdict::CannotTell, why.clone())),

@@ -241,7 +241,7 @@ fn passed(grid: &Occupancy, place: &Point2<f64>) -> impl Iterator<Item = usize> 
     })
 }
 
-/// The middle of a square.
+/// Middle of a square.
 pub fn middle(grid: &Occupancy, square: usize) -> Point2<f64> {
     let width = grid.width.max(1);
     let steps = Vector2::new((square % width) as f64 + 0.5, (square / width) as f64 + 0.5);

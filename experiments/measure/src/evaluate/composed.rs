@@ -17,7 +17,7 @@ use super::searching::Search;
 const LOOKS: usize = 8;
 /// Each pose is this many places further along the ring than the one before.
 const STRIDE: usize = 3;
-/// Greatest distance between a thing and where it is said to stand, metres.
+/// Maximum distance between a thing and where it is said to stand, metres.
 const FOUND_M: f64 = 0.05;
 
 /// Kinds of scenes.
@@ -212,7 +212,7 @@ async fn one(
     Ok((answer, heard.len(), last.unwrap_or_default()))
 }
 
-/// The position in the map, metres, of a part of an object.
+/// Position in the map, metres, of a part of an object.
 fn foot(object: &Object, at_m: [f64; 3]) -> Point3<f64> {
     object.map_from_object * Point3::from(at_m)
 }

@@ -19,7 +19,7 @@ fn cpu_ms() -> f64 {
 /// Repetitions of each merge; the least time counts.
 const REPETITIONS: usize = 7;
 
-/// Least wall-clock and CPU time, milliseconds.
+/// Minimum wall-clock and CPU time, milliseconds.
 #[derive(Clone, Copy)]
 struct Least {
     wall_ms: f64,
@@ -100,7 +100,7 @@ pub fn run(count: usize, mode: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// The number of correct and of wrong names, and of views left out.
+/// Number of correct and of wrong names, and of views left out.
 fn of_cups(merged: &Merged, things: &[(Thing, Option<&str>)]) -> Result<String, String> {
     let percepts = judge(merged, &Descry::default())?;
     let is_right = |p: &&Percept| {

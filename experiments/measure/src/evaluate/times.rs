@@ -92,7 +92,7 @@ fn merged(repetitions: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Least times, and a digest of the rounded results.
+/// Minimum times, and a digest of the rounded results.
 struct Row {
     /// Number of segments; none without a surface.
     segments: Option<usize>,

@@ -19,7 +19,7 @@ const MOST_LOOKS: usize = 250;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Policy {
-    /// The pose with the highest expected information per second of driving, turning and looking.
+    /// Pose with the highest expected information per second of driving, turning and looking.
     Expected,
     NearestFrontier,
 }

@@ -14,7 +14,7 @@ use std::time::Instant;
 const REPETITIONS: usize = 5;
 const LONG_MS: f64 = 500.0;
 
-/// Least time of several repetitions, milliseconds.
+/// Minimum time of several repetitions, milliseconds.
 fn least_ms<T>(mut run: impl FnMut() -> T) -> f64 {
     let mut least = f64::INFINITY;
     for _ in 0..REPETITIONS {

@@ -18,7 +18,7 @@ pub(super) struct Closed {
     index: [Sum; 2],
     /// Length of each segment, bytes, by number.
     pub segments: BTreeMap<u64, u64>,
-    /// The number of records.
+    /// Number of records.
     pub records: u64,
     /// Number of the next record.
     pub next: u64,

@@ -225,7 +225,7 @@ fn lost_text(lost: &BTreeSet<RecordId>) -> String {
 struct Old {
     closed: Option<Closed>,
     is_current: bool,
-    /// The index itself; readers only.
+    /// Index itself; readers only.
     index: Option<Index>,
     rows: BTreeMap<u64, SegmentRow>,
     /// Records of each segment.

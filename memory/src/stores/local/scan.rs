@@ -126,7 +126,7 @@ impl Head {
         }
     }
 
-    /// The size given by at least two of the three fields: one damaged field is outvoted.
+    /// Size given by at least two of the three fields: one damaged field is outvoted.
     fn agreed(&self) -> Option<u64> {
         let [a, b, c] = self.sizes;
         let size = if a == b || a == c {
@@ -286,9 +286,9 @@ fn summary(bytes: &Bytes, at: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// The next offset at which reading can resume behind damage: a valid chunk, or the end of the data. A chunk
-/// with damaged data but of full length is skipped as a whole, so that no bytes within its blobs are mistaken
-/// for a chunk.
+/// Next offset at which reading can resume behind damage: a valid chunk, or the end of the data. A
+/// chunk with damaged data but of full length is skipped as a whole, so that no bytes within its
+/// blobs are mistaken for a chunk.
 fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     let passed = bytes.read(at, HEAD).ok().map(|head| Head::parse(&head)).filter(|head| head.is_chunk);
     let passed = passed.and_then(|head| head.agreed()).and_then(|size| at.checked_add(HEAD + size));
@@ -312,7 +312,7 @@ fn resume(bytes: &Bytes, at: u64) -> Option<u64> {
     None
 }
 
-/// The record that ends the data section, written without a checksum.
+/// Record that ends the data section, written without a checksum.
 const END_OF_DATA: [u8; 13] = [op::DATA_END, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
 
 /// A valid chunk.

@@ -129,7 +129,7 @@ impl Writer<'_> {
 }
 
 impl Channels {
-    /// The number of a topic's channel; the declaration of a new channel is appended to `declare`.
+    /// Number of a topic's channel; the declaration of a new channel is appended to `declare`.
     fn channel(&mut self, topic: &str, form: Option<Form>, declare: &mut Vec<u8>) -> Result<u16, Error> {
         let key = (topic.to_owned(), form);
         if let Some(id) = self.ids.get(&key) {

@@ -42,13 +42,13 @@ impl Name {
 }
 
 impl MongoStore {
-    /// The index of this store's name, if it has one.
+    /// Index of this store's name, if it has one.
     pub(super) fn index(&self) -> Result<Option<i64>, Error> {
         let own = self.said(self.names.find_one(doc! { "_id": &self.name.robot }).run())?;
         Ok(own.and_then(|own| own.get_i64("index").ok()))
     }
 
-    /// The index of this store's name; the next free one if it has none yet.
+    /// Index of this store's name; the next free one if it has none yet.
     pub(super) fn take_index(&self) -> Result<i64, Error> {
         if let Some(index) = self.index()? {
             return Ok(index);

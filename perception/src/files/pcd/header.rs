@@ -30,7 +30,7 @@ impl Field {
         self.size * self.count
     }
 
-    /// The value in the first `size` bytes.
+    /// Value in the first `size` bytes.
     pub(super) fn number(&self, raw: [u8; 8]) -> f64 {
         let low = u64::from_le_bytes(raw);
         let unused = 64 - 8 * self.size as u32;

@@ -167,13 +167,12 @@ struct Rays {
     seen: Vec<u32>,
 }
 
-/// Greatest distance along a ray at which a measurement is still of a surface at that depth,
-/// metres.
+/// Maximum distance along a ray at which a measurement is still of a surface at that depth, metres.
 pub(super) fn tolerance_m(z_m: f32) -> f32 {
     (3.0 * frontal_sigma_m(z_m)).max(0.006)
 }
 
-/// The direction from a model towards the camera.
+/// Direction from a model towards the camera.
 fn towards_camera(camera_from_model: &Isometry3<f64>) -> Vector3<f32> {
     (camera_from_model.inverse() * Point3::origin()).coords.cast::<f32>().normalize()
 }

@@ -283,7 +283,7 @@ const CELL_M: f32 = 0.006;
 /// Minimum lightness difference between centre and border of a pattern that defines its direction,
 /// in L* units.
 const CONTRAST: f32 = 4.0;
-/// Least share of the cells that must have been seen.
+/// Minimum share of the cells that must have been seen.
 const COVERED: f32 = 0.75;
 /// Bytes a unit: of lightness after normalising, and of a* and b*.
 const SCALES: [f32; 2] = [40.0, 2.0];

@@ -22,7 +22,7 @@ const AGREE_M: f32 = 0.01;
 const AGREE_COS: f32 = 0.25;
 /// Minimum distance between matches in a group, metres; nearer ones are redundant.
 const APART_M: f32 = 0.012;
-/// Fewest matches of a group.
+/// Minimum number of matches of a group.
 const FEWEST: usize = 3;
 /// Distance along the normal of the second point that each match contributes to the pose, metres.
 const OUT_M: f64 = 0.02;

@@ -10,7 +10,8 @@ use nalgebra::Isometry3;
 
 /// Minimum confidence of a guess.
 const LEAST: f64 = 0.02;
-/// Fewest points of a model that a look could have shown for the look to say anything of the model.
+/// Minimum number of points of a model that a look could have shown for the look to say anything of
+/// the model.
 const FEWEST: usize = 40;
 
 /// Prepared view, with its recognition candidates.
@@ -23,7 +24,7 @@ pub struct Glance {
 /// A model that may be somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guess {
-    /// The index of the model in the library.
+    /// Index of the model in the library.
     pub model: usize,
     /// Pose in the look.
     pub camera_from_model: Isometry3<f64>,

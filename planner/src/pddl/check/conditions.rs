@@ -317,7 +317,7 @@ pub(super) fn span_of_formula(formula: &Formula) -> Span {
     }
 }
 
-/// The value of an expression without fluents.
+/// Value of an expression without fluents.
 pub(super) fn constant(expression: &Expression) -> Option<f64> {
     let all = |parts: &[Expression]| parts.iter().map(constant).collect::<Option<Vec<f64>>>();
     Some(match expression {

@@ -486,7 +486,7 @@ impl Parser<'_> {
     }
 }
 
-/// The value of an expression without fluents.
+/// Value of an expression without fluents.
 fn constant(term: &Term) -> Option<f64> {
     use crate::pddl::ast::Arithmetic;
     match term {

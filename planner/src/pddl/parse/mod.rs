@@ -114,7 +114,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The first word of a list.
+    /// First word of a list.
     fn head(&self, list: usize) -> Option<&'a str> {
         let first = self.children(list).next()?;
         self.word(first)

@@ -83,7 +83,7 @@ impl Form {
         Some(form)
     }
 
-    /// The variable of a fact at a moment.
+    /// Variable of a fact at a moment.
     pub(super) fn fact(&self, fact: u32, moment: usize) -> u32 {
         (moment * self.stride) as u32 + fact
     }

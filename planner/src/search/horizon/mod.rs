@@ -134,7 +134,7 @@ impl<'a, 's> Search<'a, 's> {
         None
     }
 
-    /// The plan of a horizon that was satisfied.
+    /// Plan of a horizon that was satisfied.
     fn found(&self, place: usize) -> End {
         let (Some(form), Horizon { steps, solver, .. }) = (&self.form, &self.open[place]) else {
             return End::Exhausted;

@@ -48,7 +48,7 @@ pub(super) fn by_number(images: Vec<(String, PathBuf)>) -> BTreeMap<u64, PathBuf
     images.into_iter().filter_map(|(name, path)| Some((number(&name)?, path))).collect()
 }
 
-/// The number at the end of a name: 12 of `frame000012`.
+/// Number at the end of a name: 12 of `frame000012`.
 pub(super) fn number(name: &str) -> Option<u64> {
     let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     name[name.len() - digits..].parse().ok()

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Units of a depth image in a metre. From: the data set's page.
 const DEPTH_SCALE: f64 = 1000.0;
-/// The camera of its sequences. From: the data set's page, the factory's values of a PrimeSense.
+/// Camera of its sequences. From: the data set's page, the factory's values of a PrimeSense.
 const PRIMESENSE: CameraSettings = CameraSettings { fx: 525.0, fy: 525.0, cx: 319.5, cy: 239.5 };
 
 /// Open3D's `PinholeCameraIntrinsic`.

@@ -59,7 +59,7 @@ pub enum Primitive {
     Turned {
         /// Pose of that frame.
         part_from_here: Isometry3<f64>,
-        /// The surface there.
+        /// Surface there.
         part: Box<Primitive>,
     },
 }
@@ -89,12 +89,12 @@ impl Primitive {
         Primitive::Ball { middle: Point3::new(0.0, 0.0, low_m + half.z), half: *half }
     }
 
-    /// The surface in another frame.
+    /// Surface in another frame.
     pub(crate) fn turned(self, part_from_here: Isometry3<f64>) -> Primitive {
         Primitive::Turned { part_from_here, part: Box::new(self) }
     }
 
-    /// The first hit with 0 < t < `before`.
+    /// First hit with 0 < t < `before`.
     #[inline]
     pub fn hit(&self, o: &Point3<f64>, d: &Vector3<f64>, before: f64) -> Option<Hit> {
         match *self {

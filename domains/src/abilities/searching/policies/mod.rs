@@ -98,7 +98,7 @@ pub enum PolicyError {
     },
 }
 
-/// The names of all policies, the planner's first.
+/// Names of all policies, the planner's first.
 pub fn names() -> Vec<&'static str> {
     std::iter::once(PLAN).chain(ALL.iter().map(|(name, ..)| *name)).collect()
 }

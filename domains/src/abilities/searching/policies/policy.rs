@@ -9,7 +9,7 @@ use crate::situation::Situation;
 pub struct Look {
     /// The candidate to look from.
     pub from: usize,
-    /// The surface to look at.
+    /// Surface to look at.
     pub on: usize,
     /// Seconds of driving until then.
     pub travel_s: f64,

@@ -45,7 +45,7 @@ pub(super) struct CameraInfo {
     pub width: usize,
     pub height: usize,
     pub distortion: Vec<f64>,
-    /// The camera matrix, row by row.
+    /// Camera matrix, row by row.
     pub matrix: [f64; 9],
 }
 

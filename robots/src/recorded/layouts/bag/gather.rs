@@ -28,7 +28,7 @@ pub(super) struct Stored {
 #[derive(Default)]
 pub(super) struct Gathered {
     pub(super) transforms: Transforms,
-    /// The first camera of each topic.
+    /// First camera of each topic.
     pub(super) cameras: BTreeMap<String, CameraInfo>,
     /// The images of each topic.
     pub(super) images: BTreeMap<String, Shown>,
@@ -140,7 +140,7 @@ pub(super) fn choose<'a>(
     }
 }
 
-/// The camera of a topic: that of `camera_info` beside it, or the only one of its frame.
+/// Camera of a topic: that of `camera_info` beside it, or the only one of its frame.
 pub(super) fn camera(
     path: &Path,
     gathered: &Gathered,

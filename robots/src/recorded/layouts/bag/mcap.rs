@@ -56,7 +56,7 @@ impl<'a> Part<'a> {
         String::from_utf8(self.take(length)?.to_vec()).ok()
     }
 
-    /// The next record: its kind and its content.
+    /// Next record: its kind and its content.
     fn record(&mut self) -> Option<(u8, &'a [u8])> {
         let kind = *self.take(1)?.first()?;
         let length = usize::try_from(self.u64()?).ok()?;

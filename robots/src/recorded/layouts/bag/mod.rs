@@ -17,7 +17,7 @@ use image::RgbImage;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Greatest difference of the stamps of depth and colour, seconds. From: chosen, a frame at 20 Hz.
+/// Maximum difference of the stamps of depth and colour, seconds. From: chosen, a frame at 20 Hz.
 const BESIDE_S: f64 = 0.05;
 /// Frames in which z is up. From: REP 105.
 const UPRIGHT: [&str; 3] = ["map", "odom", "world"];
@@ -154,7 +154,7 @@ struct BagImages {
 }
 
 impl BagImages {
-    /// The place of a message for people, and its data.
+    /// Place of a message for people, and its data.
     fn message(&self, stored: &Stored) -> Result<(String, Vec<u8>), InputError> {
         let mut bags = self.bags.lock().unwrap_or_else(PoisonError::into_inner);
         let (path, bag) = &mut bags[stored.file];

@@ -7,7 +7,7 @@ use descry_domains::abilities;
 use descry_domains::load::Domain;
 use descry_domains::origin::{self, Origin};
 use descry_domains::saying::Saying;
-use descry_planner::task::{Action, Call, Change, Expression};
+use descry_planner::task::{Action, CallTerm, Change, Expression};
 
 use super::chapters::Chapter;
 use super::wording::listed;
@@ -122,12 +122,12 @@ impl Words<'_> {
         self.domain.vocabulary.task.actions.iter().find(|action| action.name == name)
     }
 
-    fn name(&self, call: &Call) -> &str {
+    fn name(&self, call: &CallTerm) -> &str {
         &self.domain.vocabulary.task.module(call.module).name
     }
 
     /// Descriptions of known calls, without adjacent duplicates.
-    fn asked<'c>(&self, calls: impl IntoIterator<Item = &'c Call>) -> Vec<String> {
+    fn asked<'c>(&self, calls: impl IntoIterator<Item = &'c CallTerm>) -> Vec<String> {
         let mut all: Vec<String> =
             calls.into_iter().filter_map(|call| self.meaning(self.name(call))).collect();
         all.dedup();
@@ -135,7 +135,7 @@ impl Words<'_> {
     }
 
     /// The calls by which actions change a number.
-    fn grows_by(&self, number: &str) -> Vec<&Call> {
+    fn grows_by(&self, number: &str) -> Vec<&CallTerm> {
         let task = &self.domain.vocabulary.task;
         let effects =
             task.actions.iter().flat_map(|action| action.effects.start.iter().chain(&action.effects.end));

@@ -11,7 +11,7 @@ use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::{Explanation, constrained, explain, narrowed, too_slow};
-use crate::ground::{Earliest, Earns, Expression, GroundError, GroundTask, compile, ground_with};
+use crate::ground::{Earliest, Earns, GroundError, GroundExpression, GroundTask, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
@@ -383,13 +383,15 @@ fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
 fn measure(grounded: &GroundTask) -> Measure {
     match &grounded.metric {
         None => Measure::Makespan,
-        Some(metric) if metric.minimise && metric.expression == Expression::TotalTime => Measure::Makespan,
+        Some(metric) if metric.minimise && metric.expression == GroundExpression::TotalTime => {
+            Measure::Makespan
+        }
         Some(metric) if metric.additive => {
             let sign = if metric.minimise { 1.0 } else { -1.0 };
             Measure::Additive { sign, time_weight: sign * metric.time_weight }
         }
         Some(metric) if metric.minimise => Measure::Expression(metric.expression.clone()),
-        Some(metric) => Measure::Expression(Expression::Negative(Box::new(metric.expression.clone()))),
+        Some(metric) => Measure::Expression(GroundExpression::Negative(Box::new(metric.expression.clone()))),
     }
 }
 

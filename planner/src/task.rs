@@ -238,7 +238,7 @@ pub struct Fluent {
 
 /// A call of a semantic module.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Call {
+pub struct CallTerm {
     /// The module.
     pub module: ModuleId,
     /// Arguments.
@@ -267,7 +267,7 @@ pub enum Condition {
     /// Numeric comparison; false if a side is undefined.
     Compare(Comparison, Box<[Expression; 2]>, Span),
     /// Call of a condition module.
-    Call(Call),
+    Call(CallTerm),
 }
 
 impl Condition {
@@ -320,7 +320,7 @@ pub enum Expression {
     /// Number of violations of preferences of this name; in metrics alone.
     Violated(PreferenceId),
     /// Answer of a cost module.
-    Call(Call),
+    Call(CallTerm),
 }
 
 /// Parts of an action at start, over all and at end; an instantaneous action has everything at
@@ -359,7 +359,7 @@ pub struct Action {
     /// Changes at a rate over the whole duration, from `#t`.
     pub continuous: Vec<Rate>,
     /// Calls of grounding modules that propose parameters.
-    pub grounding: Vec<Call>,
+    pub grounding: Vec<CallTerm>,
     /// Preferences over the action's conditions; every violation counts.
     pub preferences: Vec<(PreferenceId, Timed<Condition>)>,
     /// Span of the name.
@@ -412,7 +412,7 @@ pub enum Change {
     /// Assigns an object function, or makes it undefined.
     Object(Fluent, Option<Term>),
     /// Writes the fluents of an effect module.
-    Call(Call),
+    Call(CallTerm),
 }
 
 /// A number that changes at a rate while an action runs.

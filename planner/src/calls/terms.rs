@@ -6,7 +6,7 @@ use rustc_hash::FxHashMap;
 
 use crate::attachment::{FactValue, Read};
 use crate::ground::{GroundTask, Meaning, NumericId, VariableId};
-use crate::semantics::calls::{Symbol, instances};
+use crate::semantics::calls::{ReadSymbol, instances};
 use crate::task::{ObjectId, Task};
 
 /// Source of a reading.
@@ -93,7 +93,7 @@ impl Terms {
         arguments: &[u32],
     ) -> Vec<Source> {
         let arguments: Vec<ObjectId> = arguments.iter().map(|&argument| ObjectId(argument)).collect();
-        let source = |(symbol, instance): (Symbol, Vec<ObjectId>)| {
+        let source = |(symbol, instance): (ReadSymbol, Vec<ObjectId>)| {
             let (name, origin) = self.origin(task, names, symbol, &instance);
             (name.into(), instance.iter().map(|a| names[a.index()].clone()).collect(), origin)
         };
@@ -104,13 +104,13 @@ impl Terms {
         &self,
         task: &'t Task,
         names: &[Arc<str>],
-        symbol: Symbol,
+        symbol: ReadSymbol,
         arguments: &[ObjectId],
     ) -> (&'t str, Origin) {
         let key = |id: u32| (id, arguments.iter().map(|object| object.0).collect::<Vec<_>>());
         let same = |objects: &[ObjectId]| *objects == *arguments;
         match symbol {
-            Symbol::Predicate(id) => {
+            ReadSymbol::Predicate(id) => {
                 let origin = match self.facts.get(&key(id.0)) {
                     Some(&(variable, value)) => Origin::Fact(variable, value),
                     None => {
@@ -121,7 +121,7 @@ impl Terms {
                 };
                 (&task.predicate(id).name, origin)
             }
-            Symbol::Function(id) => {
+            ReadSymbol::Function(id) => {
                 let numeric = || {
                     let start =
                         task.init.numbers.iter().find(|(f, _)| f.function == id && same(&f.arguments));

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::ground::{Action, Conjunction, Effect, Fact, GroundTask, Meaning, Outcome, Variable};
+use crate::ground::{
+    Conjunction, GroundAction, GroundEffect, GroundFact, GroundOutcome, GroundTask, Meaning, Variable,
+};
 use crate::model::agreement::reset;
 
-use super::measure::Measure;
+use super::measure::ClassicalMeasure;
 use super::numbers::{Numbers, is_plain};
 
 /// Candidate factors that make all costs whole numbers; if none does, costs are scaled by the first
@@ -83,7 +85,7 @@ pub struct Achieve {
     /// End of the range, exclusive.
     pub to: u32,
     /// The fact.
-    pub fact: Fact,
+    pub fact: GroundFact,
 }
 
 /// The task.
@@ -98,11 +100,11 @@ pub struct Compiled {
     /// Number of facts.
     pub facts: usize,
     /// Preconditions by operator.
-    pub preconditions: Lists<Fact>,
+    pub preconditions: Lists<GroundFact>,
     /// Effects by operator.
     pub effects: Lists<Achieve>,
     /// Conditions of conditional effects.
-    pub conditions: Vec<Fact>,
+    pub conditions: Vec<GroundFact>,
     /// True, by operator, if its effects may give one object fluent several values at once; empty
     /// if no operator can.
     contested: Vec<bool>,
@@ -111,7 +113,7 @@ pub struct Compiled {
     /// Search costs by operator.
     pub costs: Vec<u32>,
     /// Measure of a plan's cost.
-    pub measure: Measure,
+    pub measure: ClassicalMeasure,
     /// Factor from exact costs to search costs.
     pub cost_scale: f64,
     /// True if all costs are one.
@@ -119,15 +121,15 @@ pub struct Compiled {
     /// True if some operator has zero cost.
     pub free_operators: bool,
     /// Bodies of axioms, by stratum in rising order.
-    pub axiom_bodies: Lists<Fact>,
+    pub axiom_bodies: Lists<GroundFact>,
     /// Heads of axioms.
-    pub axiom_heads: Vec<Fact>,
+    pub axiom_heads: Vec<GroundFact>,
     /// First axiom of each stratum, and the number of axioms.
     pub strata: Vec<usize>,
     /// Axioms by body fact.
     pub axioms_with: Lists<u32>,
     /// Goal facts.
-    pub goal: Vec<Fact>,
+    pub goal: Vec<GroundFact>,
     /// First state, derived variables included.
     pub initial: Vec<u32>,
     /// Predicate or function by fact; `u32::MAX` for "none of these atoms".
@@ -141,11 +143,11 @@ pub struct Compiled {
 /// True if the search over instantaneous actions alone can plan for the task.
 pub fn is_classical(task: &GroundTask) -> bool {
     let plain = |c: &Conjunction| c.calls.is_empty();
-    let plain_effect = |e: &Effect| {
+    let plain_effect = |e: &GroundEffect| {
         let outcome = match &e.outcome {
-            Outcome::Set(_) => true,
-            Outcome::Change { amount, .. } => is_plain(amount),
-            Outcome::Flow { .. } | Outcome::Call(_) => false,
+            GroundOutcome::Set(_) => true,
+            GroundOutcome::Change { amount, .. } => is_plain(amount),
+            GroundOutcome::Flow { .. } | GroundOutcome::Call(_) => false,
         };
         outcome && e.when.as_ref().is_none_or(|w| plain(&w.here))
     };
@@ -164,7 +166,7 @@ pub fn is_classical(task: &GroundTask) -> bool {
 /// True, by action, if its effects may give one object fluent several values at once; empty if no
 /// action can.
 fn contested(task: &GroundTask) -> Vec<bool> {
-    let is_contested = |action: &Action| Effect::some_contest(&action.effects, &task.variables);
+    let is_contested = |action: &GroundAction| GroundEffect::some_contest(&action.effects, &task.variables);
     let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
     if contested.contains(&true) { contested } else { Vec::new() }
 }
@@ -189,14 +191,14 @@ impl Compiled {
             preconditions.push(numbers.facts(&action.condition));
             let mut list = Vec::with_capacity(action.effects.len());
             for effect in &action.effects {
-                let Outcome::Set(fact) = effect.outcome else { continue };
+                let GroundOutcome::Set(fact) = effect.outcome else { continue };
                 let from = conditions.len() as u32;
                 conditions.extend(effect.when.iter().flat_map(|w| numbers.facts(&w.here)));
                 list.push(Achieve { from, to: conditions.len() as u32, fact });
             }
             effects.push(list);
         }
-        let measure = Measure::new(task, &numbers);
+        let measure = ClassicalMeasure::new(task, &numbers);
         let (costs, cost_scale) = costs(&measure.estimates);
         let mut axiom_bodies = Lists::new();
         let mut strata = Vec::new();
@@ -210,9 +212,9 @@ impl Compiled {
             axiom_bodies.push(numbers.facts(&axiom.body));
         }
         strata.push(task.axioms.len());
-        let fact_id = |f: &Fact| offsets[f.variable as usize] + f.value;
+        let fact_id = |f: &GroundFact| offsets[f.variable as usize] + f.value;
         let pairs = (0..axiom_bodies.len())
-            .flat_map(|i| axiom_bodies.get(i).iter().map(move |f: &Fact| (fact_id(f), i as u32)));
+            .flat_map(|i| axiom_bodies.get(i).iter().map(move |f: &GroundFact| (fact_id(f), i as u32)));
         let axioms_with = Lists::group(facts as usize, pairs);
         let of_variables = task.variables.iter().flat_map(|v| v.values.iter().map(symbol));
         let of_comparisons = std::iter::repeat_n(u32::MAX, 2 * task.comparisons.len());
@@ -254,7 +256,7 @@ impl Compiled {
 
     /// Number of a fact.
     #[inline]
-    pub(crate) fn id(&self, fact: Fact) -> u32 {
+    pub(crate) fn id(&self, fact: GroundFact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
 

@@ -1,13 +1,13 @@
 //! Cost of a plan: a sum over its operators if the metric is one, else a function of its states.
 
-use crate::ground::{Expression, GroundTask};
+use crate::ground::{GroundExpression, GroundTask};
 
 use super::compiled::Compiled;
 use super::numbers::{Linear, Numbers, add_linear};
 
 /// Measure of plans.
 #[derive(Clone, Debug)]
-pub struct Measure {
+pub struct ClassicalMeasure {
     kind: Kind,
     /// Cost by operator; an estimate for state-dependent costs.
     pub estimates: Vec<f64>,
@@ -19,30 +19,31 @@ enum Kind {
     Sum,
     /// State-dependent cost of each operator, evaluated in the state before it, with the metric's
     /// sign.
-    Adding(Vec<Expression>, f64),
+    Adding(Vec<GroundExpression>, f64),
     /// Metric of the last state, times the sign.
-    Last(Expression, f64),
+    Last(GroundExpression, f64),
 }
 
-impl Measure {
+impl ClassicalMeasure {
     /// Measure of the plans of a task.
-    pub(crate) fn new(task: &GroundTask, numbers: &Numbers) -> Measure {
+    pub(crate) fn new(task: &GroundTask, numbers: &Numbers) -> ClassicalMeasure {
         let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
         if let Some(metric) = task.metric.as_ref().filter(|m| !m.additive) {
             return of_last(&metric.expression, sign, numbers);
         }
-        let constant = |e: &Expression| if let Expression::Constant(v) = e { Some(sign * v) } else { None };
+        let constant =
+            |e: &GroundExpression| if let GroundExpression::Constant(v) = e { Some(sign * v) } else { None };
         let costs: Option<Vec<f64>> = task.actions.iter().map(|a| constant(&a.cost)).collect();
         if let Some(estimates) = costs {
-            return Measure { kind: Kind::Sum, estimates };
+            return ClassicalMeasure { kind: Kind::Sum, estimates };
         }
-        let first = |e: &Expression| {
+        let first = |e: &GroundExpression| {
             let value = sign * super::numbers::evaluate(e, &|n| numbers.initial[n as usize]);
             if value.is_finite() { value.max(0.0) } else { 1.0 }
         };
         let estimates = task.actions.iter().map(|a| first(&a.cost)).collect();
         let kind = Kind::Adding(task.actions.iter().map(|a| a.cost.clone()).collect(), sign);
-        Measure { kind, estimates }
+        ClassicalMeasure { kind, estimates }
     }
 
     /// True if plan cost is the sum of operator costs.
@@ -81,16 +82,16 @@ impl Measure {
 
 /// Measure that depends on the final state. Operator costs are estimated from state-independent
 /// changes if the metric is linear; otherwise each operator costs one.
-fn of_last(expression: &Expression, sign: f64, numbers: &Numbers) -> Measure {
+fn of_last(expression: &GroundExpression, sign: f64, numbers: &Numbers) -> ClassicalMeasure {
     let kind = Kind::Last(expression.clone(), sign);
     let mut linear = Linear::default();
     if !add_linear(expression, sign, &mut linear) {
-        return Measure { kind, estimates: vec![1.0; numbers.changes.len()] };
+        return ClassicalMeasure { kind, estimates: vec![1.0; numbers.changes.len()] };
     }
     let weight = |number: u32| linear.weights.iter().find(|(n, _)| *n == number).map_or(0.0, |(_, w)| *w);
     let adds = |change: &super::numbers::NumberChange| {
         change.constant_gain().map_or(0.0, |gain| gain * weight(change.number))
     };
     let cost = |changes: &Vec<_>| changes.iter().map(adds).sum::<f64>().max(0.0);
-    Measure { kind, estimates: numbers.changes.iter().map(cost).collect() }
+    ClassicalMeasure { kind, estimates: numbers.changes.iter().map(cost).collect() }
 }

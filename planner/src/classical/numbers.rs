@@ -4,7 +4,9 @@
 //! A state carries its numbers behind its variables, two words each. Every numeric condition is a variable of its own
 //! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
 
-use crate::ground::{Change, Comparison, Conjunction, Expression, Fact, GroundTask, Outcome, Relation};
+use crate::ground::{
+    Change, Conjunction, GroundComparison, GroundExpression, GroundFact, GroundOutcome, GroundTask, Relation,
+};
 use crate::model::agreement::contradictions;
 use crate::model::relation::quotient;
 
@@ -14,21 +16,21 @@ use super::compiled::Lists;
 #[derive(Clone, Debug, Default)]
 pub struct NumberChange {
     /// Facts (including those of comparisons) that enable the change.
-    pub conditions: Vec<Fact>,
+    pub conditions: Vec<GroundFact>,
     /// Number that changes.
     pub number: u32,
     /// Kind of change.
     pub change: Option<Change>,
     /// Amount.
-    pub amount: Option<Expression>,
+    pub amount: Option<GroundExpression>,
 }
 
 impl NumberChange {
     /// Added amount, if constant.
     pub(crate) fn constant_gain(&self) -> Option<f64> {
         match (self.change, &self.amount) {
-            (Some(Change::Increase), Some(Expression::Constant(by))) => Some(*by),
-            (Some(Change::Decrease), Some(Expression::Constant(by))) => Some(-by),
+            (Some(Change::Increase), Some(GroundExpression::Constant(by))) => Some(*by),
+            (Some(Change::Decrease), Some(GroundExpression::Constant(by))) => Some(-by),
             _ => None,
         }
     }
@@ -51,7 +53,7 @@ pub struct Numbers {
     /// Number of words of a state before the numeric fluents.
     base: usize,
     /// Numeric conditions.
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<GroundComparison>,
     /// Left minus right of each comparison as a linear sum; `None` if not linear.
     pub linear: Vec<Option<Linear>>,
     /// Numbers that each comparison reads.
@@ -79,7 +81,7 @@ impl Numbers {
         let reads: Vec<Vec<u32>> = comparisons.iter().map(|c| reads(&[&c.left, &c.right])).collect();
         let pairs = (0..reads.len()).flat_map(|c| reads[c].iter().map(move |&n| (n, c as u32)));
         let read_by = Lists::group(count, pairs);
-        let difference = |c: &Comparison| {
+        let difference = |c: &GroundComparison| {
             let mut linear = Linear::default();
             let is = add_linear(&c.left, 1.0, &mut linear) && add_linear(&c.right, -1.0, &mut linear);
             is.then_some(linear)
@@ -104,10 +106,10 @@ impl Numbers {
         numbers
     }
 
-    fn operator(&mut self, action: &crate::ground::Action) {
+    fn operator(&mut self, action: &crate::ground::GroundAction) {
         let mut changes = Vec::new();
         for effect in &action.effects {
-            if let Outcome::Change { fluent, change, amount } = &effect.outcome {
+            if let GroundOutcome::Change { fluent, change, amount } = &effect.outcome {
                 let conditions = effect.when.as_ref().map_or_else(Vec::new, |w| self.facts(&w.here));
                 let (change, amount) = (Some(*change), Some(amount.clone()));
                 changes.push(NumberChange { conditions, number: *fluent, change, amount });
@@ -121,20 +123,20 @@ impl Numbers {
         let safe =
             |c: &NumberChange| c.constant_gain().is_some() && self.initial[c.number as usize].is_finite();
         self.risky.push(!changes.iter().all(safe));
-        let known = |amount: &Expression| evaluate(amount, &|_| f64::NAN);
+        let known = |amount: &GroundExpression| evaluate(amount, &|_| f64::NAN);
         let kinds = changes.iter().filter_map(|c| Some((c.number, c.change?, known(c.amount.as_ref()?))));
         self.contradicting.push(!contradictions(kinds).is_empty());
         self.changes.push(changes);
     }
 
     /// Facts of a conjunction, including those that represent its comparisons.
-    pub(crate) fn facts(&self, conjunction: &Conjunction) -> Vec<Fact> {
+    pub(crate) fn facts(&self, conjunction: &Conjunction) -> Vec<GroundFact> {
         let comparisons = conjunction.comparisons.iter().map(|&c| self.fact(c));
         conjunction.facts.iter().copied().chain(comparisons).collect()
     }
 
-    fn fact(&self, comparison: u32) -> Fact {
-        Fact { variable: self.first as u32 + comparison, value: 0 }
+    fn fact(&self, comparison: u32) -> GroundFact {
+        GroundFact { variable: self.first as u32 + comparison, value: 0 }
     }
 
     /// True if the task has no numbers.
@@ -178,14 +180,14 @@ impl Numbers {
     }
 
     fn compare(&self, comparison: usize, state: &mut [u32]) {
-        let Comparison { left, relation, right } = &self.comparisons[comparison];
+        let GroundComparison { left, relation, right } = &self.comparisons[comparison];
         let holds = relation.holds(self.value(left, state), self.value(right, state));
         state[self.first + comparison] = u32::from(!holds);
     }
 
     /// Left minus right of a comparison.
     pub(crate) fn gap(&self, comparison: usize, state: &[u32]) -> f64 {
-        let Comparison { left, right, .. } = &self.comparisons[comparison];
+        let GroundComparison { left, right, .. } = &self.comparisons[comparison];
         self.value(left, state) - self.value(right, state)
     }
 
@@ -231,7 +233,7 @@ impl Numbers {
     }
 
     /// Value of an expression; NaN if undefined.
-    pub(crate) fn value(&self, expression: &Expression, state: &[u32]) -> f64 {
+    pub(crate) fn value(&self, expression: &GroundExpression, state: &[u32]) -> f64 {
         evaluate(expression, &|number| self.get(state, number))
     }
 
@@ -284,7 +286,7 @@ impl Numbers {
     pub(crate) fn change_reads(&self, operator: u32) -> (Vec<u32>, Vec<u32>) {
         let changes = self.changes.get(operator as usize).map_or(&[][..], |c| c);
         let variables = changes.iter().flat_map(|c| c.conditions.iter().map(|f| f.variable)).collect();
-        let amounts: Vec<&Expression> = changes.iter().filter_map(|c| c.amount.as_ref()).collect();
+        let amounts: Vec<&GroundExpression> = changes.iter().filter_map(|c| c.amount.as_ref()).collect();
         (variables, reads(&amounts))
     }
 }
@@ -314,47 +316,51 @@ pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32
 }
 
 /// Value of an expression over numbers; NaN if undefined.
-pub(crate) fn evaluate(expression: &Expression, number: &impl Fn(u32) -> f64) -> f64 {
+pub(crate) fn evaluate(expression: &GroundExpression, number: &impl Fn(u32) -> f64) -> f64 {
     match expression {
-        Expression::Constant(value) => *value,
-        Expression::Fluent(id) => number(*id),
-        Expression::Sum(parts) => parts.iter().map(|p| evaluate(p, number)).sum(),
-        Expression::Product(parts) => parts.iter().map(|p| evaluate(p, number)).product(),
-        Expression::Difference(left, right) => evaluate(left, number) - evaluate(right, number),
-        Expression::Quotient(left, right) => quotient(evaluate(left, number), evaluate(right, number)),
-        Expression::Negative(inner) => -evaluate(inner, number),
-        Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
-            f64::NAN
-        }
+        GroundExpression::Constant(value) => *value,
+        GroundExpression::Fluent(id) => number(*id),
+        GroundExpression::Sum(parts) => parts.iter().map(|p| evaluate(p, number)).sum(),
+        GroundExpression::Product(parts) => parts.iter().map(|p| evaluate(p, number)).product(),
+        GroundExpression::Difference(left, right) => evaluate(left, number) - evaluate(right, number),
+        GroundExpression::Quotient(left, right) => quotient(evaluate(left, number), evaluate(right, number)),
+        GroundExpression::Negative(inner) => -evaluate(inner, number),
+        GroundExpression::Call(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => f64::NAN,
     }
 }
 
 /// True if an expression consists of numbers alone.
-pub(crate) fn is_plain(expression: &Expression) -> bool {
+pub(crate) fn is_plain(expression: &GroundExpression) -> bool {
     match expression {
-        Expression::Constant(_) | Expression::Fluent(_) => true,
-        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().all(is_plain),
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Constant(_) | GroundExpression::Fluent(_) => true,
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => parts.iter().all(is_plain),
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             is_plain(left) && is_plain(right)
         }
-        Expression::Negative(inner) => is_plain(inner),
-        Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => false,
+        GroundExpression::Negative(inner) => is_plain(inner),
+        GroundExpression::Call(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => false,
     }
 }
 
 /// The numbers that expressions read, each once.
-pub(crate) fn reads(expressions: &[&Expression]) -> Vec<u32> {
-    fn collect(expression: &Expression, out: &mut Vec<u32>) {
+pub(crate) fn reads(expressions: &[&GroundExpression]) -> Vec<u32> {
+    fn collect(expression: &GroundExpression, out: &mut Vec<u32>) {
         match expression {
-            Expression::Fluent(id) => out.push(*id),
-            Expression::Sum(parts) | Expression::Product(parts) => {
+            GroundExpression::Fluent(id) => out.push(*id),
+            GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
                 parts.iter().for_each(|p| collect(p, out));
             }
-            Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+            GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
                 collect(left, out);
                 collect(right, out);
             }
-            Expression::Negative(inner) => collect(inner, out),
+            GroundExpression::Negative(inner) => collect(inner, out),
             _ => {}
         }
     }
@@ -366,26 +372,27 @@ pub(crate) fn reads(expressions: &[&Expression]) -> Vec<u32> {
 }
 
 /// Adds a weighted expression to a sum; `false` if it is not linear.
-pub(crate) fn add_linear(expression: &Expression, factor: f64, sum: &mut Linear) -> bool {
+pub(crate) fn add_linear(expression: &GroundExpression, factor: f64, sum: &mut Linear) -> bool {
     match expression {
-        Expression::Constant(value) => {
+        GroundExpression::Constant(value) => {
             sum.constant += factor * value;
             true
         }
-        Expression::Fluent(id) => {
+        GroundExpression::Fluent(id) => {
             match sum.weights.iter_mut().find(|(number, _)| number == id) {
                 Some((_, weight)) => *weight += factor,
                 None => sum.weights.push((*id, factor)),
             }
             true
         }
-        Expression::Sum(parts) => parts.iter().all(|p| add_linear(p, factor, sum)),
-        Expression::Difference(left, right) => {
+        GroundExpression::Sum(parts) => parts.iter().all(|p| add_linear(p, factor, sum)),
+        GroundExpression::Difference(left, right) => {
             add_linear(left, factor, sum) && add_linear(right, -factor, sum)
         }
-        Expression::Negative(inner) => add_linear(inner, -factor, sum),
-        Expression::Product(parts) => {
-            let constant = |p: &Expression| if let Expression::Constant(v) = p { Some(*v) } else { None };
+        GroundExpression::Negative(inner) => add_linear(inner, -factor, sum),
+        GroundExpression::Product(parts) => {
+            let constant =
+                |p: &GroundExpression| if let GroundExpression::Constant(v) = p { Some(*v) } else { None };
             let by: f64 = parts.iter().filter_map(constant).product();
             let mut rest = parts.iter().filter(|p| constant(p).is_none());
             match (rest.next(), rest.next()) {
@@ -397,8 +404,8 @@ pub(crate) fn add_linear(expression: &Expression, factor: f64, sum: &mut Linear)
                 _ => false,
             }
         }
-        Expression::Quotient(left, right) => match **right {
-            Expression::Constant(by) if by != 0.0 => add_linear(left, factor / by, sum),
+        GroundExpression::Quotient(left, right) => match **right {
+            GroundExpression::Constant(by) if by != 0.0 => add_linear(left, factor / by, sum),
             _ => false,
         },
         _ => false,

@@ -22,7 +22,7 @@ const GLUE: u32 = 2;
 
 /// Answer of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answer {
+pub enum Satisfiability {
     /// All clauses hold under the values.
     Satisfied,
     /// Unsatisfiable.
@@ -282,15 +282,15 @@ impl Solver {
     }
 
     /// Searches until the total work reaches `work`, or `stop` returns true.
-    pub fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Answer {
+    pub fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Satisfiability {
         if self.contradiction {
-            return Answer::Unsatisfiable;
+            return Satisfiability::Unsatisfiable;
         }
         loop {
             if let Some(broken) = self.propagate() {
                 if self.level() == 0 {
                     self.contradiction = true;
-                    return Answer::Unsatisfiable;
+                    return Satisfiability::Unsatisfiable;
                 }
                 self.resolve(broken);
                 if self.conflicts >= self.restart_at {
@@ -301,13 +301,13 @@ impl Solver {
                 continue;
             }
             if self.work > work || stop() {
-                return Answer::Interrupted;
+                return Satisfiability::Interrupted;
             }
             if self.learned.len() > self.kept + self.trail.len() {
                 self.forget();
             }
             if !self.try_next(decide) {
-                return Answer::Satisfied;
+                return Satisfiability::Satisfied;
             }
         }
     }

@@ -1,15 +1,15 @@
 //! Findings about actions that are never applicable, because no duration is allowed.
 
 use crate::diagnostic::{Diagnostic, Span};
-use crate::ground::{DurationBound, Expression, GroundTask, Relation};
+use crate::ground::{GroundDurationBound, GroundExpression, GroundTask, Relation};
 use crate::plan::number_text;
 use crate::task::Task;
 
 /// Contradicting minimum and maximum duration, seconds, from state-independent bounds.
-fn contradiction(bounds: &[DurationBound]) -> Option<(f64, f64)> {
+fn contradiction(bounds: &[GroundDurationBound]) -> Option<(f64, f64)> {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {
-        let Expression::Constant(seconds) = bound.seconds else { continue };
+        let GroundExpression::Constant(seconds) = bound.seconds else { continue };
         if matches!(bound.relation, Relation::AtLeast | Relation::Greater | Relation::Equal) {
             least_s = least_s.max(seconds);
         }

@@ -2,8 +2,8 @@
 //! conditions are not evaluated; goals that need them count as unreachable.
 
 use crate::ground::{
-    Action, Change, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact, GroundTask,
-    Outcome, When,
+    Change, Conjunction, DurativeAction, GroundAction, GroundDurationBound, GroundEffect, GroundExpression,
+    GroundFact, GroundOutcome, GroundTask, GroundWhen,
 };
 use crate::model::agreement::contradictions;
 use crate::model::relation::Relation;
@@ -71,16 +71,16 @@ impl<'g> Had<'g> {
     }
 
     /// True if a condition holds after these effects.
-    fn holds_after(&self, effects: &[Effect], condition: &Conjunction) -> bool {
-        let given = |fact: &Fact| {
+    fn holds_after(&self, effects: &[GroundEffect], condition: &Conjunction) -> bool {
+        let given = |fact: &GroundFact| {
             let mut outcomes = self.happening(effects);
-            outcomes.any(|outcome| *outcome == Outcome::Set(*fact))
+            outcomes.any(|outcome| *outcome == GroundOutcome::Set(*fact))
         };
-        let has = |fact: &Fact| self.facts[fact.variable as usize][fact.value as usize] || given(fact);
+        let has = |fact: &GroundFact| self.facts[fact.variable as usize][fact.value as usize] || given(fact);
         condition.comparisons.is_empty() && condition.calls.is_empty() && condition.facts.iter().all(has)
     }
 
-    fn can_take(&self, action: &Action) -> bool {
+    fn can_take(&self, action: &GroundAction) -> bool {
         self.holds(&action.condition) && self.can_happen(&action.effects)
     }
 
@@ -96,58 +96,60 @@ impl<'g> Had<'g> {
 
     /// True if effects certainly have a result: known amounts are added to known numbers, and each
     /// object gets one value.
-    fn can_happen(&self, effects: &[Effect]) -> bool {
+    fn can_happen(&self, effects: &[GroundEffect]) -> bool {
         let kinds = effects.iter().filter_map(|effect| match effect.outcome {
-            Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => {
+            GroundOutcome::Change { fluent, change, amount: GroundExpression::Constant(amount) } => {
                 Some((fluent, change, amount))
             }
             _ => None,
         });
         contradictions(kinds).is_empty()
-            && !Effect::some_contest(effects, &self.ground.variables)
+            && !GroundEffect::some_contest(effects, &self.ground.variables)
             && effects.iter().all(|effect| self.has_result(effect))
     }
 
-    fn has_result(&self, effect: &Effect) -> bool {
+    fn has_result(&self, effect: &GroundEffect) -> bool {
         match &effect.outcome {
-            Outcome::Set(_) => true,
-            Outcome::Change { fluent, change, amount: Expression::Constant(amount) } => match change {
-                Change::Assign => amount.is_finite(),
-                Change::Increase | Change::Decrease => {
-                    amount.is_finite() && self.ground.initial.numbers[*fluent as usize].is_finite()
+            GroundOutcome::Set(_) => true,
+            GroundOutcome::Change { fluent, change, amount: GroundExpression::Constant(amount) } => {
+                match change {
+                    Change::Assign => amount.is_finite(),
+                    Change::Increase | Change::Decrease => {
+                        amount.is_finite() && self.ground.initial.numbers[*fluent as usize].is_finite()
+                    }
+                    Change::ScaleUp | Change::ScaleDown => false,
                 }
-                Change::ScaleUp | Change::ScaleDown => false,
-            },
+            }
             _ => false,
         }
     }
 
     /// Outcomes of the effects whose conditions hold.
-    fn happening<'e>(&self, effects: &'e [Effect]) -> impl Iterator<Item = &'e Outcome> {
-        let holds = |when: &When| {
+    fn happening<'e>(&self, effects: &'e [GroundEffect]) -> impl Iterator<Item = &'e GroundOutcome> {
+        let holds = |when: &GroundWhen| {
             [&when.here, &when.at_start, &when.over_all].into_iter().all(|part| self.holds(part))
         };
         let happening = effects.iter().filter(move |effect| effect.when.as_deref().is_none_or(holds));
         happening.map(|effect| &effect.outcome)
     }
 
-    fn happen(&mut self, effects: &[Effect]) {
-        let outcomes: Vec<&Outcome> = self.happening(effects).collect();
+    fn happen(&mut self, effects: &[GroundEffect]) {
+        let outcomes: Vec<&GroundOutcome> = self.happening(effects).collect();
         outcomes.into_iter().for_each(|outcome| self.make(outcome));
     }
 
-    fn make(&mut self, outcome: &Outcome) {
-        if let Outcome::Set(fact) = outcome {
+    fn make(&mut self, outcome: &GroundOutcome) {
+        if let GroundOutcome::Set(fact) = outcome {
             self.facts[fact.variable as usize][fact.value as usize] = true;
         }
     }
 }
 
 /// True if constant duration bounds exclude every duration.
-fn lasts(bounds: &[DurationBound]) -> bool {
+fn lasts(bounds: &[GroundDurationBound]) -> bool {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {
-        let Expression::Constant(seconds) = bound.seconds else { return false };
+        let GroundExpression::Constant(seconds) = bound.seconds else { return false };
         match bound.relation {
             Relation::AtLeast => least_s = least_s.max(seconds),
             Relation::AtMost => most_s = most_s.min(seconds),

@@ -6,13 +6,14 @@ use crate::model::relation::quotient;
 use crate::task::Task;
 
 use super::groups::Groups;
-use super::instantiate::{Deed, GroundEffect, Instantiate, RawCall, RawPlace};
+use super::instantiate::{Deed, Instantiate, RawCall, RawEffect, RawPlace};
 use super::raw::{RawAction, RawTask};
 use super::relaxed::Reached;
 use super::relevant::{Relevant, reads};
 use super::task::{
-    Action, Axiom, Call, Comparison, Conjunction, DurationBound, DurativeAction, Effect, Expression, Fact,
-    GroundTask, Meaning, Metric, NumericFluent, Origin, Outcome, Place, TimedEffect, Values, Variable,
+    Axiom, Conjunction, DurativeAction, GroundAction, GroundCall, GroundComparison, GroundDurationBound,
+    GroundEffect, GroundExpression, GroundFact, GroundMetric, GroundOutcome, GroundTask, Meaning,
+    NumericFluent, Origin, Place, TimedEffect, Values, Variable,
 };
 use super::variables::{Choice, Encoding, drop_none, encode, mark_none, used_none};
 
@@ -30,7 +31,7 @@ pub(super) fn assemble(
     reached: Reached,
     relevant: Relevant,
     groups: Groups,
-    metric: Option<Metric>,
+    metric: Option<GroundMetric>,
     goal_possible: bool,
 ) -> GroundTask {
     let strata = strata(&raw);
@@ -70,14 +71,14 @@ pub(super) fn assemble(
     let axioms: Vec<Axiom> = axioms.collect();
     let timed: Vec<TimedEffect> =
         raw.timed.iter().map(|(time_s, deeds)| timed(&encoding, *time_s, deeds)).collect();
-    let all = actions.iter().flat_map(|a: &Action| &a.effects);
+    let all = actions.iter().flat_map(|a: &GroundAction| &a.effects);
     let mut all = all
         .chain(durative.iter().flat_map(|d: &DurativeAction| d.start_effects.iter().chain(&d.end_effects)));
     drop_unused_none_timed(&mut variables, &initial, &mut all, &timed);
     let mutex_groups = groups
         .found
         .iter()
-        .map(|g| g.iter().filter_map(|&a| encoding.fact(a)).collect::<Vec<Fact>>())
+        .map(|g| g.iter().filter_map(|&a| encoding.fact(a)).collect::<Vec<GroundFact>>())
         .filter(|g| g.windows(2).any(|pair| pair[0].variable != pair[1].variable))
         .collect();
     let numbers = initial_numbers(&make);
@@ -116,10 +117,15 @@ fn shared(raw: &RawTask, groups: &Groups) -> Vec<Vec<u32>> {
 }
 
 /// Drops actions that always give an object fluent several values at once.
-fn drop_contested(variables: &[Variable], actions: &mut Vec<Action>, durative: &mut Vec<DurativeAction>) {
-    let never = |effects: &[Effect]| {
-        let always: Vec<Effect> = effects.iter().filter(|effect| effect.when.is_none()).cloned().collect();
-        Effect::some_contest(&always, variables)
+fn drop_contested(
+    variables: &[Variable],
+    actions: &mut Vec<GroundAction>,
+    durative: &mut Vec<DurativeAction>,
+) {
+    let never = |effects: &[GroundEffect]| {
+        let always: Vec<GroundEffect> =
+            effects.iter().filter(|effect| effect.when.is_none()).cloned().collect();
+        GroundEffect::some_contest(&always, variables)
     };
     if variables.iter().any(Variable::is_object) {
         actions.retain(|action| !never(&action.effects));
@@ -135,25 +141,25 @@ fn strata(raw: &RawTask) -> Vec<Option<u32>> {
     strata
 }
 
-fn call(raw: RawCall, encoding: &Encoding) -> Call {
+fn call(raw: RawCall, encoding: &Encoding) -> GroundCall {
     let variable = |atom: Option<&u32>| atom.and_then(|&a| encoding.fact(a)).map(|fact| fact.variable);
     let place = |place: &RawPlace| match place {
         RawPlace::Number(id) => Place::Number(*id),
         RawPlace::Truth(atom) => variable(atom.as_ref()).map_or(Place::Nowhere, Place::Truth),
         RawPlace::Object(atoms) => variable(atoms.first()).map_or(Place::Nowhere, Place::Object),
     };
-    Call { writes: raw.writes.iter().map(place).collect(), origin: raw.origin }
+    GroundCall { writes: raw.writes.iter().map(place).collect(), origin: raw.origin }
 }
 
 fn drop_unused_none_timed(
     variables: &mut [Variable],
     initial: &[u32],
-    effects: &mut dyn Iterator<Item = &Effect>,
+    effects: &mut dyn Iterator<Item = &GroundEffect>,
     timed: &[TimedEffect],
 ) {
-    let wrapped: Vec<Effect> = timed
+    let wrapped: Vec<GroundEffect> = timed
         .iter()
-        .flat_map(|t| t.outcomes.iter().map(|o| Effect { when: None, outcome: o.clone() }))
+        .flat_map(|t| t.outcomes.iter().map(|o| GroundEffect { when: None, outcome: o.clone() }))
         .collect();
     let mut used = used_none(variables, initial);
     effects.for_each(|e| mark_none(variables, e, &mut used));
@@ -203,7 +209,7 @@ fn variables(
 fn encode_action(
     encoding: &Encoding,
     action: RawAction,
-    actions: &mut Vec<Action>,
+    actions: &mut Vec<GroundAction>,
     durative: &mut Vec<DurativeAction>,
 ) {
     let Some(condition) = encoding.conjunction(&action.start) else { return };
@@ -211,14 +217,16 @@ fn encode_action(
     let origin = Origin { schema: action.schema, arguments: action.arguments.into_vec() };
     let effects = encoding.effects(&action.effects, &[&condition]);
     let Some(later) = action.later else {
-        actions.push(Action { origin, condition, effects, cost });
+        actions.push(GroundAction { origin, condition, effects, cost });
         return;
     };
     let parts = (encoding.conjunction(&later.over_all), encoding.conjunction(&later.end));
     let (Some(over_all), Some(at_end)) = parts else { return };
     let end_effects = encoding.effects(&later.end_effects, &[&over_all, &at_end]);
-    let flow =
-        |(fluent, rate): (u32, Expression)| Effect { when: None, outcome: Outcome::Flow { fluent, rate } };
+    let flow = |(fluent, rate): (u32, GroundExpression)| GroundEffect {
+        when: None,
+        outcome: GroundOutcome::Flow { fluent, rate },
+    };
     durative.push(DurativeAction {
         origin,
         duration: later.duration,
@@ -233,8 +241,8 @@ fn encode_action(
 }
 
 fn timed(encoding: &Encoding, time_s: f64, deeds: &[Deed]) -> TimedEffect {
-    let effects: Vec<GroundEffect> =
-        deeds.iter().map(|deed| GroundEffect { when: None, deed: deed.clone() }).collect();
+    let effects: Vec<RawEffect> =
+        deeds.iter().map(|deed| RawEffect { when: None, deed: deed.clone() }).collect();
     let outcomes = encoding.effects(&effects, &[]).into_iter().map(|effect| effect.outcome);
     TimedEffect { time_s, outcomes: outcomes.collect() }
 }
@@ -277,7 +285,7 @@ fn compact(ground: &mut GroundTask, keep: bool) {
         reads(e, &mut mention, &mut |_| {});
     });
     for_outcomes(ground, &mut |o| {
-        if let Outcome::Change { fluent, .. } | Outcome::Flow { fluent, .. } = o {
+        if let GroundOutcome::Change { fluent, .. } | GroundOutcome::Flow { fluent, .. } = o {
             renumber.numerics.insert(*fluent, 0);
         }
     });
@@ -290,32 +298,32 @@ fn compact(ground: &mut GroundTask, keep: bool) {
     ground.numerics = kept.iter().map(|&id| ground.numerics[id as usize].clone()).collect();
     for_expressions(ground, &mut |e| rename(e, &renumber.numerics));
     for_outcomes(ground, &mut |o| {
-        if let Outcome::Change { fluent, .. } | Outcome::Flow { fluent, .. } = o {
+        if let GroundOutcome::Change { fluent, .. } | GroundOutcome::Flow { fluent, .. } = o {
             *fluent = renumber.numerics[fluent];
         }
     });
 }
 
-fn rename(expression: &mut Expression, numerics: &FxHashMap<u32, u32>) {
+fn rename(expression: &mut GroundExpression, numerics: &FxHashMap<u32, u32>) {
     match expression {
-        Expression::Fluent(id) => *id = numerics[id],
-        Expression::Sum(parts) | Expression::Product(parts) => {
+        GroundExpression::Fluent(id) => *id = numerics[id],
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
             parts.iter_mut().for_each(|p| rename(p, numerics));
         }
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             rename(left, numerics);
             rename(right, numerics);
         }
-        Expression::Negative(inner) => rename(inner, numerics),
-        Expression::Constant(_)
-        | Expression::Call(_)
-        | Expression::Duration
-        | Expression::TotalTime
-        | Expression::Violated(_) => {}
+        GroundExpression::Negative(inner) => rename(inner, numerics),
+        GroundExpression::Constant(_)
+        | GroundExpression::Call(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => {}
     }
 }
 
-fn for_effects(ground: &mut GroundTask) -> impl Iterator<Item = &mut Effect> {
+fn for_effects(ground: &mut GroundTask) -> impl Iterator<Item = &mut GroundEffect> {
     let actions = ground.actions.iter_mut().flat_map(|a| &mut a.effects);
     let durative = ground
         .durative
@@ -338,27 +346,27 @@ fn for_conjunctions(ground: &mut GroundTask, body: &mut dyn FnMut(&mut Conjuncti
     }
 }
 
-fn for_outcomes(ground: &mut GroundTask, body: &mut dyn FnMut(&mut Outcome)) {
+fn for_outcomes(ground: &mut GroundTask, body: &mut dyn FnMut(&mut GroundOutcome)) {
     for_effects(ground).for_each(|e| body(&mut e.outcome));
     ground.timed.iter_mut().flat_map(|t| &mut t.outcomes).for_each(body);
 }
 
-fn for_expressions(ground: &mut GroundTask, body: &mut dyn FnMut(&mut Expression)) {
-    for Comparison { left, right, .. } in &mut ground.comparisons {
+fn for_expressions(ground: &mut GroundTask, body: &mut dyn FnMut(&mut GroundExpression)) {
+    for GroundComparison { left, right, .. } in &mut ground.comparisons {
         body(left);
         body(right);
     }
     for_outcomes(ground, &mut |o| match o {
-        Outcome::Change { amount, .. } => body(amount),
-        Outcome::Flow { rate, .. } => body(rate),
-        Outcome::Set(_) | Outcome::Call(_) => {}
+        GroundOutcome::Change { amount, .. } => body(amount),
+        GroundOutcome::Flow { rate, .. } => body(rate),
+        GroundOutcome::Set(_) | GroundOutcome::Call(_) => {}
     });
     ground.actions.iter_mut().for_each(|a| body(&mut a.cost));
     for d in &mut ground.durative {
         body(&mut d.cost);
-        d.duration.iter_mut().for_each(|DurationBound { seconds, .. }| body(seconds));
+        d.duration.iter_mut().for_each(|GroundDurationBound { seconds, .. }| body(seconds));
     }
-    if let Some(Metric { expression, additive: false, .. }) = &mut ground.metric {
+    if let Some(GroundMetric { expression, additive: false, .. }) = &mut ground.metric {
         body(expression);
     }
 }
@@ -394,26 +402,27 @@ fn holds_without_calls(ground: &GroundTask, condition: &Conjunction) -> bool {
     condition.calls.is_empty()
         && condition.facts.iter().all(|f| state.values[f.variable as usize] == f.value)
         && condition.comparisons.iter().all(|&id| {
-            let Comparison { left, relation, right } = &ground.comparisons[id as usize];
+            let GroundComparison { left, relation, right } = &ground.comparisons[id as usize];
             relation.holds(left.number(&state.numbers), right.number(&state.numbers))
         })
 }
 
-impl Expression {
+impl GroundExpression {
     /// Value over these numbers; NaN if a fluent is undefined or the expression needs more than
     /// numbers.
     pub fn number(&self, numbers: &[f64]) -> f64 {
         match self {
-            Expression::Constant(value) => *value,
-            Expression::Fluent(id) => numbers[*id as usize],
-            Expression::Sum(parts) => parts.iter().map(|p| p.number(numbers)).sum(),
-            Expression::Product(parts) => parts.iter().map(|p| p.number(numbers)).product(),
-            Expression::Difference(left, right) => left.number(numbers) - right.number(numbers),
-            Expression::Quotient(left, right) => quotient(left.number(numbers), right.number(numbers)),
-            Expression::Negative(inner) => -inner.number(numbers),
-            Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
-                f64::NAN
-            }
+            GroundExpression::Constant(value) => *value,
+            GroundExpression::Fluent(id) => numbers[*id as usize],
+            GroundExpression::Sum(parts) => parts.iter().map(|p| p.number(numbers)).sum(),
+            GroundExpression::Product(parts) => parts.iter().map(|p| p.number(numbers)).product(),
+            GroundExpression::Difference(left, right) => left.number(numbers) - right.number(numbers),
+            GroundExpression::Quotient(left, right) => quotient(left.number(numbers), right.number(numbers)),
+            GroundExpression::Negative(inner) => -inner.number(numbers),
+            GroundExpression::Call(_)
+            | GroundExpression::Duration
+            | GroundExpression::TotalTime
+            | GroundExpression::Violated(_) => f64::NAN,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::task::{GroundChange, Task};
 use super::assemble::{assemble, initial_numbers};
 use super::atoms::{Atoms, NONE};
 use super::groups::groups;
-use super::instantiate::{Clauses, Deed, GroundEffect, Instantiate};
+use super::instantiate::{Clauses, Deed, Instantiate, RawEffect};
 use super::metric;
 use super::normal::{self, Action_, Change_, Effect_, Formula, Normal, Number, Target};
 use super::obstacles;
@@ -19,7 +19,7 @@ use super::relaxed;
 use super::relevant::{self, Relevant};
 use super::rules::{self, Rules};
 use super::statics::{Statics, Tries};
-use super::task::{DurationBound, Expression, GroundTask, NumericFluent};
+use super::task::{GroundDurationBound, GroundExpression, GroundTask, NumericFluent};
 
 /// Reason why a task was not grounded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -425,7 +425,7 @@ fn raw_actions(
             None => return,
         },
     };
-    let free = Expression::Constant(0.0);
+    let free = GroundExpression::Constant(0.0);
     let arguments: Box<[u32]> = binding[..action.arity].into();
     let mut ways = resolve.split(start, top);
     let Some(last) = ways.pop() else { return };
@@ -468,8 +468,8 @@ fn later(
         .map(|(at_end, comparison, number)| {
             let seconds = make.expression(number, binding);
             // What never changes is the same at the start.
-            let at_end = *at_end && !matches!(seconds, Expression::Constant(_));
-            DurationBound { at_end, relation: Relation::of(*comparison, true), seconds }
+            let at_end = *at_end && !matches!(seconds, GroundExpression::Constant(_));
+            GroundDurationBound { at_end, relation: Relation::of(*comparison, true), seconds }
         })
         .collect();
     let (over_all, end) = (resolve.flat(over_all, top), resolve.flat(end, top));
@@ -477,14 +477,14 @@ fn later(
 }
 
 /// True if effects need a number that never has a value.
-fn never(effects: &[GroundEffect]) -> bool {
-    let undefined = |amount: &Expression| matches!(amount, Expression::Constant(value) if !value.is_finite());
-    let fails =
-        |effect: &GroundEffect| matches!(&effect.deed, Deed::Change(_, _, amount) if undefined(amount));
+fn never(effects: &[RawEffect]) -> bool {
+    let undefined =
+        |amount: &GroundExpression| matches!(amount, GroundExpression::Constant(value) if !value.is_finite());
+    let fails = |effect: &RawEffect| matches!(&effect.deed, Deed::Change(_, _, amount) if undefined(amount));
     effects.iter().any(|effect| effect.when.is_none() && fails(effect))
 }
 
-fn flatten(effects: &mut [GroundEffect], resolve: &mut Resolve<'_>, top: u32) {
+fn flatten(effects: &mut [RawEffect], resolve: &mut Resolve<'_>, top: u32) {
     for effect in effects {
         for clauses in effect.when.iter_mut().flat_map(|w| w.iter_mut()) {
             if !clauses.ors.is_empty() {
@@ -509,7 +509,11 @@ fn timed(task: &Task, make: &mut Instantiate<'_>) -> Vec<(f64, Vec<Deed>)> {
             GroundChange::Number(fluent, value) => {
                 let arguments = fluent.arguments.iter().map(|o| o.0).collect();
                 let id = make.numeric_id(NumericFluent { function: fluent.function.0, arguments });
-                vec![Deed::Change(id, super::task::Change::Assign, Box::new(Expression::Constant(*value)))]
+                vec![Deed::Change(
+                    id,
+                    super::task::Change::Assign,
+                    Box::new(GroundExpression::Constant(*value)),
+                )]
             }
             GroundChange::Object(fluent, value) => {
                 let (predicate, arguments) = object_atom(task, fluent, value.0);

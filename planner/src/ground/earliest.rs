@@ -9,7 +9,8 @@ use std::collections::BinaryHeap;
 use crate::grouped::Grouped;
 
 use super::task::{
-    Conjunction, DurationBound, Effect, Expression, Fact, GroundTask, Outcome, Place, Relation,
+    Conjunction, GroundDurationBound, GroundEffect, GroundExpression, GroundFact, GroundOutcome, GroundTask,
+    Place, Relation,
 };
 
 /// Times that differ by less than this are equal, seconds.
@@ -75,7 +76,7 @@ impl<'g> Earliest<'g> {
         condition.facts.iter().all(|&fact| self.until_s[self.place(fact) as usize].is_infinite())
     }
 
-    fn place(&self, fact: Fact) -> u32 {
+    fn place(&self, fact: GroundFact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
 
@@ -83,23 +84,23 @@ impl<'g> Earliest<'g> {
         let ground = self.ground;
         for (action, started) in ground.durative.iter().zip(facts..) {
             // What its start may change need not hold before it.
-            let kept = |fact: &&Fact| {
+            let kept = |fact: &&GroundFact| {
                 let derived = ground.variables[fact.variable as usize].stratum.is_some();
                 !derived && action.start_effects.iter().all(|effect| !writes(ground, effect, fact.variable))
             };
-            let inside: Vec<Fact> = action.over_all.facts.iter().filter(kept).copied().collect();
-            let at_start: Vec<&[Fact]> = vec![&action.at_start.facts, &inside];
+            let inside: Vec<GroundFact> = action.over_all.facts.iter().filter(kept).copied().collect();
+            let at_start: Vec<&[GroundFact]> = vec![&action.at_start.facts, &inside];
             self.operator(&at_start, None, vec![started]);
-            let takes_s = |bound: &&DurationBound| {
+            let takes_s = |bound: &&GroundDurationBound| {
                 !bound.at_end
                     && matches!(bound.relation, Relation::Equal | Relation::AtLeast | Relation::Greater)
             };
             let bounds = action.duration.iter().filter(takes_s).filter_map(|bound| match bound.seconds {
-                Expression::Constant(seconds) => Some(seconds),
+                GroundExpression::Constant(seconds) => Some(seconds),
                 _ => None,
             });
             let least_s = bounds.fold(0.0, f64::max);
-            let at_end: [&[Fact]; 2] = [&action.over_all.facts, &action.at_end.facts];
+            let at_end: [&[GroundFact]; 2] = [&action.over_all.facts, &action.at_end.facts];
             self.effects(&at_start, None, &action.start_effects);
             self.effects(&at_end, Some((started, least_s)), &action.end_effects);
         }
@@ -116,7 +117,7 @@ impl<'g> Earliest<'g> {
             }
         }
         for (variable, &value) in (0..).zip(&ground.initial.values) {
-            let place = self.place(Fact { variable, value });
+            let place = self.place(GroundFact { variable, value });
             self.labels_s[place as usize] = 0.0;
         }
         for timed in &ground.timed {
@@ -129,20 +130,20 @@ impl<'g> Earliest<'g> {
     }
 
     /// Adds operators for conditional effects, a given time after an action's start.
-    fn effects(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, effects: &[Effect]) {
+    fn effects(&mut self, needs: &[&[GroundFact]], started: Option<(u32, f64)>, effects: &[GroundEffect]) {
         let plain = effects.iter().filter(|effect| effect.when.is_none());
         let gives: Vec<u32> = plain.flat_map(|effect| self.given(&effect.outcome)).collect();
         self.operator(needs, started, gives);
         for effect in effects {
             let Some(when) = &effect.when else { continue };
             // What held at the start may be over by the end.
-            let more: [&[Fact]; 2] = [&when.here.facts, &when.over_all.facts];
-            let needs: Vec<&[Fact]> = needs.iter().copied().chain(more).collect();
+            let more: [&[GroundFact]; 2] = [&when.here.facts, &when.over_all.facts];
+            let needs: Vec<&[GroundFact]> = needs.iter().copied().chain(more).collect();
             self.operator(&needs, started, self.given(&effect.outcome));
         }
     }
 
-    fn operator(&mut self, needs: &[&[Fact]], started: Option<(u32, f64)>, gives: Vec<u32>) {
+    fn operator(&mut self, needs: &[&[GroundFact]], started: Option<(u32, f64)>, gives: Vec<u32>) {
         if gives.is_empty() {
             return;
         }
@@ -157,16 +158,17 @@ impl<'g> Earliest<'g> {
         self.operators.push(Operator { missing, base_s: 0.0, until_s: f64::INFINITY, gives });
     }
 
-    fn given(&self, outcome: &Outcome) -> Vec<u32> {
+    fn given(&self, outcome: &GroundOutcome) -> Vec<u32> {
         match outcome {
-            Outcome::Set(fact) => vec![self.place(*fact)],
-            Outcome::Call(call) => {
+            GroundOutcome::Set(fact) => vec![self.place(*fact)],
+            GroundOutcome::Call(call) => {
                 let written = self.ground.calls[*call as usize].writes.iter().filter_map(set_by_a_call);
                 let values = |variable: u32| self.ground.variables[variable as usize].domain_size();
-                let all = |variable: u32| (0..values(variable)).map(move |value| Fact { variable, value });
+                let all =
+                    |variable: u32| (0..values(variable)).map(move |value| GroundFact { variable, value });
                 written.flat_map(all).map(|fact| self.place(fact)).collect()
             }
-            Outcome::Change { .. } | Outcome::Flow { .. } => Vec::new(),
+            GroundOutcome::Change { .. } | GroundOutcome::Flow { .. } => Vec::new(),
         }
     }
 
@@ -179,9 +181,9 @@ impl<'g> Earliest<'g> {
         let mut now = self.ground.initial.values.clone();
         for timed in &self.ground.timed {
             for outcome in &timed.outcomes {
-                let Outcome::Set(fact) = *outcome else { continue };
+                let GroundOutcome::Set(fact) = *outcome else { continue };
                 let before = std::mem::replace(&mut now[fact.variable as usize], fact.value);
-                let before = self.place(Fact { variable: fact.variable, value: before }) as usize;
+                let before = self.place(GroundFact { variable: fact.variable, value: before }) as usize;
                 self.until_s[before] = timed.time_s;
                 let after = self.place(fact) as usize;
                 self.until_s[after] = f64::INFINITY;
@@ -245,12 +247,12 @@ fn set_by_a_call(place: &Place) -> Option<u32> {
 }
 
 /// True if an effect may change a variable.
-fn writes(ground: &GroundTask, effect: &Effect, variable: u32) -> bool {
+fn writes(ground: &GroundTask, effect: &GroundEffect, variable: u32) -> bool {
     match &effect.outcome {
-        Outcome::Set(fact) => fact.variable == variable,
-        Outcome::Call(call) => {
+        GroundOutcome::Set(fact) => fact.variable == variable,
+        GroundOutcome::Call(call) => {
             ground.calls[*call as usize].writes.iter().filter_map(set_by_a_call).any(|own| own == variable)
         }
-        Outcome::Change { .. } | Outcome::Flow { .. } => false,
+        GroundOutcome::Change { .. } | GroundOutcome::Flow { .. } => false,
     }
 }

@@ -7,7 +7,7 @@ use super::invariants::{AtomNames, Transitions, mutex_groups};
 use crate::task::Task;
 
 use super::atoms::Atoms;
-use super::instantiate::{Clauses, Deed, GroundEffect, Instantiate};
+use super::instantiate::{Clauses, Deed, Instantiate, RawEffect};
 use super::normal::{self, Normal, Target};
 use super::raw::RawTask;
 use super::relaxed;
@@ -127,7 +127,7 @@ fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
 }
 
 /// Snap action as a transition; deletions under conditions that are not atoms are unreliable.
-fn transition(before: &[&Clauses], effects: &[GroundEffect], inner: u32, into: &mut Transitions) {
+fn transition(before: &[&Clauses], effects: &[RawEffect], inner: u32, into: &mut Transitions) {
     let positive = |c: &Clauses| {
         let literals = c.literals.iter().filter(|&&l| l & 1 == 0);
         literals.map(|&l| l >> 1).collect::<Vec<_>>()

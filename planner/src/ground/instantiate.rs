@@ -9,7 +9,7 @@ use crate::task::ObjectId;
 use super::atoms::{Atoms, NONE};
 use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, Term, module_writes};
 use super::statics::{Statics, each, found};
-use super::task::{Change, Comparison, Expression, NumericFluent, Origin, Relation};
+use super::task::{Change, GroundComparison, GroundExpression, NumericFluent, Origin, Relation};
 
 /// Ground condition with disjunctions; a literal is `atom << 1 | negated`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -59,7 +59,7 @@ impl Clauses {
 pub(super) enum Deed {
     Add(u32),
     Delete(u32),
-    Change(u32, Change, Box<Expression>),
+    Change(u32, Change, Box<GroundExpression>),
     Call(u32),
 }
 
@@ -94,7 +94,7 @@ impl RawCall {
 
 /// A ground effect.
 #[derive(Clone, Debug)]
-pub(super) struct GroundEffect {
+pub(super) struct RawEffect {
     /// Conditions at start, over all and at end; `None`: unconditional.
     pub when: Option<Box<[Clauses; 3]>>,
     pub deed: Deed,
@@ -110,7 +110,7 @@ pub(super) struct Instantiate<'a> {
     /// True, by atom, if it holds in every reachable state.
     pub always: Vec<bool>,
     pub numerics: Vec<NumericFluent>,
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<GroundComparison>,
     pub calls: Vec<RawCall>,
     numeric_ids: FxHashMap<NumericFluent, u32>,
     comparison_ids: FxHashMap<Vec<u64>, u32>,
@@ -227,14 +227,14 @@ impl<'a> Instantiate<'a> {
     fn comparison(
         &mut self,
         relation: Relation,
-        left: Expression,
-        right: Expression,
+        left: GroundExpression,
+        right: GroundExpression,
         into: &mut Clauses,
     ) -> bool {
-        if let (Expression::Constant(left), Expression::Constant(right)) = (&left, &right) {
+        if let (GroundExpression::Constant(left), GroundExpression::Constant(right)) = (&left, &right) {
             return relation.holds(*left, *right);
         }
-        if [&left, &right].iter().any(|side| matches!(side, Expression::Constant(v) if v.is_nan())) {
+        if [&left, &right].iter().any(|side| matches!(side, GroundExpression::Constant(v) if v.is_nan())) {
             return false;
         }
         let mut key = vec![relation as u64];
@@ -243,42 +243,42 @@ impl<'a> Instantiate<'a> {
         let next = self.comparisons.len() as u32;
         let id = *self.comparison_ids.entry(key).or_insert(next);
         if id == next {
-            self.comparisons.push(Comparison { left, relation, right });
+            self.comparisons.push(GroundComparison { left, relation, right });
         }
         into.comparisons.push(id);
         true
     }
 
     /// The expression under the binding, constants folded.
-    pub(super) fn expression(&mut self, number: &Number, binding: &[u32]) -> Expression {
+    pub(super) fn expression(&mut self, number: &Number, binding: &[u32]) -> GroundExpression {
         if let Some(value) = self.statics.constant(number, binding) {
-            return Expression::Constant(value);
+            return GroundExpression::Constant(value);
         }
         let mut pair = |p: &[Number; 2]| {
             (Box::new(self.expression(&p[0], binding)), Box::new(self.expression(&p[1], binding)))
         };
         match number {
-            Number::Constant(value) => Expression::Constant(*value),
-            Number::Fluent(named) => Expression::Fluent(self.numeric(named, binding)),
-            Number::Call(call) => Expression::Call(self.call(call, binding)),
+            Number::Constant(value) => GroundExpression::Constant(*value),
+            Number::Fluent(named) => GroundExpression::Fluent(self.numeric(named, binding)),
+            Number::Call(call) => GroundExpression::Call(self.call(call, binding)),
             Number::Sum(parts) => {
-                Expression::Sum(parts.iter().map(|p| self.expression(p, binding)).collect())
+                GroundExpression::Sum(parts.iter().map(|p| self.expression(p, binding)).collect())
             }
             Number::Product(parts) => {
-                Expression::Product(parts.iter().map(|p| self.expression(p, binding)).collect())
+                GroundExpression::Product(parts.iter().map(|p| self.expression(p, binding)).collect())
             }
             Number::Difference(sides) => {
                 let (left, right) = pair(sides);
-                Expression::Difference(left, right)
+                GroundExpression::Difference(left, right)
             }
             Number::Quotient(sides) => {
                 let (left, right) = pair(sides);
-                Expression::Quotient(left, right)
+                GroundExpression::Quotient(left, right)
             }
-            Number::Negative(inner) => Expression::Negative(Box::new(self.expression(inner, binding))),
-            Number::Duration => Expression::Duration,
-            Number::TotalTime => Expression::TotalTime,
-            Number::Violated(preference) => Expression::Violated(*preference),
+            Number::Negative(inner) => GroundExpression::Negative(Box::new(self.expression(inner, binding))),
+            Number::Duration => GroundExpression::Duration,
+            Number::TotalTime => GroundExpression::TotalTime,
+            Number::Violated(preference) => GroundExpression::Violated(*preference),
         }
     }
 
@@ -331,7 +331,7 @@ impl<'a> Instantiate<'a> {
         at_end: bool,
         binding: &mut Vec<u32>,
         domains: &[Arc<[ObjectId]>],
-        into: &mut Vec<GroundEffect>,
+        into: &mut Vec<RawEffect>,
     ) {
         if effect.forall.is_empty() {
             return self.one_effect(effect, at_end, binding, domains, into);
@@ -348,10 +348,10 @@ impl<'a> Instantiate<'a> {
         at_end: bool,
         binding: &mut Vec<u32>,
         domains: &[Arc<[ObjectId]>],
-        into: &mut Vec<GroundEffect>,
+        into: &mut Vec<RawEffect>,
     ) {
         let Ok(when) = self.when(effect, at_end, binding, domains) else { return };
-        let mut push = |deed| into.push(GroundEffect { when: when.clone(), deed });
+        let mut push = |deed| into.push(RawEffect { when: when.clone(), deed });
         match &effect.change {
             Change_::Add(pattern) => {
                 if let Some(atom) = found(&self.atoms, pattern, binding)
@@ -522,24 +522,24 @@ fn guards_of(formula: &Formula) -> Vec<&Pattern> {
 }
 
 /// Key that is equal only for equal expressions.
-fn encode(expression: &Expression, key: &mut Vec<u64>) {
-    let mut list = |tag: u64, parts: &[&Expression]| {
+fn encode(expression: &GroundExpression, key: &mut Vec<u64>) {
+    let mut list = |tag: u64, parts: &[&GroundExpression]| {
         key.push(tag << 32 | parts.len() as u64);
         for part in parts {
             encode(part, key);
         }
     };
     match expression {
-        Expression::Constant(value) => key.extend([1, value.to_bits()]),
-        Expression::Fluent(id) => key.extend([2, u64::from(*id)]),
-        Expression::Call(id) => key.extend([3, u64::from(*id)]),
-        Expression::Duration => key.push(4),
-        Expression::TotalTime => key.push(5),
-        Expression::Violated(id) => key.extend([7, u64::from(*id)]),
-        Expression::Sum(parts) => list(8, &parts.iter().collect::<Vec<_>>()),
-        Expression::Product(parts) => list(9, &parts.iter().collect::<Vec<_>>()),
-        Expression::Difference(left, right) => list(10, &[left, right]),
-        Expression::Quotient(left, right) => list(11, &[left, right]),
-        Expression::Negative(inner) => list(12, &[inner]),
+        GroundExpression::Constant(value) => key.extend([1, value.to_bits()]),
+        GroundExpression::Fluent(id) => key.extend([2, u64::from(*id)]),
+        GroundExpression::Call(id) => key.extend([3, u64::from(*id)]),
+        GroundExpression::Duration => key.push(4),
+        GroundExpression::TotalTime => key.push(5),
+        GroundExpression::Violated(id) => key.extend([7, u64::from(*id)]),
+        GroundExpression::Sum(parts) => list(8, &parts.iter().collect::<Vec<_>>()),
+        GroundExpression::Product(parts) => list(9, &parts.iter().collect::<Vec<_>>()),
+        GroundExpression::Difference(left, right) => list(10, &[left, right]),
+        GroundExpression::Quotient(left, right) => list(11, &[left, right]),
+        GroundExpression::Negative(inner) => list(12, &[inner]),
     }
 }

@@ -1,64 +1,64 @@
 //! The metric, and the numeric fluents that only add up costs.
 
-use super::instantiate::{Deed, GroundEffect};
+use super::instantiate::{Deed, RawEffect};
 use super::raw::{RawAction, RawTask};
 use super::relevant::{is_risky, reads};
-use super::task::{Change, Comparison, Earns, Expression, Metric};
+use super::task::{Change, Earns, GroundComparison, GroundExpression, GroundMetric};
 
 /// Composition of the metric.
 pub(super) struct Costs {
     /// Weight in the metric by numeric fluent, if the fluent only adds up costs.
     pub weights: Vec<Option<f64>>,
-    pub metric: Option<Metric>,
+    pub metric: Option<GroundMetric>,
     /// Numeric fluents that the metric reads otherwise.
     pub read: Vec<u32>,
 }
 
 /// Coefficients of the numeric fluents (`count` of them) and of the total time; `None` if not
 /// linear.
-pub(crate) fn weights(expression: &Expression, count: usize) -> Option<(Vec<f64>, f64)> {
+pub(crate) fn weights(expression: &GroundExpression, count: usize) -> Option<(Vec<f64>, f64)> {
     let (mut weights, mut time) = (vec![0.0; count], 0.0);
     linear(expression, 1.0, &mut weights, &mut time).then_some((weights, time))
 }
 
 /// Splits a linear expression into weights; `false` if it is not linear.
-fn linear(expression: &Expression, factor: f64, weights: &mut [f64], time: &mut f64) -> bool {
+fn linear(expression: &GroundExpression, factor: f64, weights: &mut [f64], time: &mut f64) -> bool {
     match expression {
-        Expression::Constant(_) => true,
-        Expression::Fluent(id) => {
+        GroundExpression::Constant(_) => true,
+        GroundExpression::Fluent(id) => {
             weights[*id as usize] += factor;
             true
         }
-        Expression::TotalTime => {
+        GroundExpression::TotalTime => {
             *time += factor;
             true
         }
-        Expression::Sum(parts) => parts.iter().all(|p| linear(p, factor, weights, time)),
-        Expression::Difference(left, right) => {
+        GroundExpression::Sum(parts) => parts.iter().all(|p| linear(p, factor, weights, time)),
+        GroundExpression::Difference(left, right) => {
             linear(left, factor, weights, time) && linear(right, -factor, weights, time)
         }
-        Expression::Negative(inner) => linear(inner, -factor, weights, time),
-        Expression::Product(parts) => {
+        GroundExpression::Negative(inner) => linear(inner, -factor, weights, time),
+        GroundExpression::Product(parts) => {
             let constant: f64 = parts
                 .iter()
-                .filter_map(|p| if let Expression::Constant(v) = p { Some(*v) } else { None })
+                .filter_map(|p| if let GroundExpression::Constant(v) = p { Some(*v) } else { None })
                 .product();
-            let rest: Vec<_> = parts.iter().filter(|p| !matches!(p, Expression::Constant(_))).collect();
+            let rest: Vec<_> = parts.iter().filter(|p| !matches!(p, GroundExpression::Constant(_))).collect();
             rest.len() <= 1 && rest.iter().all(|p| linear(p, factor * constant, weights, time))
         }
-        Expression::Quotient(left, right) => match **right {
-            Expression::Constant(by) => linear(left, factor / by, weights, time),
+        GroundExpression::Quotient(left, right) => match **right {
+            GroundExpression::Constant(by) => linear(left, factor / by, weights, time),
             _ => false,
         },
-        Expression::Call(_) | Expression::Duration | Expression::Violated(_) => false,
+        GroundExpression::Call(_) | GroundExpression::Duration | GroundExpression::Violated(_) => false,
     }
 }
 
 /// Numeric fluents that are not pure costs: read outside the metric, or changed by more than
 /// unconditional increases of defined amounts.
-fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]) -> Vec<bool> {
+fn not_just_costs(task: &RawTask, comparisons: &[GroundComparison], undefined: &[bool]) -> Vec<bool> {
     let mut read = vec![false; undefined.len()];
-    let mark = |expression: &Expression, read: &mut Vec<bool>| {
+    let mark = |expression: &GroundExpression, read: &mut Vec<bool>| {
         reads(expression, &mut |id| read[id as usize] = true, &mut |_| {});
     };
     for comparison in comparisons {
@@ -95,7 +95,7 @@ fn not_just_costs(task: &RawTask, comparisons: &[Comparison], undefined: &[bool]
 
 /// Possible improvement of an additive metric by actions.
 fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
-    let earns = |effect: &GroundEffect| match &effect.deed {
+    let earns = |effect: &RawEffect| match &effect.deed {
         Deed::Change(id, change, amount) => added(*change, amount, sign * weights[*id as usize]),
         _ => Earns::Never,
     };
@@ -107,7 +107,7 @@ fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
 }
 
 /// Possible improvement by one change of a number with this weight in the metric.
-pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
+pub(crate) fn added(change: Change, amount: &GroundExpression, weight: f64) -> Earns {
     let weight = match change {
         _ if weight == 0.0 => return Earns::Never,
         Change::Increase => weight,
@@ -125,9 +125,9 @@ pub(crate) fn added(change: Change, amount: &Expression, weight: f64) -> Earns {
 /// metric.
 pub(super) fn costs(
     task: &RawTask,
-    comparisons: &[Comparison],
+    comparisons: &[GroundComparison],
     undefined: &[bool],
-    metric: Option<(bool, Expression)>,
+    metric: Option<(bool, GroundExpression)>,
     keep: bool,
     keep_metric: bool,
 ) -> Costs {
@@ -156,39 +156,42 @@ pub(super) fn costs(
     });
     let weights: Vec<_> = weights.collect();
     let read = if additive { Vec::new() } else { used };
-    Costs { weights, metric: Some(Metric { minimise, expression, additive, earns, time_weight }), read }
+    Costs { weights, metric: Some(GroundMetric { minimise, expression, additive, earns, time_weight }), read }
 }
 
 impl Costs {
     /// Contribution of the action to the metric through pure cost fluents; their effects are
     /// removed.
-    pub(super) fn of(&self, action: &mut RawAction) -> Expression {
+    pub(super) fn of(&self, action: &mut RawAction) -> GroundExpression {
         if self.metric.is_none() && action.later.is_none() {
             strip(&self.weights, &mut action.effects, &mut Vec::new());
-            return Expression::Constant(1.0);
+            return GroundExpression::Constant(1.0);
         }
         let mut terms = Vec::new();
         strip(&self.weights, &mut action.effects, &mut terms);
         if let Some(later) = &mut action.later {
             strip(&self.weights, &mut later.end_effects, &mut terms);
         }
-        let constant = |e: &Expression| if let Expression::Constant(v) = e { Some(*v) } else { None };
+        let constant =
+            |e: &GroundExpression| if let GroundExpression::Constant(v) = e { Some(*v) } else { None };
         if let Some(sum) = terms.iter().map(constant).try_fold(0.0, |sum, v| Some(sum + v?)) {
-            return Expression::Constant(sum);
+            return GroundExpression::Constant(sum);
         }
-        Expression::Sum(terms)
+        GroundExpression::Sum(terms)
     }
 }
 
-fn strip(weights: &[Option<f64>], effects: &mut Vec<GroundEffect>, terms: &mut Vec<Expression>) {
+fn strip(weights: &[Option<f64>], effects: &mut Vec<RawEffect>, terms: &mut Vec<GroundExpression>) {
     effects.retain(|effect| {
         let Deed::Change(id, change, amount) = &effect.deed else { return true };
         let Some(weight) = weights[*id as usize] else { return true };
         let weight = if *change == Change::Decrease { -weight } else { weight };
         if weight != 0.0 {
             terms.push(match **amount {
-                Expression::Constant(value) => Expression::Constant(weight * value),
-                ref other => Expression::Product(vec![Expression::Constant(weight), other.clone()]),
+                GroundExpression::Constant(value) => GroundExpression::Constant(weight * value),
+                ref other => {
+                    GroundExpression::Product(vec![GroundExpression::Constant(weight), other.clone()])
+                }
             });
         }
         false

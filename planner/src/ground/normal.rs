@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::pddl3::conditions::negated;
 use super::unused::leave_out_what_nothing_uses;
 use crate::task::{
-    Assignment, Atom, Call, Change, Comparison, Condition, Effect, Expression, Fluent, FunctionId, ObjectId,
-    Quantified, Task, Term as LiftedTerm, Timed, Written,
+    Assignment, Atom, CallTerm, Change, Comparison, Condition, Effect, Expression, Fluent, FunctionId,
+    ObjectId, Quantified, Task, Term as LiftedTerm, Timed, Written,
 };
 
 /// A variable slot or an object.
@@ -250,7 +250,7 @@ impl<'a> Scope<'a> {
         Pattern { predicate: atom.predicate.0, terms: self.terms(&atom.arguments, fresh) }
     }
 
-    fn call(&mut self, call: &Call, fresh: &mut Fresh) -> Named {
+    fn call(&mut self, call: &CallTerm, fresh: &mut Fresh) -> Named {
         Named { index: call.module.0, terms: self.terms(&call.arguments, fresh) }
     }
 

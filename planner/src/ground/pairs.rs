@@ -1,7 +1,7 @@
 //! Mutex groups from h² (Haslum and Geffner 2000): pairs of facts that are reachable together.
 //! Finds more than invariant synthesis where actions no longer correspond to lifted ones.
 
-use super::task::{Action, Fact, GroundTask, Outcome};
+use super::task::{GroundAction, GroundFact, GroundOutcome, GroundTask};
 
 /// Maximum number of facts, above which h² is skipped; the next constant limits the work.
 const MOST_FACTS: usize = 4_000;
@@ -11,11 +11,12 @@ const MOST_MEMBERS: usize = 50_000;
 
 /// Mutex groups that cover every pair of different variables found mutually exclusive; none for
 /// tasks with axioms, conditional effects or too many facts.
-pub fn exclusive(task: &GroundTask) -> Vec<Vec<Fact>> {
+pub fn exclusive(task: &GroundTask) -> Vec<Vec<GroundFact>> {
     let conditional = task.actions.iter().flat_map(|action| &action.effects).any(|e| e.when.is_some());
-    let facts: Vec<Fact> = (0..task.variables.len() as u32)
+    let facts: Vec<GroundFact> = (0..task.variables.len() as u32)
         .flat_map(|variable| {
-            (0..task.variables[variable as usize].domain_size()).map(move |value| Fact { variable, value })
+            (0..task.variables[variable as usize].domain_size())
+                .map(move |value| GroundFact { variable, value })
         })
         .collect();
     if conditional || !task.axioms.is_empty() || facts.len() > MOST_FACTS {
@@ -31,7 +32,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn reached(task: &GroundTask, facts: &[Fact]) -> Option<Pairs> {
+    fn reached(task: &GroundTask, facts: &[GroundFact]) -> Option<Pairs> {
         let words = facts.len().div_ceil(64);
         let mut pairs = Pairs { words, rows: vec![0; words * facts.len()] };
         let mut offsets = Vec::with_capacity(task.variables.len() + 1);
@@ -75,8 +76,8 @@ impl Pairs {
     }
 
     /// Applies an action wherever possible; true if this reaches new pairs.
-    fn apply(&mut self, action: &Action, offsets: &[usize]) -> bool {
-        let id = |fact: Fact| offsets[fact.variable as usize] + fact.value as usize;
+    fn apply(&mut self, action: &GroundAction, offsets: &[usize]) -> bool {
+        let id = |fact: GroundFact| offsets[fact.variable as usize] + fact.value as usize;
         let needs: Vec<usize> = action.condition.facts.iter().map(|&fact| id(fact)).collect();
         if needs.iter().any(|&one| needs.iter().any(|&other| !self.may(one, other))) {
             return false;
@@ -96,10 +97,10 @@ impl Pairs {
             }
         }
         let set = action.effects.iter().filter_map(|effect| match effect.outcome {
-            Outcome::Set(fact) => Some(fact),
+            GroundOutcome::Set(fact) => Some(fact),
             _ => None,
         });
-        let set: Vec<Fact> = set.collect();
+        let set: Vec<GroundFact> = set.collect();
         for fact in &set {
             let variable = fact.variable as usize;
             (offsets[variable]..offsets[variable + 1])
@@ -122,7 +123,7 @@ impl Pairs {
     }
 
     /// Greedy maximal mutex groups that cover every unreached pair of different variables.
-    fn groups(&self, facts: &[Fact]) -> Vec<Vec<Fact>> {
+    fn groups(&self, facts: &[GroundFact]) -> Vec<Vec<GroundFact>> {
         let reached: Vec<usize> = (0..facts.len()).filter(|&fact| self.may(fact, fact)).collect();
         let mut all = vec![0; self.words];
         reached.iter().for_each(|&fact| all[fact / 64] |= 1 << (fact % 64));

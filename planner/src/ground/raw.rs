@@ -2,9 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
-use super::instantiate::{Clauses, Deed, GroundEffect};
+use super::instantiate::{Clauses, Deed, RawEffect};
 use super::statics::Tries;
-use super::task::{DurationBound, Expression};
+use super::task::{GroundDurationBound, GroundExpression};
 
 /// Maximum number of action copies for a disjunctive condition; more become a derived variable.
 const MOST_COPIES: usize = 4;
@@ -14,9 +14,9 @@ const MOST_COPIES: usize = 4;
 pub(super) struct Later {
     pub over_all: Clauses,
     pub end: Clauses,
-    pub end_effects: Vec<GroundEffect>,
-    pub flows: Vec<(u32, Expression)>,
-    pub duration: Vec<DurationBound>,
+    pub end_effects: Vec<RawEffect>,
+    pub flows: Vec<(u32, GroundExpression)>,
+    pub duration: Vec<GroundDurationBound>,
 }
 
 /// A ground action; no disjunctions are left in its conditions.
@@ -25,10 +25,10 @@ pub(super) struct RawAction {
     pub schema: u32,
     pub arguments: Box<[u32]>,
     pub start: Clauses,
-    pub effects: Vec<GroundEffect>,
+    pub effects: Vec<RawEffect>,
     pub later: Option<Box<Later>>,
     /// Contribution to the metric.
-    pub cost: Expression,
+    pub cost: GroundExpression,
 }
 
 /// A ground axiom.

@@ -2,7 +2,7 @@
 
 use crate::grouped::Grouped;
 
-use super::instantiate::{Clauses, Deed, GroundEffect, RawCall};
+use super::instantiate::{Clauses, Deed, RawCall, RawEffect};
 use super::raw::{RawAction, RawTask};
 
 /// Result of the fixpoint.
@@ -41,7 +41,7 @@ impl Fixpoint {
         self.unary.push(Unary { missing: wanted.len() as u32, reaches });
     }
 
-    fn effect(&mut self, base: &[&Clauses], effect: &GroundEffect, started: u32, calls: &[RawCall]) {
+    fn effect(&mut self, base: &[&Clauses], effect: &RawEffect, started: u32, calls: &[RawCall]) {
         let mut add = |atom| {
             let when = effect.when.iter().flat_map(|w| w.iter());
             self.add(base.iter().copied().chain(when), Some(started), atom);
@@ -138,7 +138,7 @@ fn simplify(task: &mut RawTask, reached: &[bool], absent: &mut [bool]) {
     let drop = |clauses: &mut Clauses| {
         clauses.literals.retain(|&l| l & 1 == 0 || reached[(l >> 1) as usize]);
     };
-    let effects = |list: &mut Vec<GroundEffect>, absent: &mut [bool]| {
+    let effects = |list: &mut Vec<RawEffect>, absent: &mut [bool]| {
         list.retain_mut(|effect| {
             if let Some(when) = &mut effect.when {
                 if !when.iter().all(|c| possible(c, reached)) {

@@ -2,9 +2,9 @@
 
 use rustc_hash::FxHashMap;
 
-use super::instantiate::{Clauses, Deed, GroundEffect, RawCall, RawPlace};
+use super::instantiate::{Clauses, Deed, RawCall, RawEffect, RawPlace};
 use super::raw::{RawAction, RawTask};
-use super::task::{Change, Comparison, Expression};
+use super::task::{Change, GroundComparison, GroundExpression};
 use crate::model::agreement::contradictions;
 
 /// Relevant atoms and numbers.
@@ -19,7 +19,7 @@ pub(super) struct Relevant {
 
 struct Work<'a> {
     relevant: Relevant,
-    comparisons: &'a [Comparison],
+    comparisons: &'a [GroundComparison],
     calls: &'a [RawCall],
     /// True, by numeric fluent, if initially undefined.
     undefined: &'a [bool],
@@ -29,47 +29,50 @@ struct Work<'a> {
 }
 
 /// Every numeric fluent and call in the expression.
-pub(super) fn reads(expression: &Expression, fluent: &mut dyn FnMut(u32), call: &mut dyn FnMut(u32)) {
+pub(super) fn reads(expression: &GroundExpression, fluent: &mut dyn FnMut(u32), call: &mut dyn FnMut(u32)) {
     match expression {
-        Expression::Fluent(id) => fluent(*id),
-        Expression::Call(id) => call(*id),
-        Expression::Sum(parts) | Expression::Product(parts) => {
+        GroundExpression::Fluent(id) => fluent(*id),
+        GroundExpression::Call(id) => call(*id),
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
             parts.iter().for_each(|p| reads(p, fluent, call));
         }
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             reads(left, fluent, call);
             reads(right, fluent, call);
         }
-        Expression::Negative(inner) => reads(inner, fluent, call),
-        Expression::Constant(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {}
+        GroundExpression::Negative(inner) => reads(inner, fluent, call),
+        GroundExpression::Constant(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => {}
     }
 }
 
 /// True if a change may read something undefined: the action is then inapplicable, whoever needs
 /// the number. `undefined` marks the numeric fluents without an initial value.
-pub(super) fn is_risky(change: Change, fluent: u32, amount: &Expression, undefined: &[bool]) -> bool {
+pub(super) fn is_risky(change: Change, fluent: u32, amount: &GroundExpression, undefined: &[bool]) -> bool {
     let mut risky = change == Change::ScaleDown || change != Change::Assign && undefined[fluent as usize];
     reads(amount, &mut |id| risky |= undefined[id as usize], &mut |_| {});
     risky || may_fail(amount)
 }
 
 /// Value of a state-independent expression; NaN for others.
-fn known(expression: &Expression) -> f64 {
-    if let Expression::Constant(value) = expression { *value } else { f64::NAN }
+fn known(expression: &GroundExpression) -> f64 {
+    if let GroundExpression::Constant(value) = expression { *value } else { f64::NAN }
 }
 
 /// True if an expression may be undefined although all its inputs are defined.
-fn may_fail(expression: &Expression) -> bool {
+fn may_fail(expression: &GroundExpression) -> bool {
     match expression {
-        Expression::Constant(value) => !value.is_finite(),
-        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().any(may_fail),
-        Expression::Difference(left, right) => may_fail(left) || may_fail(right),
-        Expression::Quotient(left, right) => {
-            let safe = matches!(**right, Expression::Constant(value) if value != 0.0);
+        GroundExpression::Constant(value) => !value.is_finite(),
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => parts.iter().any(may_fail),
+        GroundExpression::Difference(left, right) => may_fail(left) || may_fail(right),
+        GroundExpression::Quotient(left, right) => {
+            let safe = matches!(**right, GroundExpression::Constant(value) if value != 0.0);
             !safe || may_fail(left)
         }
-        Expression::Negative(inner) => may_fail(inner),
-        Expression::Call(_) => true,
+        GroundExpression::Negative(inner) => may_fail(inner),
+        GroundExpression::Call(_) => true,
         _ => false,
     }
 }
@@ -114,7 +117,7 @@ impl Work<'_> {
         }
     }
 
-    fn expression(&mut self, expression: &Expression) {
+    fn expression(&mut self, expression: &GroundExpression) {
         let (numerics, changed) = (&mut self.relevant.numerics, &mut self.changed);
         reads(expression, &mut |id| Self::set(numerics, id, changed), &mut |_| {});
     }
@@ -152,8 +155,8 @@ impl Work<'_> {
 
     /// Marks a number that one action may change in contradicting ways as relevant: the
     /// contradiction makes the action inapplicable.
-    fn contradictions(&mut self, effects: &[GroundEffect]) {
-        let change = |effect: &GroundEffect| match &effect.deed {
+    fn contradictions(&mut self, effects: &[RawEffect]) {
+        let change = |effect: &RawEffect| match &effect.deed {
             Deed::Change(id, change, amount) => Some((*id, *change, known(amount))),
             _ => None,
         };
@@ -168,7 +171,7 @@ impl Work<'_> {
 
     /// Marks an object fluent that one action may give two values as relevant: the contradiction
     /// makes the action inapplicable.
-    fn contests(&mut self, effects: &[GroundEffect]) {
+    fn contests(&mut self, effects: &[RawEffect]) {
         // The object, its value (none where it loses that), and how it gets it.
         let valued = self.valued;
         let given = effects.iter().filter_map(|effect| match effect.deed {
@@ -176,7 +179,7 @@ impl Work<'_> {
             Deed::Delete(atom) => Some((*valued.get(&atom)?, None, effect)),
             _ => None,
         });
-        let given: Vec<(u32, Option<u32>, &GroundEffect)> = given.collect();
+        let given: Vec<(u32, Option<u32>, &RawEffect)> = given.collect();
         for (place, &(object, value, one)) in given.iter().enumerate() {
             for &(other_object, other_value, other) in &given[..place] {
                 if object != other_object || value == other_value || self.exclude(one, other) {
@@ -193,7 +196,7 @@ impl Work<'_> {
     }
 
     /// True if both effects give one object different values.
-    fn exclude(&self, one: &GroundEffect, other: &GroundEffect) -> bool {
+    fn exclude(&self, one: &RawEffect, other: &RawEffect) -> bool {
         let (Some(one), Some(other)) = (&one.when, &other.when) else { return false };
         let has = |literal: u32| if literal & 1 == 0 { self.valued.get(&(literal >> 1)) } else { None };
         one[0].literals.iter().any(|&literal| {
@@ -203,7 +206,7 @@ impl Work<'_> {
         })
     }
 
-    fn effects(&mut self, effects: &[GroundEffect]) {
+    fn effects(&mut self, effects: &[RawEffect]) {
         self.contradictions(effects);
         for effect in effects {
             if !self.keeps(&effect.deed) {
@@ -261,7 +264,7 @@ impl Work<'_> {
 /// arguments by atom of an object function.
 pub(super) fn prune(
     task: &mut RawTask,
-    comparisons: &[Comparison],
+    comparisons: &[GroundComparison],
     calls: &[RawCall],
     undefined: &[bool],
     metric: &[u32],

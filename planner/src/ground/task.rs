@@ -16,7 +16,7 @@ pub type ComparisonId = u32;
 
 /// Variable with one of its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Fact {
+pub struct GroundFact {
     /// The variable.
     pub variable: VariableId,
     /// Value of the variable, below [`Variable::domain_size`].
@@ -83,7 +83,7 @@ pub struct NumericFluent {
 
 /// Arithmetic expression over the state; NaN if an input fluent is undefined (its number is NaN).
 #[derive(Clone, Debug, PartialEq)]
-pub enum Expression {
+pub enum GroundExpression {
     /// A number.
     Constant(f64),
     /// Value of a numeric fluent.
@@ -97,57 +97,58 @@ pub enum Expression {
     /// Number of a preference's violations; only in metrics.
     Violated(u32),
     /// Sum of all.
-    Sum(Vec<Expression>),
+    Sum(Vec<GroundExpression>),
     /// The product of all.
-    Product(Vec<Expression>),
+    Product(Vec<GroundExpression>),
     /// First minus second.
-    Difference(Box<Expression>, Box<Expression>),
+    Difference(Box<GroundExpression>, Box<GroundExpression>),
     /// First over second.
-    Quotient(Box<Expression>, Box<Expression>),
+    Quotient(Box<GroundExpression>, Box<GroundExpression>),
     /// Minus the expression.
-    Negative(Box<Expression>),
+    Negative(Box<GroundExpression>),
 }
 
-impl Expression {
+impl GroundExpression {
     /// True if the value is a weighted sum of numbers.
     pub fn is_linear(&self) -> bool {
         match self {
-            Expression::Constant(_) | Expression::Fluent(_) => true,
-            Expression::Sum(parts) => parts.iter().all(Expression::is_linear),
-            Expression::Difference(left, right) => left.is_linear() && right.is_linear(),
-            Expression::Negative(inner) => inner.is_linear(),
-            Expression::Product(parts) => {
-                let factors = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
-                factors.clone().count() <= 1 && factors.into_iter().all(Expression::is_linear)
+            GroundExpression::Constant(_) | GroundExpression::Fluent(_) => true,
+            GroundExpression::Sum(parts) => parts.iter().all(GroundExpression::is_linear),
+            GroundExpression::Difference(left, right) => left.is_linear() && right.is_linear(),
+            GroundExpression::Negative(inner) => inner.is_linear(),
+            GroundExpression::Product(parts) => {
+                let factors = parts.iter().filter(|part| !matches!(part, GroundExpression::Constant(_)));
+                factors.clone().count() <= 1 && factors.into_iter().all(GroundExpression::is_linear)
             }
-            Expression::Quotient(left, right) => {
-                left.is_linear() && matches!(**right, Expression::Constant(_))
+            GroundExpression::Quotient(left, right) => {
+                left.is_linear() && matches!(**right, GroundExpression::Constant(_))
             }
-            Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
-                false
-            }
+            GroundExpression::Call(_)
+            | GroundExpression::Duration
+            | GroundExpression::TotalTime
+            | GroundExpression::Violated(_) => false,
         }
     }
 }
 
-impl Expression {
+impl GroundExpression {
     /// True if the value times `factor` is at least 0 in every state, judged by constants,
     /// durations and attachment answers (never negative).
     pub fn is_never_negative(&self, factor: f64) -> bool {
         match self {
-            Expression::Constant(value) => factor * value >= 0.0,
-            Expression::Duration | Expression::Call(_) => factor >= 0.0,
-            Expression::Sum(parts) => parts.iter().all(|part| part.is_never_negative(factor)),
-            Expression::Product(parts) => {
-                let rest = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+            GroundExpression::Constant(value) => factor * value >= 0.0,
+            GroundExpression::Duration | GroundExpression::Call(_) => factor >= 0.0,
+            GroundExpression::Sum(parts) => parts.iter().all(|part| part.is_never_negative(factor)),
+            GroundExpression::Product(parts) => {
+                let rest = parts.iter().filter(|part| !matches!(part, GroundExpression::Constant(_)));
                 let constants = parts.iter().map(|part| match part {
-                    Expression::Constant(value) => *value,
+                    GroundExpression::Constant(value) => *value,
                     _ => 1.0,
                 });
                 factor * constants.product::<f64>() >= 0.0
                     && rest.into_iter().all(|part| part.is_never_negative(1.0))
             }
-            Expression::Negative(inner) => inner.is_never_negative(-factor),
+            GroundExpression::Negative(inner) => inner.is_never_negative(-factor),
             _ => false,
         }
     }
@@ -155,22 +156,22 @@ impl Expression {
     /// Coefficient of a number in a sum ([`Expression::is_linear`]).
     pub fn weight_of(&self, fluent: NumericId) -> f64 {
         match self {
-            Expression::Fluent(own) => f64::from(u8::from(*own == fluent)),
-            Expression::Sum(parts) => parts.iter().map(|part| part.weight_of(fluent)).sum(),
-            Expression::Difference(left, right) => left.weight_of(fluent) - right.weight_of(fluent),
-            Expression::Negative(inner) => -inner.weight_of(fluent),
-            Expression::Product(parts) => {
-                let factor = |part: &Expression| match part {
-                    Expression::Constant(number) => *number,
+            GroundExpression::Fluent(own) => f64::from(u8::from(*own == fluent)),
+            GroundExpression::Sum(parts) => parts.iter().map(|part| part.weight_of(fluent)).sum(),
+            GroundExpression::Difference(left, right) => left.weight_of(fluent) - right.weight_of(fluent),
+            GroundExpression::Negative(inner) => -inner.weight_of(fluent),
+            GroundExpression::Product(parts) => {
+                let factor = |part: &GroundExpression| match part {
+                    GroundExpression::Constant(number) => *number,
                     other => other.weight_of(fluent),
                 };
-                if parts.iter().all(|part| matches!(part, Expression::Constant(_))) {
+                if parts.iter().all(|part| matches!(part, GroundExpression::Constant(_))) {
                     return 0.0;
                 }
                 parts.iter().map(factor).product()
             }
-            Expression::Quotient(left, right) => match **right {
-                Expression::Constant(number) => left.weight_of(fluent) / number,
+            GroundExpression::Quotient(left, right) => match **right {
+                GroundExpression::Constant(number) => left.weight_of(fluent) / number,
                 _ => 0.0,
             },
             _ => 0.0,
@@ -180,20 +181,20 @@ impl Expression {
 
 /// Numeric comparison; false if a side is NaN.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Comparison {
+pub struct GroundComparison {
     /// Left side.
-    pub left: Expression,
+    pub left: GroundExpression,
     /// Relation of left to right.
     pub relation: Relation,
     /// Right side.
-    pub right: Expression,
+    pub right: GroundExpression,
 }
 
 /// A conjunction of conditions; empty is true. Disjunctions have been split off into actions or derived variables.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Conjunction {
     /// Facts, sorted, at most one per variable.
-    pub facts: Vec<Fact>,
+    pub facts: Vec<GroundFact>,
     /// Numeric conditions, sorted.
     pub comparisons: Vec<ComparisonId>,
     /// Attachment calls and the answer wanted, sorted.
@@ -209,9 +210,9 @@ impl Conjunction {
 
 /// Outcome of an effect.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
+pub enum GroundOutcome {
     /// The variable takes the value.
-    Set(Fact),
+    Set(GroundFact),
     /// The number changes.
     Change {
         /// Number that changes.
@@ -219,14 +220,14 @@ pub enum Outcome {
         /// Kind of change.
         change: Change,
         /// Amount, evaluated in the state before the effects.
-        amount: Expression,
+        amount: GroundExpression,
     },
     /// The number changes continuously while the action runs: by `rate` a second.
     Flow {
         /// Number that changes.
         fluent: NumericId,
         /// Change a second.
-        rate: Expression,
+        rate: GroundExpression,
     },
     /// An effect module writes the numbers that [`Call::writes`] lists.
     Call(CallId),
@@ -234,7 +235,7 @@ pub enum Outcome {
 
 /// Condition of a conditional effect.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct When {
+pub struct GroundWhen {
     /// Condition at the time of the effect.
     pub here: Conjunction,
     /// Condition at the start of the durative action (end effects only).
@@ -246,17 +247,17 @@ pub struct When {
 /// Effect with its condition. Simultaneous effects of one action are all evaluated before any is
 /// applied, then applied in order (deletes before adds).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Effect {
+pub struct GroundEffect {
     /// Condition of the effect; `None`: unconditional.
-    pub when: Option<Box<When>>,
+    pub when: Option<Box<GroundWhen>>,
     /// Outcome.
-    pub outcome: Outcome,
+    pub outcome: GroundOutcome,
 }
 
-impl Effect {
+impl GroundEffect {
     /// True if both effects may happen together and give one object fluent different values.
-    pub(crate) fn contests(&self, other: &Effect, variables: &[Variable]) -> bool {
-        let (Outcome::Set(one), Outcome::Set(another)) = (&self.outcome, &other.outcome) else {
+    pub(crate) fn contests(&self, other: &GroundEffect, variables: &[Variable]) -> bool {
+        let (GroundOutcome::Set(one), GroundOutcome::Set(another)) = (&self.outcome, &other.outcome) else {
             return false;
         };
         one.variable == another.variable
@@ -266,16 +267,16 @@ impl Effect {
     }
 
     /// True if the conditions of both cannot hold at once.
-    fn excludes(&self, other: &Effect) -> bool {
+    fn excludes(&self, other: &GroundEffect) -> bool {
         let (Some(one), Some(other)) = (&self.when, &other.when) else { return false };
-        let differs = |fact: &Fact| {
+        let differs = |fact: &GroundFact| {
             other.here.facts.iter().any(|f| f.variable == fact.variable && f.value != fact.value)
         };
         one.here.facts.iter().any(differs)
     }
 
     /// True if some of these effects may give an object fluent several values at once.
-    pub(crate) fn some_contest(effects: &[Effect], variables: &[Variable]) -> bool {
+    pub(crate) fn some_contest(effects: &[GroundEffect], variables: &[Variable]) -> bool {
         let mut later = effects.iter().enumerate();
         later.any(|(place, one)| effects[..place].iter().any(|other| one.contests(other, variables)))
     }
@@ -292,15 +293,15 @@ pub struct Origin {
 
 /// Instantaneous action; a disjunctive condition gives several ground actions per lifted instance.
 #[derive(Clone, Debug)]
-pub struct Action {
+pub struct GroundAction {
     /// Lifted action and its arguments.
     pub origin: Origin,
     /// Precondition.
     pub condition: Conjunction,
     /// Effects.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<GroundEffect>,
     /// Contribution to the metric; see [`Metric::additive`].
-    pub cost: Expression,
+    pub cost: GroundExpression,
 }
 
 /// A durative action.
@@ -309,7 +310,7 @@ pub struct DurativeAction {
     /// Lifted action and its arguments.
     pub origin: Origin,
     /// Bounds on the duration, seconds, evaluated at the start (`true`) or at the end (`false`).
-    pub duration: Vec<DurationBound>,
+    pub duration: Vec<GroundDurationBound>,
     /// Condition right before the start.
     pub at_start: Conjunction,
     /// Condition strictly between start and end (invariant).
@@ -317,31 +318,31 @@ pub struct DurativeAction {
     /// Condition just before the end.
     pub at_end: Conjunction,
     /// Effects at the start.
-    pub start_effects: Vec<Effect>,
+    pub start_effects: Vec<GroundEffect>,
     /// Continuous effects ([`Outcome::Flow`] only).
-    pub flow_effects: Vec<Effect>,
+    pub flow_effects: Vec<GroundEffect>,
     /// Effects at the end.
-    pub end_effects: Vec<Effect>,
+    pub end_effects: Vec<GroundEffect>,
     /// Contribution to the metric besides time; see [`Metric::additive`].
-    pub cost: Expression,
+    pub cost: GroundExpression,
 }
 
 /// A bound on a duration.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DurationBound {
+pub struct GroundDurationBound {
     /// True if evaluated at the end of the action instead of its start.
     pub at_end: bool,
     /// Relation of `?duration` to the expression.
     pub relation: Relation,
     /// Seconds.
-    pub seconds: Expression,
+    pub seconds: GroundExpression,
 }
 
 /// Axiom: the derived variable is true (value 0) in every state in which the body holds.
 #[derive(Clone, Debug)]
 pub struct Axiom {
     /// Derived fact, always value 0 of its variable.
-    pub head: Fact,
+    pub head: GroundFact,
     /// Condition.
     pub body: Conjunction,
 }
@@ -352,12 +353,12 @@ pub struct TimedEffect {
     /// When, in seconds from the start of the plan.
     pub time_s: f64,
     /// Outcomes, in the order of the problem file.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<GroundOutcome>,
 }
 
 /// A ground call of an attachment.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Call {
+pub struct GroundCall {
     /// The module of the lifted task and the arguments.
     pub origin: Origin,
     /// Terms written by an effect module, in module order; empty for other kinds.
@@ -379,11 +380,11 @@ pub enum Place {
 
 /// Metric.
 #[derive(Clone, Debug)]
-pub struct Metric {
+pub struct GroundMetric {
     /// True for minimisation.
     pub minimise: bool,
     /// The whole expression.
-    pub expression: Expression,
+    pub expression: GroundExpression,
     /// True if the metric is a constant plus action costs plus `time_weight` × makespan.
     pub additive: bool,
     /// Possible improvement by actions beyond the value without them; if any, a best value may not
@@ -422,11 +423,11 @@ pub struct GroundTask {
     /// Numeric fluents.
     pub numerics: Vec<NumericFluent>,
     /// Numeric conditions, each once.
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<GroundComparison>,
     /// Attachment calls, each once.
-    pub calls: Vec<Call>,
+    pub calls: Vec<GroundCall>,
     /// Instantaneous actions.
-    pub actions: Vec<Action>,
+    pub actions: Vec<GroundAction>,
     /// Durative actions.
     pub durative: Vec<DurativeAction>,
     /// Axioms, by stratum.
@@ -438,9 +439,9 @@ pub struct GroundTask {
     /// Goal.
     pub goal: Conjunction,
     /// Metric; `None` counts steps (classical) or time (temporal).
-    pub metric: Option<Metric>,
+    pub metric: Option<GroundMetric>,
     /// Mutex groups beyond those that share a variable.
-    pub mutex_groups: Vec<Vec<Fact>>,
+    pub mutex_groups: Vec<Vec<GroundFact>>,
     /// False if the goal is unreachable even under delete relaxation.
     pub goal_reachable: bool,
     /// Obstacles of an unreachable task: atoms without achievers, the goal's first.
@@ -451,14 +452,14 @@ impl GroundTask {
     /// Approximate memory of the ground task, bytes; actions dominate.
     pub(crate) fn bytes(&self) -> usize {
         let condition = |condition: &Conjunction| {
-            condition.facts.len() * size_of::<Fact>()
+            condition.facts.len() * size_of::<GroundFact>()
                 + condition.comparisons.len() * size_of::<ComparisonId>()
                 + condition.calls.len() * size_of::<(CallId, bool)>()
         };
-        let effects = |effects: &[Effect]| {
-            let when = |when: &When| {
+        let effects = |effects: &[GroundEffect]| {
+            let when = |when: &GroundWhen| {
                 let parts = [&when.here, &when.at_start, &when.over_all];
-                size_of::<When>() + parts.into_iter().map(condition).sum::<usize>()
+                size_of::<GroundWhen>() + parts.into_iter().map(condition).sum::<usize>()
             };
             let conditional = effects.iter().filter_map(|effect| effect.when.as_deref());
             size_of_val(effects) + conditional.map(when).sum::<usize>()

@@ -1,17 +1,17 @@
 //! Atoms grouped into finite-domain variables, and conditions and effects translated to them.
 
-use super::instantiate::{Clauses, Deed, GroundEffect};
-use super::task::{Conjunction, Effect, Fact, Outcome, Variable, When};
+use super::instantiate::{Clauses, Deed, RawEffect};
+use super::task::{Conjunction, GroundEffect, GroundFact, GroundOutcome, GroundWhen, Variable};
 
 /// Mark of an atom without a variable.
-const NOWHERE: Fact = Fact { variable: u32::MAX, value: 0 };
+const NOWHERE: GroundFact = GroundFact { variable: u32::MAX, value: 0 };
 
 /// Encoding of atoms in variables.
 pub(super) struct Encoding {
     /// Fact of each atom; `NOWHERE` for static and irrelevant atoms.
-    facts: Vec<Fact>,
+    facts: Vec<GroundFact>,
     /// Fact that states an atom's absence, by atom, if a single fact does.
-    absent: Vec<Option<Fact>>,
+    absent: Vec<Option<GroundFact>>,
     /// Extra two-valued variable of an atom besides the shared one, by atom.
     doubles: Vec<Option<u32>>,
     /// True, by variable, if one of its atoms has an extra variable.
@@ -116,7 +116,7 @@ fn place(choice: Choice<'_>, mut chosen: Vec<Vec<u32>>, objects: usize, plain: u
         encoding.doubled.push(false);
         let shared = encoding.facts[atom as usize].variable as usize;
         encoding.doubled[shared] = true;
-        encoding.absent[atom as usize] = Some(Fact { variable, value: 1 });
+        encoding.absent[atom as usize] = Some(GroundFact { variable, value: 1 });
     }
     for group in derived {
         encoding.add(group);
@@ -129,10 +129,10 @@ impl Encoding {
         let variable = self.atoms.len() as u32;
         let none = group.len() as u32;
         for (value, &atom) in group.iter().enumerate() {
-            self.facts[atom as usize] = Fact { variable, value: value as u32 };
+            self.facts[atom as usize] = GroundFact { variable, value: value as u32 };
         }
         if let [atom] = group[..] {
-            self.absent[atom as usize] = Some(Fact { variable, value: 1 });
+            self.absent[atom as usize] = Some(GroundFact { variable, value: 1 });
         }
         self.none.push(Some(none));
         self.doubled.push(false);
@@ -140,7 +140,7 @@ impl Encoding {
     }
 
     /// Fact of an atom.
-    pub(super) fn fact(&self, atom: u32) -> Option<Fact> {
+    pub(super) fn fact(&self, atom: u32) -> Option<GroundFact> {
         let fact = self.facts[atom as usize];
         (fact != NOWHERE).then_some(fact)
     }
@@ -169,7 +169,7 @@ impl Encoding {
     }
 
     /// Effects over variables, given the conditions before them; deletes come first.
-    pub(super) fn effects(&self, effects: &[GroundEffect], before: &[&Conjunction]) -> Vec<Effect> {
+    pub(super) fn effects(&self, effects: &[RawEffect], before: &[&Conjunction]) -> Vec<GroundEffect> {
         let mut all = Vec::with_capacity(effects.len());
         for effect in effects {
             match &effect.deed {
@@ -182,17 +182,18 @@ impl Encoding {
             match &effect.deed {
                 Deed::Delete(_) => {}
                 Deed::Add(atom) => {
-                    let double = self.doubles[*atom as usize].map(|variable| Fact { variable, value: 0 });
+                    let double =
+                        self.doubles[*atom as usize].map(|variable| GroundFact { variable, value: 0 });
                     for fact in self.fact(*atom).into_iter().chain(double) {
-                        self.push(effect, None, Outcome::Set(fact), &mut all);
+                        self.push(effect, None, GroundOutcome::Set(fact), &mut all);
                     }
                 }
                 Deed::Change(fluent, change, amount) => {
                     let amount = (**amount).clone();
-                    let outcome = Outcome::Change { fluent: *fluent, change: *change, amount };
+                    let outcome = GroundOutcome::Change { fluent: *fluent, change: *change, amount };
                     self.push(effect, None, outcome, &mut all);
                 }
-                Deed::Call(call) => self.push(effect, None, Outcome::Call(*call), &mut all),
+                Deed::Call(call) => self.push(effect, None, GroundOutcome::Call(*call), &mut all),
             }
         }
         all
@@ -200,12 +201,12 @@ impl Encoding {
 
     /// Adds the effects of one value on the atoms it replaces: an assignment has no explicit
     /// delete, but the extra variables need one.
-    fn replace(&self, atom: u32, effect: &GroundEffect, out: &mut Vec<Effect>) {
+    fn replace(&self, atom: u32, effect: &RawEffect, out: &mut Vec<GroundEffect>) {
         let variable = self.fact(atom).map(|fact| fact.variable as usize);
         let Some(variable) = variable.filter(|&variable| self.doubled[variable]) else { return };
         for &other in self.atoms[variable].iter().filter(|&&other| other != atom) {
             if let Some(variable) = self.doubles[other as usize] {
-                self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+                self.push(effect, None, GroundOutcome::Set(GroundFact { variable, value: 1 }), out);
             }
         }
     }
@@ -213,10 +214,10 @@ impl Encoding {
     fn delete(
         &self,
         atom: u32,
-        effect: &GroundEffect,
-        all: &[GroundEffect],
+        effect: &RawEffect,
+        all: &[RawEffect],
         before: &[&Conjunction],
-        out: &mut Vec<Effect>,
+        out: &mut Vec<GroundEffect>,
     ) {
         if let Some(fact) = self.fact(atom).filter(|fact| (fact.variable as usize) < self.objects) {
             return self.unset(atom, fact, effect, out);
@@ -229,7 +230,7 @@ impl Encoding {
             return;
         }
         if let Some(variable) = self.doubles[atom as usize] {
-            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+            self.push(effect, None, GroundOutcome::Set(GroundFact { variable, value: 1 }), out);
         }
         let Some(fact) = self.fact(atom) else { return };
         let Some(none) = self.none[fact.variable as usize] else { return };
@@ -243,28 +244,39 @@ impl Encoding {
         let known = before.iter().any(|c| c.facts.binary_search(&fact).is_ok());
         let alone = self.atoms[fact.variable as usize].len() == 1;
         let extra = if known || alone { None } else { Some(fact) };
-        self.push(effect, extra, Outcome::Set(Fact { variable: fact.variable, value: none }), out);
+        self.push(
+            effect,
+            extra,
+            GroundOutcome::Set(GroundFact { variable: fact.variable, value: none }),
+            out,
+        );
     }
 
     /// Adds the effects of an object function becoming undefined for this value, which contradict
     /// an assignment of another value.
-    fn unset(&self, atom: u32, fact: Fact, effect: &GroundEffect, out: &mut Vec<Effect>) {
+    fn unset(&self, atom: u32, fact: GroundFact, effect: &RawEffect, out: &mut Vec<GroundEffect>) {
         if let Some(variable) = self.doubles[atom as usize] {
-            self.push(effect, None, Outcome::Set(Fact { variable, value: 1 }), out);
+            self.push(effect, None, GroundOutcome::Set(GroundFact { variable, value: 1 }), out);
         }
         let none = self.none[fact.variable as usize].filter(|_| fact.value == 0);
         if let Some(value) = none {
-            self.push(effect, None, Outcome::Set(Fact { variable: fact.variable, value }), out);
+            self.push(effect, None, GroundOutcome::Set(GroundFact { variable: fact.variable, value }), out);
         }
     }
 
-    fn push(&self, effect: &GroundEffect, extra: Option<Fact>, outcome: Outcome, out: &mut Vec<Effect>) {
-        let mut when = When::default();
+    fn push(
+        &self,
+        effect: &RawEffect,
+        extra: Option<GroundFact>,
+        outcome: GroundOutcome,
+        out: &mut Vec<GroundEffect>,
+    ) {
+        let mut when = GroundWhen::default();
         if let Some(parts) = &effect.when {
             let [here, at_start, over_all] = &**parts;
             let all = (self.conjunction(here), self.conjunction(at_start), self.conjunction(over_all));
             let (Some(here), Some(at_start), Some(over_all)) = all else { return };
-            when = When { here, at_start, over_all };
+            when = GroundWhen { here, at_start, over_all };
         }
         if let Some(fact) = extra {
             if when.here.facts.iter().any(|f| f.variable == fact.variable && *f != fact) {
@@ -275,7 +287,7 @@ impl Encoding {
             }
         }
         let always = when.here.is_empty() && when.at_start.is_empty() && when.over_all.is_empty();
-        out.push(Effect { when: if always { None } else { Some(Box::new(when)) }, outcome });
+        out.push(GroundEffect { when: if always { None } else { Some(Box::new(when)) }, outcome });
     }
 
     /// The initial value of a variable.
@@ -291,8 +303,8 @@ pub(super) fn used_none(variables: &[Variable], initial: &[u32]) -> Vec<bool> {
 }
 
 /// Marks variables that an effect may set to "none of these atoms".
-pub(super) fn mark_none(variables: &[Variable], effect: &Effect, used: &mut [bool]) {
-    if let Outcome::Set(fact) = effect.outcome {
+pub(super) fn mark_none(variables: &[Variable], effect: &GroundEffect, used: &mut [bool]) {
+    if let GroundOutcome::Set(fact) = effect.outcome {
         let variable = fact.variable as usize;
         used[variable] |= fact.value + 1 == variables[variable].domain_size();
     }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::{NumberChange, Numbers, reads, repetitions};
-use crate::ground::{Change, Expression, Relation};
+use crate::ground::{Change, GroundExpression, Relation};
 
 use super::relaxed::Relevant;
 
@@ -88,20 +88,23 @@ impl Range {
     }
 }
 
-fn range(expression: &Expression, ranges: &impl Fn(u32) -> Range) -> Range {
+fn range(expression: &GroundExpression, ranges: &impl Fn(u32) -> Range) -> Range {
     match expression {
-        Expression::Constant(value) => Range::point(*value),
-        Expression::Fluent(id) => ranges(*id),
-        Expression::Sum(parts) => {
+        GroundExpression::Constant(value) => Range::point(*value),
+        GroundExpression::Fluent(id) => ranges(*id),
+        GroundExpression::Sum(parts) => {
             parts.iter().fold(Range::point(0.0), |sum, part| sum.plus(range(part, ranges)))
         }
-        Expression::Product(parts) => {
+        GroundExpression::Product(parts) => {
             parts.iter().fold(Range::point(1.0), |product, part| product.times(range(part, ranges)))
         }
-        Expression::Difference(left, right) => range(left, ranges).minus(range(right, ranges)),
-        Expression::Quotient(left, right) => range(left, ranges).over(range(right, ranges)),
-        Expression::Negative(inner) => Range::point(0.0).minus(range(inner, ranges)),
-        Expression::Call(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => EMPTY,
+        GroundExpression::Difference(left, right) => range(left, ranges).minus(range(right, ranges)),
+        GroundExpression::Quotient(left, right) => range(left, ranges).over(range(right, ranges)),
+        GroundExpression::Negative(inner) => Range::point(0.0).minus(range(inner, ranges)),
+        GroundExpression::Call(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => EMPTY,
     }
 }
 
@@ -240,7 +243,7 @@ impl Intervals {
         for change in changes {
             self.dynamic |= change.constant_gain().is_none();
             let given = match (change.change, &change.amount) {
-                (Some(Change::Assign), Some(Expression::Constant(level))) => Some(*level),
+                (Some(Change::Assign), Some(GroundExpression::Constant(level))) => Some(*level),
                 _ => change.constant_gain(),
             };
             if let Some(gain) = given.filter(|&gain| gain > 0.0) {
@@ -313,11 +316,11 @@ impl Intervals {
         }
     }
 
-    fn range(&self, expression: &Expression) -> Range {
+    fn range(&self, expression: &GroundExpression) -> Range {
         range(expression, &|number| self.ranges[number as usize])
     }
 
-    fn near(&self, expression: &Expression) -> Range {
+    fn near(&self, expression: &GroundExpression) -> Range {
         range(expression, &|number| self.near[number as usize].range)
     }
 
@@ -386,7 +389,7 @@ impl Intervals {
     }
 
     /// Change of left minus right of a comparison, as an amount and its weight.
-    fn added<'a>(&self, change: &'a NumberChange, comparison: u32) -> Option<(&'a Expression, f64)> {
+    fn added<'a>(&self, change: &'a NumberChange, comparison: u32) -> Option<(&'a GroundExpression, f64)> {
         let linear = self.numbers.linear[comparison as usize].as_ref()?;
         let (_, weight) = linear.weights.iter().find(|(n, w)| *n == change.number && *w != 0.0)?;
         let sign = if change.change == Some(Change::Decrease) { -1.0 } else { 1.0 };

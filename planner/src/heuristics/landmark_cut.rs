@@ -6,7 +6,7 @@
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::NumberChange;
-use crate::ground::{Fact, Relation};
+use crate::ground::{GroundFact, Relation};
 
 use super::queue::RadixHeap;
 
@@ -260,7 +260,7 @@ impl<'a> Build<'a> {
     }
 
     /// Adds a relaxed operator if some condition needs one of its effects.
-    fn node(&mut self, preconditions: &[Fact], mut effects: Vec<u32>, operator: u32) {
+    fn node(&mut self, preconditions: &[GroundFact], mut effects: Vec<u32>, operator: u32) {
         let mut preconditions: Vec<u32> = preconditions.iter().map(|&fact| self.task.id(fact)).collect();
         preconditions.sort_unstable();
         preconditions.dedup();
@@ -282,7 +282,7 @@ impl<'a> Build<'a> {
         let task = self.task;
         let own = task.preconditions.get(operator);
         let mut plain = Vec::new();
-        let with = |conditions: &[Fact]| [own, conditions].concat();
+        let with = |conditions: &[GroundFact]| [own, conditions].concat();
         for effect in task.effects.get(operator) {
             match &task.conditions[effect.from as usize..effect.to as usize] {
                 [] => plain.push(task.id(effect.fact)),

@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::classical::compiled::{Compiled, Lists};
-use crate::ground::Fact;
+use crate::ground::GroundFact;
 use crate::memory::Rows;
 
 /// Maximum number of facts of a disjunctive landmark.
@@ -58,7 +58,11 @@ struct Find<'a> {
 
 impl Landmarks {
     /// Finds the landmarks of a task; returns those found so far if `stop` becomes true.
-    pub fn new(task: &Compiled, mutex_groups: &[Vec<Fact>], stop: &(dyn Fn() -> bool + Sync)) -> Landmarks {
+    pub fn new(
+        task: &Compiled,
+        mutex_groups: &[Vec<GroundFact>],
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Landmarks {
         let mut find = Find::new(task);
         for &fact in &task.goal {
             let id = find.landmark(vec![task.id(fact)]);
@@ -110,7 +114,7 @@ impl<'a> Find<'a> {
         }
     }
 
-    fn needs(&self, operator: u32) -> &'a [crate::ground::Fact] {
+    fn needs(&self, operator: u32) -> &'a [crate::ground::GroundFact] {
         let task = self.task;
         let operators = task.operators() as u32;
         if operator < operators {
@@ -277,7 +281,7 @@ const ORDERING_WORK: usize = 5_000_000;
 /// Orders a landmark before others that it would have to delete: goals, and facts needed together
 /// with a later landmark (Hoffmann et al. 2004, reasonable orders; Richter and Westphal 2010,
 /// section 4.3). Orders that close a cycle are dropped.
-fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Landmark]) {
+fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<GroundFact>], all: &mut [Landmark]) {
     let exclusions = Exclusions::new(task, mutex_groups, all);
     let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
     let mut work = 0;
@@ -316,7 +320,7 @@ fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<Fact>], all: &mut [Land
 
 /// Mutexes between facts.
 struct Exclusions<'a> {
-    mutex_groups: &'a [Vec<Fact>],
+    mutex_groups: &'a [Vec<GroundFact>],
     /// Mutex groups by fact.
     groups_of: Lists<u32>,
     /// Goal landmark by fact, and by variable; `u32::MAX` for none.
@@ -325,7 +329,7 @@ struct Exclusions<'a> {
 }
 
 impl<'a> Exclusions<'a> {
-    fn new(task: &Compiled, mutex_groups: &'a [Vec<Fact>], all: &[Landmark]) -> Self {
+    fn new(task: &Compiled, mutex_groups: &'a [Vec<GroundFact>], all: &[Landmark]) -> Self {
         let members = mutex_groups
             .iter()
             .enumerate()

@@ -3,7 +3,7 @@
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::NumberChange;
-use crate::ground::Fact;
+use crate::ground::GroundFact;
 
 use super::intervals::Intervals;
 use super::queue::RadixHeap;
@@ -117,7 +117,7 @@ impl Relaxed {
     pub(crate) fn with(task: &Compiled, counting: Counting, operators: Vec<u32>, goal: Vec<u32>) -> Relaxed {
         let mut needed = vec![false; task.facts];
         goal.iter().for_each(|&f| needed[f as usize] = true);
-        let mut need = |facts: &[Fact]| facts.iter().for_each(|&f| needed[task.id(f) as usize] = true);
+        let mut need = |facts: &[GroundFact]| facts.iter().for_each(|&f| needed[task.id(f) as usize] = true);
         for &op in &operators {
             need(task.preconditions.get(op as usize));
             for e in task.effects.get(op as usize) {

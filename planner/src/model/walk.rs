@@ -1,13 +1,13 @@
 //! Pre-order traversal of a task's conditions, expressions, calls and terms.
 
-use crate::task::{Action, Call, Change, Condition, Effect, Expression, Fluent, Task, Term, Timed};
+use crate::task::{Action, CallTerm, Change, Condition, Effect, Expression, Fluent, Task, Term, Timed};
 
 /// Visited node.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Part<'t> {
     Condition(&'t Condition),
     Expression(&'t Expression),
-    Call(&'t Call),
+    Call(&'t CallTerm),
     /// Value of a function, read or changed.
     Fluent(&'t Fluent),
     /// Change by an effect.
@@ -48,7 +48,7 @@ pub(crate) fn expression<'t>(own: &'t Expression, visit: &mut dyn FnMut(Part<'t>
     }
 }
 
-fn call<'t>(own: &'t Call, visit: &mut dyn FnMut(Part<'t>)) {
+fn call<'t>(own: &'t CallTerm, visit: &mut dyn FnMut(Part<'t>)) {
     visit(Part::Call(own));
     terms(&own.arguments, visit);
 }
@@ -101,7 +101,7 @@ pub(crate) fn action<'t>(own: &'t Action, visit: &mut dyn FnMut(Part<'t>)) {
 }
 
 /// The calls among the parts that a walk visits.
-fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t Call> {
+fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t CallTerm> {
     let mut calls = Vec::new();
     walk(&mut |part| {
         if let Part::Call(call) = part {
@@ -114,14 +114,14 @@ fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t Call> {
 impl Action {
     /// All module calls of an action: grounding, duration, conditions, effects, rates and
     /// preferences.
-    pub fn calls(&self) -> Vec<&Call> {
+    pub fn calls(&self) -> Vec<&CallTerm> {
         calls(|visit| action(self, visit))
     }
 }
 
 impl Expression {
     /// All module calls of a rule.
-    pub fn calls(&self) -> Vec<&Call> {
+    pub fn calls(&self) -> Vec<&CallTerm> {
         calls(|visit| expression(self, visit))
     }
 }

@@ -49,7 +49,7 @@ pub struct ModuleDeclaration {
     /// Name and parameters.
     pub signature: Signature,
     /// The fluents that an effect module writes.
-    pub writes: Vec<Term>,
+    pub writes: Vec<TermAst>,
     /// Kind of the module.
     pub kind: CallKind,
     /// The token `fn@lib.so`.
@@ -58,7 +58,7 @@ pub struct ModuleDeclaration {
 
 /// An option line `(init@lib arg …)`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ModuleOption {
+pub struct ModuleOptionAst {
     /// The token `init@lib`.
     pub function: Name,
     /// Arguments.
@@ -67,18 +67,18 @@ pub struct ModuleOption {
 
 /// A call of a module, `[name arg …]`.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Call {
+pub struct CallAst {
     /// The module's name.
     pub name: Name,
     /// Arguments.
-    pub arguments: Vec<Term>,
+    pub arguments: Vec<TermAst>,
     /// The whole call.
     pub span: Span,
 }
 
 /// Something with a value: an object or a number.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Term {
+pub enum TermAst {
     /// A plain name: an object, or a function without parameters written without parentheses.
     Name(Name),
     /// `?x`
@@ -90,7 +90,7 @@ pub enum Term {
         /// The function.
         name: Name,
         /// Arguments.
-        arguments: Vec<Term>,
+        arguments: Vec<TermAst>,
         /// The whole term.
         span: Span,
     },
@@ -99,12 +99,12 @@ pub enum Term {
         /// The operation.
         operator: Arithmetic,
         /// Operands, at least one.
-        operands: Vec<Term>,
+        operands: Vec<TermAst>,
         /// The whole term.
         span: Span,
     },
     /// `[cost a b]`
-    Call(Call),
+    Call(CallAst),
     /// `?duration`
     Duration(Span),
     /// `#t`
@@ -174,7 +174,7 @@ pub enum Formula {
         /// The predicate.
         name: Name,
         /// Arguments.
-        arguments: Vec<Term>,
+        arguments: Vec<TermAst>,
         /// The whole atom.
         span: Span,
     },
@@ -183,12 +183,12 @@ pub enum Formula {
         /// The comparison.
         comparison: Comparison,
         /// Both sides.
-        sides: Box<[Term; 2]>,
+        sides: Box<[TermAst; 2]>,
         /// The whole comparison.
         span: Span,
     },
     /// `[can-see a b]`
-    Call(Call),
+    Call(CallAst),
     /// `(at start f)`, …
     Timed(When, Box<Formula>, Span),
     /// `(preference name f)`
@@ -249,13 +249,13 @@ pub enum Assignment {
 
 /// An effect.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Effect {
+pub enum EffectAst {
     /// `(and …)`
-    And(Vec<Effect>),
+    And(Vec<EffectAst>),
     /// `(forall (…) e)`
-    Forall(Vec<Typed>, Box<Effect>),
+    Forall(Vec<Typed>, Box<EffectAst>),
     /// `(when f e)`
-    When(Formula, Box<Effect>),
+    When(Formula, Box<EffectAst>),
     /// `(p a b)` or `(not (p a b))`
     Literal {
         /// True if the atom becomes false.
@@ -263,7 +263,7 @@ pub enum Effect {
         /// The predicate.
         name: Name,
         /// Arguments.
-        arguments: Vec<Term>,
+        arguments: Vec<TermAst>,
         /// The whole literal.
         span: Span,
     },
@@ -272,34 +272,34 @@ pub enum Effect {
         /// Kind of change.
         assignment: Assignment,
         /// The fluent that changes.
-        fluent: Term,
+        fluent: TermAst,
         /// The new value, or the amount of the change.
-        value: Term,
+        value: TermAst,
         /// The whole effect.
         span: Span,
     },
     /// `[update a b]`
-    Call(Call),
+    Call(CallAst),
     /// `(at end e)`, …
-    Timed(When, Box<Effect>, Span),
+    Timed(When, Box<EffectAst>, Span),
 }
 
 /// Bound on a duration, `(<= ?duration e)`, at start or end.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DurationBound {
+pub struct DurationBoundAst {
     /// Time at which the bound is evaluated.
     pub when: When,
     /// Comparison with `?duration` on the left-hand side.
     pub comparison: Comparison,
     /// The bound.
-    pub value: Term,
+    pub value: TermAst,
     /// The whole bound.
     pub span: Span,
 }
 
 /// An action, instantaneous or durative.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Action {
+pub struct ActionAst {
     /// Name.
     pub name: Name,
     /// True for a `:durative-action`.
@@ -307,13 +307,13 @@ pub struct Action {
     /// Parameters.
     pub parameters: Vec<Typed>,
     /// Calls of grounding modules.
-    pub grounding: Vec<Call>,
+    pub grounding: Vec<CallAst>,
     /// Bounds on the duration.
-    pub duration: Vec<DurationBound>,
+    pub duration: Vec<DurationBoundAst>,
     /// Precondition.
     pub condition: Option<Formula>,
     /// Effect.
-    pub effect: Option<Effect>,
+    pub effect: Option<EffectAst>,
     /// The whole declaration.
     pub span: Span,
 }
@@ -341,7 +341,7 @@ pub struct Domain {
     /// Declared types.
     pub types: Vec<Typed>,
     /// `:oplinit`: options of the modules, independent of the problem.
-    pub module_options: Vec<ModuleOption>,
+    pub module_options: Vec<ModuleOptionAst>,
     /// Declared semantic modules.
     pub modules: Vec<ModuleDeclaration>,
     /// Declared constants.
@@ -355,7 +355,7 @@ pub struct Domain {
     /// Rules of derived predicates.
     pub derived: Vec<Derived>,
     /// Actions of both kinds.
-    pub actions: Vec<Action>,
+    pub actions: Vec<ActionAst>,
 }
 
 /// An element of the initial state.
@@ -398,11 +398,11 @@ pub enum InitialValue {
 
 /// The metric of a problem.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Metric {
+pub struct MetricAst {
     /// True to minimise, false to maximise.
     pub minimise: bool,
     /// The expression that is optimised.
-    pub value: Term,
+    pub value: TermAst,
     /// The whole section.
     pub span: Span,
 }
@@ -419,9 +419,9 @@ pub struct Problem {
     /// Requirements repeated in the problem.
     pub requirements: Vec<Name>,
     /// `:moduleoptions`
-    pub module_options: Vec<ModuleOption>,
+    pub module_options: Vec<ModuleOptionAst>,
     /// `:moduleexitoptions`
-    pub module_exit_options: Vec<ModuleOption>,
+    pub module_exit_options: Vec<ModuleOptionAst>,
     /// Objects.
     pub objects: Vec<Typed>,
     /// The initial state, timed literals included.
@@ -433,5 +433,5 @@ pub struct Problem {
     /// Trajectory constraints.
     pub constraints: Vec<Formula>,
     /// The metric.
-    pub metric: Option<Metric>,
+    pub metric: Option<MetricAst>,
 }

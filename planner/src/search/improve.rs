@@ -473,7 +473,7 @@ impl Needs {
             return Needs { events: Vec::new() };
         }
         for (step, &operator) in plan.iter().enumerate() {
-            let compared = |f: &&crate::ground::Fact| (f.variable as usize) < task.numbers.first;
+            let compared = |f: &&crate::ground::GroundFact| (f.variable as usize) < task.numbers.first;
             for fact in task.preconditions.get(operator as usize).iter().filter(compared) {
                 events[fact.variable as usize].push((step as u32, fact.value));
             }

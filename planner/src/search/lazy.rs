@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::classical::compiled::Compiled;
 use crate::classical::successor::Successors;
-use crate::ground::Fact;
+use crate::ground::GroundFact;
 use crate::heuristics::landmarks::{Landmarks, Status};
 use crate::heuristics::relaxed::{Counting, Relaxed};
 use crate::memory::MemoryLimit;
@@ -71,7 +71,7 @@ pub struct Shared<'a> {
     pub successors: &'a Successors,
     pub landmarks: &'a Landmarks,
     /// Mutex groups of facts.
-    pub mutex_groups: &'a [Vec<Fact>],
+    pub mutex_groups: &'a [Vec<GroundFact>],
     pub memory: MemoryLimit,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }

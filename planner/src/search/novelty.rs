@@ -94,7 +94,7 @@ impl Novelty {
 }
 
 /// Resumable search; after [`End::Limit`] it can continue.
-pub struct Search<'a, 's> {
+pub struct NoveltySearch<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
@@ -116,11 +116,11 @@ pub struct Search<'a, 's> {
     unseen: usize,
 }
 
-impl<'a, 's> Search<'a, 's> {
+impl<'a, 's> NoveltySearch<'a, 's> {
     /// Search before its first step.
-    pub fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> Search<'a, 's> {
+    pub fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> NoveltySearch<'a, 's> {
         let task = shared.task;
-        Search {
+        NoveltySearch {
             shared,
             bound,
             narrow,

@@ -146,8 +146,8 @@ const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 /// Resumable search for a first plan.
 enum Kept<'a, 's> {
     Lazy(Box<lazy::Search<'a, 's>>),
-    Novelty(Box<novelty::Search<'a, 's>>),
-    Horizon(Box<horizon::Search<'a, 's>>),
+    Novelty(Box<novelty::NoveltySearch<'a, 's>>),
+    Horizon(Box<horizon::SatSearch<'a, 's>>),
     /// Finished search.
     Spent,
 }
@@ -155,8 +155,10 @@ enum Kept<'a, 's> {
 impl<'a, 's> Kept<'a, 's> {
     fn new(shared: &'s Shared<'a>, place: usize, bound: u32) -> Self {
         match PORTFOLIO[place].engine {
-            Engine::Width { prunes } => Kept::Novelty(Box::new(novelty::Search::new(shared, bound, prunes))),
-            Engine::Satisfiability => Kept::Horizon(Box::new(horizon::Search::new(shared, bound))),
+            Engine::Width { prunes } => {
+                Kept::Novelty(Box::new(novelty::NoveltySearch::new(shared, bound, prunes)))
+            }
+            Engine::Satisfiability => Kept::Horizon(Box::new(horizon::SatSearch::new(shared, bound))),
             Engine::LazyGreedy { costs, lookahead, newest_first, prefers_landmarks } => {
                 let counting = if costs { GREEDY.counting } else { Counting::Steps };
                 let (newest, towards_landmarks) = (newest_first, prefers_landmarks);

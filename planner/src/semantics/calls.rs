@@ -5,11 +5,11 @@ use std::sync::Arc;
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::{self, Answer, FactValue, Level, Read, Reading};
 use crate::state::State;
-use crate::task::{Call, FunctionId, ObjectId, Parameter, PredicateId, Task};
+use crate::task::{CallTerm, FunctionId, ObjectId, Parameter, PredicateId, Task};
 
 /// A predicate or function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Symbol {
+pub enum ReadSymbol {
     /// A predicate.
     Predicate(PredicateId),
     /// A function.
@@ -21,7 +21,7 @@ impl Semantics<'_> {
     pub(crate) fn ask(
         &self,
         state: &State,
-        call: &Call,
+        call: &CallTerm,
         binding: &Binding,
     ) -> Result<Option<Answer>, CallFailure> {
         let Some(arguments) = self.objects(state, &call.arguments, binding) else { return Ok(None) };
@@ -37,7 +37,7 @@ impl Semantics<'_> {
     pub(crate) fn proposals(
         &self,
         state: &State,
-        call: &Call,
+        call: &CallTerm,
         binding: &Binding,
     ) -> Result<Vec<Arc<str>>, CallFailure> {
         Ok(match self.ask(state, call, binding)? {
@@ -50,7 +50,7 @@ impl Semantics<'_> {
     fn question(
         &self,
         state: &State,
-        call: &Call,
+        call: &CallTerm,
         arguments: &[ObjectId],
         binding: &Binding,
     ) -> attachment::Call {
@@ -70,12 +70,12 @@ impl Semantics<'_> {
         }
     }
 
-    fn reading(&self, state: &State, symbol: Symbol, arguments: &[ObjectId]) -> Reading {
+    fn reading(&self, state: &State, symbol: ReadSymbol, arguments: &[ObjectId]) -> Reading {
         let (name, value) = match symbol {
-            Symbol::Predicate(id) => {
+            ReadSymbol::Predicate(id) => {
                 (&self.task.predicate(id).name, FactValue::Truth(state.holds(id, arguments)))
             }
-            Symbol::Function(id) => {
+            ReadSymbol::Function(id) => {
                 let value = match self.task.function(id).result {
                     None => state.number(id, arguments).map(FactValue::Number),
                     Some(_) => state
@@ -92,7 +92,11 @@ impl Semantics<'_> {
 
 /// Ground facts and fluents that a declared read covers for these arguments, ordered by declaration
 /// and by the task's objects; empty for an unknown symbol.
-pub(crate) fn instances(task: &Task, read: &Read, arguments: &[ObjectId]) -> Vec<(Symbol, Vec<ObjectId>)> {
+pub(crate) fn instances(
+    task: &Task,
+    read: &Read,
+    arguments: &[ObjectId],
+) -> Vec<(ReadSymbol, Vec<ObjectId>)> {
     match read {
         Read::At(name, positions) => {
             // What stands at a position that the call does not have is nothing.
@@ -106,37 +110,38 @@ pub(crate) fn instances(task: &Task, read: &Read, arguments: &[ObjectId]) -> Vec
         Read::All(name) => find(task, name).map(|symbol| all_instances(task, symbol)).unwrap_or_default(),
         Read::Everything => {
             let predicates =
-                (0..task.predicates.len()).map(|index| Symbol::Predicate(PredicateId(index as u32)));
-            let functions = (0..task.functions.len()).map(|index| Symbol::Function(FunctionId(index as u32)));
+                (0..task.predicates.len()).map(|index| ReadSymbol::Predicate(PredicateId(index as u32)));
+            let functions =
+                (0..task.functions.len()).map(|index| ReadSymbol::Function(FunctionId(index as u32)));
             predicates.chain(functions).flat_map(|symbol| all_instances(task, symbol)).collect()
         }
     }
 }
 
-fn find(task: &Task, name: &str) -> Option<Symbol> {
+fn find(task: &Task, name: &str) -> Option<ReadSymbol> {
     match task.find_predicate(name) {
-        Some(id) => Some(Symbol::Predicate(id)),
-        None => task.find_function(name).map(Symbol::Function),
+        Some(id) => Some(ReadSymbol::Predicate(id)),
+        None => task.find_function(name).map(ReadSymbol::Function),
     }
 }
 
-fn all_instances(task: &Task, symbol: Symbol) -> Vec<(Symbol, Vec<ObjectId>)> {
+fn all_instances(task: &Task, symbol: ReadSymbol) -> Vec<(ReadSymbol, Vec<ObjectId>)> {
     instances_with(task, symbol, &vec![None; parameters(task, symbol).len()])
 }
 
-fn parameters(task: &Task, symbol: Symbol) -> &[Parameter] {
+fn parameters(task: &Task, symbol: ReadSymbol) -> &[Parameter] {
     match symbol {
-        Symbol::Predicate(id) => &task.predicate(id).parameters,
-        Symbol::Function(id) => &task.function(id).parameters,
+        ReadSymbol::Predicate(id) => &task.predicate(id).parameters,
+        ReadSymbol::Function(id) => &task.function(id).parameters,
     }
 }
 
 /// Instances with these arguments; `None`: any object of the parameter's type.
 fn instances_with(
     task: &Task,
-    symbol: Symbol,
+    symbol: ReadSymbol,
     arguments: &[Option<ObjectId>],
-) -> Vec<(Symbol, Vec<ObjectId>)> {
+) -> Vec<(ReadSymbol, Vec<ObjectId>)> {
     let mut all: Vec<Vec<ObjectId>> = vec![Vec::new()];
     for (parameter, argument) in parameters(task, symbol).iter().zip(arguments) {
         let objects = argument.as_ref().map_or(&*parameter.objects, std::slice::from_ref);

@@ -3,7 +3,7 @@
 use super::{Binding, Semantics, UNBOUND};
 use crate::diagnostic::Span;
 use crate::task::{
-    Atom, Call, Comparison, Condition, Expression, Fact, Fluent, GroundFluent, ObjectId, Quantified, Term,
+    Atom, CallTerm, Comparison, Condition, Expression, Fact, Fluent, GroundFluent, ObjectId, Quantified, Term,
 };
 
 impl Semantics<'_> {
@@ -32,7 +32,7 @@ impl Semantics<'_> {
         format!("({})", self.listed(&self.task.function(fluent.function).name, &fluent.arguments, binding))
     }
 
-    pub(crate) fn call_text(&self, call: &Call, binding: &Binding) -> String {
+    pub(crate) fn call_text(&self, call: &CallTerm, binding: &Binding) -> String {
         let mut text = self.listed(&self.task.module(call.module).name, &call.arguments, binding);
         for proposal in &binding.proposals {
             text.push(' ');

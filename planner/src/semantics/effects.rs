@@ -6,7 +6,7 @@ use crate::diagnostic::Span;
 use crate::model::agreement::{contradictions, reset};
 use crate::state::State;
 use crate::task::{
-    ActionId, Assignment, Call, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
+    ActionId, Assignment, CallTerm, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
 };
 
 /// Changes made by a happening.
@@ -189,7 +189,7 @@ impl Semantics<'_> {
     fn written(
         &self,
         state: &State,
-        call: &Call,
+        call: &CallTerm,
         binding: &Binding,
         changes: &mut Changes,
     ) -> Result<Result<(), Clash>, CallFailure> {

@@ -5,12 +5,12 @@
 
 use rustc_hash::FxHashSet;
 
-use super::calls::{Symbol, instances};
+use super::calls::{ReadSymbol, instances};
 use super::effects::Changes;
 use super::{Binding, CallFailure, Semantics};
 use crate::state::State;
 use crate::task::{
-    Assignment, Call, Change, Condition, Effect, Expression, Fact, GroundChange, GroundFluent, ObjectId,
+    Assignment, CallTerm, Change, Condition, Effect, Expression, Fact, GroundChange, GroundFluent, ObjectId,
     PredicateId, Task, Term, Written,
 };
 
@@ -264,14 +264,14 @@ impl Semantics<'_> {
         }
     }
 
-    fn call_reads(&self, state: &State, call: &Call, binding: &Binding, touched: &mut Touched) {
+    fn call_reads(&self, state: &State, call: &CallTerm, binding: &Binding, touched: &mut Touched) {
         self.terms_read(state, &call.arguments, binding, touched);
         let Some(arguments) = self.objects(state, &call.arguments, binding) else { return };
         for read in self.attachments.reads(&self.bound[call.module.index()]) {
             for (symbol, arguments) in instances(self.task, read, &arguments) {
                 match symbol {
-                    Symbol::Predicate(id) => self.fact_read(id, arguments, touched),
-                    Symbol::Function(function) => {
+                    ReadSymbol::Predicate(id) => self.fact_read(id, arguments, touched),
+                    ReadSymbol::Function(function) => {
                         touched.fluents.insert(GroundFluent { function, arguments: arguments.into() });
                     }
                 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Effect, Outcome, Values, When};
+use crate::ground::{Change, GroundEffect, GroundOutcome, GroundWhen, Values};
 use crate::model::between::telling_parts;
 
 use super::order::Access;
 use super::touch::{Touched, expression_touches};
-use super::world::{Act, Moment, Span, World};
+use super::world::{Act, DurationRange, EvaluationContext, World};
 
 /// Snap action of a step or of a relaxed operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -33,16 +33,16 @@ pub struct Open {
     /// Parameter proposed by the grounding module.
     pub proposal: Option<Arc<str>>,
     /// Possible durations, seconds.
-    pub span: Span,
+    pub span: DurationRange,
     /// End effects that can still happen.
     pub gates: Gates,
 }
 
 impl Open {
     /// Evaluation context inside an action in progress.
-    fn moment<'s>(&'s self, state: &'s Values) -> Moment<'s> {
+    fn moment<'s>(&'s self, state: &'s Values) -> EvaluationContext<'s> {
         let proposal = self.proposal.as_ref();
-        Moment { state, duration_s: self.span.least_s, proposal, level: Level::Exact }
+        EvaluationContext { state, duration_s: self.span.least_s, proposal, level: Level::Exact }
     }
 }
 
@@ -53,7 +53,7 @@ pub struct Gates(Vec<u64>);
 
 impl Gates {
     /// All gates open, for an action's end effects.
-    fn open(effects: &[Effect]) -> Gates {
+    fn open(effects: &[GroundEffect]) -> Gates {
         let remembered =
             effects.iter().rposition(|effect| effect.when.as_ref().is_some_and(|when| is_remembered(when)));
         Gates(vec![0; remembered.map_or(0, |last| last / 64 + 1)])
@@ -69,7 +69,7 @@ impl Gates {
 }
 
 /// True if an end effect's condition refers to earlier times.
-fn is_remembered(when: &When) -> bool {
+fn is_remembered(when: &GroundWhen) -> bool {
     !when.at_start.is_empty() || !when.over_all.is_empty()
 }
 
@@ -87,7 +87,7 @@ pub struct Situation {
 
 /// Step of the search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct TemporalStep {
     /// The action; meaningless for timed effects.
     pub act: u32,
     /// Part; [`Part::Free`] is the next timed effect.
@@ -97,25 +97,25 @@ pub struct Step {
     /// Duration chosen by the schedule if it stretches the action, seconds.
     pub taken_s: Option<f64>,
     /// Duration that the action may take; filled in by [`World::advance`].
-    pub span: Span,
+    pub span: DurationRange,
 }
 
-impl Step {
+impl TemporalStep {
     /// Compressed action, without a proposal.
-    pub fn whole(act: u32) -> Step {
-        Step {
+    pub fn whole(act: u32) -> TemporalStep {
+        TemporalStep {
             act,
             part: Part::Whole,
             proposal: None,
             taken_s: None,
-            span: Span { least_s: 0.0, most_s: 0.0 },
+            span: DurationRange { least_s: 0.0, most_s: 0.0 },
         }
     }
 }
 
 impl World<'_> {
     /// State after a step, or `None` if the step is inapplicable; sets the step's span.
-    pub fn advance(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+    pub fn advance(&self, from: &Situation, step: &mut TemporalStep) -> Result<Option<Situation>, Failure> {
         match step.part {
             Part::Whole => self.whole(from, step),
             Part::Start => self.start(from, step),
@@ -124,7 +124,7 @@ impl World<'_> {
         }
     }
 
-    fn whole(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+    fn whole(&self, from: &Situation, step: &mut TemporalStep) -> Result<Option<Situation>, Failure> {
         let Some((after, span)) = self.started(from, step)? else { return Ok(None) };
         step.span = span;
         let act = &self.acts[step.act as usize];
@@ -143,7 +143,7 @@ impl World<'_> {
         Ok(Some(next))
     }
 
-    fn start(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+    fn start(&self, from: &Situation, step: &mut TemporalStep) -> Result<Option<Situation>, Failure> {
         let Some((after, span)) = self.started(from, step)? else { return Ok(None) };
         step.span = span;
         let act = &self.acts[step.act as usize];
@@ -153,7 +153,7 @@ impl World<'_> {
         Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
-    fn end(&self, from: &Situation, step: &mut Step) -> Result<Option<Situation>, Failure> {
+    fn end(&self, from: &Situation, step: &mut TemporalStep) -> Result<Option<Situation>, Failure> {
         let same = |open: &Open| open.act == step.act && open.proposal == step.proposal;
         let Some(position) = from.open.iter().position(same) else { return Ok(None) };
         let mut next = from.clone();
@@ -170,7 +170,8 @@ impl World<'_> {
         let effects = always(&timed.outcomes);
         let mut next = from.clone();
         next.timed += 1;
-        let moment = Moment { state: &from.state, duration_s: 0.0, proposal: None, level: Level::Exact };
+        let moment =
+            EvaluationContext { state: &from.state, duration_s: 0.0, proposal: None, level: Level::Exact };
         if !self.apply(&effects, &moment, &|_, _| true, &mut next.state)? {
             return Ok(None);
         }
@@ -178,9 +179,13 @@ impl World<'_> {
     }
 
     /// State after the start, and the durations possible.
-    fn started(&self, from: &Situation, step: &Step) -> Result<Option<(Values, Span)>, Failure> {
+    fn started(
+        &self,
+        from: &Situation,
+        step: &TemporalStep,
+    ) -> Result<Option<(Values, DurationRange)>, Failure> {
         let act = &self.acts[step.act as usize];
-        let mut moment = Moment {
+        let mut moment = EvaluationContext {
             state: &from.state,
             duration_s: 0.0,
             proposal: step.proposal.as_ref(),
@@ -191,7 +196,7 @@ impl World<'_> {
         }
         let span = match act.durative {
             true => self.span(act, &moment)?,
-            false => Some(Span { least_s: 0.0, most_s: 0.0 }),
+            false => Some(DurationRange { least_s: 0.0, most_s: 0.0 }),
         };
         let Some(span) = span.and_then(|span| span.taking(step.taken_s)) else { return Ok(None) };
         moment.duration_s = span.least_s;
@@ -199,14 +204,14 @@ impl World<'_> {
         if !self.apply(act.start_effects, &moment, &|_, _| true, &mut after)? {
             return Ok(None);
         }
-        let inside = Moment { state: &after, ..moment };
+        let inside = EvaluationContext { state: &after, ..moment };
         // Where numbers flow, what holds over all is told at the end.
         let goes_on = !act.flow_effects.is_empty() || self.holds(act.over_all, &inside)?;
         Ok(goes_on.then_some((after, span)))
     }
 
-    fn start_gates(&self, act: &Act, before: &Values, step: &Step) -> Result<Gates, Failure> {
-        let moment = Moment {
+    fn start_gates(&self, act: &Act, before: &Values, step: &TemporalStep) -> Result<Gates, Failure> {
+        let moment = EvaluationContext {
             state: before,
             duration_s: step.span.least_s,
             proposal: step.proposal.as_ref(),
@@ -240,7 +245,7 @@ impl World<'_> {
         for effect in act.end_effects {
             inside.push(effect.when.as_ref().map_or(Ok(true), |when| self.holds(&when.over_all, &moment))?);
         }
-        let gate = |index: usize, _: &Effect| inside[index] && own.gates.is_open(index);
+        let gate = |index: usize, _: &GroundEffect| inside[index] && own.gates.is_open(index);
         self.apply(act.end_effects, &moment, &gate, state)
     }
 
@@ -287,7 +292,7 @@ impl World<'_> {
     /// happen any more.
     fn goes_on(&self, situation: &mut Situation) -> Result<bool, Failure> {
         for open in &mut situation.open {
-            let moment = Moment {
+            let moment = EvaluationContext {
                 state: &situation.state,
                 duration_s: open.span.least_s,
                 proposal: open.proposal.as_ref(),
@@ -335,7 +340,7 @@ impl World<'_> {
 
     /// True if the goal holds in a last state.
     pub fn holds_at_end(&self, state: &Values) -> Result<bool, Failure> {
-        let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+        let moment = EvaluationContext { state, duration_s: 0.0, proposal: None, level: Level::Exact };
         self.holds(&self.ground.goal, &moment)
     }
 
@@ -433,7 +438,7 @@ impl<'w, 'a> Watch<'w, 'a> {
     }
 
     /// Access of the recorded reads together with these effects.
-    fn access<'e>(&mut self, effects: impl Iterator<Item = &'e Effect>) -> Access {
+    fn access<'e>(&mut self, effects: impl Iterator<Item = &'e GroundEffect>) -> Access {
         let (world, read) = (self.world, &mut self.read);
         for effect in effects {
             if let Some(when) = &effect.when {
@@ -441,23 +446,23 @@ impl<'w, 'a> Watch<'w, 'a> {
                 read.condition(world, &when.over_all);
             }
             match &effect.outcome {
-                Outcome::Change { fluent, change: Change::Increase | Change::Decrease, amount } => {
+                GroundOutcome::Change { fluent, change: Change::Increase | Change::Decrease, amount } => {
                     expression_touches(world, amount, read);
                     self.added.numbers.push(*fluent);
                 }
-                Outcome::Change { amount, .. } => {
+                GroundOutcome::Change { amount, .. } => {
                     expression_touches(world, amount, read);
                     self.written.outcome(world, &effect.outcome);
                 }
-                Outcome::Flow { fluent, rate } => {
+                GroundOutcome::Flow { fluent, rate } => {
                     expression_touches(world, rate, read);
                     self.added.numbers.push(*fluent);
                 }
-                Outcome::Call(call) => {
+                GroundOutcome::Call(call) => {
                     read.call(world, *call);
                     self.written.outcome(world, &effect.outcome);
                 }
-                Outcome::Set(_) => self.written.outcome(world, &effect.outcome),
+                GroundOutcome::Set(_) => self.written.outcome(world, &effect.outcome),
             }
         }
         let variables = world.ground.variables.len();
@@ -521,6 +526,6 @@ pub(super) fn derived_roots(world: &World) -> Vec<Vec<u32>> {
         .collect()
 }
 
-fn always(outcomes: &[Outcome]) -> Vec<Effect> {
-    outcomes.iter().map(|outcome| Effect { when: None, outcome: outcome.clone() }).collect()
+fn always(outcomes: &[GroundOutcome]) -> Vec<GroundEffect> {
+    outcomes.iter().map(|outcome| GroundEffect { when: None, outcome: outcome.clone() }).collect()
 }

@@ -6,15 +6,15 @@ use rustc_hash::FxHashMap;
 
 use crate::classical::compiled::is_classical;
 use crate::ground::{
-    Action, Conjunction, Earns, Effect, Expression, Fact, GroundTask, Meaning, Metric, Outcome, Variable,
-    exclusive,
+    Conjunction, Earns, GroundAction, GroundEffect, GroundExpression, GroundFact, GroundMetric,
+    GroundOutcome, GroundTask, Meaning, Variable, exclusive,
 };
 use crate::memory::MemoryLimit;
 use crate::search::run::{ClassicalOptions, FIRST_WORK, solve};
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::space::Space;
-use super::world::{Act, NOTHING, Span, World};
+use super::world::{Act, DurationRange, NOTHING, World};
 
 /// First plan by the classical search over compressed actions, or start and end snap actions where
 /// needed; `None` if the task does not allow this or the search fails. Also returns evaluated
@@ -24,7 +24,7 @@ pub fn classical_plan(
     memory: MemoryLimit,
     evaluations: u64,
     stop: &(dyn Fn() -> bool + Sync),
-) -> Option<(Vec<Step>, u64, u64)> {
+) -> Option<(Vec<TemporalStep>, u64, u64)> {
     let (task, parts) = compressed(space)?;
     if !is_classical(&task) {
         return None;
@@ -48,10 +48,10 @@ pub fn classical_plan(
         found.store(true, Ordering::Relaxed);
     });
     let actions = actions?;
-    let nothing = Span { least_s: 0.0, most_s: 0.0 };
+    let nothing = DurationRange { least_s: 0.0, most_s: 0.0 };
     let step = |&action: &u32| {
         let (act, part) = parts[action as usize];
-        Step { act, part, proposal: None, taken_s: None, span: nothing }
+        TemporalStep { act, part, proposal: None, taken_s: None, span: nothing }
     };
     Some((actions.iter().map(step).collect(), outcome.evaluated, outcome.work))
 }
@@ -81,19 +81,24 @@ pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     }
     for &index in &apart {
         let act = &world.acts[index as usize];
-        let running = Fact { variable: task.variables.len() as u32, value: 0 };
+        let running = GroundFact { variable: task.variables.len() as u32, value: 0 };
         let Some(halves) = halves(act, seconds(act)?, running) else { continue };
         task.variables.push(Variable { values: vec![Meaning::Inner, Meaning::NoneOfThose], stratum: None });
         task.initial.values.push(IDLE);
-        task.goal.facts.push(Fact { value: IDLE, ..running });
+        task.goal.facts.push(GroundFact { value: IDLE, ..running });
         task.actions.extend(halves);
         parts.extend([(index, Part::Start), (index, Part::End)]);
     }
     guard(world, &mut task, &parts)?;
     task.mutex_groups.extend(exclusive(&task));
-    let expression = Expression::Constant(0.0);
-    task.metric =
-        Some(Metric { minimise: true, expression, additive: true, earns: Earns::Never, time_weight: 0.0 });
+    let expression = GroundExpression::Constant(0.0);
+    task.metric = Some(GroundMetric {
+        minimise: true,
+        expression,
+        additive: true,
+        earns: Earns::Never,
+        time_weight: 0.0,
+    });
     Some((task, parts))
 }
 
@@ -102,23 +107,23 @@ const IDLE: u32 = 1;
 
 /// Start and end snap actions of an action; `running` holds in between. `None` if the action can
 /// never run.
-fn halves(act: &Act, seconds: f64, running: Fact) -> Option<[Action; 2]> {
+fn halves(act: &Act, seconds: f64, running: GroundFact) -> Option<[GroundAction; 2]> {
     let mut inside =
         in_one_go(&Act { at_end: &NOTHING, end_effects: &[], flow_effects: &[], ..act.clone() }, 0.0)?;
-    inside.condition.facts.push(Fact { value: IDLE, ..running });
-    let always = |fact: Fact| Effect { when: None, outcome: Outcome::Set(fact) };
+    inside.condition.facts.push(GroundFact { value: IDLE, ..running });
+    let always = |fact: GroundFact| GroundEffect { when: None, outcome: GroundOutcome::Set(fact) };
     inside.effects.push(always(running));
     let nobody = Act { start_effects: &[], at_start: act.over_all, ..act.clone() };
     let mut end = in_one_go(&nobody, seconds)?;
     end.condition.facts.push(running);
-    end.effects.push(always(Fact { value: IDLE, ..running }));
+    end.effects.push(always(GroundFact { value: IDLE, ..running }));
     Some([inside, end])
 }
 
 /// Adds conditions so that no action deletes an invariant of a running one; `None` if there would
 /// be too many.
 fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<()> {
-    let mut kept: FxHashMap<u32, Vec<(u32, u32, Fact)>> = FxHashMap::default();
+    let mut kept: FxHashMap<u32, Vec<(u32, u32, GroundFact)>> = FxHashMap::default();
     for (action, &(act, _)) in parts.iter().enumerate().filter(|(_, (_, part))| *part == Part::Start) {
         let running = task.actions[action].condition.facts.last().copied()?;
         for fact in &world.acts[act as usize].over_all.facts {
@@ -129,7 +134,7 @@ fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<
     for (action, &(act, _)) in task.actions.iter_mut().zip(parts) {
         let own = &world.acts[act as usize];
         let changes = own.start_effects.iter().chain(own.end_effects).filter_map(set);
-        let mut idle: Vec<Fact> = changes
+        let mut idle: Vec<GroundFact> = changes
             .flat_map(|fact| kept.get(&fact.variable).into_iter().flatten().map(move |kept| (fact, kept)))
             .filter(|(fact, (value, other, _))| fact.value != *value && *other != act)
             .map(|(_, &(_, _, running))| running)
@@ -147,9 +152,9 @@ fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<
     Some(())
 }
 
-fn set(effect: &Effect) -> Option<Fact> {
+fn set(effect: &GroundEffect) -> Option<GroundFact> {
     match effect.outcome {
-        Outcome::Set(fact) => Some(fact),
+        GroundOutcome::Set(fact) => Some(fact),
         _ => None,
     }
 }
@@ -157,14 +162,14 @@ fn set(effect: &Effect) -> Option<Fact> {
 fn seconds(act: &Act) -> Option<f64> {
     let mut least_s: f64 = 0.0;
     for bound in act.bounds {
-        let Expression::Constant(seconds) = bound.seconds else { return None };
+        let GroundExpression::Constant(seconds) = bound.seconds else { return None };
         least_s = least_s.max(seconds);
     }
     Some(least_s)
 }
 
 /// Compressed action; `None` if its own start deletes one of its invariants.
-fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
+fn in_one_go(act: &Act, seconds: f64) -> Option<GroundAction> {
     let after_start =
         |variable: u32| act.start_effects.iter().rev().filter_map(set).find(|fact| fact.variable == variable);
     let mut condition = act.at_start.clone();
@@ -184,13 +189,13 @@ fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
     if condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable) {
         return None;
     }
-    let overwritten = |fact: Fact| {
+    let overwritten = |fact: GroundFact| {
         act.end_effects
             .iter()
             .any(|end| end.when.is_none() && set(end).is_some_and(|e| e.variable == fact.variable))
     };
     let start = act.start_effects.iter().filter(|effect| set(effect).is_none_or(|fact| !overwritten(fact)));
-    let effects: Vec<Effect> = start.chain(act.flow_effects).chain(act.end_effects).cloned().collect();
+    let effects: Vec<GroundEffect> = start.chain(act.flow_effects).chain(act.end_effects).cloned().collect();
     // Conditions on effects at the end would be looked up after the start; those are left to the other search.
     let plain = |part: &Conjunction| part.is_empty();
     let odd = act.durative
@@ -198,5 +203,10 @@ fn in_one_go(act: &Act, seconds: f64) -> Option<Action> {
     if odd || !act.grounding.is_empty() {
         return None;
     }
-    Some(Action { origin: act.origin.clone(), condition, effects, cost: Expression::Constant(seconds) })
+    Some(GroundAction {
+        origin: act.origin.clone(),
+        condition,
+        effects,
+        cost: GroundExpression::Constant(seconds),
+    })
 }

@@ -1,8 +1,8 @@
 //! Taking a plan apart for the large neighbourhood search.
 
-use crate::ground::{Conjunction, Fact, Outcome};
+use crate::ground::{Conjunction, GroundFact, GroundOutcome};
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::space::Space;
 use super::touch::Touched;
 use super::world::World;
@@ -65,7 +65,7 @@ impl Asked<'_, '_> {
 ///
 /// An action whose start and end are apart is kept or dropped as a whole: once its start is found useful, the walk begins
 /// anew with its end kept.
-pub(crate) fn keep_for(world: &World, steps: &[Step], goal: &Conjunction) -> Vec<Step> {
+pub(crate) fn keep_for(world: &World, steps: &[TemporalStep], goal: &Conjunction) -> Vec<TemporalStep> {
     let mut forced = vec![false; steps.len()];
     loop {
         let keep = walk(world, steps, goal, &forced);
@@ -84,7 +84,7 @@ pub(crate) fn keep_for(world: &World, steps: &[Step], goal: &Conjunction) -> Vec
 }
 
 /// Pairs of starts and ends.
-fn pairs(steps: &[Step]) -> Vec<(usize, usize)> {
+fn pairs(steps: &[TemporalStep]) -> Vec<(usize, usize)> {
     let mut open: Vec<usize> = Vec::new();
     let mut pairs = Vec::new();
     for (index, step) in steps.iter().enumerate() {
@@ -103,7 +103,7 @@ fn pairs(steps: &[Step]) -> Vec<(usize, usize)> {
     pairs
 }
 
-fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> Vec<bool> {
+fn walk(world: &World, steps: &[TemporalStep], goal: &Conjunction, forced: &[bool]) -> Vec<bool> {
     let variables = world.ground.variables.len();
     let numbers = vec![false; world.ground.numerics.len()];
     let mut asked = Asked { world, facts: vec![None; variables], numbers };
@@ -126,7 +126,7 @@ fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> V
             effects.extend(act.flow_effects.iter().chain(act.end_effects));
         }
         let useful = effects.iter().any(|effect| match &effect.outcome {
-            Outcome::Set(fact) => {
+            GroundOutcome::Set(fact) => {
                 asked.facts[fact.variable as usize].is_some_and(|v| v == fact.value || v == u32::MAX)
             }
             other => {
@@ -141,7 +141,7 @@ fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> V
         }
         keep[index] = true;
         for effect in &effects {
-            if let Outcome::Set(Fact { variable, .. }) = effect.outcome
+            if let GroundOutcome::Set(GroundFact { variable, .. }) = effect.outcome
                 && effect.when.is_none()
             {
                 asked.facts[variable as usize] = None;
@@ -171,8 +171,14 @@ fn walk(world: &World, steps: &[Step], goal: &Conjunction, forced: &[bool]) -> V
 }
 
 /// Collects the condition of an action, except the part that its own start achieves.
-fn ask_but_for(asked: &mut Asked, condition: &Conjunction, start: &[crate::ground::Effect], whole: bool) {
-    let given = |fact: &Fact| whole && start.iter().any(|effect| effect.outcome == Outcome::Set(*fact));
+fn ask_but_for(
+    asked: &mut Asked,
+    condition: &Conjunction,
+    start: &[crate::ground::GroundEffect],
+    whole: bool,
+) {
+    let given =
+        |fact: &GroundFact| whole && start.iter().any(|effect| effect.outcome == GroundOutcome::Set(*fact));
     let facts = condition.facts.iter().filter(|fact| !given(fact)).copied().collect();
     asked.ask(&Conjunction { facts, ..condition.clone() });
 }
@@ -211,7 +217,7 @@ fn spread_derived(supports: &[Option<Touched>], asked: &mut Asked) {
 
 /// Random part of a plan to keep while the rest is replanned: a prefix, or the steps for some
 /// goals.
-pub(crate) fn taken_apart(space: &Space, steps: &[Step], chance: &mut Chance) -> Vec<Step> {
+pub(crate) fn taken_apart(space: &Space, steps: &[TemporalStep], chance: &mut Chance) -> Vec<TemporalStep> {
     let goal = &space.world.ground.goal;
     let parts = goal.facts.len() + goal.comparisons.len() + goal.calls.len();
     if parts < 2 || chance.below(4) == 0 {
@@ -223,7 +229,7 @@ pub(crate) fn taken_apart(space: &Space, steps: &[Step], chance: &mut Chance) ->
     // What is fulfilled last decides when the plan ends: it is given up more often.
     if let Ok(track) = space.track(steps) {
         let ready_s = track.order.ready_s();
-        let done_s = |fact: &Fact| ready_s[fact.variable as usize];
+        let done_s = |fact: &GroundFact| ready_s[fact.variable as usize];
         kept.facts.sort_by(|one, other| done_s(other).total_cmp(&done_s(one)).then(one.cmp(other)));
     }
     for _ in 0..most {
@@ -238,7 +244,7 @@ pub(crate) fn taken_apart(space: &Space, steps: &[Step], chance: &mut Chance) ->
     keep_for(space.world, steps, &kept)
 }
 
-fn beginning(steps: &[Step], chance: &mut Chance) -> Vec<Step> {
+fn beginning(steps: &[TemporalStep], chance: &mut Chance) -> Vec<TemporalStep> {
     let mut end = chance.below(steps.len());
     // Not while an action is in progress.
     let open = |end: usize| {

@@ -1,13 +1,13 @@
 //! Direction in which effects change numeric conditions.
 
-use crate::ground::{Change, ComparisonId, Expression, Outcome, Relation};
+use crate::ground::{Change, ComparisonId, GroundExpression, GroundOutcome, Relation};
 
 use super::touch::{Touched, expression_touches};
 use super::world::World;
 
 /// True if simultaneous effects may help a numeric condition; false if they move its sum away from
 /// the bound, or not at all, in every state.
-pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) -> bool {
+pub fn may_help(world: &World, outcomes: &[&GroundOutcome], comparison: ComparisonId) -> bool {
     let comparison = &world.ground.comparisons[comparison as usize];
     let sign = match comparison.relation {
         Relation::AtLeast | Relation::Greater => 1.0,
@@ -26,10 +26,10 @@ pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) 
     let mut moved = 0.0;
     for outcome in outcomes {
         let (fluent, change, amount) = match outcome {
-            Outcome::Change { fluent, change, amount } => (*fluent, *change, amount),
-            Outcome::Flow { fluent, rate } => (*fluent, Change::Increase, rate),
-            Outcome::Set(_) => continue,
-            Outcome::Call(_) => return true,
+            GroundOutcome::Change { fluent, change, amount } => (*fluent, *change, amount),
+            GroundOutcome::Flow { fluent, rate } => (*fluent, Change::Increase, rate),
+            GroundOutcome::Set(_) => continue,
+            GroundOutcome::Call(_) => return true,
         };
         let by = match change {
             _ if !read.numbers.contains(&fluent) => continue,
@@ -39,7 +39,7 @@ pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) 
             Change::Assign | Change::ScaleUp | Change::ScaleDown => return true,
         };
         match amount {
-            Expression::Constant(amount) => moved += by * amount,
+            GroundExpression::Constant(amount) => moved += by * amount,
             amount if amount.is_never_negative(-by) => {}
             _ => return true,
         }
@@ -49,22 +49,24 @@ pub fn may_help(world: &World, outcomes: &[&Outcome], comparison: ComparisonId) 
 
 /// True if an expression is a weighted sum of numbers and of answers that do not depend on changed
 /// resources.
-fn is_sum(world: &World, expression: &Expression, changed: &Touched) -> bool {
-    let holds = |part: &Expression| is_sum(world, part, changed);
+fn is_sum(world: &World, expression: &GroundExpression, changed: &Touched) -> bool {
+    let holds = |part: &GroundExpression| is_sum(world, part, changed);
     match expression {
-        Expression::Call(call) => {
+        GroundExpression::Call(call) => {
             let mut read = Touched::default();
             read.call(world, *call);
             !read.meets(changed)
         }
-        Expression::Sum(parts) => parts.iter().all(holds),
-        Expression::Difference(left, right) => holds(left) && holds(right),
-        Expression::Negative(inner) => holds(inner),
-        Expression::Product(parts) => {
-            let mut factors = parts.iter().filter(|part| !matches!(part, Expression::Constant(_)));
+        GroundExpression::Sum(parts) => parts.iter().all(holds),
+        GroundExpression::Difference(left, right) => holds(left) && holds(right),
+        GroundExpression::Negative(inner) => holds(inner),
+        GroundExpression::Product(parts) => {
+            let mut factors = parts.iter().filter(|part| !matches!(part, GroundExpression::Constant(_)));
             factors.next().is_none_or(holds) && factors.next().is_none()
         }
-        Expression::Quotient(left, right) => holds(left) && matches!(**right, Expression::Constant(_)),
+        GroundExpression::Quotient(left, right) => {
+            holds(left) && matches!(**right, GroundExpression::Constant(_))
+        }
         other => other.is_linear(),
     }
 }

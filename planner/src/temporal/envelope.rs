@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 
 use rustc_hash::FxHashSet;
 
-use crate::ground::{Change, Conjunction, Effect, Expression, Fact, NumericId, Outcome};
+use crate::ground::{
+    Change, Conjunction, GroundEffect, GroundExpression, GroundFact, GroundOutcome, NumericId,
+};
 
 use super::touch::Touched;
 use super::world::{Act, World};
@@ -74,7 +76,7 @@ pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
 /// True if an action that can start can also start just before its end; `kept`: variables that no
 /// other action changes.
 fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
-    let kept = |fact: &Fact| act.over_all.facts.contains(fact) || kept(fact.variable);
+    let kept = |fact: &GroundFact| act.over_all.facts.contains(fact) || kept(fact.variable);
     act.start_effects.is_empty()
         && act.flow_effects.is_empty()
         && act.at_start.facts.iter().all(kept)
@@ -101,9 +103,9 @@ fn ends_early(locked: &[bool], act: &Act) -> bool {
             .all(|effect| plain(effect).is_some_and(|fact| locked[fact.variable as usize]))
 }
 
-fn plain(effect: &Effect) -> Option<Fact> {
+fn plain(effect: &GroundEffect) -> Option<GroundFact> {
     match (&effect.when, &effect.outcome) {
-        (None, Outcome::Set(fact)) => Some(*fact),
+        (None, GroundOutcome::Set(fact)) => Some(*fact),
         _ => None,
     }
 }
@@ -124,23 +126,26 @@ fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> 
 }
 
 /// True for a state-independent expression.
-pub(crate) fn settled(world: &World, expression: &Expression) -> bool {
+pub(crate) fn settled(world: &World, expression: &GroundExpression) -> bool {
     match expression {
-        Expression::Constant(_) => true,
-        Expression::Call(call) => world.calls.settles(*call),
-        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().all(|part| settled(world, part)),
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Constant(_) => true,
+        GroundExpression::Call(call) => world.calls.settles(*call),
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
+            parts.iter().all(|part| settled(world, part))
+        }
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             settled(world, left) && settled(world, right)
         }
-        Expression::Negative(inner) => settled(world, inner),
-        Expression::Fluent(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {
-            false
-        }
+        GroundExpression::Negative(inner) => settled(world, inner),
+        GroundExpression::Fluent(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => false,
     }
 }
 
 struct Wanted {
-    facts: FxHashSet<Fact>,
+    facts: FxHashSet<GroundFact>,
     numbers: FxHashSet<NumericId>,
     /// True, by variable, if a call reads it.
     read: Vec<bool>,
@@ -177,11 +182,11 @@ impl Wanted {
 
     fn inside(&self, _index: u32, act: &Act) -> bool {
         act.start_effects.iter().any(|effect| match &effect.outcome {
-            Outcome::Set(fact) => self.facts.contains(fact) && undone(*fact, act.end_effects),
-            Outcome::Change { fluent, change: Change::Increase, .. } => {
+            GroundOutcome::Set(fact) => self.facts.contains(fact) && undone(*fact, act.end_effects),
+            GroundOutcome::Change { fluent, change: Change::Increase, .. } => {
                 self.numbers.contains(fluent)
                     && act.end_effects.iter().any(|end| {
-                        matches!(&end.outcome, Outcome::Change { fluent: other, change: Change::Decrease, .. } if other == fluent)
+                        matches!(&end.outcome, GroundOutcome::Change { fluent: other, change: Change::Decrease, .. } if other == fluent)
                     })
             }
             _ => false,
@@ -189,9 +194,9 @@ impl Wanted {
     }
 }
 
-fn undone(fact: Fact, end: &[Effect]) -> bool {
-    let sets = |effect: &Effect| match effect.outcome {
-        Outcome::Set(other) => Some(other).filter(|other| other.variable == fact.variable),
+fn undone(fact: GroundFact, end: &[GroundEffect]) -> bool {
+    let sets = |effect: &GroundEffect| match effect.outcome {
+        GroundOutcome::Set(other) => Some(other).filter(|other| other.variable == fact.variable),
         _ => None,
     };
     end.iter().any(|effect| sets(effect).is_some_and(|other| other.value != fact.value))

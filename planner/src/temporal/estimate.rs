@@ -12,11 +12,11 @@ use std::sync::Arc;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Effect, Expression, Outcome, Values};
+use crate::ground::{Change, GroundEffect, GroundExpression, GroundOutcome, Values};
 
 use super::advance::Part;
 use super::relaxed::{NOBODY, Operator, Relaxed, Seconds, Test, Waiter};
-use super::world::{Moment, World};
+use super::world::{EvaluationContext, World};
 
 /// Estimate of the heuristic for a state.
 #[derive(Debug, Clone, Default)]
@@ -227,7 +227,8 @@ impl Relaxed {
         for (variable, &value) in from.state.values.iter().enumerate() {
             work.reach(self.offsets[variable] + value, ready_s(variable), NOBODY, 1.0);
         }
-        let moment = Moment { state: from.state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        let moment =
+            EvaluationContext { state: from.state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
         for (index, test) in self.tests.iter().enumerate().filter(|&(index, _)| self.asked[index]) {
             let holds = match *test {
                 Test::Comparison(comparison) => world.compare(comparison, &moment)?,
@@ -311,7 +312,7 @@ impl Relaxed {
         }
         let is_settled = operator.seconds == Seconds::Settled;
         let act = &world.acts[operator.act as usize];
-        let moment = Moment { state, duration_s: 0.0, proposal, level: Level::Relaxed };
+        let moment = EvaluationContext { state, duration_s: 0.0, proposal, level: Level::Relaxed };
         let share = match operator.part {
             Part::Start => 0.0,
             _ => 1.0,
@@ -332,7 +333,8 @@ impl Relaxed {
         let operator = &self.operators[index as usize];
         match self.counted.get(operator.act as usize) {
             Some(Some(counted)) if matches!(operator.part, Part::Whole | Part::End) => {
-                let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+                let moment =
+                    EvaluationContext { state, duration_s: 0.0, proposal: None, level: Level::Relaxed };
                 Ok(world.evaluate(counted, &moment)?.max(0.0))
             }
             _ => Ok(0.0),
@@ -349,7 +351,8 @@ impl Relaxed {
         test: u32,
     ) -> Result<Option<f64>, Failure> {
         let operator = &self.operators[index as usize];
-        let moment = Moment { state: after, duration_s: 0.0, proposal: None, level: Level::Relaxed };
+        let moment =
+            EvaluationContext { state: after, duration_s: 0.0, proposal: None, level: Level::Relaxed };
         let comparison = match self.tests[(test - self.test_base) as usize] {
             Test::Call(call, wanted) => {
                 let holds = world.calls.truth(call, None, after, Level::Relaxed)? == wanted;
@@ -361,10 +364,10 @@ impl Relaxed {
             return Ok(Some(1.0));
         }
         let comparison = &world.ground.comparisons[comparison as usize];
-        let gap = |moment: &Moment| -> Result<f64, Failure> {
+        let gap = |moment: &EvaluationContext| -> Result<f64, Failure> {
             Ok((world.evaluate(&comparison.left, moment)? - world.evaluate(&comparison.right, moment)?).abs())
         };
-        let (before, after) = (gap(&Moment { state, ..moment })?, gap(&moment)?);
+        let (before, after) = (gap(&EvaluationContext { state, ..moment })?, gap(&moment)?);
         if before.is_nan() || after.is_nan() {
             return Ok(Some(UNSURE));
         }
@@ -389,7 +392,8 @@ impl Relaxed {
     ) -> Result<Option<Values>, Failure> {
         let Some(act) = world.acts.get(operator.act as usize) else { return Ok(Some(state.clone())) };
         let Some(proposal) = suiting(world, state, operator)? else { return Ok(None) };
-        let before = Moment { state, duration_s: 0.0, proposal: proposal.as_ref(), level: Level::Relaxed };
+        let before =
+            EvaluationContext { state, duration_s: 0.0, proposal: proposal.as_ref(), level: Level::Relaxed };
         let duration_s = world.span(act, &before)?.map_or(0.0, |span| span.least_s);
         let mut after = state.clone();
         let lists = match operator.part {
@@ -400,13 +404,17 @@ impl Relaxed {
         let mut lists = lists.into_iter().filter(|effects| !effects.is_empty()).peekable();
         while let Some(effects) = lists.next() {
             let is_last = lists.peek().is_none();
-            let matters = |_: usize, effect: &Effect| match effect.outcome {
-                Outcome::Change { fluent, .. } => !is_last || self.is_tested(fluent),
+            let matters = |_: usize, effect: &GroundEffect| match effect.outcome {
+                GroundOutcome::Change { fluent, .. } => !is_last || self.is_tested(fluent),
                 _ => true,
             };
             let from = after.clone();
-            let moment =
-                Moment { state: &from, duration_s, proposal: proposal.as_ref(), level: Level::Relaxed };
+            let moment = EvaluationContext {
+                state: &from,
+                duration_s,
+                proposal: proposal.as_ref(),
+                level: Level::Relaxed,
+            };
             if !world.apply(effects, &moment, &matters, &mut after)? {
                 return Ok(None);
             }
@@ -461,11 +469,11 @@ fn changes_by_constants(world: &World, operator: &Operator) -> bool {
     let mut effects = act.start_effects.iter().chain(act.end_effects);
     act.flow_effects.is_empty()
         && effects.all(|effect| match &effect.outcome {
-            Outcome::Set(_) => true,
-            Outcome::Change { amount: Expression::Constant(_), change, .. } => {
+            GroundOutcome::Set(_) => true,
+            GroundOutcome::Change { amount: GroundExpression::Constant(_), change, .. } => {
                 effect.when.is_none() && matches!(change, Change::Increase | Change::Decrease)
             }
-            Outcome::Change { .. } | Outcome::Flow { .. } | Outcome::Call(_) => false,
+            GroundOutcome::Change { .. } | GroundOutcome::Flow { .. } | GroundOutcome::Call(_) => false,
         })
 }
 

@@ -11,7 +11,7 @@ use crate::calls::Failure;
 use crate::ground::Earns;
 use crate::memory::MemoryLimit;
 
-use super::advance::{Part, Situation, Step};
+use super::advance::{Part, Situation, TemporalStep};
 use super::compress::classical_plan;
 use super::destroy::{Chance, keep_for, taken_apart};
 use super::envelope::{all_apart, envelopes, in_one_go_suffices};
@@ -286,7 +286,7 @@ struct Best {
     measured: f64,
     /// Sum of the times at which the goals are achieved.
     slowness_s: f64,
-    steps: Vec<Step>,
+    steps: Vec<TemporalStep>,
 }
 
 impl Run<'_, '_, '_> {
@@ -371,7 +371,7 @@ impl Run<'_, '_, '_> {
 
     /// Adopts a plan if better than the best so far, without superfluous steps. Ties are broken by
     /// the sum of goal achievement times, as earlier goals are closer to an improvement.
-    fn take(&mut self, mut steps: Vec<Step>) -> Result<bool, Failure> {
+    fn take(&mut self, mut steps: Vec<TemporalStep>) -> Result<bool, Failure> {
         let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps, self.stop)? else {
             return Ok(false);
         };
@@ -393,7 +393,7 @@ impl Run<'_, '_, '_> {
     }
 
     /// Adopts a plan if better than the best so far; `found`: the plan as found by the search.
-    fn keep(&mut self, plan: Replayed, found: Vec<Step>) -> Result<bool, Failure> {
+    fn keep(&mut self, plan: Replayed, found: Vec<TemporalStep>) -> Result<bool, Failure> {
         let (measured, mut steps, base) = plan;
         let ready_s = base.track.order.ready_s();
         let goal = &self.space.world.ground.goal.facts;
@@ -555,10 +555,10 @@ fn tolerance(measured: f64) -> f64 {
 
 /// Steps sorted by start, so that a prefix is what happens until some time. The order may be
 /// invalid as a sequence of compressed steps, because an early start may have a late end.
-fn in_time_order(space: &Space, steps: &[Step]) -> Vec<Step> {
+fn in_time_order(space: &Space, steps: &[TemporalStep]) -> Vec<TemporalStep> {
     let Ok(track) = space.track(steps) else { return steps.to_vec() };
     let mut starts: Vec<usize> = Vec::new();
-    let mut timed: Vec<(f64, &Step)> = Vec::with_capacity(steps.len());
+    let mut timed: Vec<(f64, &TemporalStep)> = Vec::with_capacity(steps.len());
     let mut given = space.world.ground.timed.iter();
     for (index, step) in steps.iter().enumerate() {
         let own = track.actions[index];

@@ -1,6 +1,6 @@
 //! Independence of happenings: an action's start and end, and snap actions of several actions.
 
-use crate::ground::Outcome;
+use crate::ground::GroundOutcome;
 
 use super::mentions::disturbs_itself;
 use super::together::some_only_together;
@@ -26,7 +26,7 @@ impl World<'_> {
         [act.over_all, act.at_end].into_iter().for_each(|condition| end_read.condition(self, condition));
         for effect in act.end_effects {
             end_written.outcome(self, &effect.outcome);
-            if let Outcome::Change { amount, .. } = &effect.outcome {
+            if let GroundOutcome::Change { amount, .. } = &effect.outcome {
                 expression_touches(self, amount, &mut end_read);
             }
         }

@@ -3,9 +3,9 @@
 //! detours.
 
 use crate::calls::Failure;
-use crate::ground::Outcome;
+use crate::ground::GroundOutcome;
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::schedule::Replayed;
 use super::space::Space;
 use super::world::{Act, World};
@@ -54,13 +54,13 @@ pub fn shortened(space: &Space, mut plan: Replayed, stop: &dyn Fn() -> bool) -> 
 
 /// Pairs of steps by one action, the second of which needs an effect of the first; incomplete once
 /// stopped.
-fn pairs(world: &World, steps: &[Step], stop: &dyn Fn() -> bool) -> Vec<(usize, usize)> {
-    let act = |step: &Step| &world.acts[step.act as usize];
-    let is_whole = |step: &Step| step.part == Part::Whole && step.proposal.is_none();
+fn pairs(world: &World, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> Vec<(usize, usize)> {
+    let act = |step: &TemporalStep| &world.acts[step.act as usize];
+    let is_whole = |step: &TemporalStep| step.part == Part::Whole && step.proposal.is_none();
     let follows = |first: &Act, second: &Act| {
         first.origin.schema == second.origin.schema
             && first.start_effects.iter().chain(first.end_effects).any(|effect| match &effect.outcome {
-                Outcome::Set(fact) => second.at_start.facts.contains(fact),
+                GroundOutcome::Set(fact) => second.at_start.facts.contains(fact),
                 _ => false,
             })
     };

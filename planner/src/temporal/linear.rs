@@ -11,17 +11,19 @@ use std::collections::BinaryHeap;
 use rustc_hash::FxHashSet;
 
 use crate::calls::Failure;
-use crate::ground::{Change, Conjunction, Effect, NumericId, Outcome, Relation, Values, When};
+use crate::ground::{
+    Change, Conjunction, GroundEffect, GroundOutcome, GroundWhen, NumericId, Relation, Values,
+};
 use crate::plan::EPSILON_S;
 use crate::validate::validate;
 
-use super::advance::Step;
+use super::advance::TemporalStep;
 use super::estimate::{From, Key};
 use super::program::{Linear, Program};
 use super::relaxed::Relaxed;
 use super::space::{Measure, Space};
 use super::timed::{Timed, to_plan};
-use super::world::{Act, Span, World};
+use super::world::{Act, DurationRange, World};
 
 /// States that are evaluated at most.
 const MOST_EVALUATED: u64 = 1_500;
@@ -234,8 +236,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         let timed = last.steps.iter().map(|&(act, start, end)| {
             let start_s = values[start as usize];
             let duration_s = end.map_or(0.0, |end| values[end as usize] - start_s);
-            let span = Span { least_s: duration_s, most_s: duration_s };
-            Timed { step: Step { span, ..Step::whole(act) }, start_s, duration_s }
+            let span = DurationRange { least_s: duration_s, most_s: duration_s };
+            Timed { step: TemporalStep { span, ..TemporalStep::whole(act) }, start_s, duration_s }
         });
         let timed: Vec<Timed> = timed.collect();
         let verdict = validate(world.task, world.calls.attachments(), &to_plan(world, &timed));
@@ -355,8 +357,11 @@ impl Node {
         let timed = world.ground.timed.get(self.timed)?;
         let now = self.program.variable(timed.time_s, timed.time_s);
         self.pass(world, now)?;
-        let effects: Vec<Effect> =
-            timed.outcomes.iter().map(|outcome| Effect { when: None, outcome: outcome.clone() }).collect();
+        let effects: Vec<GroundEffect> = timed
+            .outcomes
+            .iter()
+            .map(|outcome| GroundEffect { when: None, outcome: outcome.clone() })
+            .collect();
         self.apply(world, &effects, None)?;
         self.timed += 1;
         self.last = Some(now);
@@ -384,7 +389,7 @@ impl Node {
             })
     }
 
-    fn apply(&mut self, world: &World, effects: &[Effect], duration: Option<&Linear>) -> Option<()> {
+    fn apply(&mut self, world: &World, effects: &[GroundEffect], duration: Option<&Linear>) -> Option<()> {
         let before = self.clone();
         for effect in effects {
             if let Some(when) = &effect.when
@@ -393,8 +398,8 @@ impl Node {
                 continue;
             }
             match &effect.outcome {
-                Outcome::Set(fact) => self.state.values[fact.variable as usize] = fact.value,
-                Outcome::Change { fluent, change, amount } => {
+                GroundOutcome::Set(fact) => self.state.values[fact.variable as usize] = fact.value,
+                GroundOutcome::Change { fluent, change, amount } => {
                     let amount = Linear::of(amount, &before.numbers, duration, None)?;
                     let number = &mut self.numbers[*fluent as usize];
                     *number = match change {
@@ -406,14 +411,14 @@ impl Node {
                     };
                     number.is_finite().then_some(())?;
                 }
-                Outcome::Flow { .. } | Outcome::Call(_) => return None,
+                GroundOutcome::Flow { .. } | GroundOutcome::Call(_) => return None,
             }
         }
         Some(())
     }
 
     /// Truth of an effect's condition; `None` if it depends on times or earlier states.
-    fn decides(&self, world: &World, when: &When, duration: Option<&Linear>) -> Option<bool> {
+    fn decides(&self, world: &World, when: &GroundWhen, duration: Option<&Linear>) -> Option<bool> {
         if !when.at_start.is_empty() || !when.over_all.is_empty() {
             return None;
         }
@@ -431,8 +436,8 @@ impl Node {
         if !self.open.iter().all(facts) {
             return false;
         }
-        let rate = |effect: &Effect| match &effect.outcome {
-            Outcome::Flow { fluent, rate } if effect.when.is_none() => {
+        let rate = |effect: &GroundEffect| match &effect.outcome {
+            GroundOutcome::Flow { fluent, rate } if effect.when.is_none() => {
                 let rate = Linear::of(rate, &self.numbers, None, None)?.as_constant()?;
                 Some((*fluent, rate))
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::memory::MemoryLimit;
 
-use super::advance::Step;
+use super::advance::TemporalStep;
 
 /// Options of a search.
 #[derive(Debug, Clone, Copy)]
@@ -37,7 +37,7 @@ pub(crate) struct Manner {
 #[derive(Debug, Clone)]
 pub(crate) enum End {
     /// Steps from the base to the goal.
-    Found(Vec<Step>),
+    Found(Vec<TemporalStep>),
     /// Search space within the bound exhausted.
     Exhausted {
         /// True if no plan within the bound exists, except with self-overlapping actions; nothing

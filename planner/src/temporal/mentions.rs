@@ -16,7 +16,7 @@ use crate::task::{
     Assignment, Change, Condition, Expression, GroundChange, PredicateId, Quantified, Task, Term,
 };
 
-use super::advance::Step;
+use super::advance::TemporalStep;
 use super::order::{Access, Inconsistent};
 use super::space::{Space, Track};
 use super::world::{Act, World};
@@ -65,7 +65,7 @@ struct Touch {
 /// Separates simultaneous mutex happenings; false if stopped early.
 pub fn keep_apart(
     space: &Space,
-    steps: &[Step],
+    steps: &[TemporalStep],
     track: &mut Track,
     stop: &dyn Fn() -> bool,
 ) -> Result<bool, Inconsistent> {
@@ -117,7 +117,7 @@ fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
 /// Happenings that access each atom, for atoms accessed in different ways.
 fn touches(
     space: &Space,
-    steps: &[Step],
+    steps: &[TemporalStep],
     track: &mut Track,
 ) -> Result<FxHashMap<Name, Vec<Touch>>, Inconsistent> {
     let mut touches: FxHashMap<Name, Vec<Touch>> = FxHashMap::default();

@@ -9,7 +9,7 @@
 
 use crate::plan::EPSILON_S;
 
-use super::world::Span;
+use super::world::DurationRange;
 
 /// A shift below this is rounding.
 const ROUNDING_S: f64 = 1e-9;
@@ -41,7 +41,7 @@ struct Resource {
 struct Tie {
     start: u32,
     end: u32,
-    span: Span,
+    span: DurationRange,
 }
 
 /// Happenings in the order of a sequence, with their earliest times.
@@ -209,7 +209,12 @@ impl Order {
     }
 
     /// The end of the action whose start is `start`.
-    pub fn push_end(&mut self, start: u32, access: &Access, span: Span) -> Result<u32, Inconsistent> {
+    pub fn push_end(
+        &mut self,
+        start: u32,
+        access: &Access,
+        span: DurationRange,
+    ) -> Result<u32, Inconsistent> {
         let end = self.push(access);
         // An action without duration ends when it starts.
         let own = self.after[end as usize].iter_mut().filter(|(other, _)| *other == start);
@@ -325,7 +330,7 @@ impl Clock {
     }
 
     /// Appends an action: its start, and its end if durative.
-    pub fn push(&mut self, start: &Access, end: Option<(&Access, Span)>) {
+    pub fn push(&mut self, start: &Access, end: Option<(&Access, DurationRange)>) {
         let mut start_s = self.after(start);
         let Some((end, span)) = end else {
             self.record(start, start_s);

@@ -11,16 +11,16 @@ use std::collections::BTreeSet;
 use rustc_hash::FxHashMap;
 
 use crate::calls::Failure;
-use crate::ground::{Fact, Outcome};
+use crate::ground::{GroundFact, GroundOutcome};
 
-use super::advance::{Part, Situation, Step};
+use super::advance::{Part, Situation, TemporalStep};
 use super::touch::Touched;
-use super::world::{Act, Span, World};
+use super::world::{Act, DurationRange, World};
 
 /// True if an action can start while it is in progress; its grounding module is not asked.
 pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
-    let nothing = Span { least_s: 0.0, most_s: 0.0 };
-    let mut step = Step { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
+    let nothing = DurationRange { least_s: 0.0, most_s: 0.0 };
+    let mut step = TemporalStep { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
     Ok(!world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some())
 }
 
@@ -34,11 +34,11 @@ pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32
     }
     let kept = kept(world);
     let once = |act: &Act| {
-        let for_ever = |fact: Fact| kept.get(&fact.variable) == Some(&Some(fact.value));
+        let for_ever = |fact: GroundFact| kept.get(&fact.variable) == Some(&Some(fact.value));
         act.start_effects.is_empty()
             && act.flow_effects.is_empty()
             && act.end_effects.iter().all(|effect| match effect.outcome {
-                Outcome::Set(fact) => effect.when.is_none() && for_ever(fact),
+                GroundOutcome::Set(fact) => effect.when.is_none() && for_ever(fact),
                 _ => false,
             })
     };
@@ -52,7 +52,7 @@ fn kept(world: &World) -> FxHashMap<u32, Option<u32>> {
     let mut kept: FxHashMap<u32, Option<u32>> = FxHashMap::default();
     let mut touched = Touched::default();
     for outcome in acts.map(|effect| &effect.outcome).chain(given) {
-        if let Outcome::Set(fact) = outcome {
+        if let GroundOutcome::Set(fact) = outcome {
             let value = kept.entry(fact.variable).or_insert(Some(fact.value));
             *value = value.filter(|value| *value == fact.value);
             continue;

@@ -2,7 +2,7 @@
 
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, Variable};
 
-use crate::ground::{Expression, Relation};
+use crate::ground::{GroundExpression, Relation};
 
 /// Margin of a strict comparison, in the unit of the compared numbers: well above the tolerance
 /// (1e-7) of linear programs and comparisons.
@@ -64,26 +64,26 @@ impl Linear {
 
     /// Linear form of an expression; `None` if nonlinear, or if it asks an attachment.
     pub fn of(
-        expression: &Expression,
+        expression: &GroundExpression,
         numbers: &[Linear],
         duration: Option<&Linear>,
         total_time: Option<&Linear>,
     ) -> Option<Linear> {
-        let inner = |inner: &Expression| Linear::of(inner, numbers, duration, total_time);
+        let inner = |inner: &GroundExpression| Linear::of(inner, numbers, duration, total_time);
         Some(match expression {
-            Expression::Constant(number) => Linear::constant(*number),
-            Expression::Fluent(fluent) => numbers[*fluent as usize].clone(),
-            Expression::Duration => duration?.clone(),
-            Expression::TotalTime => total_time?.clone(),
-            Expression::Call(_) | Expression::Violated(_) => return None,
-            Expression::Sum(parts) => {
+            GroundExpression::Constant(number) => Linear::constant(*number),
+            GroundExpression::Fluent(fluent) => numbers[*fluent as usize].clone(),
+            GroundExpression::Duration => duration?.clone(),
+            GroundExpression::TotalTime => total_time?.clone(),
+            GroundExpression::Call(_) | GroundExpression::Violated(_) => return None,
+            GroundExpression::Sum(parts) => {
                 let mut sum = Linear::constant(0.0);
                 for part in parts {
                     sum = sum.plus(1.0, &inner(part)?);
                 }
                 sum
             }
-            Expression::Product(parts) => {
+            GroundExpression::Product(parts) => {
                 let mut product = Linear::constant(1.0);
                 for part in parts {
                     let part = inner(part)?;
@@ -95,12 +95,12 @@ impl Linear {
                 }
                 product
             }
-            Expression::Difference(left, right) => inner(left)?.plus(-1.0, &inner(right)?),
-            Expression::Quotient(left, right) => {
+            GroundExpression::Difference(left, right) => inner(left)?.plus(-1.0, &inner(right)?),
+            GroundExpression::Quotient(left, right) => {
                 let divisor = inner(right)?.as_constant().filter(|divisor| *divisor != 0.0)?;
                 inner(left)?.times(1.0 / divisor)
             }
-            Expression::Negative(operand) => inner(operand)?.times(-1.0),
+            GroundExpression::Negative(operand) => inner(operand)?.times(-1.0),
         })
     }
 }

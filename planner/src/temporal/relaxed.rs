@@ -7,7 +7,8 @@ use rustc_hash::FxHashMap;
 
 use crate::attachment::CallKind;
 use crate::ground::{
-    CallId, ComparisonId, Conjunction, Effect, Expression, Fact, NumericId, Outcome, Place, Relation,
+    CallId, ComparisonId, Conjunction, GroundEffect, GroundExpression, GroundFact, GroundOutcome, NumericId,
+    Place, Relation,
 };
 use crate::grouped::Grouped;
 
@@ -127,7 +128,7 @@ pub(crate) struct Relaxed {
     /// Mean duration, the weight of a step.
     pub(super) unit: f64,
     /// Contribution of each action to the measure beside time, in equivalent seconds.
-    pub(super) counted: Vec<Option<Expression>>,
+    pub(super) counted: Vec<Option<GroundExpression>>,
     /// Operators without preconditions.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
@@ -251,15 +252,15 @@ impl Relaxed {
         !self.tests_on[self.offsets.len() + number as usize].is_empty()
     }
 
-    fn fact(&self, fact: Fact) -> u32 {
+    fn fact(&self, fact: GroundFact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
 
     /// Adds the facts that an outcome may achieve; for an effect module, every value of its terms.
-    fn given(&self, world: &World, outcome: &Outcome, into: &mut Vec<u32>) {
+    fn given(&self, world: &World, outcome: &GroundOutcome, into: &mut Vec<u32>) {
         match outcome {
-            Outcome::Set(fact) => into.push(self.fact(*fact)),
-            Outcome::Call(call) => {
+            GroundOutcome::Set(fact) => into.push(self.fact(*fact)),
+            GroundOutcome::Call(call) => {
                 for place in &world.ground.calls[*call as usize].writes {
                     if let Place::Truth(variable) | Place::Object(variable) = place {
                         let values = world.ground.variables[*variable as usize].domain_size();
@@ -268,11 +269,11 @@ impl Relaxed {
                     }
                 }
             }
-            Outcome::Change { .. } | Outcome::Flow { .. } => {}
+            GroundOutcome::Change { .. } | GroundOutcome::Flow { .. } => {}
         }
     }
 
-    fn propositions(&self, facts: &[Fact], comparisons: &[ComparisonId]) -> impl Iterator<Item = u32> {
+    fn propositions(&self, facts: &[GroundFact], comparisons: &[ComparisonId]) -> impl Iterator<Item = u32> {
         let facts = facts.iter().map(|&fact| self.fact(fact));
         facts.chain(comparisons.iter().map(|&comparison| self.test_base + comparison))
     }
@@ -288,16 +289,16 @@ impl Relaxed {
         seconds: Seconds,
     ) {
         let action = &world.acts[act as usize];
-        let lists: [&[Effect]; 3] = match part {
+        let lists: [&[GroundEffect]; 3] = match part {
             Part::Whole => [action.start_effects, action.flow_effects, action.end_effects],
             Part::Start => [action.start_effects, &[], &[]],
             Part::End | Part::Free => [action.flow_effects, action.end_effects, &[]],
         };
         let effects = lists.into_iter().flatten();
         let plain = effects.clone().filter(|effect| effect.when.is_none());
-        let plain: Vec<&Outcome> = plain.map(|effect| &effect.outcome).collect();
+        let plain: Vec<&GroundOutcome> = plain.map(|effect| &effect.outcome).collect();
         self.under(world, (act, part), (before, &Merged::default()), tokens, seconds, &plain);
-        let mut groups: Vec<(Merged, Vec<&Outcome>)> = Vec::new();
+        let mut groups: Vec<(Merged, Vec<&GroundOutcome>)> = Vec::new();
         for effect in effects {
             let Some(when) = &effect.when else { continue };
             let extra = Merged::of(&[&when.here, &when.at_start, &when.over_all]);
@@ -319,7 +320,7 @@ impl Relaxed {
         (before, extra): (&Merged, &Merged),
         tokens: &[u32],
         seconds: Seconds,
-        outcomes: &[&Outcome],
+        outcomes: &[&GroundOutcome],
     ) {
         let action = &world.acts[act as usize];
         let mut needs = Vec::with_capacity(before.facts.len() + before.calls.len() + tokens.len());
@@ -355,7 +356,7 @@ impl Relaxed {
         own.filter(|operator| operator.part == part).for_each(|operator| operator.gives.push(token));
     }
 
-    fn tests_touched(&mut self, world: &World, outcomes: &[&Outcome]) -> Vec<u32> {
+    fn tests_touched(&mut self, world: &World, outcomes: &[&GroundOutcome]) -> Vec<u32> {
         let touched = &mut self.touched;
         touched.clear();
         outcomes.iter().for_each(|outcome| touched.outcome(world, outcome));
@@ -393,7 +394,7 @@ impl Relaxed {
         // Anything not derived may be absent: negated conditions on derived facts count as reachable.
         for (variable, declared) in world.ground.variables.iter().enumerate() {
             if declared.stratum.is_some() {
-                let gives = vec![self.fact(Fact { variable: variable as u32, value: 1 })];
+                let gives = vec![self.fact(GroundFact { variable: variable as u32, value: 1 })];
                 let (part, seconds) = (Part::Free, Seconds::Known(0.0));
                 let nothing = Operator {
                     act: NOBODY,
@@ -511,7 +512,7 @@ fn plain_calls(world: &World) -> Vec<bool> {
 /// Conditions taken together.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Merged {
-    facts: Vec<Fact>,
+    facts: Vec<GroundFact>,
     comparisons: Vec<ComparisonId>,
     calls: Vec<(CallId, bool)>,
 }
@@ -531,9 +532,9 @@ impl Merged {
 }
 
 /// True if the start of an action may itself achieve a fact that is needed after it.
-fn may_give(world: &World, act: &Act, fact: &Fact) -> bool {
+fn may_give(world: &World, act: &Act, fact: &GroundFact) -> bool {
     let derived = world.ground.variables[fact.variable as usize].stratum.is_some();
-    let gives = |effect: &Effect| effect.outcome == Outcome::Set(*fact);
+    let gives = |effect: &GroundEffect| effect.outcome == GroundOutcome::Set(*fact);
     derived && !act.start_effects.is_empty() || act.start_effects.iter().any(gives)
 }
 
@@ -578,7 +579,7 @@ fn seconds_of(world: &World, act: usize) -> Seconds {
     }
     let mut least_s: f64 = 0.0;
     for bound in bounds {
-        let Expression::Constant(seconds) = bound.seconds else { return Seconds::Settled };
+        let GroundExpression::Constant(seconds) = bound.seconds else { return Seconds::Settled };
         if matches!(bound.relation, Relation::Equal | Relation::AtLeast | Relation::Greater) {
             least_s = least_s.max(seconds);
         }

@@ -11,7 +11,7 @@ use petgraph::graph::{DiGraph, NodeIndex};
 
 use crate::calls::Failure;
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::order::Order;
 use super::space::{Base, Space, Track};
 
@@ -19,7 +19,7 @@ use super::space::{Base, Space, Track};
 const MOST_REPLAYED: usize = 50_000;
 
 /// Plan with the results of its replay.
-pub(crate) type Replayed = (f64, Vec<Step>, Base);
+pub(crate) type Replayed = (f64, Vec<TemporalStep>, Base);
 
 /// Plan with steps on its critical path exchanged while this improves it; never worse, always
 /// replayed.
@@ -59,7 +59,7 @@ pub(crate) fn tightened(
 }
 
 /// Pairs of different steps that follow each other on the longest path of the network, the last first.
-fn critical_pairs(steps: &[Step], track: &Track) -> Vec<(usize, usize)> {
+fn critical_pairs(steps: &[TemporalStep], track: &Track) -> Vec<(usize, usize)> {
     let path = longest_path(&track.order);
     let step_of = steps_of(steps, track);
     let mut pairs: Vec<(usize, usize)> = Vec::new();
@@ -99,7 +99,7 @@ pub fn longest_path(order: &Order) -> Vec<usize> {
 }
 
 /// The step that each happening belongs to; `None` for timed effects.
-fn steps_of(steps: &[Step], track: &Track) -> Vec<Option<usize>> {
+fn steps_of(steps: &[TemporalStep], track: &Track) -> Vec<Option<usize>> {
     let mut step_of = vec![None; track.order.len()];
     let mut open: Vec<usize> = Vec::new();
     for (index, step) in steps.iter().enumerate() {

@@ -13,7 +13,7 @@ use crate::calls::Failure;
 use crate::ground::{Earns, Values};
 use crate::memory::{Heap, Rows, soon};
 
-use super::advance::{Gates, Open, Part, Situation, Step};
+use super::advance::{Gates, Open, Part, Situation, TemporalStep};
 use super::destroy::shuffled;
 use super::estimate::{Estimate, From};
 use super::manner::{Counts, End, Manner};
@@ -23,7 +23,7 @@ use super::relaxed::Relaxed;
 use super::space::{Base, Space};
 use super::store::Store;
 use super::timed::schedule;
-use super::world::Span;
+use super::world::DurationRange;
 
 /// The key of an entry in the queue, smaller first, then older or as shuffled.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,7 +81,7 @@ pub(crate) struct Search<'s, 'w, 'a> {
     manner: Manner,
     store: Store,
     nodes: Rows<Node>,
-    steps: Rows<Step>,
+    steps: Rows<TemporalStep>,
     costs: Rows<f64>,
     phases: Rows<Phase>,
     phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
@@ -158,12 +158,12 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
 
     /// Searches.
     pub fn run(mut self, stop: &dyn Fn() -> bool) -> Result<(End, Counts), Failure> {
-        let nowhere = Step {
+        let nowhere = TemporalStep {
             act: NONE,
             part: Part::Free,
             proposal: None,
             taken_s: None,
-            span: Span { least_s: 0.0, most_s: 0.0 },
+            span: DurationRange { least_s: 0.0, most_s: 0.0 },
         };
         if let Some(end) = self.visit(NONE, nowhere, self.base.situation.clone(), self.base.costs)? {
             return Ok((end, self.counts));
@@ -235,7 +235,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Situation { state, open, timed }
     }
 
-    fn path(&self, mut node: u32) -> Vec<Step> {
+    fn path(&self, mut node: u32) -> Vec<TemporalStep> {
         let mut steps = Vec::new();
         while node != NONE && self.nodes[node as usize].parent != NONE {
             steps.push(self.steps[node as usize].clone());
@@ -248,8 +248,9 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     fn follow(&mut self, entry: Entry) -> Result<Option<End>, Failure> {
         let from = self.situation(entry.parent);
         let proposal = self.proposals.get(entry.proposal as usize).cloned();
-        let nothing = Span { least_s: 0.0, most_s: 0.0 };
-        let mut step = Step { act: entry.act, part: entry.part, proposal, taken_s: None, span: nothing };
+        let nothing = DurationRange { least_s: 0.0, most_s: 0.0 };
+        let mut step =
+            TemporalStep { act: entry.act, part: entry.part, proposal, taken_s: None, span: nothing };
         let Some(next) = self.space.world.advance(&from, &mut step)? else { return Ok(None) };
         let costs = self.costs[entry.parent as usize] + self.space.step_cost(&from.state, &step)?;
         self.visit(entry.parent, step, next, costs)
@@ -260,7 +261,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     }
 
     /// Times of the happenings up to a new step; `Err` if inconsistent.
-    fn times(&mut self, parent: u32, step: &Step, open: bool) -> Result<Times, Inconsistent> {
+    fn times(&mut self, parent: u32, step: &TemporalStep, open: bool) -> Result<Times, Inconsistent> {
         let wanted = self.manner.timed || self.bounded() && self.space.timed_measure();
         if !self.space.tight && !wanted {
             return Ok(Times::default());
@@ -296,7 +297,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     fn visit(
         &mut self,
         parent: u32,
-        step: Step,
+        step: TemporalStep,
         situation: Situation,
         costs: f64,
     ) -> Result<Option<End>, Failure> {
@@ -341,8 +342,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         let mut from = self.situation(ahead.from);
         let mut node = ahead.from;
         let mut left = ahead.plan;
-        let nothing = Span { least_s: 0.0, most_s: 0.0 };
-        let mut last: Option<(Step, Situation, f64)> = None;
+        let nothing = DurationRange { least_s: 0.0, most_s: 0.0 };
+        let mut last: Option<(TemporalStep, Situation, f64)> = None;
         loop {
             let mut taken = None;
             for (position, &(act, part)) in left.iter().enumerate() {
@@ -350,7 +351,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
                 if !self.space.world.acts[act as usize].grounding.is_empty() {
                     continue;
                 }
-                let mut step = Step { act, part, proposal: None, taken_s: None, span: nothing };
+                let mut step = TemporalStep { act, part, proposal: None, taken_s: None, span: nothing };
                 if part == Part::Start && self.is_full(&from, act) {
                     continue;
                 }
@@ -388,7 +389,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
     }
 
     /// Unevaluated node on a lookahead's path; `None` if known or temporally inconsistent.
-    fn pass(&mut self, parent: u32, step: Step, situation: &Situation, costs: f64) -> Option<u32> {
+    fn pass(&mut self, parent: u32, step: TemporalStep, situation: &Situation, costs: f64) -> Option<u32> {
         let times = self.times(parent, &step, !situation.open.is_empty()).ok()?;
         let extra = self.extra(situation, times.mark) | PASSED;
         let (node, new) = self.store.insert(&situation.state, extra);

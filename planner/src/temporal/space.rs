@@ -8,12 +8,12 @@ use rustc_hash::FxHasher;
 
 use crate::attachment::Level;
 use crate::calls::Failure;
-use crate::ground::{Change, Earns, Expression, Outcome, Values, added, weights};
+use crate::ground::{Change, Earns, GroundExpression, GroundOutcome, Values, added, weights};
 
-use super::advance::{Accesses, Part, Situation, Step};
+use super::advance::{Accesses, Part, Situation, TemporalStep};
 use super::order::{Clock, Inconsistent, Order};
 use super::timed::is_valid;
-use super::world::{Act, Moment, Span, World};
+use super::world::{Act, DurationRange, EvaluationContext, World};
 
 /// Maximum number of replays of a plan whose stretched actions stretch others.
 const MOST_STRETCHED: usize = 8;
@@ -35,7 +35,7 @@ pub enum Measure {
         time_weight: f64,
     },
     /// An expression over the last state and the makespan, to be made small.
-    Expression(Expression),
+    Expression(GroundExpression),
 }
 
 impl Measure {
@@ -57,20 +57,22 @@ impl Measure {
         let acts = world.acts.iter();
         let effects = acts.flat_map(|act| [act.start_effects, act.flow_effects, act.end_effects]).flatten();
         let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);
-        let earns = |outcome: &Outcome| match outcome {
-            Outcome::Set(_) => Earns::Never,
-            Outcome::Change { fluent, change, amount } => added(*change, amount, weights[*fluent as usize]),
-            Outcome::Flow { fluent, rate } => added(Change::Increase, rate, weights[*fluent as usize]),
-            Outcome::Call(_) => Earns::Perhaps,
+        let earns = |outcome: &GroundOutcome| match outcome {
+            GroundOutcome::Set(_) => Earns::Never,
+            GroundOutcome::Change { fluent, change, amount } => {
+                added(*change, amount, weights[*fluent as usize])
+            }
+            GroundOutcome::Flow { fluent, rate } => added(Change::Increase, rate, weights[*fluent as usize]),
+            GroundOutcome::Call(_) => Earns::Perhaps,
         };
         effects.map(|effect| &effect.outcome).chain(given).map(earns).max().unwrap_or(Earns::Never)
     }
 
     /// Contribution of each action to the measure besides time, in equivalent seconds; `None` if
     /// time or costs do not count, or the measure is nonlinear.
-    pub fn counted(&self, world: &World) -> Vec<Option<Expression>> {
-        let times = |factor: f64, of: &Expression| {
-            Expression::Product(vec![Expression::Constant(factor), of.clone()])
+    pub fn counted(&self, world: &World) -> Vec<Option<GroundExpression>> {
+        let times = |factor: f64, of: &GroundExpression| {
+            GroundExpression::Product(vec![GroundExpression::Constant(factor), of.clone()])
         };
         let (weights, time) = match self {
             Measure::Additive { sign, time_weight } if *time_weight > 0.0 => {
@@ -86,7 +88,7 @@ impl Measure {
             let changes =
                 act.start_effects.iter().chain(act.end_effects).filter(|effect| effect.when.is_none());
             let terms = changes.filter_map(|effect| match &effect.outcome {
-                Outcome::Change { fluent, change, amount } => {
+                GroundOutcome::Change { fluent, change, amount } => {
                     let weight = weights.get(*fluent as usize).filter(|weight| **weight != 0.0)?;
                     match change {
                         Change::Increase => Some(times(weight / time, amount)),
@@ -96,8 +98,8 @@ impl Measure {
                 }
                 _ => None,
             });
-            let terms: Vec<Expression> = terms.collect();
-            (!terms.is_empty()).then_some(Expression::Sum(terms))
+            let terms: Vec<GroundExpression> = terms.collect();
+            (!terms.is_empty()).then_some(GroundExpression::Sum(terms))
         };
         world.acts.iter().map(counted).collect()
     }
@@ -189,14 +191,14 @@ impl<'w, 'a> Space<'w, 'a> {
     }
 
     /// The clock after steps that are all done in one go.
-    pub fn clock(&self, steps: &[Step]) -> Clock {
+    pub fn clock(&self, steps: &[TemporalStep]) -> Clock {
         let mut clock = Clock::new(self.accesses.resources);
         steps.iter().filter(|step| step.part == Part::Whole).for_each(|step| self.tick(&mut clock, step));
         clock
     }
 
     /// Lets a step that is done in one go happen on a clock.
-    pub fn tick(&self, clock: &mut Clock, step: &Step) {
+    pub fn tick(&self, clock: &mut Clock, step: &TemporalStep) {
         let (start, end) = self.accesses.of(step.act);
         clock.push(start, end.as_ref().map(|end| (end, step.span)));
     }
@@ -216,19 +218,19 @@ impl<'w, 'a> Space<'w, 'a> {
     }
 
     /// The track of a sequence of steps.
-    pub fn track(&self, steps: &[Step]) -> Result<Track, Inconsistent> {
+    pub fn track(&self, steps: &[TemporalStep]) -> Result<Track, Inconsistent> {
         let mut track = self.begin();
         steps.iter().try_for_each(|step| track.push(self, step))?;
         Ok(track)
     }
 
     /// Contribution of an action to an additive metric.
-    pub fn step_cost(&self, before: &Values, step: &Step) -> Result<f64, Failure> {
+    pub fn step_cost(&self, before: &Values, step: &TemporalStep) -> Result<f64, Failure> {
         let Measure::Additive { sign, .. } = self.measure else { return Ok(0.0) };
         if matches!(step.part, Part::End | Part::Free) {
             return Ok(0.0);
         }
-        let moment = Moment {
+        let moment = EvaluationContext {
             state: before,
             duration_s: step.span.least_s,
             proposal: step.proposal.as_ref(),
@@ -243,7 +245,8 @@ impl<'w, 'a> Space<'w, 'a> {
             Measure::Makespan => Ok(makespan_s),
             Measure::Additive { time_weight, .. } => Ok(costs + time_weight * makespan_s),
             Measure::Expression(expression) => {
-                let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+                let moment =
+                    EvaluationContext { state, duration_s: 0.0, proposal: None, level: Level::Exact };
                 let timed = with_total_time(expression, makespan_s);
                 self.world.evaluate(&timed, &moment)
             }
@@ -254,7 +257,7 @@ impl<'w, 'a> Space<'w, 'a> {
     /// `None` if a step is inapplicable, or if a long sequence is stopped.
     pub fn replay(
         &self,
-        steps: &mut [Step],
+        steps: &mut [TemporalStep],
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<(f64, Base)>, Failure> {
         let mut situation = Situation { state: self.world.initial()?, open: Vec::new(), timed: 0 };
@@ -282,7 +285,7 @@ impl<'w, 'a> Space<'w, 'a> {
     /// stretched action use its stretched duration.
     pub fn replay_to_goal(
         &self,
-        steps: &mut [Step],
+        steps: &mut [TemporalStep],
         stop: &dyn Fn() -> bool,
     ) -> Result<Option<(f64, Base)>, Failure> {
         steps.iter_mut().for_each(|step| step.taken_s = None);
@@ -310,7 +313,7 @@ impl<'w, 'a> Space<'w, 'a> {
 
     /// Fixes the durations of stretched actions on a track where effects depend on them; true if
     /// there are any.
-    fn stretch(&self, steps: &mut [Step], track: &Track) -> bool {
+    fn stretch(&self, steps: &mut [TemporalStep], track: &Track) -> bool {
         let mut any = false;
         for (step, action) in steps.iter_mut().zip(&track.actions) {
             let Some((start, Some(end))) = *action else { continue };
@@ -358,7 +361,7 @@ struct Started {
     act: u32,
     proposal: Option<Arc<str>>,
     start: u32,
-    span: Span,
+    span: DurationRange,
 }
 
 impl Track {
@@ -367,7 +370,7 @@ impl Track {
     }
 
     /// Adds a step.
-    pub fn push(&mut self, space: &Space, step: &Step) -> Result<(), Inconsistent> {
+    pub fn push(&mut self, space: &Space, step: &TemporalStep) -> Result<(), Inconsistent> {
         let mut action = None;
         match step.part {
             Part::Free => {
@@ -465,19 +468,19 @@ impl Track {
     }
 }
 
-fn with_total_time(expression: &Expression, makespan_s: f64) -> Expression {
-    let inner = |inner: &Expression| with_total_time(inner, makespan_s);
+fn with_total_time(expression: &GroundExpression, makespan_s: f64) -> GroundExpression {
+    let inner = |inner: &GroundExpression| with_total_time(inner, makespan_s);
     match expression {
-        Expression::TotalTime => Expression::Constant(makespan_s),
-        Expression::Sum(parts) => Expression::Sum(parts.iter().map(inner).collect()),
-        Expression::Product(parts) => Expression::Product(parts.iter().map(inner).collect()),
-        Expression::Difference(left, right) => {
-            Expression::Difference(Box::new(inner(left)), Box::new(inner(right)))
+        GroundExpression::TotalTime => GroundExpression::Constant(makespan_s),
+        GroundExpression::Sum(parts) => GroundExpression::Sum(parts.iter().map(inner).collect()),
+        GroundExpression::Product(parts) => GroundExpression::Product(parts.iter().map(inner).collect()),
+        GroundExpression::Difference(left, right) => {
+            GroundExpression::Difference(Box::new(inner(left)), Box::new(inner(right)))
         }
-        Expression::Quotient(left, right) => {
-            Expression::Quotient(Box::new(inner(left)), Box::new(inner(right)))
+        GroundExpression::Quotient(left, right) => {
+            GroundExpression::Quotient(Box::new(inner(left)), Box::new(inner(right)))
         }
-        Expression::Negative(operand) => Expression::Negative(Box::new(inner(operand))),
+        GroundExpression::Negative(operand) => GroundExpression::Negative(Box::new(inner(operand))),
         other => other.clone(),
     }
 }

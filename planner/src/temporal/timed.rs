@@ -3,7 +3,7 @@
 use crate::plan::Plan;
 use crate::validate::validate;
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::mentions::keep_apart;
 use super::space::{Space, Track};
 use super::world::World;
@@ -12,7 +12,7 @@ use super::world::World;
 #[derive(Debug, Clone)]
 pub(crate) struct Timed {
     /// The step of the search.
-    pub step: Step,
+    pub step: TemporalStep,
     /// Start time, seconds.
     pub start_s: f64,
     /// Duration, seconds.
@@ -21,7 +21,7 @@ pub(crate) struct Timed {
 
 /// Earliest schedule of a plan; `None` if stopped, or if timed effects leave no room to separate
 /// mutex happenings.
-pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
+pub(super) fn schedule(space: &Space, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
     let mut track = space.track(steps).ok()?;
     track.pass_timed(space).ok()?;
     let mut apart = track.clone();
@@ -40,7 +40,7 @@ pub(super) fn schedule(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -
 }
 
 /// The actions of a track at their earliest times.
-fn timed(steps: &[Step], track: &Track) -> Vec<Timed> {
+fn timed(steps: &[TemporalStep], track: &Track) -> Vec<Timed> {
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
     let mut plan: Vec<Timed> = actions
@@ -65,7 +65,7 @@ fn timed(steps: &[Step], track: &Track) -> Vec<Timed> {
 
 /// True if the validator accepts a plan with its times; needed with continuous change, or effects
 /// that depend on chosen durations, where the search does not know the order of happenings.
-pub(super) fn is_valid(space: &Space, steps: &[Step], stop: &dyn Fn() -> bool) -> bool {
+pub(super) fn is_valid(space: &Space, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> bool {
     let Some(timed) = schedule(space, steps, stop) else { return false };
     let world = space.world;
     validate(world.task, world.calls.attachments(), &to_plan(world, &timed)).valid

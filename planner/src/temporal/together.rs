@@ -8,7 +8,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
 use rustc_hash::FxHashMap;
 
-use crate::ground::{Effect, Outcome};
+use crate::ground::{GroundEffect, GroundOutcome};
 
 use super::advance::derived_roots;
 use super::touch::Touched;
@@ -42,7 +42,7 @@ pub(super) fn some_only_together(world: &World) -> bool {
 fn in_a_circle<'w>(
     world: &World<'w>,
     held: &[Vec<Place>],
-    effects: impl Fn(&Act<'w>) -> &'w [Effect],
+    effects: impl Fn(&Act<'w>) -> &'w [GroundEffect],
     meets: impl Fn(Option<u32>, Option<u32>) -> bool,
 ) -> bool {
     // Actions are the first nodes, then the places that some of them hold.
@@ -95,8 +95,8 @@ fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
 }
 
 /// Resources that an effect sets.
-fn set(world: &World, effect: &Effect) -> Vec<Place> {
-    if let Outcome::Set(fact) = &effect.outcome {
+fn set(world: &World, effect: &GroundEffect) -> Vec<Place> {
+    if let GroundOutcome::Set(fact) = &effect.outcome {
         return vec![(fact.variable, Some(fact.value))];
     }
     let mut touched = Touched::default();

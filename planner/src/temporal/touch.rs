@@ -1,6 +1,8 @@
 //! Variables and numbers that conditions, expressions and effects read or change.
 
-use crate::ground::{CallId, ComparisonId, Conjunction, Expression, NumericId, Outcome, Place, VariableId};
+use crate::ground::{
+    CallId, ComparisonId, Conjunction, GroundExpression, GroundOutcome, NumericId, Place, VariableId,
+};
 
 use super::world::World;
 
@@ -57,11 +59,13 @@ impl Touched {
     }
 
     /// Adds the resources that an outcome changes.
-    pub fn outcome(&mut self, world: &World, outcome: &Outcome) {
+    pub fn outcome(&mut self, world: &World, outcome: &GroundOutcome) {
         match outcome {
-            Outcome::Set(fact) => self.variables.push(fact.variable),
-            Outcome::Change { fluent, .. } | Outcome::Flow { fluent, .. } => self.numbers.push(*fluent),
-            Outcome::Call(call) => {
+            GroundOutcome::Set(fact) => self.variables.push(fact.variable),
+            GroundOutcome::Change { fluent, .. } | GroundOutcome::Flow { fluent, .. } => {
+                self.numbers.push(*fluent)
+            }
+            GroundOutcome::Call(call) => {
                 for place in &world.ground.calls[*call as usize].writes {
                     match place {
                         Place::Number(number) => self.numbers.push(*number),
@@ -75,18 +79,21 @@ impl Touched {
 }
 
 /// Adds the read set of an expression.
-pub(crate) fn expression_touches(world: &World, expression: &Expression, touched: &mut Touched) {
+pub(crate) fn expression_touches(world: &World, expression: &GroundExpression, touched: &mut Touched) {
     match expression {
-        Expression::Fluent(fluent) => touched.numbers.push(*fluent),
-        Expression::Call(call) => touched.call(world, *call),
-        Expression::Sum(parts) | Expression::Product(parts) => {
+        GroundExpression::Fluent(fluent) => touched.numbers.push(*fluent),
+        GroundExpression::Call(call) => touched.call(world, *call),
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
             parts.iter().for_each(|part| expression_touches(world, part, touched));
         }
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             expression_touches(world, left, touched);
             expression_touches(world, right, touched);
         }
-        Expression::Negative(inner) => expression_touches(world, inner, touched),
-        Expression::Constant(_) | Expression::Duration | Expression::TotalTime | Expression::Violated(_) => {}
+        GroundExpression::Negative(inner) => expression_touches(world, inner, touched),
+        GroundExpression::Constant(_)
+        | GroundExpression::Duration
+        | GroundExpression::TotalTime
+        | GroundExpression::Violated(_) => {}
     }
 }

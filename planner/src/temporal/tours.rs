@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use crate::calls::Failure;
 
-use super::advance::{Part, Step};
+use super::advance::{Part, TemporalStep};
 use super::schedule::Replayed;
 use super::space::Space;
 use super::world::World;
@@ -33,7 +33,7 @@ struct Tour {
     /// Arguments of one travel step.
     arguments: Vec<u32>,
     /// Steps before the tour.
-    before: Vec<Step>,
+    before: Vec<TemporalStep>,
     /// Places along the tour, with the steps at each.
     stops: Vec<Stop>,
 }
@@ -42,7 +42,7 @@ struct Tour {
 #[derive(Clone)]
 struct Stop {
     place: u32,
-    steps: Vec<Step>,
+    steps: Vec<TemporalStep>,
 }
 
 impl<'w, 'a> Tours<'w, 'a> {
@@ -87,9 +87,9 @@ impl<'w, 'a> Tours<'w, 'a> {
     }
 
     /// The tours of a plan with two steps that lead on or more.
-    fn tours(&self, steps: &[Step]) -> Vec<Tour> {
-        let origin = |step: &Step| self.world.acts[step.act as usize].origin;
-        let is_whole = |step: &Step| step.part == Part::Whole && step.proposal.is_none();
+    fn tours(&self, steps: &[TemporalStep]) -> Vec<Tour> {
+        let origin = |step: &TemporalStep| self.world.acts[step.act as usize].origin;
+        let is_whole = |step: &TemporalStep| step.part == Part::Whole && step.proposal.is_none();
         let mut by_schema: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (at, step) in steps.iter().enumerate().filter(|(_, step)| is_whole(step)) {
             by_schema.entry(origin(step).schema).or_default().push(at);
@@ -126,14 +126,14 @@ impl<'w, 'a> Tours<'w, 'a> {
     }
 
     /// Plan with the tour's stops replaced; `None` if no action connects two stops.
-    fn assembled(&self, tour: &Tour, stops: &[Stop]) -> Option<Vec<Step>> {
+    fn assembled(&self, tour: &Tour, stops: &[Stop]) -> Option<Vec<TemporalStep>> {
         let mut steps = tour.before.clone();
         let mut at = tour.arguments[tour.from];
         for stop in stops {
             if stop.place != at {
                 let mut arguments = tour.arguments.clone();
                 (arguments[tour.from], arguments[tour.to]) = (at, stop.place);
-                steps.push(Step::whole(*self.acts.get(&(tour.schema, arguments.as_slice()))?));
+                steps.push(TemporalStep::whole(*self.acts.get(&(tour.schema, arguments.as_slice()))?));
                 at = stop.place;
             }
             steps.extend(stop.steps.iter().cloned());

@@ -8,8 +8,8 @@ use rustc_hash::FxHashMap;
 use crate::attachment::Level;
 use crate::calls::{Calls, Failure};
 use crate::ground::{
-    Axiom, Change, ComparisonId, Conjunction, DurationBound, Effect, Expression, GroundTask, Origin, Outcome,
-    Place, Relation, Values, Variable, VariableId,
+    Axiom, Change, ComparisonId, Conjunction, GroundDurationBound, GroundEffect, GroundExpression,
+    GroundOutcome, GroundTask, Origin, Place, Relation, Values, Variable, VariableId,
 };
 use crate::model::agreement::{contradictions, reset};
 use crate::model::relation::quotient;
@@ -24,7 +24,7 @@ pub struct Act<'a> {
     /// True if durative.
     pub durative: bool,
     /// Bounds on the duration.
-    pub bounds: &'a [DurationBound],
+    pub bounds: &'a [GroundDurationBound],
     /// Position of the duration within its bounds: 0 is the shortest, 1 the longest; above 0 only
     /// where the shortest cannot give all effects.
     pub share: f64,
@@ -35,13 +35,13 @@ pub struct Act<'a> {
     /// Holds right before the end.
     pub at_end: &'a Conjunction,
     /// Happens at the start.
-    pub start_effects: &'a [Effect],
+    pub start_effects: &'a [GroundEffect],
     /// Continuous effects, with their rates.
-    pub flow_effects: &'a [Effect],
+    pub flow_effects: &'a [GroundEffect],
     /// Happens at the end.
-    pub end_effects: &'a [Effect],
+    pub end_effects: &'a [GroundEffect],
     /// Contribution to an additive metric.
-    pub cost: &'a Expression,
+    pub cost: &'a GroundExpression,
     /// Grounding calls: module and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
     /// True if the end is independent of the start; computed on demand.
@@ -57,7 +57,7 @@ pub static NOTHING: Conjunction =
 
 /// State with the other inputs of expressions.
 #[derive(Clone, Copy)]
-pub struct Moment<'s> {
+pub struct EvaluationContext<'s> {
     /// The state.
     pub state: &'s Values,
     /// `?duration` of the action at hand, in seconds.
@@ -70,23 +70,23 @@ pub struct Moment<'s> {
 
 /// The duration that an action may take, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Span {
+pub struct DurationRange {
     /// Shortest duration.
     pub least_s: f64,
     /// Longest duration; may be infinite.
     pub most_s: f64,
 }
 
-impl Span {
+impl DurationRange {
     /// The span reduced to a chosen duration, if any; `None` if that is not allowed.
-    pub fn taking(self, taken_s: Option<f64>) -> Option<Span> {
+    pub fn taking(self, taken_s: Option<f64>) -> Option<DurationRange> {
         let Some(taken_s) = taken_s else { return Some(self) };
         (self.least_s <= taken_s && taken_s <= self.most_s)
-            .then_some(Span { least_s: taken_s, most_s: taken_s })
+            .then_some(DurationRange { least_s: taken_s, most_s: taken_s })
     }
 
     /// Span reduced by an [`EPSILON_S`] at excluded bounds; its middle if there is less room.
-    fn strictly_inside(self, bounds: Span) -> Span {
+    fn strictly_inside(self, bounds: DurationRange) -> DurationRange {
         let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
         let most_s = self.most_s.min(bounds.most_s - EPSILON_S);
         let middle_s = (self.least_s.max(bounds.least_s) + self.most_s.min(bounds.most_s)) / 2.0;
@@ -95,8 +95,8 @@ impl Span {
             && bounds.least_s < middle_s
             && middle_s < bounds.most_s;
         match least_s > most_s && is_inside {
-            true => Span { least_s: middle_s, most_s: middle_s },
-            false => Span { least_s, most_s },
+            true => DurationRange { least_s: middle_s, most_s: middle_s },
+            false => DurationRange { least_s, most_s },
         }
     }
 }
@@ -186,7 +186,7 @@ impl<'a> World<'a> {
         let last_given = given
             .flat_map(|(index, timed)| timed.outcomes.iter().map(move |outcome| (index, outcome)))
             .filter_map(|(index, outcome)| match outcome {
-                Outcome::Set(fact) => Some((fact.variable, (index, fact.value))),
+                GroundOutcome::Set(fact) => Some((fact.variable, (index, fact.value))),
                 _ => None,
             })
             .collect();
@@ -222,39 +222,45 @@ impl<'a> World<'a> {
     }
 
     /// Value of an expression; NaN if undefined. `total-time` and preferences count as zero.
-    pub fn evaluate(&self, expression: &Expression, moment: &Moment) -> Result<f64, Failure> {
+    pub fn evaluate(
+        &self,
+        expression: &GroundExpression,
+        moment: &EvaluationContext,
+    ) -> Result<f64, Failure> {
         Ok(match expression {
-            Expression::Constant(number) => *number,
-            Expression::Fluent(fluent) => moment.state.numbers[*fluent as usize],
-            Expression::Call(call) => self.calls.cost(*call, moment.proposal, moment.state, moment.level)?,
-            Expression::Duration => moment.duration_s,
-            Expression::TotalTime | Expression::Violated(_) => 0.0,
-            Expression::Sum(parts) => {
+            GroundExpression::Constant(number) => *number,
+            GroundExpression::Fluent(fluent) => moment.state.numbers[*fluent as usize],
+            GroundExpression::Call(call) => {
+                self.calls.cost(*call, moment.proposal, moment.state, moment.level)?
+            }
+            GroundExpression::Duration => moment.duration_s,
+            GroundExpression::TotalTime | GroundExpression::Violated(_) => 0.0,
+            GroundExpression::Sum(parts) => {
                 let mut sum = 0.0;
                 for part in parts {
                     sum += self.evaluate(part, moment)?;
                 }
                 sum
             }
-            Expression::Product(parts) => {
+            GroundExpression::Product(parts) => {
                 let mut product = 1.0;
                 for part in parts {
                     product *= self.evaluate(part, moment)?;
                 }
                 product
             }
-            Expression::Difference(left, right) => {
+            GroundExpression::Difference(left, right) => {
                 self.evaluate(left, moment)? - self.evaluate(right, moment)?
             }
-            Expression::Quotient(left, right) => {
+            GroundExpression::Quotient(left, right) => {
                 quotient(self.evaluate(left, moment)?, self.evaluate(right, moment)?)
             }
-            Expression::Negative(inner) => -self.evaluate(inner, moment)?,
+            GroundExpression::Negative(inner) => -self.evaluate(inner, moment)?,
         })
     }
 
     /// True if a numeric condition holds.
-    pub fn compare(&self, comparison: ComparisonId, moment: &Moment) -> Result<bool, Failure> {
+    pub fn compare(&self, comparison: ComparisonId, moment: &EvaluationContext) -> Result<bool, Failure> {
         let comparison = &self.ground.comparisons[comparison as usize];
         let left = self.evaluate(&comparison.left, moment)?;
         let right = self.evaluate(&comparison.right, moment)?;
@@ -262,7 +268,7 @@ impl<'a> World<'a> {
     }
 
     /// True if a conjunction holds; calls are evaluated last.
-    pub fn holds(&self, condition: &Conjunction, moment: &Moment) -> Result<bool, Failure> {
+    pub fn holds(&self, condition: &Conjunction, moment: &EvaluationContext) -> Result<bool, Failure> {
         let facts =
             condition.facts.iter().all(|fact| moment.state.values[fact.variable as usize] == fact.value);
         if !facts {
@@ -284,9 +290,9 @@ impl<'a> World<'a> {
     /// Durations allowed by the bounds at the start; `None` if none.
     ///
     /// A durative action takes at least [`EPSILON_S`], unless it must take less and its end is free of its start.
-    pub fn span(&self, act: &Act, moment: &Moment) -> Result<Option<Span>, Failure> {
-        let mut span = Span { least_s: 0.0, most_s: f64::INFINITY };
-        let mut strict = Span { least_s: f64::NEG_INFINITY, most_s: f64::INFINITY };
+    pub fn span(&self, act: &Act, moment: &EvaluationContext) -> Result<Option<DurationRange>, Failure> {
+        let mut span = DurationRange { least_s: 0.0, most_s: f64::INFINITY };
+        let mut strict = DurationRange { least_s: f64::NEG_INFINITY, most_s: f64::INFINITY };
         for bound in act.bounds.iter().filter(|bound| !bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
             if seconds.is_nan() {
@@ -319,13 +325,13 @@ impl<'a> World<'a> {
         if act.share > 0.0 {
             let seconds = span.least_s + act.share * (span.most_s - span.least_s);
             let is_longer = seconds.is_finite() && seconds > span.least_s;
-            return Ok(is_longer.then_some(Span { least_s: seconds, most_s: seconds }));
+            return Ok(is_longer.then_some(DurationRange { least_s: seconds, most_s: seconds }));
         }
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
     }
 
     /// True if the bounds that are evaluated at the end allow this duration.
-    pub fn end_allows(&self, act: &Act, moment: &Moment) -> Result<bool, Failure> {
+    pub fn end_allows(&self, act: &Act, moment: &EvaluationContext) -> Result<bool, Failure> {
         for bound in act.bounds.iter().filter(|bound| bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
             if !bound.relation.holds(moment.duration_s, seconds) {
@@ -342,15 +348,15 @@ impl<'a> World<'a> {
     /// effects cannot happen.
     pub fn apply(
         &self,
-        effects: &[Effect],
-        moment: &Moment,
-        gate: &dyn Fn(usize, &Effect) -> bool,
+        effects: &[GroundEffect],
+        moment: &EvaluationContext,
+        gate: &dyn Fn(usize, &GroundEffect) -> bool,
         into: &mut Values,
     ) -> Result<bool, Failure> {
-        let may_contradict = |effect: &&Effect| match &effect.outcome {
-            Outcome::Set(fact) => self.is_object(fact.variable),
-            Outcome::Change { .. } | Outcome::Call(_) => true,
-            Outcome::Flow { .. } => false,
+        let may_contradict = |effect: &&GroundEffect| match &effect.outcome {
+            GroundOutcome::Set(fact) => self.is_object(fact.variable),
+            GroundOutcome::Change { .. } | GroundOutcome::Call(_) => true,
+            GroundOutcome::Flow { .. } => false,
         };
         let several = effects.iter().filter(may_contradict).nth(1).is_some();
         let mut changes: Vec<(u32, Change, f64)> = Vec::new();
@@ -361,12 +367,12 @@ impl<'a> World<'a> {
                 continue;
             }
             match &effect.outcome {
-                Outcome::Set(fact) => {
+                GroundOutcome::Set(fact) => {
                     into.values[fact.variable as usize] = fact.value;
                     let is_object = several && self.is_object(fact.variable);
                     objects.extend(is_object.then_some((fact.variable, fact.value)));
                 }
-                Outcome::Change { fluent, change, amount } => {
+                GroundOutcome::Change { fluent, change, amount } => {
                     let amount = self.evaluate(amount, moment)?;
                     changes.extend(several.then_some((*fluent, *change, amount)));
                     change.apply(&mut into.numbers[*fluent as usize], amount);
@@ -374,14 +380,14 @@ impl<'a> World<'a> {
                         return Ok(false);
                     }
                 }
-                Outcome::Flow { fluent, rate } => {
+                GroundOutcome::Flow { fluent, rate } => {
                     let change = self.evaluate(rate, moment)? * moment.duration_s;
                     into.numbers[*fluent as usize] += change;
                     if !into.numbers[*fluent as usize].is_finite() {
                         return Ok(false);
                     }
                 }
-                Outcome::Call(call) => {
+                GroundOutcome::Call(call) => {
                     self.calls.write(*call, moment.proposal, moment.state, moment.level, into)?;
                     for place in &self.ground.calls[*call as usize].writes {
                         match *place {
@@ -425,7 +431,8 @@ impl<'a> World<'a> {
                     if state.values[head] == axiom.head.value {
                         continue;
                     }
-                    let moment = Moment { state, duration_s: 0.0, proposal: None, level: Level::Exact };
+                    let moment =
+                        EvaluationContext { state, duration_s: 0.0, proposal: None, level: Level::Exact };
                     if self.holds(&axiom.body, &moment)? {
                         state.values[head] = axiom.head.value;
                         changed = true;
@@ -458,24 +465,26 @@ fn is_fixed(act: &Act) -> bool {
 
 /// True if effects, or bounds at the end, depend on the chosen duration.
 fn chooses_effects(act: &Act) -> bool {
-    let timed = |effect: &Effect| match &effect.outcome {
-        Outcome::Change { amount, .. } => mentions_duration(amount),
-        Outcome::Flow { .. } => true,
-        Outcome::Set(_) | Outcome::Call(_) => false,
+    let timed = |effect: &GroundEffect| match &effect.outcome {
+        GroundOutcome::Change { amount, .. } => mentions_duration(amount),
+        GroundOutcome::Flow { .. } => true,
+        GroundOutcome::Set(_) | GroundOutcome::Call(_) => false,
     };
     let ends = act.bounds.iter().any(|bound| bound.at_end);
     let mut effects = act.start_effects.iter().chain(act.flow_effects).chain(act.end_effects);
     !is_fixed(act) && (ends || effects.any(timed))
 }
 
-fn mentions_duration(expression: &Expression) -> bool {
+fn mentions_duration(expression: &GroundExpression) -> bool {
     match expression {
-        Expression::Duration => true,
-        Expression::Sum(parts) | Expression::Product(parts) => parts.iter().any(mentions_duration),
-        Expression::Difference(left, right) | Expression::Quotient(left, right) => {
+        GroundExpression::Duration => true,
+        GroundExpression::Sum(parts) | GroundExpression::Product(parts) => {
+            parts.iter().any(mentions_duration)
+        }
+        GroundExpression::Difference(left, right) | GroundExpression::Quotient(left, right) => {
             mentions_duration(left) || mentions_duration(right)
         }
-        Expression::Negative(inner) => mentions_duration(inner),
+        GroundExpression::Negative(inner) => mentions_duration(inner),
         _ => false,
     }
 }

@@ -21,11 +21,11 @@ fn check(variables: usize, clauses: &[Vec<i32>], satisfiable: bool) {
         // In small pieces: going on must make no difference.
         let more = solver.work + 1_000;
         match solver.run(&mut Nothing, more, &|| false) {
-            Answer::Interrupted => {}
+            Satisfiability::Interrupted => {}
             answer => break answer,
         }
     };
-    assert_eq!(answer == Answer::Satisfied, satisfiable, "{clauses:?}");
+    assert_eq!(answer == Satisfiability::Satisfied, satisfiable, "{clauses:?}");
     if satisfiable {
         let holds = |c: &Vec<i32>| c.iter().any(|&l| solver.value(literal(l)) == Some(true));
         assert!(clauses.iter().all(holds), "{clauses:?}");
@@ -95,7 +95,7 @@ impl Decide for Asked {
 fn what_is_left_open_is_set_in_one_go() {
     let (mut solver, mut asked) = (Solver::new(1_000), Asked(0));
     solver.add(&[Literal::new(3, true), Literal::new(7, true)]);
-    assert_eq!(solver.run(&mut asked, u64::MAX, &|| false), Answer::Satisfied);
+    assert_eq!(solver.run(&mut asked, u64::MAX, &|| false), Satisfiability::Satisfied);
     assert_eq!(asked.0, 2, "once more at the end");
 }
 

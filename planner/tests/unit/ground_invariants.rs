@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 fn where_something_is_it_is_alone() {
     let (task, grounded) = small::read(small::SHUTTLE, small::ROW);
     let named = |variable: u32, value: u32| {
-        small::fact(&task, &grounded, descry_planner::ground::Fact { variable, value })
+        small::fact(&task, &grounded, descry_planner::ground::GroundFact { variable, value })
     };
     let variables = grounded.variables.iter().enumerate();
     let groups: Vec<BTreeSet<String>> = variables

@@ -2,11 +2,11 @@
 
 use super::small;
 use descry_planner::ground::pairs::*;
-use descry_planner::ground::task::Fact;
+use descry_planner::ground::task::GroundFact;
 
 fn check(domain: &str, problem: &str, expected: &[&str]) {
     let (task, grounded) = small::read(domain, problem);
-    let said = |group: &Vec<Fact>| {
+    let said = |group: &Vec<GroundFact>| {
         let facts = group.iter().map(|&fact| small::fact(&task, &grounded, fact));
         facts.collect::<Vec<_>>().join(" ")
     };

@@ -2,7 +2,7 @@
 
 use super::small;
 use descry_planner::classical::compiled::Compiled;
-use descry_planner::ground::Fact;
+use descry_planner::ground::GroundFact;
 use descry_planner::heuristics::landmarks::Landmarks;
 
 #[test]
@@ -13,7 +13,7 @@ fn what_every_plan_passes_is_found() {
     let variable = |id: u32| compiled.variables[id as usize];
     let named = |id: u32| {
         let value = id - compiled.offsets[variable(id) as usize];
-        small::fact(&task, &grounded, Fact { variable: variable(id), value })
+        small::fact(&task, &grounded, GroundFact { variable: variable(id), value })
     };
     let single = landmarks.all.iter().filter(|landmark| landmark.facts.len() == 1);
     let found: Vec<String> = single.map(|landmark| named(landmark.facts[0])).collect();

@@ -13,7 +13,7 @@ fn check(domain: &str, problem: &str, bound: u32, expected: Option<usize>) {
 
 fn check_shared(shared: &Shared<'_>, bound: u32, expected: Option<usize>) {
     let task = shared.task;
-    let mut search = Search::new(shared, bound);
+    let mut search = SatSearch::new(shared, bound);
     let end = loop {
         // In pieces: going on must make no difference.
         let work = search.counts().work + 200_000;

@@ -14,7 +14,7 @@ fn check(problem: &str, narrow: bool, solvable: bool) {
 
 fn check_shared(shared: &Shared<'_>, problem: &str, narrow: bool, solvable: bool) {
     let task = shared.task;
-    let mut search = Search::new(shared, u32::MAX, narrow);
+    let mut search = NoveltySearch::new(shared, u32::MAX, narrow);
     let cancelled = &AtomicBool::new(false);
     let all = Allowed { work: u64::MAX, evaluations: u64::MAX, memory: shared.memory, cancelled };
     let End::Plan(plan) = search.run(all) else {

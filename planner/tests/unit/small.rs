@@ -3,7 +3,7 @@
 use descry_planner::classical::compiled::Compiled;
 use descry_planner::classical::successor::Successors;
 use descry_planner::diagnostic::Source;
-use descry_planner::ground::{Fact, GroundTask, Meaning, Origin, ground};
+use descry_planner::ground::{GroundFact, GroundTask, Meaning, Origin, ground};
 use descry_planner::heuristics::landmarks::Landmarks;
 use descry_planner::memory::MemoryLimit;
 use descry_planner::search::lazy::Shared;
@@ -49,7 +49,7 @@ pub fn read(domain: &str, problem: &str) -> (Task, GroundTask) {
 }
 
 /// A fact as people write it.
-pub fn fact(task: &Task, grounded: &GroundTask, fact: Fact) -> String {
+pub fn fact(task: &Task, grounded: &GroundTask, fact: GroundFact) -> String {
     match &grounded.variables[fact.variable as usize].values[fact.value as usize] {
         Meaning::Atom { predicate, arguments } => {
             let names = arguments.iter().map(|&object| format!(" {}", task.objects[object as usize].name));

@@ -3,7 +3,7 @@
 use super::small;
 use descry_planner::attachment::Attachments;
 use descry_planner::calls::Calls;
-use descry_planner::ground::Fact;
+use descry_planner::ground::GroundFact;
 use descry_planner::memory::MemoryLimit;
 use descry_planner::task::Task;
 use descry_planner::temporal::advance::Part;
@@ -45,7 +45,7 @@ fn what_excludes_what_is_known_of_actions_in_one_go() {
       (:init (at r a) (at s b) (clear c)) (:goal (at r b)))";
     let together = in_space(domain, problem, |task, space| {
         let (compressed, _) = compressed(space)?;
-        let said = |fact: &Fact| small::fact(task, &compressed, *fact);
+        let said = |fact: &GroundFact| small::fact(task, &compressed, *fact);
         let groups = compressed.mutex_groups.iter();
         let groups = groups.map(|group| group.iter().map(said).collect::<Vec<_>>().join(" "));
         Some(groups.collect::<Vec<_>>())

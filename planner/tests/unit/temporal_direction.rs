@@ -2,7 +2,7 @@
 
 use descry_planner::attachment::{Answer, Attachments};
 use descry_planner::calls::Calls;
-use descry_planner::ground::Outcome;
+use descry_planner::ground::GroundOutcome;
 use descry_planner::temporal::direction::may_help;
 use descry_planner::temporal::world::World;
 
@@ -33,7 +33,7 @@ fn what_drains_by_an_answer_helps_no_lower_bound() {
         let (task, grounded) = small::read(&domain(effect), problem);
         let calls = Calls::bind(&task, &grounded, &attachments).expect("it has an answer");
         let world = World::new(&task, &grounded, calls);
-        let outcomes: Vec<&Outcome> =
+        let outcomes: Vec<&GroundOutcome> =
             world.acts[0].end_effects.iter().map(|effect| &effect.outcome).collect();
         assert_eq!(may_help(&world, &outcomes, 0), helps, "{effect}");
     }

@@ -3,7 +3,7 @@
 use super::small;
 use descry_planner::attachment::Attachments;
 use descry_planner::calls::Calls;
-use descry_planner::temporal::advance::Step;
+use descry_planner::temporal::advance::TemporalStep;
 use descry_planner::temporal::envelope::envelopes;
 use descry_planner::temporal::joined::*;
 use descry_planner::temporal::space::Measure;
@@ -35,9 +35,9 @@ fn check(roads: &[(&str, f64)], goal: &str, plan: &[&str], expected: &[&str]) {
     let called = |act: &Act| small::called(&task, act.origin);
     let step = |call: &&str| {
         let act = world.acts.iter().position(|act| called(act) == *call).expect("an action") as u32;
-        Step::whole(act)
+        TemporalStep::whole(act)
     };
-    let mut steps: Vec<Step> = plan.iter().map(step).collect();
+    let mut steps: Vec<TemporalStep> = plan.iter().map(step).collect();
     let (measured, base) = space.replay_to_goal(&mut steps, &|| false).expect("no call").expect("a plan");
     let (_, shorter, _) = shortened(&space, (measured, steps, base), &|| false).expect("no call");
     let left: Vec<String> = shorter.iter().map(|step| called(&world.acts[step.act as usize])).collect();

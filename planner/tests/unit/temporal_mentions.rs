@@ -3,7 +3,7 @@
 use super::small;
 use descry_planner::attachment::Attachments;
 use descry_planner::calls::Calls;
-use descry_planner::temporal::advance::Step;
+use descry_planner::temporal::advance::TemporalStep;
 use descry_planner::temporal::envelope::all_apart;
 use descry_planner::temporal::mentions::*;
 use descry_planner::temporal::space::Measure;
@@ -21,7 +21,7 @@ fn of_a_long_plan_less_is_done_once_asked_to_stop() {
     let world = World::new(&task, &grounded, calls);
     let space = Space::new(&world, all_apart(&world), Measure::Makespan);
     for (count, stopped) in [(1, false), (100, false), (2_000, true)] {
-        let mut steps = vec![Step::whole(0); count];
+        let mut steps = vec![TemporalStep::whole(0); count];
         let replayed = space.replay_to_goal(&mut steps, &|| true).expect("no call");
         assert_eq!(replayed.is_none(), stopped, "{count}");
         let mut track = space.track(&steps).expect("it fits");

@@ -2,7 +2,7 @@
 
 use descry_planner::plan::EPSILON_S;
 use descry_planner::temporal::order::*;
-use descry_planner::temporal::world::Span;
+use descry_planner::temporal::world::DurationRange;
 
 fn access(reads: &[u32], writes: &[u32]) -> Access {
     Access { reads: reads.to_vec(), writes: writes.to_vec(), ..Access::default() }
@@ -12,8 +12,8 @@ fn holding(holds: &[u32]) -> Access {
     Access { holds: holds.to_vec(), ..Access::default() }
 }
 
-fn exactly(seconds: f64) -> Span {
-    Span { least_s: seconds, most_s: seconds }
+fn exactly(seconds: f64) -> DurationRange {
+    DurationRange { least_s: seconds, most_s: seconds }
 }
 
 #[test]

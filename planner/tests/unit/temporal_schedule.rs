@@ -3,7 +3,7 @@
 use descry_planner::temporal::order::Access;
 use descry_planner::temporal::order::Order;
 use descry_planner::temporal::schedule::*;
-use descry_planner::temporal::world::Span;
+use descry_planner::temporal::world::DurationRange;
 
 #[test]
 fn the_longest_path_leads_from_the_end_to_the_beginning() {
@@ -16,7 +16,7 @@ fn the_longest_path_leads_from_the_end_to_the_beginning() {
     let mut order = Order::new(3);
     for (reads, writes, seconds) in [(0, 0, 3.0), (1, 1, 5.0), (0, 2, 4.0)] {
         let start = order.push(&access(&[reads], &[]));
-        let span = Span { least_s: seconds, most_s: seconds };
+        let span = DurationRange { least_s: seconds, most_s: seconds };
         order.push_end(start, &access(&[], &[writes]), span).expect("fits");
     }
     assert_eq!(longest_path(&order), [5, 4, 1, 0]);

@@ -3,7 +3,7 @@
 use super::small;
 use descry_planner::attachment::Attachments;
 use descry_planner::calls::Calls;
-use descry_planner::temporal::advance::Step;
+use descry_planner::temporal::advance::TemporalStep;
 use descry_planner::temporal::envelope::envelopes;
 use descry_planner::temporal::space::Measure;
 use descry_planner::temporal::space::Space;
@@ -38,9 +38,9 @@ fn check(sees: &[&str], goal: &[&str], plan: &str, expected: &str) {
     let space = Space::new(&world, envelopes(&world), Measure::Makespan);
     let called = |act: &Act| small::called(&task, act.origin);
     let step = |call: &str| {
-        Step::whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
+        TemporalStep::whole(world.acts.iter().position(|act| called(act) == call).expect("an action") as u32)
     };
-    let mut steps: Vec<Step> = plan.split(", ").map(step).collect();
+    let mut steps: Vec<TemporalStep> = plan.split(", ").map(step).collect();
     let (measured, base) = space.replay_to_goal(&mut steps, &|| false).expect("no call").expect("a plan");
     let tours = Tours::new(&world).expect("they are few");
     let better = tours.rearranged(&space, (measured, steps, base), &|| false);

@@ -4,8 +4,8 @@ use rustc_hash::FxHashSet;
 
 use crate::diagnostic::Span;
 use crate::task::{
-    Atom, Call, Condition, Expression, Fact, Fluent, GroundChange, ObjectId, PredicateId, Quantified, Slot,
-    Task, Term,
+    Atom, CallTerm, Condition, Expression, Fact, Fluent, GroundChange, ObjectId, PredicateId, Quantified,
+    Slot, Task, Term,
 };
 
 /// Conjunction, with constants folded.
@@ -194,8 +194,8 @@ fn fluent(own: &Fluent, binding: &[Option<ObjectId>]) -> Fluent {
     Fluent { arguments: terms(&own.arguments, binding), ..*own }
 }
 
-fn call(own: &Call, binding: &[Option<ObjectId>]) -> Call {
-    Call { arguments: terms(&own.arguments, binding), ..*own }
+fn call(own: &CallTerm, binding: &[Option<ObjectId>]) -> CallTerm {
+    CallTerm { arguments: terms(&own.arguments, binding), ..*own }
 }
 
 fn expression(own: &Expression, binding: &[Option<ObjectId>]) -> Expression {

@@ -27,7 +27,7 @@ struct Found {
 }
 
 impl Checker<'_> {
-    pub(super) fn action(&mut self, action: &ast::Action) {
+    pub(super) fn action(&mut self, action: &ast::ActionAst) {
         let name = self.name(action.name.symbol).to_string();
         if let Some(first) = self.actions.insert(action.name.symbol, action.name.span) {
             let message = format!("action `{name}` is declared twice");
@@ -89,7 +89,7 @@ impl Checker<'_> {
         }
     }
 
-    fn duration(&mut self, action: &ast::Action, scope: &Scope) -> Vec<DurationBound> {
+    fn duration(&mut self, action: &ast::ActionAst, scope: &Scope) -> Vec<DurationBound> {
         let mut bounds = Vec::new();
         for bound in &action.duration {
             let Some(value) = self.expression(&bound.value, Place::Bound, scope) else { continue };
@@ -227,7 +227,7 @@ impl Checker<'_> {
 
     fn effect(
         &mut self,
-        effect: &ast::Effect,
+        effect: &ast::EffectAst,
         around: &Around,
         when: Option<When>,
         durative: bool,
@@ -235,36 +235,36 @@ impl Checker<'_> {
         found: &mut Found,
     ) {
         match effect {
-            ast::Effect::And(parts) => {
+            ast::EffectAst::And(parts) => {
                 for part in parts {
                     self.effect(part, around, when, durative, scope, found);
                 }
             }
-            ast::Effect::Forall(variables, inner) => {
+            ast::EffectAst::Forall(variables, inner) => {
                 let (before, quantified) = self.quantify(variables, scope);
                 let mut around = around.clone();
                 around.forall.extend(quantified);
                 self.effect(inner, &around, when, durative, scope, found);
                 scope.variables.truncate(before);
             }
-            ast::Effect::When(condition, inner) => {
+            ast::EffectAst::When(condition, inner) => {
                 self.conditional(condition, inner, around, when, durative, scope, found);
             }
-            ast::Effect::Timed(when, inner, _) => {
+            ast::EffectAst::Timed(when, inner, _) => {
                 self.effect(inner, around, Some(*when), durative, scope, found)
             }
-            ast::Effect::Literal { negated, name, arguments, span } => {
+            ast::EffectAst::Literal { negated, name, arguments, span } => {
                 let Some(atom) = self.atom(*name, arguments, *span, scope) else { return };
                 self.changeable(&atom, *name);
                 let change = if *negated { Change::Delete(atom) } else { Change::Add(atom) };
                 self.add_effect(change, around, when, *span, found);
             }
-            ast::Effect::Call(call) => {
+            ast::EffectAst::Call(call) => {
                 let span = call.span;
                 let Some(call) = self.call(call, CallKind::Effect, scope) else { return };
                 self.add_effect(Change::Call(call), around, when, span, found);
             }
-            ast::Effect::Assign { assignment, fluent, value, span } => {
+            ast::EffectAst::Assign { assignment, fluent, value, span } => {
                 let place = if durative { Place::Durative } else { Place::Effect };
                 if durative && when.is_none() && mentions_time(value) {
                     self.rate(*assignment, fluent, value, *span, around, scope, found);
@@ -280,7 +280,7 @@ impl Checker<'_> {
     fn conditional(
         &mut self,
         condition: &Formula,
-        inner: &ast::Effect,
+        inner: &ast::EffectAst,
         around: &Around,
         when: Option<When>,
         durative: bool,
@@ -363,8 +363,8 @@ impl Checker<'_> {
     fn assignment(
         &mut self,
         assignment: Assignment,
-        fluent: &ast::Term,
-        value: &ast::Term,
+        fluent: &ast::TermAst,
+        value: &ast::TermAst,
         span: Span,
         place: Place,
         scope: &Scope,
@@ -395,7 +395,7 @@ impl Checker<'_> {
         }
         let value = match value {
             // An object may be called 5.
-            ast::Term::Number(..) => {
+            ast::TermAst::Number(..) => {
                 let (term, types) = self.object_term(value, scope)?;
                 Value::Object(term, types)
             }
@@ -427,12 +427,12 @@ impl Checker<'_> {
     /// Fluent changed by an assignment, with the types of its values (`None` for a number).
     fn changed_fluent(
         &mut self,
-        fluent: &ast::Term,
+        fluent: &ast::TermAst,
         scope: &Scope,
     ) -> Option<(Fluent, Option<Vec<crate::task::TypeId>>)> {
-        let (name, arguments, span): (Name, &[ast::Term], Span) = match fluent {
-            ast::Term::Name(name) => (*name, &[], name.span),
-            ast::Term::Apply { name, arguments, span } => (*name, arguments, *span),
+        let (name, arguments, span): (Name, &[ast::TermAst], Span) = match fluent {
+            ast::TermAst::Name(name) => (*name, &[], name.span),
+            ast::TermAst::Apply { name, arguments, span } => (*name, arguments, *span),
             other => {
                 let span = span_of(other);
                 self.push(Diagnostic::error(
@@ -454,8 +454,8 @@ impl Checker<'_> {
     fn rate(
         &mut self,
         assignment: Assignment,
-        fluent: &ast::Term,
-        value: &ast::Term,
+        fluent: &ast::TermAst,
+        value: &ast::TermAst,
         span: Span,
         around: &Around,
         scope: &Scope,
@@ -465,13 +465,15 @@ impl Checker<'_> {
         let unconditional = around.forall.is_empty() && around.when == Timed::default();
         let direct = matches!(assignment, Assignment::Increase | Assignment::Decrease);
         let factor = match value {
-            ast::Term::ContinuousTime(_) => Some(Expression::Number(1.0)),
-            ast::Term::Arithmetic { operator: Arithmetic::Multiply, operands, .. } => {
-                let times =
-                    operands.iter().filter(|operand| matches!(operand, ast::Term::ContinuousTime(_))).count();
-                let others: Vec<&ast::Term> = operands
+            ast::TermAst::ContinuousTime(_) => Some(Expression::Number(1.0)),
+            ast::TermAst::Arithmetic { operator: Arithmetic::Multiply, operands, .. } => {
+                let times = operands
                     .iter()
-                    .filter(|operand| !matches!(operand, ast::Term::ContinuousTime(_)))
+                    .filter(|operand| matches!(operand, ast::TermAst::ContinuousTime(_)))
+                    .count();
+                let others: Vec<&ast::TermAst> = operands
+                    .iter()
+                    .filter(|operand| !matches!(operand, ast::TermAst::ContinuousTime(_)))
                     .collect();
                 let factors: Option<Vec<Expression>> = (times == 1
                     && others.iter().all(|other| !mentions_time(other)))
@@ -524,10 +526,10 @@ fn has_preference(formula: &Formula) -> bool {
     }
 }
 
-fn mentions_time(term: &ast::Term) -> bool {
+fn mentions_time(term: &ast::TermAst) -> bool {
     match term {
-        ast::Term::ContinuousTime(_) => true,
-        ast::Term::Arithmetic { operands, .. } => operands.iter().any(mentions_time),
+        ast::TermAst::ContinuousTime(_) => true,
+        ast::TermAst::Arithmetic { operands, .. } => operands.iter().any(mentions_time),
         _ => false,
     }
 }

@@ -83,7 +83,7 @@ impl Checker<'_> {
     pub(super) fn atom(
         &mut self,
         name: Name,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<Atom> {
@@ -95,7 +95,7 @@ impl Checker<'_> {
     fn comparison(
         &mut self,
         comparison: Comparison,
-        sides: &[ast::Term; 2],
+        sides: &[ast::TermAst; 2],
         span: Span,
         negated: bool,
         place: Place,
@@ -112,7 +112,7 @@ impl Checker<'_> {
     /// `=` compares objects or numbers.
     fn equality(
         &mut self,
-        sides: &[ast::Term; 2],
+        sides: &[ast::TermAst; 2],
         span: Span,
         negated: bool,
         place: Place,
@@ -121,10 +121,14 @@ impl Checker<'_> {
         let [left, right] = sides.each_ref().map(|side| self.value(side, place, scope));
         let (left, right) = match (left?, right?) {
             // An object may be called 5.
-            (Value::Object(left, types), Value::Number(_)) if matches!(sides[1], ast::Term::Number(..)) => {
+            (Value::Object(left, types), Value::Number(_))
+                if matches!(sides[1], ast::TermAst::Number(..)) =>
+            {
                 (Value::Object(left, types), self.named_like_number(&sides[1], scope)?)
             }
-            (Value::Number(_), Value::Object(right, types)) if matches!(sides[0], ast::Term::Number(..)) => {
+            (Value::Number(_), Value::Object(right, types))
+                if matches!(sides[0], ast::TermAst::Number(..)) =>
+            {
                 (self.named_like_number(&sides[0], scope)?, Value::Object(right, types))
             }
             both => both,
@@ -151,7 +155,7 @@ impl Checker<'_> {
         }
     }
 
-    fn named_like_number(&mut self, term: &ast::Term, scope: &Scope) -> Option<Value> {
+    fn named_like_number(&mut self, term: &ast::TermAst, scope: &Scope) -> Option<Value> {
         self.object_term(term, scope).map(|(term, types)| Value::Object(term, types))
     }
 

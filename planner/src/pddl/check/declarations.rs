@@ -386,8 +386,8 @@ impl Checker<'_> {
     }
 
     /// Target of an effect module: a number, an object function or the truth of an atom.
-    fn written_place(&mut self, term: &ast::Term, scope: &Scope) -> Option<Written> {
-        let ast::Term::Apply { name, arguments, span } = term else { return None };
+    fn written_place(&mut self, term: &ast::TermAst, scope: &Scope) -> Option<Written> {
+        let ast::TermAst::Apply { name, arguments, span } = term else { return None };
         if !self.functions.contains_key(&name.symbol)
             && let Some(&predicate) = self.predicates.get(&name.symbol)
         {
@@ -403,8 +403,8 @@ impl Checker<'_> {
         })
     }
 
-    pub(super) fn options(&self, options: &[ast::ModuleOption]) -> Vec<ModuleOption> {
-        let option = |option: &ast::ModuleOption| ModuleOption {
+    pub(super) fn options(&self, options: &[ast::ModuleOptionAst]) -> Vec<ModuleOption> {
+        let option = |option: &ast::ModuleOptionAst| ModuleOption {
             function: self.written(option.function.span).to_string(),
             arguments: option.arguments.iter().map(|name| self.written(name.span).to_string()).collect(),
             span: option.function.span,

@@ -6,7 +6,9 @@ use super::{Checker, Scope};
 use crate::attachment::CallKind;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{self, Arithmetic, Name};
-use crate::task::{Call, Expression, Fluent, FunctionId, Parameter, PredicateId, PreferenceId, Term, TypeId};
+use crate::task::{
+    CallTerm, Expression, Fluent, FunctionId, Parameter, PredicateId, PreferenceId, Term, TypeId,
+};
 
 /// Checked term: object or number.
 pub(super) enum Value {
@@ -33,30 +35,32 @@ pub(super) enum Place {
     Metric,
 }
 
-pub(super) fn span_of(term: &ast::Term) -> Span {
+pub(super) fn span_of(term: &ast::TermAst) -> Span {
     match term {
-        ast::Term::Name(name)
-        | ast::Term::Variable(name)
-        | ast::Term::Number(_, name)
-        | ast::Term::Violated(name) => name.span,
-        ast::Term::Apply { span, .. } | ast::Term::Arithmetic { span, .. } => *span,
-        ast::Term::Call(call) => call.span,
-        ast::Term::Duration(span) | ast::Term::ContinuousTime(span) | ast::Term::TotalTime(span) => *span,
+        ast::TermAst::Name(name)
+        | ast::TermAst::Variable(name)
+        | ast::TermAst::Number(_, name)
+        | ast::TermAst::Violated(name) => name.span,
+        ast::TermAst::Apply { span, .. } | ast::TermAst::Arithmetic { span, .. } => *span,
+        ast::TermAst::Call(call) => call.span,
+        ast::TermAst::Duration(span) | ast::TermAst::ContinuousTime(span) | ast::TermAst::TotalTime(span) => {
+            *span
+        }
     }
 }
 
 impl Checker<'_> {
     /// Object term with its possible types.
-    pub(super) fn object_term(&mut self, term: &ast::Term, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
+    pub(super) fn object_term(&mut self, term: &ast::TermAst, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
         match term {
-            ast::Term::Variable(name) => match scope.find(name.symbol) {
+            ast::TermAst::Variable(name) => match scope.find(name.symbol) {
                 Some(variable) => Some((Term::Variable(variable.slot), variable.types.clone())),
                 None => {
                     self.unknown_variable(*name, scope);
                     None
                 }
             },
-            ast::Term::Name(name) | ast::Term::Number(_, name) => {
+            ast::TermAst::Name(name) | ast::TermAst::Number(_, name) => {
                 if self.objects[name.symbol.0 as usize].is_none() && self.functions.contains_key(&name.symbol)
                 {
                     return self.object_function(*name, &[], name.span, scope);
@@ -67,7 +71,7 @@ impl Checker<'_> {
                 let id = self.find_object(*name)?;
                 Some((Term::Object(id), self.task.object(id).types.clone()))
             }
-            ast::Term::Apply { name, arguments, span } => {
+            ast::TermAst::Apply { name, arguments, span } => {
                 self.object_function(*name, arguments, *span, scope)
             }
             other => {
@@ -86,7 +90,7 @@ impl Checker<'_> {
     fn object_function(
         &mut self,
         name: Name,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<(Term, Vec<TypeId>)> {
@@ -110,7 +114,7 @@ impl Checker<'_> {
     pub(super) fn fluent(
         &mut self,
         name: Name,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<Fluent> {
@@ -126,7 +130,7 @@ impl Checker<'_> {
         &mut self,
         predicate: PredicateId,
         name: Name,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<Vec<Term>> {
@@ -136,7 +140,7 @@ impl Checker<'_> {
     }
 
     /// Call of a module of the wanted kind.
-    pub(super) fn call(&mut self, call: &ast::Call, kind: CallKind, scope: &Scope) -> Option<Call> {
+    pub(super) fn call(&mut self, call: &ast::CallAst, kind: CallKind, scope: &Scope) -> Option<CallTerm> {
         let module = self.find_module(call.name)?;
         let known = self.task.module(module);
         let (declared, parameters, is) = (known.span, known.parameters.clone(), known.kind);
@@ -163,7 +167,7 @@ impl Checker<'_> {
         }
         let arguments =
             self.arguments("module", call.name, &parameters, declared, &call.arguments, call.span, scope)?;
-        Some(Call { module, arguments, span: call.span })
+        Some(CallTerm { module, arguments, span: call.span })
     }
 
     #[expect(
@@ -176,7 +180,7 @@ impl Checker<'_> {
         name: Name,
         parameters: &[Parameter],
         declared: Span,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<Vec<Term>> {
@@ -254,19 +258,21 @@ impl Checker<'_> {
     }
 
     /// Term as an object or a number.
-    pub(super) fn value(&mut self, term: &ast::Term, place: Place, scope: &Scope) -> Option<Value> {
+    pub(super) fn value(&mut self, term: &ast::TermAst, place: Place, scope: &Scope) -> Option<Value> {
         let object = |(term, types)| Value::Object(term, types);
         match term {
-            ast::Term::Variable(_) => self.object_term(term, scope).map(object),
-            ast::Term::Name(name) if self.objects[name.symbol.0 as usize].is_some() => {
+            ast::TermAst::Variable(_) => self.object_term(term, scope).map(object),
+            ast::TermAst::Name(name) if self.objects[name.symbol.0 as usize].is_some() => {
                 self.object_term(term, scope).map(object)
             }
-            ast::Term::Name(name) if self.name(name.symbol) == "undefined" => Some(Value::Undefined),
-            ast::Term::Name(name) if !self.functions.contains_key(&name.symbol) => {
+            ast::TermAst::Name(name) if self.name(name.symbol) == "undefined" => Some(Value::Undefined),
+            ast::TermAst::Name(name) if !self.functions.contains_key(&name.symbol) => {
                 self.object_term(term, scope).map(object)
             }
-            ast::Term::Name(name) => self.function_value(*name, &[], name.span, scope),
-            ast::Term::Apply { name, arguments, span } => self.function_value(*name, arguments, *span, scope),
+            ast::TermAst::Name(name) => self.function_value(*name, &[], name.span, scope),
+            ast::TermAst::Apply { name, arguments, span } => {
+                self.function_value(*name, arguments, *span, scope)
+            }
             _ => self.expression(term, place, scope).map(Value::Number),
         }
     }
@@ -274,7 +280,7 @@ impl Checker<'_> {
     fn function_value(
         &mut self,
         name: Name,
-        arguments: &[ast::Term],
+        arguments: &[ast::TermAst],
         span: Span,
         scope: &Scope,
     ) -> Option<Value> {
@@ -286,14 +292,19 @@ impl Checker<'_> {
     }
 
     /// A numeric expression.
-    pub(super) fn expression(&mut self, term: &ast::Term, place: Place, scope: &Scope) -> Option<Expression> {
+    pub(super) fn expression(
+        &mut self,
+        term: &ast::TermAst,
+        place: Place,
+        scope: &Scope,
+    ) -> Option<Expression> {
         match term {
-            ast::Term::Number(number, _) => Some(Expression::Number(*number)),
-            ast::Term::Arithmetic { operator, operands, .. } => {
+            ast::TermAst::Number(number, _) => Some(Expression::Number(*number)),
+            ast::TermAst::Arithmetic { operator, operands, .. } => {
                 self.arithmetic(*operator, operands, place, scope)
             }
-            ast::Term::Call(call) => self.call(call, CallKind::Cost, scope).map(Expression::Call),
-            ast::Term::Duration(span) => {
+            ast::TermAst::Call(call) => self.call(call, CallKind::Cost, scope).map(Expression::Call),
+            ast::TermAst::Duration(span) => {
                 if place == Place::Durative {
                     return Some(Expression::Duration);
                 }
@@ -312,15 +323,15 @@ impl Checker<'_> {
                 self.push(finding);
                 None
             }
-            ast::Term::ContinuousTime(span) => {
+            ast::TermAst::ContinuousTime(span) => {
                 let message = "`#t` stands only in a change at a rate";
                 let help =
                     "as in `(increase (fuel ?r) (* #t 2))`, an effect of a durative action without a time";
                 self.push(Diagnostic::error("continuous", message, *span, "not here").with_help(help));
                 None
             }
-            ast::Term::TotalTime(span) => self.total_time(*span, place),
-            ast::Term::Violated(name) => self.violated(*name, place),
+            ast::TermAst::TotalTime(span) => self.total_time(*span, place),
+            ast::TermAst::Violated(name) => self.violated(*name, place),
             _ => match self.value(term, place, scope)? {
                 Value::Number(expression) => Some(expression),
                 Value::Object(_, types) => {
@@ -345,7 +356,7 @@ impl Checker<'_> {
     fn arithmetic(
         &mut self,
         operator: Arithmetic,
-        operands: &[ast::Term],
+        operands: &[ast::TermAst],
         place: Place,
         scope: &Scope,
     ) -> Option<Expression> {

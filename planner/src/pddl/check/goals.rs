@@ -130,7 +130,7 @@ impl Checker<'_> {
         });
     }
 
-    pub(super) fn metric(&mut self, metric: &ast::Metric) {
+    pub(super) fn metric(&mut self, metric: &ast::MetricAst) {
         let scope = Scope::default();
         if let Some(value) = self.expression(&metric.value, Place::Metric, &scope) {
             self.task.metric = Some(Metric { minimise: metric.minimise, value, span: metric.span });

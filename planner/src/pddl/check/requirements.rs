@@ -3,7 +3,7 @@
 use super::Checker;
 use super::conditions::span_of_formula;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::pddl::ast::{Action, Domain, Effect, Formula, Problem};
+use crate::pddl::ast::{ActionAst, Domain, EffectAst, Formula, Problem};
 
 /// Language feature, with all requirements that allow it, narrowest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -81,21 +81,21 @@ impl Checker<'_> {
     }
 }
 
-fn in_action(action: &Action, uses: &mut Uses) {
+fn in_action(action: &ActionAst, uses: &mut Uses) {
     action.condition.iter().for_each(|condition| in_formula(condition, uses));
     action.effect.iter().for_each(|effect| in_effect(effect, uses));
 }
 
-fn in_effect(effect: &Effect, uses: &mut Uses) {
+fn in_effect(effect: &EffectAst, uses: &mut Uses) {
     match effect {
-        Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, uses)),
-        Effect::Forall(_, inner) | Effect::Timed(_, inner, _) => in_effect(inner, uses),
-        Effect::When(condition, inner) => {
+        EffectAst::And(parts) => parts.iter().for_each(|part| in_effect(part, uses)),
+        EffectAst::Forall(_, inner) | EffectAst::Timed(_, inner, _) => in_effect(inner, uses),
+        EffectAst::When(condition, inner) => {
             uses.push((Feature::When, span_of_formula(condition)));
             in_formula(condition, uses);
             in_effect(inner, uses);
         }
-        Effect::Literal { .. } | Effect::Assign { .. } | Effect::Call(_) => {}
+        EffectAst::Literal { .. } | EffectAst::Assign { .. } | EffectAst::Call(_) => {}
     }
 }
 

@@ -1,6 +1,6 @@
 //! Lines from lists, words and comments.
 
-use super::tree::{Node, What};
+use super::tree::{LayoutNode, What};
 use crate::pddl::parse::ACTION_PARTS;
 
 /// Preferred maximum line width, characters.
@@ -21,7 +21,7 @@ const TABLES: [&str; 7] =
     [":modules", ":types", ":objects", ":constants", ":predicates", ":functions", ":init"];
 
 /// Prints a text.
-pub fn print(roots: &[Node<'_>]) -> String {
+pub fn print(roots: &[LayoutNode<'_>]) -> String {
     let mut page = Page::default();
     for (n, node) in roots.iter().enumerate() {
         if n > 0 && (node.breaks > 0 || !node.is_comment()) {
@@ -62,7 +62,7 @@ impl Page {
     }
 
     /// Lays out a node at the end of a line with room for `closing` parentheses.
-    fn node(&mut self, node: &Node<'_>, closing: usize) {
+    fn node(&mut self, node: &LayoutNode<'_>, closing: usize) {
         match &node.what {
             What::Word(word) => self.line.text.push_str(word),
             What::Comment(text, _) if self.line.text.is_empty() => self.line.text.push_str(text),
@@ -76,7 +76,7 @@ impl Page {
         }
     }
 
-    fn list(&mut self, open: char, children: &[Node<'_>], close: char, closing: usize) {
+    fn list(&mut self, open: char, children: &[LayoutNode<'_>], close: char, closing: usize) {
         if let Some(flat) = flat(open, children, close, self.in_table)
             && (self.column() + flat.chars().count() + closing <= WIDTH || children.len() < 2)
             && !is_always_broken(children)
@@ -108,7 +108,7 @@ impl Page {
             self.node(child, behind);
         }
         // Nothing but a line break ends a comment.
-        if children.last().is_some_and(Node::is_comment) {
+        if children.last().is_some_and(LayoutNode::is_comment) {
             self.new_line(indent, false);
         }
         self.line.text.push(close);
@@ -145,8 +145,8 @@ enum Indent {
     Aligned(usize),
 }
 
-fn indent_of(children: &[Node<'_>]) -> Indent {
-    let Some(head) = children.first().and_then(Node::word) else { return Indent::Aligned(0) };
+fn indent_of(children: &[LayoutNode<'_>]) -> Indent {
+    let Some(head) = children.first().and_then(LayoutNode::word) else { return Indent::Aligned(0) };
     if head.starts_with(['?', '-']) {
         return Indent::Aligned(0);
     }
@@ -158,17 +158,17 @@ fn indent_of(children: &[Node<'_>]) -> Indent {
     if joins && is_beside { Indent::Aligned(head.chars().count() + 1) } else { Indent::Body }
 }
 
-fn is_head(children: &[Node<'_>], words: &[&str]) -> bool {
-    let head = children.first().and_then(Node::word);
+fn is_head(children: &[LayoutNode<'_>], words: &[&str]) -> bool {
+    let head = children.first().and_then(LayoutNode::word);
     head.is_some_and(|head| words.iter().any(|word| word.eq_ignore_ascii_case(head)))
 }
 
-fn is_always_broken(children: &[Node<'_>]) -> bool {
+fn is_always_broken(children: &[LayoutNode<'_>]) -> bool {
     is_head(children, &["define"]) || is_head(children, &ACTIONS)
 }
 
 /// List on one line; `None` if the author wrote it over several lines, or a comment is inside.
-fn flat(open: char, children: &[Node<'_>], close: char, in_table: bool) -> Option<String> {
+fn flat(open: char, children: &[LayoutNode<'_>], close: char, in_table: bool) -> Option<String> {
     let mut text = String::from(open);
     for (n, child) in children.iter().enumerate() {
         if child.breaks > 0 && n > 0 {
@@ -188,11 +188,11 @@ fn flat(open: char, children: &[Node<'_>], close: char, in_table: bool) -> Optio
 }
 
 /// Number of blanks before a node within a line.
-fn blanks(node: &Node<'_>, in_table: bool) -> String {
+fn blanks(node: &LayoutNode<'_>, in_table: bool) -> String {
     " ".repeat(if in_table { node.blanks.max(1) } else { 1 })
 }
 
-fn flat_width(node: &Node<'_>, in_table: bool) -> Option<usize> {
+fn flat_width(node: &LayoutNode<'_>, in_table: bool) -> Option<usize> {
     match &node.what {
         What::Word(word) => Some(word.chars().count()),
         What::Comment(..) => None,
@@ -203,7 +203,7 @@ fn flat_width(node: &Node<'_>, in_table: bool) -> Option<usize> {
 }
 
 /// Children of a list that takes several lines, with the required line breaks.
-fn broken<'a>(children: &[Node<'a>]) -> Vec<Node<'a>> {
+fn broken<'a>(children: &[LayoutNode<'a>]) -> Vec<LayoutNode<'a>> {
     let mut children = children.to_vec();
     if let Some(first) = children.first_mut() {
         first.breaks = 0;
@@ -220,15 +220,15 @@ fn broken<'a>(children: &[Node<'a>]) -> Vec<Node<'a>> {
 }
 
 /// Sets at least one line break before each child from index `from` on, except trailing comments.
-fn set_breaks(children: &mut [Node<'_>], from: usize) {
+fn set_breaks(children: &mut [LayoutNode<'_>], from: usize) {
     for child in children.iter_mut().skip(from).filter(|child| !child.is_comment()) {
         child.breaks = child.breaks.max(1);
     }
 }
 
 /// Puts each part of an action on a new line, with its value after its keyword.
-fn parts_apart(children: &mut [Node<'_>]) {
-    let is_part = |node: &Node<'_>| {
+fn parts_apart(children: &mut [LayoutNode<'_>]) {
+    let is_part = |node: &LayoutNode<'_>| {
         node.word().is_some_and(|word| ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(word)))
     };
     for n in 1..children.len() {
@@ -244,8 +244,8 @@ fn parts_apart(children: &mut [Node<'_>]) {
 }
 
 /// Breaks a list that was written on one line and is too wide for one.
-fn explode(children: &mut [Node<'_>]) {
-    let Some(head) = children.first().and_then(Node::word).map(str::to_ascii_lowercase) else { return };
+fn explode(children: &mut [LayoutNode<'_>]) {
+    let Some(head) = children.first().and_then(LayoutNode::word).map(str::to_ascii_lowercase) else { return };
     let beside = match head.as_str() {
         staying if STAYING.contains(&staying) => return,
         "forall" | "exists" | "when" | "increase" | "decrease" | "assign" | ":derived" => 1,

@@ -2,7 +2,7 @@
 
 /// Node of a text: a word, a comment or a list.
 #[derive(Debug, Clone)]
-pub struct Node<'a> {
+pub struct LayoutNode<'a> {
     /// Number of line breaks before the node.
     pub breaks: usize,
     /// Number of blanks before the node, unless it begins a line.
@@ -19,10 +19,10 @@ pub enum What<'a> {
     /// Text from the semicolon to the end of the line, and its column.
     Comment(&'a str, usize),
     /// Opening sign, contents and closing sign.
-    List(char, Vec<Node<'a>>, char),
+    List(char, Vec<LayoutNode<'a>>, char),
 }
 
-impl<'a> Node<'a> {
+impl<'a> LayoutNode<'a> {
     /// Word of the node, if the node is one.
     pub fn word(&self) -> Option<&'a str> {
         match self.what {
@@ -43,9 +43,9 @@ impl<'a> Node<'a> {
 }
 
 /// Reads a text whose parentheses fit.
-pub fn read(text: &str) -> Vec<Node<'_>> {
+pub fn read(text: &str) -> Vec<LayoutNode<'_>> {
     // The outermost list is the text itself.
-    let mut open: Vec<(Gap, char, Vec<Node<'_>>)> = vec![(Gap::default(), '(', Vec::new())];
+    let mut open: Vec<(Gap, char, Vec<LayoutNode<'_>>)> = vec![(Gap::default(), '(', Vec::new())];
     let (mut at, mut gap, mut line_start) =
         (if text.starts_with('\u{feff}') { 3 } else { 0 }, Gap::default(), 0);
     let bytes = text.as_bytes();
@@ -92,9 +92,9 @@ pub fn read(text: &str) -> Vec<Node<'_>> {
     open.into_iter().next().map(|(_, _, children)| children).unwrap_or_default()
 }
 
-fn put<'a>(open: &mut [(Gap, char, Vec<Node<'a>>)], Gap { breaks, blanks }: Gap, what: What<'a>) {
+fn put<'a>(open: &mut [(Gap, char, Vec<LayoutNode<'a>>)], Gap { breaks, blanks }: Gap, what: What<'a>) {
     if let Some((_, _, children)) = open.last_mut() {
-        children.push(Node { breaks, blanks, what });
+        children.push(LayoutNode { breaks, blanks, what });
     }
 }
 

@@ -4,8 +4,8 @@ use super::{Parser, refused};
 use crate::attachment::CallKind;
 use crate::diagnostic::Diagnostic;
 use crate::pddl::ast::{
-    Derived, FunctionDeclaration, Initial, InitialValue, ModuleDeclaration, ModuleOption, Name, Signature,
-    Term, Typed,
+    Derived, FunctionDeclaration, Initial, InitialValue, ModuleDeclaration, ModuleOptionAst, Name, Signature,
+    TermAst, Typed,
 };
 use crate::pddl::lex::Kind;
 use crate::pddl::nearest;
@@ -252,7 +252,7 @@ impl Parser<'_> {
             children[..at].iter().position(|&node| self.is_list(node) && self.head(node) != Some("either"));
         let end = writes_at.unwrap_or(at);
         let parameters = self.typed_nodes(&children[1..end.max(1)]);
-        let writes: Vec<Term> =
+        let writes: Vec<TermAst> =
             children[end..at].iter().filter_map(|&node| self.written_term(node)).collect();
         Some(ModuleDeclaration { signature: Signature { name, parameters }, writes, kind, function })
     }
@@ -279,7 +279,7 @@ impl Parser<'_> {
     }
 
     /// A fluent or atom that an effect module writes.
-    fn written_term(&mut self, node: usize) -> Option<Term> {
+    fn written_term(&mut self, node: usize) -> Option<TermAst> {
         if !self.is_list(node) {
             self.expected("a fluent that the module writes", node, "for example `(x ?o)`");
             return None;
@@ -287,12 +287,12 @@ impl Parser<'_> {
         self.object_term(node)
     }
 
-    pub(super) fn module_options(&mut self, section: usize, into: &mut Vec<ModuleOption>) {
+    pub(super) fn module_options(&mut self, section: usize, into: &mut Vec<ModuleOptionAst>) {
         let nodes: Vec<usize> = self.children(section).skip(1).collect();
         self.options_of(&nodes, into);
     }
 
-    fn options_of(&mut self, nodes: &[usize], into: &mut Vec<ModuleOption>) {
+    fn options_of(&mut self, nodes: &[usize], into: &mut Vec<ModuleOptionAst>) {
         for &node in nodes {
             let words: Vec<usize> = self.children(node).collect();
             let Some((&first, rest)) = words.split_first().filter(|_| self.is_list(node)) else {
@@ -308,17 +308,17 @@ impl Parser<'_> {
             if let Some(&list) = rest.iter().find(|&&node| self.word(node).is_none()) {
                 self.expected("a word", list, "arguments of options are words");
             }
-            into.push(ModuleOption { function, arguments });
+            into.push(ModuleOptionAst { function, arguments });
         }
     }
 
     /// `(:oplinit init@lib.so)`: words by themselves, or options.
-    pub(super) fn module_setup(&mut self, section: usize, into: &mut Vec<ModuleOption>) {
+    pub(super) fn module_setup(&mut self, section: usize, into: &mut Vec<ModuleOptionAst>) {
         let (lists, words): (Vec<usize>, Vec<usize>) =
             self.children(section).skip(1).partition(|&node| self.is_list(node));
         for node in words {
             let function = self.name(node, "the function that sets modules up");
-            into.extend(function.map(|function| ModuleOption { function, arguments: Vec::new() }));
+            into.extend(function.map(|function| ModuleOptionAst { function, arguments: Vec::new() }));
         }
         self.options_of(&lists, into);
     }
@@ -487,11 +487,11 @@ impl Parser<'_> {
 }
 
 /// Value of an expression without fluents.
-fn constant(term: &Term) -> Option<f64> {
+fn constant(term: &TermAst) -> Option<f64> {
     use crate::pddl::ast::Arithmetic;
     match term {
-        Term::Number(number, _) => Some(*number),
-        Term::Arithmetic { operator, operands, .. } => {
+        TermAst::Number(number, _) => Some(*number),
+        TermAst::Arithmetic { operator, operands, .. } => {
             let values: Vec<f64> = operands.iter().map(constant).collect::<Option<_>>()?;
             let (&first, rest) = values.split_first()?;
             let value = match operator {

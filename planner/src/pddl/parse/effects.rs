@@ -1,7 +1,7 @@
 //! Effects of actions.
 
 use super::{Parser, refused};
-use crate::pddl::ast::{Assignment, Effect, Term, When};
+use crate::pddl::ast::{Assignment, EffectAst, TermAst, When};
 use crate::pddl::lex::Kind;
 
 fn assignment(word: &str) -> Option<Assignment> {
@@ -17,9 +17,9 @@ fn assignment(word: &str) -> Option<Assignment> {
 
 impl Parser<'_> {
     /// Parses an effect; `timed`: its parts carry time specifiers.
-    pub(super) fn effect(&mut self, node: usize, timed: bool) -> Option<Effect> {
+    pub(super) fn effect(&mut self, node: usize, timed: bool) -> Option<EffectAst> {
         match self.tree.nodes[node].kind {
-            Kind::Bracket => return self.call(node).map(Effect::Call),
+            Kind::Bracket => return self.call(node).map(EffectAst::Call),
             Kind::Word(_) => {
                 let word = self.written(node);
                 self.expected("an effect", node, format!("did you mean `({word})`?"));
@@ -28,7 +28,7 @@ impl Parser<'_> {
             Kind::List => {}
         }
         let children: Vec<usize> = self.children(node).collect();
-        let Some((&first, rest)) = children.split_first() else { return Some(Effect::And(Vec::new())) };
+        let Some((&first, rest)) = children.split_first() else { return Some(EffectAst::And(Vec::new())) };
         let Some(head) = self.word(first) else {
             if let [only] = children.as_slice() {
                 return self.effect(*only, timed);
@@ -40,16 +40,16 @@ impl Parser<'_> {
             return self.timed_effect(node, when, body, &children);
         }
         match head {
-            "and" => Some(Effect::And(rest.iter().filter_map(|&part| self.effect(part, timed)).collect())),
+            "and" => Some(EffectAst::And(rest.iter().filter_map(|&part| self.effect(part, timed)).collect())),
             "forall" => {
                 let [variables, body] = self.exactly(node, rest, "(forall (?x - type) effect)")?;
                 let variables = self.quantified(variables)?;
-                Some(Effect::Forall(variables, Box::new(self.effect(body, timed)?)))
+                Some(EffectAst::Forall(variables, Box::new(self.effect(body, timed)?)))
             }
             "when" => {
                 let [condition, body] = self.exactly(node, rest, "(when condition effect)")?;
                 let (condition, body) = (self.formula(condition, timed), self.effect(body, timed));
-                Some(Effect::When(condition?, Box::new(body?)))
+                Some(EffectAst::When(condition?, Box::new(body?)))
             }
             "not" => {
                 let [atom] = self.exactly(node, rest, "(not (predicate arg))")?;
@@ -92,7 +92,7 @@ impl Parser<'_> {
         when: When,
         body: Option<usize>,
         children: &[usize],
-    ) -> Option<Effect> {
+    ) -> Option<EffectAst> {
         let Some(body) = body else {
             self.fault("syntax", "a time without an effect", node, "what happens then?");
             return None;
@@ -105,7 +105,7 @@ impl Parser<'_> {
             self.fault("duration", message, node, "effects happen `at start` or `at end`");
             return None;
         }
-        Some(Effect::Timed(when, Box::new(self.effect(body, false)?), self.span(node)))
+        Some(EffectAst::Timed(when, Box::new(self.effect(body, false)?), self.span(node)))
     }
 
     fn assignment(
@@ -114,10 +114,10 @@ impl Parser<'_> {
         assignment: Assignment,
         head: &str,
         rest: &[usize],
-    ) -> Option<Effect> {
+    ) -> Option<EffectAst> {
         let [fluent, value] = self.exactly(node, rest, &format!("({head} (f ?x) value)"))?;
         let fluent = match self.word(fluent) {
-            Some(word) if !word.starts_with('?') => Some(Term::Name(self.name(fluent, "a fluent")?)),
+            Some(word) if !word.starts_with('?') => Some(TermAst::Name(self.name(fluent, "a fluent")?)),
             Some(_) => {
                 self.expected(
                     "a fluent",
@@ -129,10 +129,10 @@ impl Parser<'_> {
             None => self.object_term(fluent),
         };
         let value = self.number(value);
-        Some(Effect::Assign { assignment, fluent: fluent?, value: value?, span: self.span(node) })
+        Some(EffectAst::Assign { assignment, fluent: fluent?, value: value?, span: self.span(node) })
     }
 
-    fn literal(&mut self, node: usize, negated: bool, whole: usize) -> Option<Effect> {
+    fn literal(&mut self, node: usize, negated: bool, whole: usize) -> Option<EffectAst> {
         if self.is_bracket(node) {
             self.expected("a fact", node, "what a module does cannot be negated");
             return None;
@@ -147,7 +147,7 @@ impl Parser<'_> {
             return None;
         }
         let name = self.name(first, "a predicate")?;
-        let arguments: Option<Vec<Term>> = rest.iter().map(|&part| self.object_term(part)).collect();
-        Some(Effect::Literal { negated, name, arguments: arguments?, span: self.span(whole) })
+        let arguments: Option<Vec<TermAst>> = rest.iter().map(|&part| self.object_term(part)).collect();
+        Some(EffectAst::Literal { negated, name, arguments: arguments?, span: self.span(whole) })
     }
 }

@@ -2,7 +2,9 @@
 
 use super::{Parser, refused};
 use crate::diagnostic::Diagnostic;
-use crate::pddl::ast::{Arithmetic, Call, Comparison, DurationBound, Formula, Modal, Name, Term, When};
+use crate::pddl::ast::{
+    Arithmetic, CallAst, Comparison, DurationBoundAst, Formula, Modal, Name, TermAst, When,
+};
 use crate::pddl::lex::Kind;
 use crate::pddl::nearest;
 
@@ -270,7 +272,7 @@ impl Parser<'_> {
             return None;
         }
         let name = self.name(first, "a predicate")?;
-        let arguments: Option<Vec<Term>> = rest.iter().map(|&part| self.object_term(part)).collect();
+        let arguments: Option<Vec<TermAst>> = rest.iter().map(|&part| self.object_term(part)).collect();
         Some(Formula::Atom { name, arguments: arguments?, span: self.span(node) })
     }
 
@@ -279,18 +281,18 @@ impl Parser<'_> {
     }
 
     /// A call of a module, `[name arg …]`.
-    pub(super) fn call(&mut self, node: usize) -> Option<Call> {
+    pub(super) fn call(&mut self, node: usize) -> Option<CallAst> {
         let children: Vec<usize> = self.children(node).collect();
         let Some((&first, rest)) = children.split_first() else {
             self.fault("syntax", "an empty call", node, "expected the name of a module");
             return None;
         };
         let name = self.name(first, "the name of a module")?;
-        let arguments: Option<Vec<Term>> = rest.iter().map(|&part| self.object_term(part)).collect();
-        Some(Call { name, arguments: arguments?, span: self.span(node) })
+        let arguments: Option<Vec<TermAst>> = rest.iter().map(|&part| self.object_term(part)).collect();
+        Some(CallAst { name, arguments: arguments?, span: self.span(node) })
     }
 
-    pub(super) fn grounding(&mut self, node: usize) -> Vec<Call> {
+    pub(super) fn grounding(&mut self, node: usize) -> Vec<CallAst> {
         if self.is_bracket(node) {
             return self.call(node).into_iter().collect();
         }
@@ -306,7 +308,7 @@ impl Parser<'_> {
     }
 
     /// An argument of a predicate, function or call.
-    pub(super) fn object_term(&mut self, node: usize) -> Option<Term> {
+    pub(super) fn object_term(&mut self, node: usize) -> Option<TermAst> {
         let span = self.span(node);
         match self.tree.nodes[node].kind {
             Kind::Word(symbol) => {
@@ -316,7 +318,7 @@ impl Parser<'_> {
                     self.expected("an object or variable", node, "is a parenthesis missing before this?");
                     return None;
                 }
-                Some(if word.starts_with('?') { Term::Variable(name) } else { Term::Name(name) })
+                Some(if word.starts_with('?') { TermAst::Variable(name) } else { TermAst::Name(name) })
             }
             Kind::List => self.apply(node),
             Kind::Bracket => {
@@ -326,29 +328,29 @@ impl Parser<'_> {
         }
     }
 
-    fn apply(&mut self, node: usize) -> Option<Term> {
+    fn apply(&mut self, node: usize) -> Option<TermAst> {
         let children: Vec<usize> = self.children(node).collect();
         let Some((&first, rest)) = children.split_first() else {
             self.expected("an object or number", node, "a function looks like `(fuel ?robot)`");
             return None;
         };
         let name = self.name(first, "a function")?;
-        let arguments: Option<Vec<Term>> = rest.iter().map(|&part| self.object_term(part)).collect();
-        Some(Term::Apply { name, arguments: arguments?, span: self.span(node) })
+        let arguments: Option<Vec<TermAst>> = rest.iter().map(|&part| self.object_term(part)).collect();
+        Some(TermAst::Apply { name, arguments: arguments?, span: self.span(node) })
     }
 
     /// Numeric expression, or an object where the other side is one: side of a comparison, assigned
     /// value, duration, metric.
-    pub(super) fn number(&mut self, node: usize) -> Option<Term> {
+    pub(super) fn number(&mut self, node: usize) -> Option<TermAst> {
         let span = self.span(node);
         match self.tree.nodes[node].kind {
-            Kind::Bracket => self.call(node).map(Term::Call),
+            Kind::Bracket => self.call(node).map(TermAst::Call),
             Kind::Word(symbol) => Some(match self.symbols.name(symbol) {
-                "?duration" => Term::Duration(span),
-                "#t" => Term::ContinuousTime(span),
-                "total-time" => Term::TotalTime(span),
+                "?duration" => TermAst::Duration(span),
+                "#t" => TermAst::ContinuousTime(span),
+                "total-time" => TermAst::TotalTime(span),
                 word => match number(word) {
-                    Some(number) => Term::Number(number, Name { symbol, span }),
+                    Some(number) => TermAst::Number(number, Name { symbol, span }),
                     None => return self.object_term(node),
                 },
             }),
@@ -356,7 +358,7 @@ impl Parser<'_> {
         }
     }
 
-    fn compound(&mut self, node: usize) -> Option<Term> {
+    fn compound(&mut self, node: usize) -> Option<TermAst> {
         let children: Vec<usize> = self.children(node).collect();
         let span = self.span(node);
         let Some((&first, rest)) = children.split_first() else { return self.apply(node) };
@@ -368,7 +370,7 @@ impl Parser<'_> {
             return self.apply(node);
         };
         if let Some(operator) = arithmetic(head) {
-            let operands: Option<Vec<Term>> = rest.iter().map(|&part| self.number(part)).collect();
+            let operands: Option<Vec<TermAst>> = rest.iter().map(|&part| self.number(part)).collect();
             let operands = operands?;
             let fits = match operator {
                 Arithmetic::Add | Arithmetic::Multiply => !operands.is_empty(),
@@ -380,11 +382,11 @@ impl Parser<'_> {
                 self.fault("syntax", format!("`{head}` with the wrong number of operands"), node, label);
                 return None;
             }
-            return Some(Term::Arithmetic { operator, operands, span });
+            return Some(TermAst::Arithmetic { operator, operands, span });
         }
         match (head, rest) {
-            ("total-time", []) => Some(Term::TotalTime(span)),
-            ("is-violated", [name]) => self.name(*name, "the name of a preference").map(Term::Violated),
+            ("total-time", []) => Some(TermAst::TotalTime(span)),
+            ("is-violated", [name]) => self.name(*name, "the name of a preference").map(TermAst::Violated),
             ("at", [time, inner])
                 if matches!(self.word(*time), Some("start" | "end")) && self.is_list(*inner) =>
             {
@@ -398,7 +400,12 @@ impl Parser<'_> {
     }
 
     /// `(= ?duration e)`, `(and (>= ?duration e) (<= ?duration f))`, `(at start (…))`, `()`.
-    pub(super) fn duration_bounds(&mut self, node: usize, when: Option<When>, into: &mut Vec<DurationBound>) {
+    pub(super) fn duration_bounds(
+        &mut self,
+        node: usize,
+        when: Option<When>,
+        into: &mut Vec<DurationBoundAst>,
+    ) {
         const SHAPE: &str = "a duration looks like `(= ?duration 5)`";
         let children: Vec<usize> = self.children(node).collect();
         let Some((&first, rest)) = children.split_first().filter(|_| self.is_list(node)) else {
@@ -427,7 +434,7 @@ impl Parser<'_> {
         word: &str,
         rest: &[usize],
         when: When,
-    ) -> Option<DurationBound> {
+    ) -> Option<DurationBoundAst> {
         let [left, right] = self.exactly(node, rest, "(= ?duration 5)")?;
         let span = self.span(node);
         let written = comparison(word)?;
@@ -441,7 +448,7 @@ impl Parser<'_> {
             }
         };
         let value = self.number(value)?;
-        Some(DurationBound { when, comparison, value, span })
+        Some(DurationBoundAst { when, comparison, value, span })
     }
 }
 

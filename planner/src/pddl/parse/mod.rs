@@ -6,7 +6,7 @@ mod declarations;
 mod effects;
 mod formulas;
 
-use super::ast::{Action, Domain, DurationBound, Formula, Metric, Name, Problem, Typed};
+use super::ast::{ActionAst, Domain, DurationBoundAst, Formula, MetricAst, Name, Problem, Typed};
 use super::lex::{self, Children, Kind, Symbols, Tree};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::nearest;
@@ -387,7 +387,7 @@ impl<'a> Parser<'a> {
         parts.into_iter().filter_map(|part| self.formula(part, false)).collect()
     }
 
-    fn metric(&mut self, section: usize) -> Option<Metric> {
+    fn metric(&mut self, section: usize) -> Option<MetricAst> {
         let parts: Vec<usize> = self.children(section).skip(1).collect();
         let span = self.span(section);
         let minimise = match parts.first().and_then(|&node| self.word(node)) {
@@ -411,17 +411,17 @@ impl<'a> Parser<'a> {
             self.expected("`)`", extra, "a metric has one expression; use `(+ a b)` for a sum");
         }
         let value = self.number(value)?;
-        Some(Metric { minimise, value, span })
+        Some(MetricAst { minimise, value, span })
     }
 
-    fn action(&mut self, section: usize, keyword: &str) -> Option<Action> {
+    fn action(&mut self, section: usize, keyword: &str) -> Option<ActionAst> {
         let mut nodes = self.children(section).skip(1).peekable();
         let Some(first) = nodes.next() else {
             self.fault("syntax", "an action without a name", section, "expected a name");
             return None;
         };
         let name = self.name(first, "the action's name")?;
-        let mut action = Action {
+        let mut action = ActionAst {
             name,
             durative: keyword == ":durative-action",
             parameters: Vec::new(),
@@ -471,7 +471,7 @@ impl<'a> Parser<'a> {
         keyword: usize,
         part: &str,
         value: Option<usize>,
-        action: &mut Action,
+        action: &mut ActionAst,
         variables: &mut Vec<Typed>,
     ) {
         let known = ACTION_PARTS.contains(&part).then_some(part);
@@ -511,7 +511,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Checks that a durative action has a duration and an instantaneous one has none.
-    fn duration_fits(&mut self, action: &Action, has_duration: bool) {
+    fn duration_fits(&mut self, action: &ActionAst, has_duration: bool) {
         let span = action.name.span;
         let name = self.symbols.name(action.name.symbol);
         if action.durative && !has_duration {
@@ -537,7 +537,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn duration(&mut self, node: usize) -> Vec<DurationBound> {
+    fn duration(&mut self, node: usize) -> Vec<DurationBoundAst> {
         let mut bounds = Vec::new();
         self.duration_bounds(node, None, &mut bounds);
         bounds

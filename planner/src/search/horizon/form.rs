@@ -4,7 +4,7 @@
 use crate::classical::compiled::{Compiled, Lists};
 use crate::clauses::Literal;
 use crate::clauses::solver::Solver;
-use crate::ground::Fact;
+use crate::ground::GroundFact;
 
 use super::goals::in_order;
 use super::order::{Use, order, uses};
@@ -48,7 +48,7 @@ pub(super) struct Form {
 impl Form {
     /// Encoding of a task without conditional effects or axioms; `None` for others, or if too
     /// large.
-    pub(super) fn new(task: &Compiled, mutex_groups: &[Vec<Fact>]) -> Option<Form> {
+    pub(super) fn new(task: &Compiled, mutex_groups: &[Vec<GroundFact>]) -> Option<Form> {
         let conditional = task.effects.all().iter().any(|effect| effect.from != effect.to);
         if conditional || !task.axiom_heads.is_empty() || task.some_impossible() {
             return None;
@@ -103,7 +103,7 @@ impl Form {
     }
 
     /// Adds the exclusions: one value per variable, and at most one fact per mutex group.
-    fn exclude(&mut self, task: &Compiled, mutex_groups: &[Vec<Fact>]) {
+    fn exclude(&mut self, task: &Compiled, mutex_groups: &[Vec<GroundFact>]) {
         for (&offset, &size) in task.offsets.iter().zip(&task.domains) {
             self.always.push((offset..offset + size).map(|fact| is(fact, false)));
             for fact in offset..offset + size {

@@ -2,10 +2,10 @@
 //! that one (Koehler and Hoffmann 2000, transitively closed).
 
 use crate::classical::compiled::{Compiled, Lists};
-use crate::ground::Fact;
+use crate::ground::GroundFact;
 
 /// The goals' facts in order.
-pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<Fact>], adders: &Lists<u32>) -> Vec<u32> {
+pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<GroundFact>], adders: &Lists<u32>) -> Vec<u32> {
     let goals: Vec<u32> = task.goal.iter().map(|&goal| task.id(goal)).collect();
     let excluded = excluded(task, mutex_groups, &goals);
     let clashes = |operator: u32| -> Vec<u32> {
@@ -21,7 +21,7 @@ pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<Fact>], adders: &Lis
 }
 
 /// True, by goal and fact, if goal and fact are mutex.
-fn excluded(task: &Compiled, mutex_groups: &[Vec<Fact>], goals: &[u32]) -> Vec<Vec<bool>> {
+fn excluded(task: &Compiled, mutex_groups: &[Vec<GroundFact>], goals: &[u32]) -> Vec<Vec<bool>> {
     let with = |&goal: &u32| {
         let mut excluded = vec![false; task.facts];
         let variable = task.variables[goal as usize];

@@ -9,7 +9,7 @@ pub mod order;
 mod support;
 
 use crate::clauses::Literal;
-use crate::clauses::solver::{Answer, Solver};
+use crate::clauses::solver::{Satisfiability, Solver};
 
 use self::form::Form;
 use self::support::{Agenda, Support};
@@ -36,7 +36,7 @@ struct Horizon {
 }
 
 /// Resumable search; after [`End::Limit`] it can continue.
-pub struct Search<'a, 's> {
+pub struct SatSearch<'a, 's> {
     shared: &'s Shared<'a>,
     /// Only cheaper plans (in the search's costs) are of interest.
     bound: u32,
@@ -49,11 +49,11 @@ pub struct Search<'a, 's> {
     counts: Counts,
 }
 
-impl<'a, 's> Search<'a, 's> {
+impl<'a, 's> SatSearch<'a, 's> {
     /// Search before its first step.
-    pub fn new(shared: &'s Shared<'a>, bound: u32) -> Search<'a, 's> {
+    pub fn new(shared: &'s Shared<'a>, bound: u32) -> SatSearch<'a, 's> {
         let counts = Counts::default();
-        Search { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
+        SatSearch { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
     }
 
     /// Counts so far.
@@ -122,13 +122,13 @@ impl<'a, 's> Search<'a, 's> {
             let answer = solver.run(&mut support, before + TURN_WORK, &|| allowed.has_ended(self.shared));
             self.counts.work += solver.work - before;
             match answer {
-                Answer::Satisfied => return Some(self.found(place)),
+                Satisfiability::Satisfied => return Some(self.found(place)),
                 // Nor is there a shorter plan.
-                Answer::Unsatisfiable => {
+                Satisfiability::Unsatisfiable => {
                     self.open.drain(..=place);
                     return None;
                 }
-                Answer::Interrupted => {}
+                Satisfiability::Interrupted => {}
             }
         }
         None

@@ -21,6 +21,7 @@ pub mod model;
 mod outcome;
 pub mod pddl;
 pub mod plan;
+mod problem;
 #[doc(hidden)]
 pub mod search;
 pub mod semantics;
@@ -38,9 +39,11 @@ pub use attachment::{
 };
 pub use diagnostic::{Diagnostic, Findings, Label, Severity, Source, Span};
 pub use explain::{Explanation, NoPlan, Refusal};
+pub use ground::Regrounded;
 pub use outcome::{Options, Outcome, PlanError, Statistics};
 pub use pddl::{check, nearest};
 pub use plan::{EPSILON_S, Plan, Step, number_text};
+pub use problem::{Misnamed, Problem};
 pub use search::portfolio;
 pub use semantics::Semantics;
 pub use solve::optimal::plan_optimally;

@@ -11,7 +11,7 @@ use crate::calls::{Calls, report};
 use crate::classical::compiled::is_classical;
 use crate::diagnostic::{Diagnostic, Findings};
 use crate::explain::{Explanation, constrained, explain, narrowed, too_slow};
-use crate::ground::{Earliest, Earns, GroundError, GroundExpression, GroundTask, compile, ground_with};
+use crate::ground::{Earliest, Earns, GroundError, GroundExpression, GroundTask, Keep, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::plan::{EPSILON_S, Plan};
@@ -135,9 +135,9 @@ fn search(
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
     let Some(compiled) = compile(task) else {
-        return search_on(task, task, attachments, options, stop, on_plan);
+        return search_on(task, task, None, attachments, options, stop, on_plan);
     };
-    let mut outcome = search_on(task, &compiled.task, attachments, options, stop, on_plan)?;
+    let mut outcome = search_on(task, &compiled.task, None, attachments, options, stop, on_plan)?;
     let statistics = outcome.statistics_mut();
     statistics.scored_only = compiled.forgets || compiled.uncounted;
     // Times say more than the compiled task does of what happens at once and when.
@@ -150,15 +150,17 @@ fn search(
 ///
 /// Where actions earn something, states in which more has been earned are better ones, and there are ever more of them: the
 /// first search looks away from that, for a plan or the proof that there is none, and a second one goes after what is to be earned.
-fn search_on(
+/// `grounded` is the task grounded before, if it was.
+pub(crate) fn search_on(
     original: &Task,
     task: &Task,
+    grounded: Option<&GroundTask>,
     attachments: &Attachments,
     options: &Options,
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<Outcome, PlanError> {
-    let (outcome, earns) = search_for(original, task, attachments, options, false, stop, on_plan)?;
+    let (outcome, earns) = search_for(original, task, grounded, attachments, options, stop, on_plan)?;
     let Outcome::Solved { plan, mut statistics } = outcome else { return Ok(outcome) };
     statistics.optimal &= earns == Earns::Never;
     let evaluation_limit = options.evaluation_limit.map(|limit| limit.saturating_sub(statistics.evaluated));
@@ -176,7 +178,7 @@ fn search_on(
         }
     };
     let options = Options { evaluation_limit, ..options.clone() };
-    let (outcome, _) = search_for(original, task, attachments, &options, true, stop, &mut hear)?;
+    let (outcome, _) = search_keeping(original, task, attachments, &options, Keep::Metric, stop, &mut hear)?;
     let more = outcome.statistics();
     statistics.plans = plans;
     statistics.evaluated += more.evaluated;
@@ -189,14 +191,31 @@ fn search_on(
     })
 }
 
-/// Runs one search; `keep_metric` keeps the fluents of the metric in the state. Returns also
+/// Runs one search on a task that is grounded already, or grounds what matters to the goal. Returns also
 /// whether actions may improve the metric.
 fn search_for(
     original: &Task,
     task: &Task,
+    grounded: Option<&GroundTask>,
     attachments: &Attachments,
     options: &Options,
-    keep_metric: bool,
+    stop: &(dyn Fn() -> bool + Sync),
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<(Outcome, Earns), PlanError> {
+    let memory = MemoryLimit::new(options.memory_limit_bytes, options.memory_used);
+    match grounded {
+        Some(grounded) => search_in(original, task, grounded, attachments, options, memory, stop, on_plan),
+        None => search_keeping(original, task, attachments, options, Keep::Relevant, stop, on_plan),
+    }
+}
+
+/// Grounds a task and runs one search on it.
+fn search_keeping(
+    original: &Task,
+    task: &Task,
+    attachments: &Attachments,
+    options: &Options,
+    keep: Keep,
     stop: &(dyn Fn() -> bool + Sync),
     on_plan: &mut dyn FnMut(&Plan),
 ) -> Result<(Outcome, Earns), PlanError> {
@@ -209,18 +228,33 @@ fn search_for(
     };
     let out_of_memory =
         || Ok((Outcome::OutOfMemory { best: None, statistics: Statistics::default() }, Earns::Never));
-    let grounded = match ground_with(task, memory.counted(), keep_metric, &halt) {
+    let grounded = match ground_with(task, memory.counted(), keep, &halt) {
         Ok(grounded) => grounded,
         Err(GroundError::Stopped) if full.load(Ordering::Relaxed) => return out_of_memory(),
         Err(error) => return Ok((grounding_ended(task, error)?, Earns::Never)),
     };
+    search_in(original, task, &grounded, attachments, options, memory, stop, on_plan)
+}
+
+/// One search on a grounded task.
+#[allow(clippy::too_many_arguments)]
+fn search_in(
+    original: &Task,
+    task: &Task,
+    grounded: &GroundTask,
+    attachments: &Attachments,
+    options: &Options,
+    memory: MemoryLimit,
+    stop: &(dyn Fn() -> bool + Sync),
+    on_plan: &mut dyn FnMut(&Plan),
+) -> Result<(Outcome, Earns), PlanError> {
     let additive = grounded.metric.as_ref().filter(|metric| metric.additive);
     let earns = additive.map_or(Earns::Never, |metric| metric.earns);
     let options = &Options { anytime: options.anytime && earns != Earns::Surely, ..options.clone() };
     // Every search has its own form of the grounded task beside it.
     let compiled = FORMS * grounded.bytes();
     if grounded.goal_reachable && !memory.has_room(|| grounded.bytes(), compiled) {
-        return out_of_memory();
+        return Ok((Outcome::OutOfMemory { best: None, statistics: Statistics::default() }, earns));
     }
     let memory = memory.beside(compiled);
     // What searches know of preferences may be less than what the validator counts.
@@ -239,14 +273,14 @@ fn search_for(
     };
     // Parameters that a module proposes are no part of the ground actions: only the search in time asks for them.
     let proposes = task.actions.iter().any(|action| !action.grounding.is_empty());
-    if grounded.goal_reachable && !proposes && is_classical(&grounded) {
+    if grounded.goal_reachable && !proposes && is_classical(grounded) {
         // Violations are numbers that the original does not have.
         let soft = !original.preferences.is_empty() && task.functions.len() > original.functions.len();
-        let outcome = plan_classical(task, &grounded, options, soft, memory, stop, &check, on_plan)?;
+        let outcome = plan_classical(task, grounded, options, soft, memory, stop, &check, on_plan)?;
         return Ok((found_at_least(outcome, unchecked.get()), earns));
     }
     let outcome =
-        plan_in_time((task, &grounded), attachments, limits(options, memory), stop, &check, on_plan)?;
+        plan_in_time((task, grounded), attachments, limits(options, memory), stop, &check, on_plan)?;
     Ok((found_at_least(outcome, unchecked.get()), earns))
 }
 

@@ -15,6 +15,7 @@ mod objects;
 mod optimal;
 mod preferences;
 mod reading;
+mod replanning;
 mod solving;
 mod temporal;
 mod timed_literals;

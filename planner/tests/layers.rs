@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From below. What is written, its reader and how it is walked over know each other.
-const LAYERS: [&str; 12] = [
+const LAYERS: [&str; 13] = [
     "attachment clauses diagnostic grouped memory",
     "plan",
     "model pddl task",
@@ -16,6 +16,7 @@ const LAYERS: [&str; 12] = [
     "search",
     "temporal",
     "solve",
+    "problem",
     "lib small",
 ];
 

@@ -45,3 +45,27 @@ fn two_choices_add_up_to_a_number() {
         "(:init (cold) (hot) (= (level) 0) (= (warmth) 0)) (:goal (and (= (level) 10) (= (warmth) 70)))";
     check(domain, problem, Some(7.0));
 }
+
+#[test]
+fn a_rule_may_compare_numbers_beside_those_that_times_decide() {
+    let domain = PETROL
+        .replace("(:predicates", "(:predicates (paid)")
+        .replace("(:functions", "(:functions (money)")
+        .replace("(at start (unused))", "(at start (unused)) (at start (paid))")
+        + "(:derived (paid) (>= (money) 2))";
+    let domain = domain.replace("(:requirements", "(:requirements :derived-predicates");
+    let problem =
+        |money: u32| format!("(:init (= (fuel) 0) (= (cap) 8) (= (money) {money}) (unused)) (:goal (done))");
+    check(&domain, &problem(2), Some(6.5));
+    check(&domain, &problem(1), None);
+}
+
+#[test]
+fn what_flows_for_long_begins_before_a_timed_literal_and_ends_after_it() {
+    let domain = "(:requirements :duration-inequalities :continuous-effects) (:predicates (night)) (:functions (level))
+      (:durative-action fill :parameters () :duration (>= ?duration 2) :effect (increase (level) (* #t 1)))";
+    for night_s in [0.5, 2.003, 8.0] {
+        let problem = format!("(:init (= (level) 0) (at {night_s} (night))) (:goal (>= (level) 7.5))");
+        check(domain, &problem, Some(7.5));
+    }
+}

@@ -1,7 +1,7 @@
 //! Explanation of deadlines in constraints that no plan can meet.
 
 use crate::diagnostic::Diagnostic;
-use crate::ground::{Earliest, GroundTask, WITNESS, compile, ground_with};
+use crate::ground::{Earliest, GroundTask, Keep, WITNESS, compile, ground_with};
 use crate::plan::{EPSILON_S, number_text};
 use crate::task::{Modal, Task, Trajectory};
 
@@ -20,7 +20,7 @@ pub(crate) fn too_slow(
         return None;
     }
     let compiled = compile(&Task { constraints: within.clone(), ..free })?.task;
-    let grounded = ground_with(&compiled, memory_limit_bytes, false, stop).ok()?;
+    let grounded = ground_with(&compiled, memory_limit_bytes, Keep::Relevant, stop).ok()?;
     if !grounded.goal_reachable {
         return None;
     }

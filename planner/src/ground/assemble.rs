@@ -372,7 +372,7 @@ fn for_expressions(ground: &mut GroundTask, body: &mut dyn FnMut(&mut GroundExpr
 }
 
 /// Sets the derived variables of the initial state, calls counted as false.
-fn derive_initial(ground: &mut GroundTask) {
+pub(super) fn derive_initial(ground: &mut GroundTask) {
     let mut from = 0;
     while from < ground.axioms.len() {
         let stratum = ground.variables[ground.axioms[from].head.variable as usize].stratum;

@@ -48,14 +48,25 @@ pub fn ground(
     memory_limit_bytes: Option<usize>,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<GroundTask, GroundError> {
-    ground_with(task, memory_limit_bytes, false, stop)
+    ground_with(task, memory_limit_bytes, Keep::Relevant, stop)
 }
 
-/// Grounds a task; `keep_metric` keeps the fluents of the metric in the state.
+/// Parts of a grounded task that are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Keep {
+    /// Parts that matter to the goal.
+    Relevant,
+    /// Those, and the fluents of the metric in the state.
+    Metric,
+    /// Parts that matter to any goal.
+    All,
+}
+
+/// Grounds a task; `kept` says what is left out.
 pub(crate) fn ground_with(
     task: &Task,
     memory_limit_bytes: Option<usize>,
-    keep_metric: bool,
+    kept: Keep,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<GroundTask, GroundError> {
     let _span = debug_span!("ground").entered();
@@ -92,10 +103,11 @@ pub(crate) fn ground_with(
     halt()?;
     let expression = normal.metric.as_ref().map(|m| make.expression(m, &[]));
     let reached = relaxed::prune(&mut raw, &make.calls);
-    let keep = !task.modules.is_empty() || !task.preferences.is_empty() || !task.constraints.is_empty();
+    let soft = !task.preferences.is_empty() || !task.constraints.is_empty();
+    let keep = kept == Keep::All || soft || !task.modules.is_empty();
     let signed = expression.map(|e| (task.metric.as_ref().is_none_or(|m| m.minimise), e));
     let undefined: Vec<bool> = initial_numbers(&make).iter().map(|number| number.is_nan()).collect();
-    let costs = metric::costs(&raw, &make.comparisons, &undefined, signed, keep, keep_metric);
+    let costs = metric::costs(&raw, &make.comparisons, &undefined, signed, keep, kept == Keep::Metric);
     for action in &mut raw.actions {
         action.cost = costs.of(action);
     }

@@ -18,6 +18,7 @@ mod raw;
 mod reach;
 mod relaxed;
 mod relevant;
+mod restate;
 mod rules;
 mod statics;
 #[doc(hidden)]
@@ -25,11 +26,13 @@ pub mod task;
 mod unused;
 mod variables;
 
-pub(crate) use build::ground_with;
 pub use build::{GroundError, ground};
+pub(crate) use build::{Keep, ground_with};
 pub(crate) use earliest::Earliest;
 pub(crate) use metric::{added, weights};
 pub use obstacles::{MissingAtom, Obstacle};
 pub use pairs::exclusive;
 pub(crate) use pddl3::{WITNESS, compile};
+pub use restate::Regrounded;
+pub(crate) use restate::Restated;
 pub use task::*;

@@ -4,7 +4,7 @@ use crate::attachment::Attachments;
 use crate::classical::compiled::{Compiled, is_classical};
 use crate::diagnostic::{Diagnostic, Findings, Span};
 use crate::explain::{Refusals, explain, too_slow};
-use crate::ground::{Earns, GroundTask, compile, ground_with};
+use crate::ground::{Earns, GroundTask, Keep, compile, ground_with};
 use crate::memory::MemoryLimit;
 use crate::outcome::{Options, Outcome, PlanError, Statistics};
 use crate::search::astar::{AStar, AStarLimits};
@@ -52,7 +52,7 @@ pub fn plan_optimally(
     }
     let searched = compiled.as_ref().map_or(task, |compiled| &compiled.task);
     let room = || memory.counted().is_some() || memory.has_room(|| 0, 0);
-    let grounded = match ground_with(searched, memory.counted(), false, &|| !room() || stop()) {
+    let grounded = match ground_with(searched, memory.counted(), Keep::Relevant, &|| !room() || stop()) {
         Ok(grounded) => grounded,
         Err(_) if !room() => {
             return Ok(Outcome::OutOfMemory { best: None, statistics: Statistics::default() });

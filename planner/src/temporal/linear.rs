@@ -42,11 +42,9 @@ const TOLERANCE: f64 = 1e-6;
 /// Weight of the makespan as a tie-breaker for a metric without it.
 const TIME_WEIGHT: f64 = 1e-4;
 
-/// True if the task's numbers fit linear programs: no attachments, and no axioms over numbers.
+/// True if the task's numbers fit linear programs: no attachments.
 pub(super) fn is_linear(world: &World) -> bool {
-    world.ground.calls.is_empty()
-        && !world.proposes
-        && world.ground.axioms.iter().all(|axiom| axiom.body.comparisons.is_empty())
+    world.ground.calls.is_empty() && !world.proposes
 }
 
 /// Best plan by linear programs with a measure below the bound, with the number of evaluated
@@ -58,8 +56,11 @@ pub(super) fn linear_plan(
     evaluations: u64,
     stop: &dyn Fn() -> bool,
 ) -> Result<(Option<Vec<Timed>>, u64), Failure> {
+    let ground = space.world.ground;
+    let rules_compare = ground.axioms.iter().any(|axiom| !axiom.body.comparisons.is_empty());
     let mut search = Search {
         space,
+        rules_compare,
         relaxed,
         bound,
         nodes: Vec::new(),
@@ -67,7 +68,6 @@ pub(super) fn linear_plan(
         evaluated: 0,
         work: 0,
     };
-    let ground = space.world.ground;
     let bytes = size_of::<Node>()
         + ground.variables.len() * 2 * size_of::<u32>()
         + ground.numerics.len() * (size_of::<Linear>() + size_of::<[i64; 3]>());
@@ -116,6 +116,8 @@ type Seen = (Vec<u32>, Vec<u32>, usize, Vec<[i64; 2]>);
 struct Search<'s, 'w, 'a> {
     space: &'s Space<'w, 'a>,
     relaxed: &'s mut Relaxed,
+    /// True if derived facts depend on numbers.
+    rules_compare: bool,
     bound: f64,
     nodes: Vec<Node>,
     seen: FxHashSet<Seen>,
@@ -210,6 +212,12 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         };
         if happens.is_none() {
             return Ok(None);
+        }
+        if self.rules_compare {
+            // Rules see the numbers of the earliest time. Where these come out otherwise, the plan is not valid, and is dropped.
+            let now = made.last.map_or(Linear::constant(0.0), Linear::variable);
+            let Some(values) = made.program.minimised(&now) else { return Ok(None) };
+            made.state.numbers = made.numbers.iter().map(|number| number.value(&values)).collect();
         }
         self.space.world.derive(&mut made.state)?;
         Ok(made.goes_on(self.space.world).then_some(made))
@@ -311,6 +319,15 @@ impl Node {
         holds.then_some(())
     }
 
+    /// Advances time to a start or an end, which comes before the next timed effect.
+    fn act(&mut self, world: &World, now: u32) -> Option<()> {
+        if let Some(next) = world.ground.timed.get(self.timed) {
+            let latest = Linear::constant(next.time_s - EPSILON_S);
+            self.program.ask(&Linear::variable(now), Relation::AtMost, &latest).then_some(())?;
+        }
+        self.pass(world, now)
+    }
+
     fn holds_over_all(&mut self, world: &World) -> bool {
         let open = self.open.clone();
         open.iter().all(|own| {
@@ -322,7 +339,7 @@ impl Node {
     fn start(&mut self, world: &World, act: u32) -> Option<()> {
         let own = &world.acts[act as usize];
         let now = self.program.variable(0.0, f64::INFINITY);
-        self.pass(world, now)?;
+        self.act(world, now)?;
         let end = own.durative.then(|| self.program.variable(0.0, f64::INFINITY));
         let duration = end.map(|end| Linear::variable(end).plus(-1.0, &Linear::variable(now)));
         if let Some(duration) = &duration {
@@ -344,7 +361,7 @@ impl Node {
 
     fn end(&mut self, world: &World, position: usize) -> Option<()> {
         let now = self.open[position].end;
-        self.pass(world, now)?;
+        self.act(world, now)?;
         let Running { act, duration, .. } = self.open.remove(position);
         let own = &world.acts[act as usize];
         (self.bounds(own, &duration, true) && self.asks(world, own.at_end, Some(&duration))).then_some(())?;

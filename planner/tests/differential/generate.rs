@@ -1,6 +1,7 @@
 //! Random small tasks.
 
-use super::task::{Action, Change, Effect, Formula, Named, Number, Rule, Task, Term};
+use super::oracle::State;
+use super::task::{Action, Change, Effect, Flow, Formula, Named, Number, Rule, Task, Term};
 
 /// Numbers by chance (splitmix64; Steele, Lea and Flood 2014).
 pub struct Chance(pub u64);
@@ -31,6 +32,8 @@ pub enum Kind {
     Temporal,
     /// With timed literals, which the goal speaks of.
     Given,
+    /// Timed literals, durations that are chosen, numbers among their bounds, and numbers that change at rates.
+    Mixed,
 }
 
 struct Maker<'c> {
@@ -42,7 +45,7 @@ struct Maker<'c> {
     /// Predicates from here on may not be mentioned.
     limit: usize,
     /// For each function, the kinds of changes by the action at hand.
-    families: [&'static [&'static str]; 2],
+    families: [&'static [&'static str]; 4],
 }
 
 /// A random task.
@@ -59,6 +62,8 @@ pub fn task(chance: &mut Chance, kind: Kind) -> Task {
     let functions = match kind {
         Kind::Numeric => vec![vec![], vec![0]],
         Kind::Temporal | Kind::Given if chance.percent(40) => vec![vec![], vec![0]],
+        // The first two flow; the others bound durations, and are rates.
+        Kind::Mixed => vec![vec![], vec![0], vec![], vec![0]],
         _ => vec![],
     };
     let task = Task {
@@ -75,7 +80,7 @@ pub fn task(chance: &mut Chance, kind: Kind) -> Task {
         goal: Formula::And(Vec::new()),
         metric: None,
     };
-    let mut maker = Maker { chance, task, kind, scope: Vec::new(), limit: 0, families: [&[]; 2] };
+    let mut maker = Maker { chance, task, kind, scope: Vec::new(), limit: 0, families: [&[]; 4] };
     maker.fill();
     maker.task
 }
@@ -146,15 +151,13 @@ impl Maker<'_> {
         let parameters: Vec<usize> = (0..self.chance.below(3)).map(|_| self.chance.below(2)).collect();
         self.scope = parameters.clone();
         let durative = self.is_temporal() && self.chance.percent(80);
-        self.families = [(); 2].map(|()| {
-            self.chance.of::<&[&str]>(&[
-                &["increase", "increase", "decrease"],
-                &["increase"],
-                &["assign"],
-                &["scale-up"],
-            ])
-        });
+        let all: [&[&str]; 4] =
+            [&["increase", "increase", "decrease"], &["increase"], &["assign"], &["scale-up"]];
+        for family in 0..if self.kind == Kind::Mixed { 4 } else { 2 } {
+            self.families[family] = self.chance.of::<&[&str]>(&all);
+        }
         let duration = durative.then(|| self.duration());
+        let flows = if durative && self.kind == Kind::Mixed { self.flows() } else { Vec::new() };
         let mut condition = [None, None, None];
         condition[0] = self.chance.percent(75).then(|| self.formula(2));
         if durative {
@@ -163,13 +166,56 @@ impl Maker<'_> {
             }
         }
         let effects = (0..1 + self.chance.below(3)).map(|_| self.effect(durative)).collect();
-        Action { parameters, duration, condition, effects }
+        Action { parameters, duration, condition, effects, flows }
     }
 
-    fn duration(&mut self) -> [Number; 2] {
+    fn duration(&mut self) -> [Option<Number>; 2] {
+        if self.kind == Kind::Mixed {
+            return self.chosen_duration();
+        }
         let least = 1 + self.chance.below(3);
         let most = if self.chance.percent(25) { least + 1 + self.chance.below(2) } else { least };
-        [least, most].map(|seconds| Number::Constant(seconds as f64))
+        [least, most].map(|seconds| Some(Number::Constant(seconds as f64)))
+    }
+
+    /// Bounds of a duration that are numbers or given by a fluent, mostly with room between them.
+    fn chosen_duration(&mut self) -> [Option<Number>; 2] {
+        let least = 1 + self.chance.below(2);
+        let least = match self.chance.below(4) {
+            0 => self.steady(),
+            _ => Number::Constant(least as f64),
+        };
+        let more = Number::Constant(self.chance.of(&[0.5, 1.0, 2.0, 4.0]));
+        let longer = Number::Binary('+', Box::new([least.clone(), more]));
+        let most = match self.chance.below(8) {
+            0 => None,
+            1 => Some(self.steady()),
+            2 | 3 => Some(least.clone()),
+            _ => Some(longer),
+        };
+        [Some(least), most]
+    }
+
+    /// A fluent that nothing flows into.
+    fn steady(&mut self) -> Number {
+        let index = 2 + self.chance.below(2);
+        let kinds = self.task.functions[index].clone();
+        Number::Fluent(self.named(index, &kinds))
+    }
+
+    fn flows(&mut self) -> Vec<Flow> {
+        let many = self.chance.of(&[0, 0, 1, 1, 2]);
+        let flow = |_| {
+            let index = self.chance.below(2);
+            let kinds = self.task.functions[index].clone();
+            let per_second = match self.chance.below(20) {
+                0 => Number::Fluent(Named { index: 0, terms: Vec::new() }),
+                1..=6 => self.steady(),
+                _ => Number::Constant(self.chance.of(&[0.5, 1.0, 2.0])),
+            };
+            Flow { increases: self.chance.percent(70), fluent: self.named(index, &kinds), per_second }
+        };
+        (0..many).map(flow).collect()
     }
 
     fn effect(&mut self, durative: bool) -> Effect {
@@ -201,14 +247,20 @@ impl Maker<'_> {
     }
 
     fn numeric_change(&mut self, durative: bool) -> Change {
-        let index = self.chance.below(self.task.functions.len());
+        let steady = self.kind == Kind::Mixed && self.chance.percent(80);
+        let index = self.chance.below(if steady { 2 } else { self.task.functions.len() });
         let kinds = self.task.functions[index].clone();
         // What effects of one action make of a number must not depend on their order.
         let how = self.chance.of(self.families[index]);
         let amount = match how {
             "assign" => Number::Constant(1.0),
             "scale-up" => Number::Constant(2.0),
-            _ if durative && self.chance.percent(20) => Number::Duration,
+            _ if durative && self.chance.percent(20) => match self.kind {
+                Kind::Mixed if self.chance.percent(50) => {
+                    Number::Binary('*', Box::new([Number::Constant(2.0), Number::Duration]))
+                }
+                _ => Number::Duration,
+            },
             _ if self.chance.percent(70) => Number::Constant(self.chance.of(&[1.0, 2.0, 0.1])),
             _ => self.number(1),
         };
@@ -226,7 +278,10 @@ impl Maker<'_> {
         for function in 0..self.task.functions.len() {
             for arguments in tuples(&self.task, &self.task.functions[function].clone()) {
                 if self.chance.percent(85) {
-                    let value = self.chance.of(&[0.0, 0.0, 1.0, 2.0, 0.3]);
+                    let value = match function {
+                        0 | 1 => self.chance.of(&[0.0, 0.0, 1.0, 2.0, 0.3]),
+                        _ => self.chance.of(&[0.5, 1.0, 2.0, 3.0]),
+                    };
                     self.task.numbers.push((function, arguments, value));
                 }
             }
@@ -234,7 +289,11 @@ impl Maker<'_> {
         if !self.is_temporal() {
             return;
         }
-        let counts = if self.kind == Kind::Given { [1, 2, 2, 3, 4] } else { [0, 0, 0, 1, 2] };
+        let counts = match self.kind {
+            Kind::Given => [1, 2, 2, 3, 4],
+            Kind::Mixed => [0, 1, 1, 2, 3],
+            _ => [0, 0, 0, 1, 2],
+        };
         for index in 0..counts[self.chance.below(5)] {
             let predicate = self.chance.below(self.task.derived);
             let all = tuples(&self.task, &self.task.predicates[predicate].clone());
@@ -248,7 +307,7 @@ impl Maker<'_> {
     }
 
     fn is_temporal(&self) -> bool {
-        matches!(self.kind, Kind::Temporal | Kind::Given)
+        matches!(self.kind, Kind::Temporal | Kind::Given | Kind::Mixed)
     }
 
     /// Arguments that fit as far as there are any; else the nullary predicate or function 0.
@@ -313,7 +372,11 @@ impl Maker<'_> {
 
     fn number(&mut self, depth: usize) -> Number {
         if depth > 0 && self.chance.percent(35) {
-            let operator = self.chance.of(&['+', '-', '*', '/', '+']);
+            let operator = match self.kind {
+                // Sums of numbers that flow are linear in time.
+                Kind::Mixed => self.chance.of(&['+', '-', '+']),
+                _ => self.chance.of(&['+', '-', '*', '/', '+']),
+            };
             return Number::Binary(operator, Box::new([self.number(depth - 1), self.number(depth - 1)]));
         }
         match self.chance.below(20) {
@@ -326,6 +389,65 @@ impl Maker<'_> {
             }
         }
     }
+}
+
+/// A goal that holds in a state, made of some of what is otherwise at first.
+pub fn goal_in(task: &Task, first: &State, last: &State, chance: &mut Chance) -> Formula {
+    let (mut turned, mut same) = (Vec::new(), Vec::new());
+    let fits = |kinds: &[usize], arguments: &[usize]| {
+        kinds.iter().zip(arguments).all(|(&kind, object)| task.of(kind).contains(object))
+    };
+    let mut bit = 0;
+    for (index, kinds) in task.predicates.iter().enumerate() {
+        for arguments in all_tuples(task.objects, kinds.len()) {
+            let (was, holds) = (first.facts >> bit & 1 != 0, last.facts >> bit & 1 != 0);
+            bit += 1;
+            if !fits(kinds, &arguments) {
+                continue;
+            }
+            let terms = arguments.into_iter().map(Term::Object).collect();
+            let atom = Formula::Atom(Named { index, terms });
+            let part = if holds { atom } else { Formula::Not(Box::new(atom)) };
+            if was == holds { same.push(part) } else { turned.push(part) }
+        }
+    }
+    let mut place = 0;
+    for (index, kinds) in task.functions.iter().enumerate() {
+        for arguments in all_tuples(task.objects, kinds.len()) {
+            let (before, value) = (first.numbers[place], last.numbers[place]);
+            place += 1;
+            if value.is_nan() || !fits(kinds, &arguments) {
+                continue;
+            }
+            let (relation, bound) = match chance.below(6) {
+                0 => ("=", value),
+                1 => (">=", value),
+                2 => ("<=", value),
+                3 => (">=", value - 0.25),
+                4 => (">", value - 0.5),
+                _ => ("<", value + 0.25),
+            };
+            let terms = arguments.into_iter().map(Term::Object).collect();
+            let part =
+                Formula::Compare(relation, Number::Fluent(Named { index, terms }), Number::Constant(bound));
+            if before == value { same.push(part) } else { turned.push(part) }
+        }
+    }
+    let mut parts = Vec::new();
+    for _ in 0..1 + chance.below(3) {
+        let from = if turned.is_empty() || chance.percent(20) { &mut same } else { &mut turned };
+        if !from.is_empty() {
+            parts.push(from.swap_remove(chance.below(from.len())));
+        }
+    }
+    Formula::And(parts)
+}
+
+/// All tuples of so many objects, in the order of their bits in a state.
+fn all_tuples(objects: usize, length: usize) -> Vec<Vec<usize>> {
+    let count = objects.pow(length as u32);
+    let digit = |number: usize, place: usize| number / objects.pow((length - 1 - place) as u32) % objects;
+    (0..count).map(|number| (0..length).map(|place| digit(number, place)).collect()).collect()
 }
 
 /// All arguments of these types.

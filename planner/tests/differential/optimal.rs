@@ -2,8 +2,9 @@
 
 use descry_planner::{Attachments, Options, Outcome, Source, Task, plan_optimally, validate};
 
+use super::exhaust::Cheapest;
 use super::generate::{self, Chance, Kind};
-use super::oracle::{Cheapest, Oracle};
+use super::oracle::Oracle;
 use super::task::{Change, Effect, Named, Number};
 use super::{MOST_EVALUATED, MOST_STATES, task};
 

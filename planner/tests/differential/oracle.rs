@@ -1,8 +1,4 @@
-//! Reference implementation of the semantics, written a second time as plainly as possible, with exhaustive
-//! searches.
-
-use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap, HashSet, VecDeque};
+//! Reference implementation of the semantics, written a second time as plainly as possible.
 
 use super::generate::tuples;
 use super::task::{Change, Effect, Formula, Named, Number, Task, Term};
@@ -23,49 +19,32 @@ pub struct Step {
     pub duration_s: f64,
 }
 
+/// An action in progress.
 #[derive(Debug, Clone)]
-struct Running {
-    step: usize,
+pub struct Running {
+    pub step: usize,
     action: usize,
     arguments: Vec<usize>,
     duration_s: f64,
     /// Effects at the end, with the object that they are for, whose earlier conditions were met so far.
     pending: Vec<(usize, usize)>,
+    /// Started by the last happening.
+    is_new: bool,
 }
 
 /// A state with what is in progress.
 #[derive(Debug, Clone)]
-struct World {
-    state: State,
-    running: Vec<Running>,
+pub struct World {
+    pub state: State,
+    pub running: Vec<Running>,
 }
 
+/// A timed literal, the end of a step, or its start.
 #[derive(Debug, Clone)]
-enum Event<'s> {
+pub enum Event<'s> {
     Timed(usize),
     End(usize),
     Start(usize, &'s Step),
-}
-
-/// Result of a search.
-#[derive(Debug)]
-pub enum Found {
-    Plan(Vec<Step>),
-    /// Everything was seen.
-    Nothing,
-    /// There is more than was looked at.
-    Unknown,
-}
-
-/// Result of a uniform-cost search.
-#[derive(Debug)]
-pub enum Cheapest {
-    /// The metric of the best plan, or its steps without one.
-    Cost(f64),
-    /// Everything was seen.
-    Nothing,
-    /// There is more than was looked at.
-    Unknown,
 }
 
 /// A task with a bit for every fact.
@@ -83,8 +62,6 @@ const TOLERANCE: f64 = 1e-7;
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 /// Events nearer than this are at one time.
 const TOGETHER_S: f64 = 1e-4;
-/// Spacing of the starts that the search tries, seconds.
-const GAP_S: f64 = 0.01;
 
 impl<'t> Oracle<'t> {
     pub fn new(task: &'t Task) -> Oracle<'t> {
@@ -244,9 +221,10 @@ impl<'t> Oracle<'t> {
     }
 
     /// Lets events happen together; `None` if they cannot.
-    fn happen(&self, world: &World, events: &[Event]) -> Option<World> {
+    pub fn happen(&self, world: &World, events: &[Event]) -> Option<World> {
         let before = &world.state;
         let mut next = world.clone();
+        next.running.iter_mut().for_each(|running| running.is_new = false);
         let (mut added, mut deleted) = (0u64, 0u64);
         let mut changes: Vec<(usize, &str, f64)> = Vec::new();
         for event in events {
@@ -305,7 +283,7 @@ impl<'t> Oracle<'t> {
                 Event::Start(step, from) if own.duration.is_some() => {
                     let (step, arguments) = (*step, from.arguments.clone());
                     let pending = self.pending(action, &arguments, before);
-                    next.running.push(Running { step, action, arguments, duration_s, pending });
+                    next.running.push(Running { step, action, arguments, duration_s, pending, is_new: true });
                 }
                 _ => {}
             }
@@ -313,14 +291,130 @@ impl<'t> Oracle<'t> {
         next.state.facts = next.state.facts & !deleted | added;
         reckon(&mut next.state.numbers, &changes)?;
         self.derive(&mut next.state);
-        self.goes_on(&mut next).then_some(next)
+        let flows = self.flows(&next);
+        self.goes_on(&mut next, flows).then_some(next)
+    }
+
+    /// True if some action changes numbers at a rate.
+    pub fn may_flow(&self) -> bool {
+        self.task.actions.iter().any(|action| !action.flows.is_empty())
+    }
+
+    /// True if an action in progress changes numbers at a rate.
+    pub fn flows(&self, world: &World) -> bool {
+        world.running.iter().any(|running| !self.task.actions[running.action].flows.is_empty())
+    }
+
+    /// Lets time pass up to the next happening, which changes numbers at rates; `None` if the actions in progress
+    /// cannot go on all the time in between.
+    pub fn pass(&self, world: &World, elapsed_s: f64) -> Option<World> {
+        let mut changes = Vec::new();
+        for running in &world.running {
+            for flow in &self.task.actions[running.action].flows {
+                let place = self.numbers[flow.fluent.index]
+                    + self.place(&self.objects(&flow.fluent, &running.arguments));
+                let rate = self.number(&flow.per_second, &world.state, &running.arguments, 0.0)?;
+                changes.push((place, "increase", if flow.increases { rate } else { -rate } * elapsed_s));
+            }
+        }
+        if changes.is_empty() || elapsed_s <= 0.0 {
+            return Some(world.clone());
+        }
+        let after = |part: f64| {
+            let mut next = world.clone();
+            let partly: Vec<_> =
+                changes.iter().map(|&(place, how, amount)| (place, how, part * amount)).collect();
+            reckon(&mut next.state.numbers, &partly)?;
+            self.derive(&mut next.state);
+            Some(next)
+        };
+        let mut last = after(1.0)?;
+        let mut points = self.crossings(world, &last);
+        points.extend([0.0, 1.0]);
+        points.sort_by(f64::total_cmp);
+        for pair in 1..points.len() {
+            let inside = [(points[pair - 1] + points[pair]) / 2.0, points[pair]];
+            for part in inside.into_iter().filter(|&part| part < 1.0) {
+                let mut there = after(part)?;
+                for (own, known) in there.running.iter_mut().zip(&last.running) {
+                    own.pending.clone_from(&known.pending);
+                }
+                if !self.goes_on(&mut there, false) {
+                    return None;
+                }
+                last.running = there.running;
+            }
+        }
+        Some(last)
+    }
+
+    /// Where between two states a comparison that matters to the actions in progress turns, as parts of the way.
+    fn crossings(&self, first: &World, last: &World) -> Vec<f64> {
+        let [before, after] = [first, last].map(|world| {
+            let mut found = Vec::new();
+            for rule in &self.task.rules {
+                for mut binding in tuples(self.task, &self.task.predicates[rule.predicate]) {
+                    self.differences(&rule.body, &world.state, &mut binding, &mut found);
+                }
+            }
+            for running in &first.running {
+                let action = &self.task.actions[running.action];
+                let mut binding = running.arguments.clone();
+                action.condition[1]
+                    .iter()
+                    .for_each(|own| self.differences(own, &world.state, &mut binding, &mut found));
+                for effect in &action.effects {
+                    for object in self.objects_for(effect) {
+                        let mut binding = bound(effect, object, &running.arguments);
+                        effect.when[1]
+                            .iter()
+                            .for_each(|own| self.differences(own, &world.state, &mut binding, &mut found));
+                    }
+                }
+            }
+            found
+        });
+        let crossing = |(first, last): (f64, f64)| {
+            let part = first / (first - last);
+            let nothing =
+                |own: f64, apart: f64| own.abs() <= TOLERANCE && ((last - first) * apart).abs() <= TOLERANCE;
+            let inside =
+                part > 1e-9 && part < 1.0 - 1e-9 && !nothing(first, part) && !nothing(last, 1.0 - part);
+            inside.then_some(part)
+        };
+        before.into_iter().zip(after).filter_map(crossing).collect()
+    }
+
+    /// Differences between the sides of all comparisons of a formula; NaN where one has no value.
+    fn differences(&self, formula: &Formula, state: &State, binding: &mut Vec<usize>, found: &mut Vec<f64>) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => {
+                parts.iter().for_each(|part| self.differences(part, state, binding, found));
+            }
+            Formula::Not(inner) => self.differences(inner, state, binding, found),
+            Formula::Imply(sides) => {
+                sides.iter().for_each(|side| self.differences(side, state, binding, found))
+            }
+            Formula::Quantified { variable, of, body, .. } => {
+                for object in self.task.of(*of) {
+                    binding.resize(binding.len().max(variable + 1), 0);
+                    binding[*variable] = object;
+                    self.differences(body, state, binding, found);
+                }
+            }
+            Formula::Atom(_) | Formula::Same(..) => {}
+            Formula::Compare(_, left, right) => {
+                let [left, right] = [left, right].map(|side| self.number(side, state, binding, 0.0));
+                found.push(left.zip(right).map_or(f64::NAN, |(left, right)| left - right));
+            }
+        }
     }
 
     /// True if the actions in progress may go on in a state; removes their end effects whose condition has
-    /// failed on the way.
-    fn goes_on(&self, next: &mut World) -> bool {
+    /// failed on the way. Where numbers flow, those that have just begun are asked from then on.
+    fn goes_on(&self, next: &mut World, flows: bool) -> bool {
         let World { state, running } = next;
-        for own in running {
+        for own in running.iter_mut().filter(|own| !flows || !own.is_new) {
             let action = &self.task.actions[own.action];
             let over_all = action.condition[1].as_ref();
             if over_all.is_some_and(|over_all| !self.holds(over_all, true, state, &mut own.arguments.clone()))
@@ -345,8 +439,10 @@ impl<'t> Oracle<'t> {
 
     fn allows(&self, action: usize, arguments: &[usize], duration_s: f64, state: &State) -> bool {
         let Some([least, most]) = &self.task.actions[action].duration else { return true };
-        let value = |number| self.number(number, state, arguments, 0.0);
-        let (Some(least), Some(most)) = (value(least), value(most)) else { return false };
+        let value = |bound: &Option<Number>, none: f64| {
+            bound.as_ref().map_or(Some(none), |bound| self.number(bound, state, arguments, 0.0))
+        };
+        let (Some(least), Some(most)) = (value(least, 0.0), value(most, f64::INFINITY)) else { return false };
         duration_s >= least - 1e-3 && duration_s <= most + 1e-3
     }
 
@@ -367,174 +463,41 @@ impl<'t> Oracle<'t> {
         events.sort_by(|one, other| one.0.total_cmp(&other.0));
         let mut world = World { state: self.initial(), running: Vec::new() };
         let mut rest = &events[..];
+        let mut now_s = 0.0;
         while let Some((time_s, _)) = rest.first() {
             let count = rest.iter().take_while(|(other_s, _)| other_s - time_s < TOGETHER_S).count();
             let together: Vec<Event> = rest[..count].iter().map(|(_, event)| event.clone()).collect();
-            world = self.happen(&world, &together)?;
+            world = self.happen(&self.pass(&world, time_s - now_s)?, &together)?;
+            now_s = *time_s;
             rest = &rest[count..];
         }
         world.running.is_empty().then_some(world.state)
     }
 
-    /// A shortest plan without times.
-    pub fn search(&self, most: usize) -> Found {
-        let start = World { state: self.initial(), running: Vec::new() };
-        let mut seen: HashMap<(u64, Vec<u64>), ()> = HashMap::from([(key(&start.state), ())]);
-        let mut queue = VecDeque::from([(start, Vec::new())]);
-        let mut all = true;
-        while let Some((world, plan)) = queue.pop_front() {
-            if self.is_goal(&world.state) {
-                return Found::Plan(plan);
-            }
-            for (action, arguments) in &self.instances {
-                let step = Step {
-                    start_s: plan.len() as f64,
-                    action: *action,
-                    arguments: arguments.clone(),
-                    duration_s: 0.0,
-                };
-                let Some(next) = self.happen(&world, &[Event::Start(0, &step)]) else { continue };
-                if seen.len() >= most {
-                    all = false;
-                } else if seen.insert(key(&next.state), ()).is_none() {
-                    queue.push_back((next, plan.iter().cloned().chain([step]).collect()));
-                }
-            }
-        }
-        if all { Found::Nothing } else { Found::Unknown }
-    }
-
-    /// The cost of the cheapest plan without times. Nothing but the metric reads the function that it is.
-    pub fn cheapest(&self, most: usize) -> Cheapest {
-        let cost = |state: &State, steps: usize| self.metric(state).unwrap_or(steps as f64);
-        // Costs are halves.
-        let in_halves = |cost: f64| (2.0 * cost).round() as u64;
-        let place = |world: &World| {
-            let mut state = world.state.clone();
-            if self.task.metric.is_some() {
-                state.numbers.pop();
-            }
-            key(&state)
-        };
-        let mut worlds = vec![(World { state: self.initial(), running: Vec::new() }, 0)];
-        let mut queue = BinaryHeap::from([(Reverse(0), 0)]);
-        let mut closed = HashSet::new();
-        while let Some((_, index)) = queue.pop() {
-            let (world, steps) = worlds[index].clone();
-            if !closed.insert(place(&world)) {
-                continue;
-            }
-            if self.is_goal(&world.state) {
-                return Cheapest::Cost(cost(&world.state, steps));
-            }
-            if closed.len() >= most {
-                return Cheapest::Unknown;
-            }
-            for (action, arguments) in &self.instances {
-                let (action, arguments) = (*action, arguments.clone());
-                let step = Step { start_s: steps as f64, action, arguments, duration_s: 0.0 };
-                let Some(next) = self.happen(&world, &[Event::Start(0, &step)]) else { continue };
-                queue.push((Reverse(in_halves(cost(&next.state, steps + 1))), worlds.len()));
-                worlds.push((next, steps + 1));
-            }
-        }
-        Cheapest::Nothing
-    }
-
-    /// Some plan with times: what starts, starts a little after what happened last.
-    pub fn search_timed(&self, most: usize) -> Found {
-        let start = Epoch {
-            world: World { state: self.initial(), running: Vec::new() },
-            plan: Vec::new(),
-            now_s: 0.0,
-            given: 0,
-        };
-        let mut given: Vec<usize> = (0..self.task.timed.len()).collect();
-        given.sort_by(|&one, &other| self.task.timed[one].0.total_cmp(&self.task.timed[other].0));
-        if self.ends_well(&start, &given) {
-            return Found::Plan(Vec::new());
-        }
-        let mut queue = VecDeque::from([start]);
-        let mut made = 0;
-        while let Some(epoch) = queue.pop_front() {
-            for next in self.after(&epoch, &given) {
-                if self.ends_well(&next, &given) {
-                    return Found::Plan(next.plan);
-                }
-                made += 1;
-                if made < most {
-                    queue.push_back(next);
-                }
-            }
-        }
-        Found::Unknown
-    }
-
-    /// True if the goal holds after the last timed literal, if nothing more is done.
-    fn ends_well(&self, epoch: &Epoch, given: &[usize]) -> bool {
-        let mut left = given[epoch.given..].iter();
-        let last =
-            left.try_fold(epoch.world.clone(), |world, &index| self.happen(&world, &[Event::Timed(index)]));
-        epoch.world.running.is_empty() && last.is_some_and(|last| self.is_goal(&last.state))
-    }
-
-    fn after(&self, epoch: &Epoch, given: &[usize]) -> Vec<Epoch> {
-        let end_s = |running: &Running| {
-            let step: &Step = &epoch.plan[running.step];
-            step.start_s + step.duration_s
-        };
-        let mut due: Vec<(f64, Event)> =
-            epoch.world.running.iter().map(|running| (end_s(running), Event::End(running.step))).collect();
-        due.extend(given.get(epoch.given).map(|&index| (self.task.timed[index].0, Event::Timed(index))));
-        due.sort_by(|one, other| one.0.total_cmp(&other.0));
-        let mut all = Vec::new();
-        if let Some((time_s, event)) = due.first()
-            && let Some(world) = self.happen(&epoch.world, std::slice::from_ref(event))
-        {
-            let passed = epoch.given + usize::from(matches!(event, Event::Timed(_)));
-            all.push(Epoch { world, plan: epoch.plan.clone(), now_s: *time_s, given: passed });
-        }
-        let start_s = epoch.now_s + GAP_S;
-        if due.first().is_some_and(|(time_s, _)| time_s - start_s < GAP_S / 2.0) || epoch.plan.len() >= 8 {
-            return all;
-        }
-        for (action, arguments) in &self.instances {
-            for duration_s in self.durations(*action) {
-                let step = Step { start_s, action: *action, arguments: arguments.clone(), duration_s };
-                let clashes = |other_s: f64| (other_s - start_s - duration_s).abs() < GAP_S / 2.0;
-                if duration_s > 0.0 && due.iter().any(|(time_s, _)| clashes(*time_s)) {
-                    continue;
-                }
-                let Some(world) = self.happen(&epoch.world, &[Event::Start(epoch.plan.len(), &step)]) else {
-                    continue;
-                };
-                let plan = epoch.plan.iter().cloned().chain([step]).collect();
-                all.push(Epoch { world, plan, now_s: start_s, given: epoch.given });
-            }
-        }
-        all
-    }
-
-    /// The least and the greatest duration of an action; 0 for one that takes no time.
-    pub fn durations(&self, action: usize) -> Vec<f64> {
+    /// Durations to try: the least, the greatest, and one between them; 0 for an action that takes no time.
+    pub fn durations(&self, action: usize, arguments: &[usize], state: &State) -> Vec<f64> {
         let Some(bounds) = &self.task.actions[action].duration else { return vec![0.0] };
-        let mut all: Vec<f64> =
-            bounds.iter().filter_map(|bound| self.number(bound, &self.initial(), &[], 0.0)).collect();
+        let [least, most] =
+            bounds.each_ref().map(|bound| self.number(bound.as_ref()?, state, arguments, 0.0));
+        let Some(least) = least else { return Vec::new() };
+        let most = match &bounds[1] {
+            None => least + 4.0,
+            Some(_) => most.unwrap_or(least),
+        };
+        let mut all = vec![least, most];
         all.dedup();
+        if matches!(
+            bounds,
+            [
+                Some(Number::Fluent(_) | Number::Constant(_)),
+                None | Some(Number::Binary(..) | Number::Fluent(_))
+            ]
+        ) {
+            all.push((least + most) / 2.0);
+        }
+        all.retain(|&duration_s| duration_s > 0.05);
         all
     }
-}
-
-/// State of the search for temporal plans.
-struct Epoch {
-    world: World,
-    plan: Vec<Step>,
-    now_s: f64,
-    given: usize,
-}
-
-fn key(state: &State) -> (u64, Vec<u64>) {
-    (state.facts, state.numbers.iter().map(|number| (number + 0.0).to_bits()).collect())
 }
 
 fn object(term: Term, binding: &[usize]) -> usize {

@@ -64,14 +64,24 @@ pub struct Effect {
     pub change: Change,
 }
 
+/// A number that an action increases or decreases at a rate.
+#[derive(Debug, Clone)]
+pub struct Flow {
+    pub increases: bool,
+    pub fluent: Named,
+    pub per_second: Number,
+}
+
 /// An action; its variables are numbered from 0.
 #[derive(Debug, Clone)]
 pub struct Action {
     pub parameters: Vec<usize>,
-    /// Minimum and maximum duration.
-    pub duration: Option<[Number; 2]>,
+    /// Minimum and maximum duration; `None` inside for no maximum.
+    pub duration: Option<[Option<Number>; 2]>,
     pub condition: [Option<Formula>; 3],
     pub effects: Vec<Effect>,
+    /// Numbers that change while it goes on, with the change per second.
+    pub flows: Vec<Flow>,
 }
 
 /// A rule of a derived predicate.
@@ -113,7 +123,7 @@ impl Task {
     pub fn domain(&self) -> String {
         let mut text =
             "(define (domain d) (:requirements :adl :fluents :durative-actions :duration-inequalities
-  :derived-predicates :timed-initial-literals)
+  :continuous-effects :derived-predicates :timed-initial-literals)
  (:types special - object)
  (:predicates"
                 .to_string();
@@ -171,13 +181,21 @@ fn action_text(index: usize, action: &Action) -> String {
             " (:action a{index} :parameters ({parameters}) :precondition {condition}\n  :effect (and{effects}))\n"
         );
     };
-    let (least, most) = (number(least), number(most));
-    let duration = match least == most {
-        true => format!("(= ?duration {least})"),
-        false => format!("(and (>= ?duration {least}) (<= ?duration {most}))"),
+    let duration = match [least, most].map(|bound| bound.as_ref().map(number)) {
+        [Some(least), Some(most)] if least == most => format!("(= ?duration {least})"),
+        bounds => {
+            let parts = [">=", "<="].into_iter().zip(bounds);
+            let parts =
+                parts.filter_map(|(relation, bound)| Some(format!(" ({relation} ?duration {})", bound?)));
+            format!("(and{})", parts.collect::<String>())
+        }
     };
+    let flows = action.flows.iter().map(|flow| {
+        let how = if flow.increases { "increase" } else { "decrease" };
+        format!(" ({how} {} (* #t {}))", named("f", &flow.fluent), number(&flow.per_second))
+    });
     let effects: String =
-        action.effects.iter().map(|effect| format!(" {}", effect_text(effect, true))).collect();
+        action.effects.iter().map(|effect| format!(" {}", effect_text(effect, true))).chain(flows).collect();
     format!(
         " (:durative-action a{index} :parameters ({parameters}) :duration {duration}
   :condition (and{})\n  :effect (and{effects}))\n",

@@ -389,6 +389,21 @@ fn looks_that_contradict_the_map_prove_nothing() {
 }
 
 #[test]
+fn a_key_that_nobody_knows_is_a_finding_with_the_nearest_one() {
+    let misspelt = |from: &'static str, to: &'static str, words: &[&str]| {
+        let folder = own(&[replace("domain.toml", from, to)]);
+        let output = descry(folder.path(), &["check", "own"]);
+        let (out, err) = shown(&output);
+        assert_eq!(output.status.code(), Some(1), "{to}: {out}{err}");
+        let said = out + &err;
+        words.iter().for_each(|word| assert!(said.contains(word), "{to}: no {word:?} in\n{said}"));
+    };
+    let words = ["unknown field `limits_s`", "did you mean `limit_s`?", "own/domain.toml:"];
+    misspelt("limit_s = 120.0", "limits_s = 120.0", &words);
+    misspelt("limit_s = 120.0", "limit_s = \"long\"", &["expected a number", "own/domain.toml:"]);
+}
+
+#[test]
 fn a_domain_with_a_fault_is_refused_before_anything_begins() {
     let folder = own(&[replace("domain.toml", "\"observe ?from ?on\"", "\"observ ?from ?on\"")]);
     for arguments in

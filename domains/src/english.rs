@@ -49,7 +49,7 @@ const CONTRACTIONS: [(&str, &str); 8] = [
 
 /// Words and fixed expressions that request the same.
 const SAME: [&[&str]; 12] = [
-    &["find", "locate", "seek", "look for", "search for", "hunt for"],
+    &["find", "locate", "seek", "look for", "search for", "hunt for", "i lost"],
     &["pick up", "grab", "grasp", "take", "lift"],
     &["bring", "put", "place", "move", "carry", "take", "deliver", "set"],
     &["to", "on", "onto", "upon", "on top of"],

@@ -11,8 +11,8 @@ use std::sync::Arc;
 
 use descry_perception::laser::KnownShape;
 use descry_perception::recognise::ObjectModel;
-use descry_planner::Source;
-use descry_robots::input::{clipped, read_text};
+use descry_planner::{Diagnostic, Findings, Source, Span};
+use descry_robots::input::{clipped, read_text, toml_problem};
 use include_dir::{Dir, include_dir};
 pub use program_texts::program_texts;
 use serde::Deserialize;
@@ -237,8 +237,18 @@ fn shape(path: &str, text: &str) -> Result<KnownShape, LoadError> {
 }
 
 fn parse<T: for<'de> Deserialize<'de>>(path: &str, text: &str) -> Result<T, LoadError> {
-    toml::from_str(text).map_err(|e| {
-        let drawn = e.to_string().lines().map(clipped).collect::<Vec<_>>().join("\n");
-        LoadError::Toml { path: path.into(), drawn }
-    })
+    toml::from_str(text).map_err(|e| LoadError::Findings { findings: no_toml(path, text, &e) })
+}
+
+/// Finding for a TOML text that cannot be read, with the nearest of the names that could stand there.
+fn no_toml(path: &str, text: &str, error: &toml::de::Error) -> Findings {
+    let at = error.span().unwrap_or_default();
+    let span = Span { source: 0, start: at.start as u32, end: at.end as u32 };
+    let (problem, mend) = toml_problem(error);
+    let mut quoted = error.message().split('`').skip(1).step_by(2);
+    let near = quoted.next().zip(Some(quoted.collect::<Vec<_>>()));
+    let near = near.and_then(|(found, known)| english::nearest(found, &known));
+    let mut finding = Diagnostic::error("unreadable", clipped(&problem), span, "here");
+    finding.help = Some(near.map_or(mend.to_string(), |near| format!("did you mean `{near}`?")));
+    Findings { sources: vec![Source::new(path, text)], list: vec![finding] }
 }

@@ -162,10 +162,23 @@ pub struct Objection {
 pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputError> {
     toml::from_str(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
-        let problem =
-            e.message().replace('\n', " ").replace("f64", "a number").replace("u8", "a number from 0 to 255");
-        InputError::at(file, text, byte, &problem, mend_of(&problem))
+        let (problem, mend) = toml_problem(&e);
+        InputError::at(file, text, byte, &problem, mend)
     })
+}
+
+/// Error of the TOML parser in words for people, and its mend.
+pub fn toml_problem(error: &toml::de::Error) -> (String, &'static str) {
+    const TYPES: [(&str, &str); 4] = [
+        ("f64", "a number"),
+        ("u8", "a number from 0 to 255"),
+        ("usize", "a whole number of at least 0"),
+        ("u64", "a whole number of at least 0"),
+    ];
+    let problem = error.message().replace('\n', " ");
+    let problem = TYPES.iter().fold(problem, |problem, (of, said)| problem.replace(of, said));
+    let mend = mend_of(&problem);
+    (problem, mend)
 }
 
 fn mend_of(problem: &str) -> &'static str {

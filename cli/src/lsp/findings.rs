@@ -175,14 +175,6 @@ fn of_error(
     let whole = |path: &str| (PathBuf::from(path), Span::default());
     let first = folder.join("domain.toml");
     match error {
-        LoadError::Toml { path, drawn } => {
-            let text = files.values().find(|(name, _)| name == path).map_or("", |(_, text)| text);
-            let said: Vec<&str> = drawn
-                .lines()
-                .filter(|line| !line.contains('|') && !line.starts_with("TOML parse error"))
-                .collect();
-            (PathBuf::from(path), toml_place(text, drawn), said.join("\n").trim().to_string())
-        }
         LoadError::File { path, because, expected } => {
             let (file, span) = if files.values().any(|(name, _)| name == path) {
                 whole(path)
@@ -193,19 +185,6 @@ fn of_error(
         }
         other => (first, Span::default(), other.to_string()),
     }
-}
-
-/// Span named by `TOML parse error at line L, column C`, to the end of that line.
-fn toml_place(text: &str, drawn: &str) -> Span {
-    let number = |before: &str| {
-        let (_, rest) = drawn.split_once(before)?;
-        rest.split(|c: char| !c.is_ascii_digit()).next()?.parse::<usize>().ok()
-    };
-    let (line, column) = (number("at line ").unwrap_or(1).max(1), number("column ").unwrap_or(1).max(1));
-    let start: usize = text.split_inclusive('\n').take(line - 1).map(str::len).sum();
-    let rest = text[start..].lines().next().unwrap_or_default();
-    let from = start + rest.chars().take(column - 1).map(char::len_utf8).sum::<usize>();
-    Span { source: 0, start: from as u32, end: (start + rest.len()).max(from) as u32 }
 }
 
 /// Groups findings by file.

@@ -27,14 +27,6 @@ pub enum LoadError {
         /// Expected content.
         expected: &'static str,
     },
-    /// A TOML file is invalid; the drawing points at the place.
-    #[error("{path}\n{drawn}")]
-    Toml {
-        /// The file.
-        path: String,
-        /// The error under the text.
-        drawn: String,
-    },
     /// The PDDL text has errors, or a value in `domain.toml` is out of range.
     #[error("{}", .findings.render(false))]
     Findings {

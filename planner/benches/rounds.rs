@@ -8,13 +8,9 @@ use descry_planner::{
 };
 use divan::Bencher;
 
-const TABLETOP: (&str, [&str; 3]) = (
+const TABLETOP: (&str, [&str; 2]) = (
     include_str!("../../domains/tabletop/domain.pddl"),
-    [
-        include_str!("rounds/tabletop-1.pddl"),
-        include_str!("rounds/tabletop-2.pddl"),
-        include_str!("rounds/tabletop-3.pddl"),
-    ],
+    [include_str!("rounds/tabletop-1.pddl"), include_str!("rounds/tabletop-2.pddl")],
 );
 const HOME: (&str, [&str; 5]) = (
     include_str!("../../domains/home/domain.pddl"),

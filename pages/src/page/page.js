@@ -18,6 +18,9 @@ const isoDate = unix_s => {
   return `${date.getFullYear()}-${two(date.getMonth() + 1)}-${two(date.getDate())} ${two(date.getHours())}:${two(date.getMinutes())}`;
 };
 
+const verdicts = { achieved: "achieved", not_found: "not found", cannot_tell: "cannot tell", impossible: "cannot be done", failed: "failed" };
+const inWords = report => (report.answer ? report.answer + "; " : "") + (verdicts[report.verdict] ?? report.verdict);
+
 // The top: what was asked, how it ended, and the figures.
 function head() {
   $("goal").textContent = story.goal;
@@ -26,10 +29,9 @@ function head() {
   verdict.replaceChildren();
   $("facts").replaceChildren();
   if (report) {
-    const words = { achieved: "achieved", not_found: "not found", cannot_tell: "cannot tell", impossible: "cannot be done", failed: "failed" };
     verdict.classList.toggle("no", report.verdict !== "achieved");
     const bold = document.createElement("b");
-    bold.textContent = (report.answer ? report.answer + "; " : "") + (words[report.verdict] ?? report.verdict);
+    bold.textContent = inWords(report);
     verdict.append(bold, ": " + report.why);
   } else {
     verdict.textContent = over ? "The run has not finished." : "The run is under way.";
@@ -40,6 +42,10 @@ function head() {
   }
   const facts = [["in PDDL", story.pddl], ["on the body's clock", seconds(story.ends_s)], ["looks", story.looks.length], ["plans", story.plans.length]];
   if (story.wanted) facts.unshift(["wanted", story.wanted]);
+  if (report?.position_m) {
+    const spread = report.position_sigma_m === null ? "" : ` \u00b1 ${(report.position_sigma_m * 1000).toFixed(0)} mm`;
+    facts.push(["position", `(${report.position_m.map(v => v.toFixed(3)).join(", ")}) m${spread}`]);
+  }
   if (report) facts.push(["driven", `${report.distance_m.toFixed(1)} m`], ["asked for", report.threshold]);
   if (story.begun_unix_s) facts.push(["begun", isoDate(story.begun_unix_s)]);
   for (const [name, value] of facts) {
@@ -71,13 +77,20 @@ function way(from, to) {
   return [from, to];
 }
 
+// Name of the viewpoint of the look at this time: the place in the step under way that is no surface and no room.
+function viewpoint(at_s) {
+  const [, ...places] = story.deeds.findLast(d => d.from_s <= at_s + 1e-6)?.call.replace(/[()]/g, "").split(" ") ?? [];
+  const areas = new Set([...story.map.surfaces, ...story.map.rooms].map(a => a.name.toLowerCase().replaceAll(" ", "-")));
+  return places.find(place => !areas.has(place));
+}
+
 // The map, seen from above: rooms, surfaces, where the body stood, what each look took in, what is believed.
 function mapOf(at) {
   const svg = $("map");
   svg.replaceChildren();
   const path = points => points.map(([x, y]) => `${x},${-y}`).join(" ");
   const all = [...story.map.rooms, ...story.map.surfaces].flatMap(a => a.outline_m)
-    .concat(story.stands.map(s => [s.x_m, s.y_m]), story.beliefs.flatMap(b => b.objects.map(o => o.position_m)));
+    .concat(story.looks.flatMap(l => l.corners_m.slice(2)), story.stands.map(s => [s.x_m, s.y_m]), story.beliefs.flatMap(b => b.objects.map(o => o.position_m)));
   const [xs, ys] = [0, 1].map(k => all.map(p => p[k]));
   const least = list => list.length ? Math.min(...list) : -1, most = list => list.length ? Math.max(...list) : 1;
   const box = [least(xs) - .4, -most(ys) - .4, most(xs) - least(xs) + .8, most(ys) - least(ys) + .8];
@@ -113,6 +126,13 @@ function mapOf(at) {
   const stood = story.stands.filter(s => s.at_s <= at + 1e-6);
   shape(svg, "polyline", { points: path(stood.flatMap((s, n) => n ? way([stood[n - 1].x_m, stood[n - 1].y_m], [s.x_m, s.y_m]).slice(1) : [[s.x_m, s.y_m]])), fill: "none", stroke: "var(--done)", "stroke-width": .13 * em, "stroke-dasharray": `${.45 * em} ${.35 * em}` });
   stood.forEach((s, n) => shape(svg, "circle", { cx: s.x_m, cy: -s.y_m, r: .22 * em, fill: n === stood.length - 1 ? "var(--now)" : "var(--done)" }));
+  const seen = new Set();
+  for (const s of stood) {
+    const name = viewpoint(s.at_s);
+    if (!name || seen.has(name)) continue;
+    seen.add(name);
+    named.push({ x: s.x_m, y: s.y_m - 1.1 * em, name, step: -1, more: { fill: "var(--done)" } });
+  }
   const body = stood.at(-1);
   if (body) {
     const r = story.body_radius_m;
@@ -127,6 +147,9 @@ function mapOf(at) {
     drawn.append(titled(`${o.name ?? "unknown"} ${o.probability.toFixed(2)}`));
     if (o.name) named.push({ x: o.position_m[0], y: o.position_m[1] + .6 * em, name: o.name, step: 1, more: { fill: colour } });
   }
+  const [x, y] = [box[0] + .8 * em, box[1] + box[3] - .7 * em], length_m = box[2] > 2.5 ? 1 : .2;
+  shape(svg, "path", { d: `M${x},${y - .3 * em} v${.3 * em} h${length_m} v${-.3 * em}`, fill: "none", stroke: "var(--faint)", "stroke-width": .12 * em });
+  words(x + length_m / 2, -y + .5 * em, `${length_m} m`, { fill: "var(--faint)" });
   // Names of neighbours make room for each other: those of objects upwards, those of surfaces downwards.
   const set = [];
   for (const { x, y: from, name, step, more } of named.sort((a, b) => a.step - b.step || a.step * (a.y - b.y))) {
@@ -177,8 +200,9 @@ function planOf(at) {
 function sureOf(at) {
   // Several things may be asked for: of each, how it stands by now.
   const by = latest(story.known, at)?.at_s;
-  $("known").textContent = story.known.filter(k => k.at_s === by).map(k => k.text).join(" ") || "Nothing was looked at yet.";
-  $("known").hidden = !story.known.length;
+  const looked = story.looks.some(l => l.at_s <= at + 1e-6);
+  $("known").textContent = story.known.filter(k => k.at_s === by).map(k => k.text).join(" ") || (looked ? "Nothing was judged yet." : "Nothing was looked at yet.");
+  $("known").hidden = story.report !== null && !story.known.length;
   $("sought").textContent = story.sought.map((s, n) => `sought${story.sought.length > 1 ? ` ${n + 1}` : ""}: ${s.name}, ${s.wanted} is wanted`).join("; ");
   const svg = $("sure"), lines = curves();
   svg.replaceChildren();
@@ -188,22 +212,26 @@ function sureOf(at) {
   const high = Math.max(300, 40 + 14 * lines.length), left = 34, right = Math.min(wide * .45, 26 + 6.6 * longest), low = high - 26;
   svg.setAttribute("viewBox", `0 0 ${wide} ${high}`);
   svg.style.height = `${high}px`;
-  const x = s => left + s / Math.max(story.ends_s, 1e-9) * (wide - left - right), y = p => low - p * (low - 12);
+  // What the last look changed has a line of its own behind it.
+  const until_s = 1.06 * Math.max(story.ends_s, 1e-9);
+  const x = s => left + s / until_s * (wide - left - right), y = p => low - p * (low - 12);
+  const wanted = [...new Set([...story.sought.map(s => s.wanted), ...(story.report ? [story.report.threshold] : [])])].filter(p => p <= 1);
   for (const p of [0, .25, .5, .75, 1]) {
     shape(svg, "line", { x1: left, x2: wide - right, y1: y(p), y2: y(p), stroke: "var(--line)" });
-    shape(svg, "text", { x: left - 6, y: y(p) + 4, "text-anchor": "end" }, p);
+    if (!wanted.some(w => Math.abs(w - p) < .06)) shape(svg, "text", { x: left - 6, y: y(p) + 4, "text-anchor": "end" }, p);
   }
-  const wanted = [...new Set([...story.sought.map(s => s.wanted), ...(story.report ? [story.report.threshold] : [])])];
-  for (const p of wanted.filter(p => p <= 1)) {
-    shape(svg, "line", { x1: left, x2: wide - right, y1: y(p), y2: y(p), stroke: "var(--known)", "stroke-dasharray": "5 4" });
-    shape(svg, "text", { x: left + 4, y: y(p) - 4, style: "fill:var(--known)" }, `wanted: ${p}`);
+  for (const p of wanted) {
+    shape(svg, "line", { x1: left - 4, x2: wide - right, y1: y(p), y2: y(p), stroke: "var(--known)", "stroke-dasharray": "5 4" });
+    shape(svg, "text", { x: left - 6, y: y(p) + 4, "text-anchor": "end", style: "fill:var(--known);font-weight:600" }, p).append(titled(`wanted: ${p}`));
   }
   const ends = [];
   lines.forEach(({ name, values, is_sought }, n) => {
-    const colour = is_sought ? "var(--known)" : `hsl(${n * 360 / lines.length + 210} 60% 50%)`;
+    // The greens belong to what is sought.
+    const hue = 170 + 270 * n / lines.length;
+    const colour = is_sought ? "var(--known)" : `light-dark(hsl(${hue} 60% 30%), hsl(${hue} 60% 70%))`;
     let points = `${x(0)},${y(0)}`, last = 0;
     for (const [at_s, value] of values) { points += ` ${x(at_s)},${y(last)}`; last = Math.min(1, Math.max(0, value)); points += ` ${x(at_s)},${y(last)}`; }
-    shape(svg, "polyline", { points: points + ` ${x(story.ends_s)},${y(last)}`, fill: "none", stroke: colour, "stroke-width": is_sought ? 3 : 1.5 });
+    shape(svg, "polyline", { points: points + ` ${x(until_s)},${y(last)}`, fill: "none", style: `stroke:${colour}`, "stroke-width": is_sought ? 3 : 1.5 });
     ends.push({ name, colour, from: y(last), y: y(last) + 4 });
   });
   // Names stand at the ends of their lines; where they would cover each other they make room, and a thread leads back.
@@ -232,7 +260,7 @@ let gl = null, program = null, inputs = {}, clouds = new Map(), turning = false,
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 function beginSpace() {
   const canvas = $("cloud");
-  gl = canvas.getContext("webgl", { antialias: false });
+  gl = canvas.getContext("webgl", { antialias: false, preserveDrawingBuffer: true });
   if (!gl) return;
   const part = (kind, text) => { const s = gl.createShader(kind); gl.shaderSource(s, text); gl.compileShader(s); return s; };
   program = gl.createProgram();
@@ -353,9 +381,10 @@ function drawLabels(paper, seen, wide, high, scale, at) {
   }
 }
 
-// What was said, and the moment that all parts show.
+// What was said, the verdict last, and the moment that all parts show.
+const moments = () => story.report ? [...story.moments, { at_s: story.ends_s, what: "verdict", head: "verdict", text: `${inWords(story.report)}: ${story.report.why}` }] : story.moments;
 function said() {
-  $("said").replaceChildren(...story.moments.map(moment => {
+  $("said").replaceChildren(...moments().map(moment => {
     const item = document.createElement("li"), time = document.createElement("time"), text = document.createElement("pre");
     item.className = moment.what;
     time.textContent = seconds(moment.at_s);
@@ -374,7 +403,7 @@ function go(s) {
   $("time").value = at;
   $("now").textContent = seconds(at);
   const items = [...$("said").children];
-  const current = story.moments.findLastIndex(m => m.at_s <= at + 1e-6);
+  const current = moments().findLastIndex(m => m.at_s <= at + 1e-6);
   items.forEach((item, n) => item.classList.toggle("now", n === current));
   if (current >= 0) $("said").scrollTop = items[current].offsetTop - $("said").offsetTop - 60;
   mapOf(at); planOf(at); sureOf(at); redraw();

@@ -133,12 +133,20 @@ fn a_value_of_the_file_may_be_given_on_the_command_line() {
     let changed = plain.replace("runs = 2", "runs = 5").replace("cup A", "cup B");
     assert_ne!(plain, set);
     assert_eq!(set, changed, "nothing else differs");
+    let added = of(&["--set", "goal.0.absent_share=0.5", "--set", "position_tolerance_m=0.1"]);
+    let plain = plain.lines().collect::<Vec<_>>();
+    let more: Vec<&str> =
+        added.lines().map(str::trim).filter(|line| !plain.iter().any(|l| l.trim() == *line)).collect();
+    assert!(more.iter().any(|line| line.ends_with("position_tolerance_m = 0.1")), "{more:?}");
+    assert!(more.contains(&"absent_share = 0.5"), "{more:?}");
     for (wrong, words) in [
-        ("goal.1.say=\"x\"", "has: 0"),
-        ("rums=5", "has: about, domain, first_seed, goal"),
-        ("goal=5", "no such key"),
+        ("goal.1.say=\"x\"", "`goal` has one entry, number 0"),
+        ("goals.0.say=\"x\"", "the file has the keys about, domain, first_seed, goal"),
+        ("rums=5", "(with --set rums=5):1:1: unknown field `rums`, expected one of `name`"),
+        ("goal.0.absent_shar=5", "unknown field `absent_shar`, expected one of `say`"),
+        ("goal=5", "`goal` has one entry, number 0"),
         ("runs", "expected KEY=VALUE"),
-        ("runs=five of them", "no TOML value"),
+        ("runs=five of them", "a text needs quotes: 'runs=\"five of them\"'"),
         ("runs=5\nfirst_seed=2", "no TOML value"),
     ] {
         check_refused(folder.path(), &["experiment", "batch.toml", "--set", wrong], 2, &[words]);

@@ -20,7 +20,7 @@ pub enum ExperimentError {
     },
     /// The folder holds another experiment.
     #[error(
-        "{path} belongs to another experiment\n  found: {} with hash {}, {} jobs, version {}\n  expected: {} with hash {}, {} jobs, version {}\n  name another folder with --out, or remove this one",
+        "{path} belongs to another experiment\n  found: {} with hash {}, {} jobs, version {}\n  expected: {} with hash {}, {} jobs, version {}\n  give the same --set as before, name another folder with --out, or remove this one",
         found.experiment, found.hash, found.jobs, found.version, expected.experiment, expected.hash, expected.jobs, expected.version
     )]
     Another {

@@ -26,6 +26,12 @@ impl Job {
             factors: factors.into_iter().map(|(name, value)| (name.to_string(), value)).collect(),
         }
     }
+
+    /// Adds the seed of the run as a column; it follows from the factors and is no part of the ID.
+    pub fn with_seed(mut self, seed: u64) -> Self {
+        self.factors.insert("seed".into(), seed.into());
+        self
+    }
 }
 
 /// Result of a job: rows of measurements, the same on every machine, and wall-clock times.

@@ -186,13 +186,13 @@ fn perform(
     }
     done.append(&mut own);
     let mine = |number: &usize| options.shard.is_none_or(|shard| number % shard.of == shard.index);
-    let todo: Vec<usize> =
-        (0..jobs.len()).filter(mine).filter(|&n| !done.contains_key(&jobs[n].id)).collect();
+    let (finished, todo): (Vec<usize>, Vec<usize>) =
+        (0..jobs.len()).filter(mine).partition(|&n| done.contains_key(&jobs[n].id));
     let scratch = folder.join("scratch");
     let finished = runner::run(
         kind,
         jobs,
-        &todo,
+        (&todo, finished.len()),
         options.threads,
         (&scratch, options.least_free_bytes),
         (&options.stop, options.tell),

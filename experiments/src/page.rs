@@ -30,14 +30,27 @@ const STYLE: &str = "
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--ground); max-width: 100rem; margin: 2rem auto; padding: 0 1.5rem; }
 h1 { margin-bottom: 0; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); } h3 { margin: 1.8rem 0 .4rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .2rem .5rem; text-align: left; border-bottom: 1px solid var(--line); white-space: nowrap; }
-th { border-bottom: 2px solid var(--faint); } th.n, td.n { text-align: right; } tbody tr:hover { background: var(--field); }
+th, td { padding: .2rem .5rem; text-align: left; border-bottom: 1px solid var(--line); vertical-align: top; } td { white-space: nowrap; }
+td.t { white-space: normal; } td i { display: block; font-style: normal; font-size: 80%; color: var(--faint); }
+th { border-bottom: 2px solid var(--faint); vertical-align: bottom; } th.n, td.n { text-align: right; } tbody tr:hover { background: var(--field); }
 .scroll { overflow-x: auto; } .note { color: var(--faint); margin: .4rem 0 0; max-width: 60rem; } #live { color: var(--now); }
-figure { margin: 1.2rem 0; overflow-x: auto; } figure svg { max-width: 100%; min-width: 34rem; height: auto; border-radius: 8px; } progress { width: 100%; accent-color: var(--done); }
+figure { margin: 1.2rem 0; } figure svg { display: block; width: 100%; max-width: 40rem; height: auto; } figure svg .paper { display: none; }
+progress { width: 100%; accent-color: var(--done); }
 pre { background: var(--field); padding: 1rem; overflow-x: auto; } dl { display: grid; grid-template-columns: max-content minmax(0, 1fr); gap: .1rem 1rem; }
 dt { color: var(--faint); } dd { margin: 0; font-family: ui-monospace, monospace; font-size: 90%; overflow-wrap: anywhere; }
-@media (max-width: 600px) { body { padding: 0 .8rem; } th, td { padding: .2rem .45rem; } }
-@media (prefers-color-scheme: dark) { figure svg { filter: invert(1) hue-rotate(180deg); } }
+@media screen and (max-width: 600px) {
+  body { padding: 0 .8rem; } dl { display: block; } thead { display: none; } table, tbody, tr, td { display: block; }
+  tr { border-bottom: 2px solid var(--line); padding: .4rem 0; }
+  td, td.n { display: flex; gap: .6rem; align-items: baseline; white-space: normal; text-align: right; border: 0; padding: .1rem 0; }
+  td::before { content: attr(data-name); color: var(--faint); text-align: left; margin-right: auto; } td i { white-space: nowrap; }
+}
+@media screen and (prefers-color-scheme: dark) { figure svg { filter: invert(1) hue-rotate(180deg); } }
+@media print {
+  @page { size: A4 landscape; margin: 12mm; }
+  :root { color-scheme: light; --ground: #fff; --text: #000; --faint: #555; --line: #ccc; --field: #f4f6f8; }
+  body { font-size: 11px; margin: 0; padding: 0; max-width: none; } th, td { padding: .1rem .3rem; }
+  .scroll, pre { overflow: visible; } pre { white-space: pre-wrap; } h2, h3 { break-after: avoid; } tr, figure { break-inside: avoid; } figure svg { max-width: 15cm; }
+}
 ";
 
 /// Progress of a batch.

@@ -13,14 +13,21 @@ use axis::Scale;
 /// Colours distinguishable with any colour vision (Okabe and Ito).
 const COLOURS: [&str; 8] =
     ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8A8A00"];
-const WIDTH: f64 = 760.0;
-const TITLE: f64 = 34.0;
+/// Width of a plot, pixels: its letters stay legible on a telephone.
+const WIDTH: f64 = 480.0;
+/// Margin on the right, pixels.
+const RIGHT: f64 = 24.0;
+/// Height of the axis's numbers and label, pixels.
 const BOTTOM: f64 = 54.0;
-const LEGEND: f64 = 170.0;
+/// Height of a row of the legend, and of a line of the title, pixels.
+const ROW: f64 = 19.0;
 /// Height of the strip of counts under a reliability plot.
 const STRIP: f64 = 64.0;
-/// Average width of a letter in the axes' text, pixels.
+/// Average width of a letter in the axes' text and in the title, pixels.
 const LETTER: f64 = 6.6;
+const TITLE_LETTER: f64 = 7.6;
+/// Maximum number of letters in a line of a category's name.
+const CATEGORY: usize = 20;
 
 /// A point with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,13 +151,13 @@ pub fn lines(
     counts: &[(f64, usize)],
 ) -> String {
     let strip = if counts.is_empty() { 0.0 } else { STRIP };
-    let height = 430.0 + strip;
-    let frame =
-        Frame { left: 66.0, top: TITLE + 8.0, right: WIDTH - LEGEND, bottom: height - BOTTOM - strip };
+    let top = top(title);
+    let frame = Frame { left: 62.0, top, right: WIDTH - RIGHT, bottom: top + 290.0 };
+    let below = frame.bottom + BOTTOM + strip;
     let points = || series.iter().flat_map(|s| &s.points);
     let xs = Scale::new(x.range, points().map(|p| p.at), frame.left, frame.right);
     let ys = Scale::new(y.range, points().flat_map(extent), frame.bottom, frame.top);
-    let mut svg = begin(title, height);
+    let mut svg = begin(title, below + ROW * legend(series).len() as f64);
     grid_across(&mut svg, &ys, &frame);
     for tick in xs.ticks() {
         let at = xs.at(tick);
@@ -199,20 +206,23 @@ pub fn lines(
     if !counts.is_empty() {
         count_strip(&mut svg, &xs, &frame, counts);
     }
-    legend(&mut svg, series);
+    draw_legend(&mut svg, below, series);
     svg + "</svg>\n"
 }
 
 #[doc(hidden)]
 pub fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> String {
-    let row = (10.0 + 13.0 * series.len() as f64).max(26.0);
-    let widest = categories.iter().map(|c| c.chars().count()).max().unwrap_or(0) as f64;
-    let height = TITLE + 8.0 + row * categories.len().max(1) as f64 + BOTTOM;
-    let right = WIDTH - if series.len() > 1 { LEGEND } else { 24.0 };
-    let frame = Frame { left: 24.0 + LETTER * widest, top: TITLE + 8.0, right, bottom: height - BOTTOM };
+    let categories: Vec<Vec<String>> = categories.iter().map(|name| wrapped(name, CATEGORY)).collect();
+    let widest = categories.iter().flatten().map(|line| line.chars().count()).max().unwrap_or(0) as f64;
+    let most_lines = categories.iter().map(Vec::len).max().unwrap_or(1) as f64;
+    let row = (10.0 + 13.0 * most_lines.max(series.len() as f64)).max(26.0);
+    let top = top(title);
+    let bottom = top + row * categories.len().max(1) as f64;
+    let frame = Frame { left: 24.0 + LETTER * widest, top, right: WIDTH - RIGHT, bottom };
+    let named = if series.len() > 1 { series } else { &[] };
     let values = series.iter().flat_map(|s| &s.points).flat_map(extent);
     let xs = Scale::new(x.range, values, frame.left + 8.0, frame.right - 8.0);
-    let mut svg = begin(title, height);
+    let mut svg = begin(title, bottom + BOTTOM + ROW * legend(named).len() as f64);
     for tick in xs.ticks() {
         let at = xs.at(tick);
         let _ = writeln!(
@@ -232,7 +242,10 @@ pub fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> 
                 frame.right - frame.left
             );
         }
-        label(&mut svg, frame.left - 8.0, top + row / 2.0 + 4.0, "end", category);
+        for (line, at) in category.iter().zip(0..) {
+            let y = top + row / 2.0 + 4.0 + 13.0 * (f64::from(at) - (category.len() as f64 - 1.0) / 2.0);
+            label(&mut svg, frame.left - 8.0, y, "end", line);
+        }
     }
     axis_lines(&mut svg, &frame);
     label(&mut svg, (frame.left + frame.right) / 2.0, frame.bottom + 40.0, "middle", &x.label);
@@ -246,9 +259,7 @@ pub fn dots(title: &str, categories: &[String], x: &Axis, series: &[Series]) -> 
             mark(&mut svg, xs.at(p.value), y, n);
         }
     }
-    if series.len() > 1 {
-        legend(&mut svg, series);
-    }
+    draw_legend(&mut svg, bottom + BOTTOM, named);
     svg + "</svg>\n"
 }
 
@@ -257,14 +268,47 @@ fn extent(p: &Point) -> impl Iterator<Item = f64> + use<> {
     [p.value, low, high].into_iter()
 }
 
+/// Splits a text into lines of at most this many letters, at its spaces.
+fn wrapped(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.into()),
+        }
+    }
+    lines
+}
+
+fn title_lines(title: &str) -> Vec<String> {
+    wrapped(title, ((WIDTH - 28.0) / TITLE_LETTER) as usize)
+}
+
+/// Upper end of the plot below its title.
+fn top(title: &str) -> f64 {
+    23.0 + ROW * title_lines(title).len() as f64
+}
+
+/// Begins the drawing; its white ground has the class `paper`, so that a page may use its own.
 fn begin(title: &str, height: f64) -> String {
-    format!(
+    let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" height=\"{height}\" \
          font-family=\"system-ui, 'DejaVu Sans', Arial, sans-serif\" font-size=\"12\" fill=\"#1a1a1a\" role=\"img\">\n\
-         <title>{0}</title>\n<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n\
-         <text x=\"14\" y=\"24\" font-size=\"15\" font-weight=\"600\">{0}</text>\n",
+         <title>{0}</title>\n<rect class=\"paper\" width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
         escaped(title)
-    )
+    );
+    for (line, n) in title_lines(title).iter().zip(0..) {
+        let y = 22.0 + ROW * f64::from(n);
+        let _ = writeln!(
+            svg,
+            r#"<text x="14" y="{y}" font-size="14" font-weight="600">{}</text>"#,
+            escaped(line)
+        );
+    }
+    svg
 }
 
 fn axis_lines(svg: &mut String, f: &Frame) {
@@ -308,20 +352,35 @@ fn count_strip(svg: &mut String, xs: &Scale, f: &Frame, counts: &[(f64, usize)])
     );
 }
 
-#[doc(hidden)]
-pub fn legend(svg: &mut String, series: &[Series]) {
-    let left = WIDTH - LEGEND + 18.0;
+/// Rows of the legend: indices of the series, each with its left end.
+fn legend(series: &[Series]) -> Vec<Vec<(usize, f64)>> {
+    let (mut rows, mut left) = (Vec::new(), WIDTH);
     for (n, s) in series.iter().enumerate() {
-        let y = TITLE + 20.0 + 20.0 * n as f64;
-        let broken = if s.broken { r#" stroke-dasharray="6 4""# } else { "" };
-        let _ = writeln!(
-            svg,
-            r#"<line x1="{left}" y1="{y}" x2="{}" y2="{y}" stroke="{}" stroke-width="1.8"{broken}/>"#,
-            left + 24.0,
-            colour(n)
-        );
-        mark(svg, left + 12.0, y, n);
-        label(svg, left + 32.0, y + 4.0, "start", &s.name);
+        let wide = 48.0 + LETTER * s.name.chars().count() as f64;
+        if rows.is_empty() || left + wide > WIDTH {
+            rows.push(Vec::new());
+            left = 14.0;
+        }
+        rows.last_mut().into_iter().for_each(|row| row.push((n, left)));
+        left += wide;
+    }
+    rows
+}
+
+fn draw_legend(svg: &mut String, top: f64, series: &[Series]) {
+    for (row, at) in legend(series).iter().zip(0..) {
+        let y = top + ROW * f64::from(at);
+        for &(n, left) in row {
+            let broken = if series[n].broken { r#" stroke-dasharray="6 4""# } else { "" };
+            let _ = writeln!(
+                svg,
+                r#"<line x1="{left}" y1="{y}" x2="{}" y2="{y}" stroke="{}" stroke-width="1.8"{broken}/>"#,
+                left + 24.0,
+                colour(n)
+            );
+            mark(svg, left + 12.0, y, n);
+            label(svg, left + 30.0, y + 4.0, "start", &series[n].name);
+        }
     }
 }
 

@@ -21,7 +21,7 @@ const STACK_BYTES: usize = 16 << 20;
 /// Interval between lines of progress where there is no terminal.
 const LINE_EVERY: Duration = Duration::from_secs(15);
 
-/// Runs these jobs and appends each to the journal. Runs record into `scratch`, which is emptied afterwards.
+/// Runs these jobs, `before` others of which are done already, and appends each to the journal. Runs record into `scratch`, which is emptied afterwards.
 /// On a stop, jobs under way do not count. Returns the finished jobs in the order in which they ended.
 ///
 /// # Errors
@@ -30,7 +30,7 @@ const LINE_EVERY: Duration = Duration::from_secs(15);
 pub fn run(
     kind: &dyn Kind,
     jobs: &[Job],
-    todo: &[usize],
+    (todo, before): (&[usize], usize),
     threads: usize,
     (scratch, least_free_bytes): (&Path, u64),
     (stop, tell): (&Stop, fn(&str)),
@@ -57,7 +57,8 @@ pub fn run(
         drop(send);
         let result = match started {
             Ok(()) => {
-                collect(&receive, todo.len(), journal, tell, |job| lacks_room(job, scratch, least_free_bytes))
+                let counts = (before, before + todo.len());
+                collect(&receive, counts, journal, tell, |job| lacks_room(job, scratch, least_free_bytes))
             }
             Err(e) => Err(ExperimentError::Threads { because: e.to_string() }),
         };
@@ -99,13 +100,13 @@ fn lacks_room(job: &Finished, scratch: &Path, least_free_bytes: u64) -> Option<E
 
 fn collect(
     done: &Receiver<Finished>,
-    all: usize,
+    (before, all): (usize, usize),
     journal: &mut Journal,
     tell: fn(&str),
     lacks_room: impl Fn(&Finished) -> Option<ExperimentError>,
 ) -> Result<Vec<Finished>, ExperimentError> {
-    let mut progress = Progress::new(all, tell);
-    let mut finished = Vec::with_capacity(all);
+    let mut progress = Progress::new(before, all, tell);
+    let mut finished = Vec::with_capacity(all - before);
     for job in done {
         if let Some(full) = lacks_room(&job) {
             return Err(full);
@@ -121,7 +122,9 @@ fn collect(
 /// Progress on standard error: a bar on a terminal, occasional lines elsewhere.
 struct Progress {
     bar: Option<ProgressBar>,
+    /// Number of all jobs, of those done before, and of those done by now.
     all: usize,
+    before: usize,
     done: usize,
     failed: usize,
     began: Instant,
@@ -130,15 +133,21 @@ struct Progress {
 }
 
 impl Progress {
-    fn new(all: usize, tell: fn(&str)) -> Self {
+    fn new(before: usize, all: usize, tell: fn(&str)) -> Self {
+        if before > 0 {
+            tell(&format!("{before} of {all} jobs are done already"));
+        }
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(all as u64);
             let style = ProgressStyle::with_template("{bar:40} {pos}/{len} jobs, {eta} left {msg}");
             style.map(|style| bar.set_style(style)).ok();
+            bar.set_position(before as u64);
+            bar.reset_eta();
             bar.enable_steady_tick(Duration::from_millis(500));
             bar
         });
-        Self { bar, all, done: 0, failed: 0, began: Instant::now(), last_line: Instant::now(), tell }
+        let now = Instant::now();
+        Self { bar, all, before, done: before, failed: 0, began: now, last_line: now, tell }
     }
 
     fn one_more(&mut self, failed: bool) {
@@ -151,10 +160,10 @@ impl Progress {
             bar.inc(1);
         } else if self.last_line.elapsed() > LINE_EVERY || self.done == self.all {
             self.last_line = Instant::now();
-            let left_s =
-                self.began.elapsed().as_secs_f64() / self.done as f64 * (self.all - self.done) as f64;
+            let each_s = self.began.elapsed().as_secs_f64() / (self.done - self.before) as f64;
+            let left_s = each_s * (self.all - self.done) as f64;
             let (done, all, failed) = (self.done, self.all, self.failed);
-            (self.tell)(&format!("{done}/{all} jobs, {failed} failed, about {left_s:.0} s left"));
+            (self.tell)(&format!("{done} of {all} jobs, {failed} failed, about {left_s:.0} s left"));
         }
     }
 

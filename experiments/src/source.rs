@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use descry_agent::shell;
+
 use crate::error::ExperimentError;
 use crate::overrides;
 
@@ -10,8 +12,10 @@ use crate::overrides;
 pub struct Source {
     /// Path, as given.
     pub path: PathBuf,
-    /// Text.
+    /// Text, with the assignments carried out.
     pub text: String,
+    /// Assignments of the command line, as given.
+    pub assignments: Vec<String>,
 }
 
 impl Source {
@@ -26,30 +30,42 @@ impl Source {
                 &format!("{e}\n  expected an experiment: a TOML file, as those in domains/*/experiments"),
             )
         })?;
-        Ok(Self { path: path.to_path_buf(), text })
+        Ok(Self { path: path.to_path_buf(), text, assignments: Vec::new() })
     }
 
-    /// Replaces one value of the file by an assignment `KEY=VALUE`: a path of keys and numbers, and a TOML
-    /// value.
+    /// Gives a key of the file another value by an assignment `KEY=VALUE`: a path of keys and numbers, and a
+    /// TOML value. A key that the file leaves out is added.
     ///
     /// # Errors
-    /// [`ExperimentError::Input`] if the file has no such key, or the text is not an assignment.
+    /// [`ExperimentError::Input`] if the path leaves the file, or the text is not an assignment.
     pub fn set(&mut self, assignment: &str) -> Result<(), ExperimentError> {
-        let refused = |problem: &str, mend: String| {
-            ExperimentError::Input(format!("--set {assignment}: {problem}\n  {mend}"))
-        };
-        let expected = || "expected KEY=VALUE, such as first_seed=7 or set.1.arrangements=10".to_owned();
-        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("no value", expected()))?;
+        let refused = |problem: String| ExperimentError::Input(format!("--set {assignment}: {problem}"));
+        let expected = "expected KEY=VALUE, such as first_seed=7 or set.1.arrangements=10";
+        let (key, value) =
+            assignment.split_once('=').ok_or_else(|| refused(format!("no value\n  {expected}")))?;
         if toml::from_str::<toml::Table>(&format!("value = {value}")).map_or(true, |one| one.len() != 1) {
-            return Err(refused("this is no TOML value", expected()));
+            let quoted = format!("'{key}=\"{}\"'", value.trim());
+            return Err(refused(format!(
+                "this is no TOML value\n  {expected}; a text needs quotes: {quoted}"
+            )));
         }
-        match overrides::value_at(&self.text, key.trim()) {
-            Ok(span) => self.text.replace_range(span, value.trim()),
-            Err(known) => {
-                let mend = format!("{} has: {}", self.path.display(), known.join(", "));
-                return Err(refused("the file has no such key", mend));
-            }
-        }
+        self.text = overrides::with(&self.text, key.trim(), value.trim()).map_err(refused)?;
+        self.assignments.push(assignment.to_owned());
         Ok(())
+    }
+
+    /// Its path for messages, with the assignments.
+    pub(crate) fn label(&self) -> String {
+        match self.assignments.is_empty() {
+            true => self.path.display().to_string(),
+            false => format!("{} (with --set {})", self.path.display(), self.assignments.join(" --set ")),
+        }
+    }
+
+    /// The file with the assignments, as words of a command line.
+    pub fn words(&self) -> String {
+        let file = shell::word(&self.path.display().to_string());
+        let set = self.assignments.iter().map(|assignment| format!(" --set {}", shell::word(assignment)));
+        file + &set.collect::<String>()
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Rates get Wilson's score interval. Everything else gets a percentile bootstrap that resamples whole
 //! *groups* (all runs in one scene), since runs in the same scene are not independent; its seed is fixed, so
-//! the same rows give the same interval. For shares of 0 or 1 the bootstrap is degenerate; they get Wilson's
-//! interval with the number of groups as observations.
+//! the same rows give the same interval. Fewer than [`LEAST_GROUPS`] groups get none. For shares of 0 or 1 the
+//! bootstrap is degenerate; they get Wilson's interval with the number of groups as observations.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +13,14 @@ use serde::Serialize;
 const Z_95: f64 = 1.959_963_984_540_054;
 /// Number of bootstrap resamples.
 const RESAMPLES: usize = 2000;
-/// Seed of the bootstrap.
+/// Minimum number of groups for a bootstrap interval. From: the first that has more distinct resamples
+/// (6435, the multisets of 8 out of 8) than are drawn; with 2 there are 3, and no interval follows from them.
+pub const LEAST_GROUPS: usize = 8;
+/// Maximum number of groups whose signs are flipped in all combinations; beyond, [`FLIPS`] are drawn.
+const MOST_EXACT: usize = 12;
+/// Number of random combinations of signs.
+const FLIPS: u32 = 10_000;
+/// Seed of the bootstrap and of the random signs.
 const SEED: u64 = 4;
 
 /// A measured value with its interval.
@@ -21,7 +28,7 @@ const SEED: u64 = 4;
 pub struct Estimate {
     /// Value.
     pub value: f64,
-    /// 95 % interval; none if the sample is too small.
+    /// 95 % interval; none if there are too few groups.
     pub interval: Option<[f64; 2]>,
     /// Number of observations.
     pub n: usize,
@@ -76,13 +83,12 @@ pub fn ratio(pairs: &[Pair]) -> Option<Estimate> {
 /// Replaces the degenerate bootstrap interval of a share of 0 or 1 by Wilson's interval, each group counting
 /// once.
 fn at_an_end(found: Estimate, groups: usize) -> Estimate {
-    match found.interval {
-        Some([low, high]) if low == high && (low == 0.0 || low == 1.0) => {
-            let hits = if low == 1.0 { groups } else { 0 };
-            Estimate { interval: rate(hits, groups).and_then(|e| e.interval), ..found }
-        }
-        _ => found,
-    }
+    let hits = match found.value {
+        0.0 => 0,
+        1.0 => groups,
+        _ => return found,
+    };
+    Estimate { interval: rate(hits, groups).and_then(|e| e.interval), ..found }
 }
 
 /// Mean of `a - b`; none without pairs.
@@ -95,6 +101,33 @@ pub fn difference(pairs: &[Pair]) -> Option<Estimate> {
 pub fn saving(pairs: &[Pair]) -> Option<Estimate> {
     let sums = sums(pairs.iter().map(|p| (p.group, [p.a, p.b])));
     estimate(pairs.len(), &sums, |[a, b]| 1.0 - a / b)
+}
+
+/// Two-sided p-value of the sign-flip permutation test (Fisher's randomisation test) for a mean of `a - b` of
+/// 0. The pairs of a group change their signs together; none without pairs.
+pub fn sign_flip(pairs: &[Pair]) -> Option<f64> {
+    let sums: Vec<f64> =
+        sums(pairs.iter().map(|p| (p.group, [p.a - p.b, 0.0]))).iter().map(|[sum, _]| *sum).collect();
+    let observed = sums.iter().sum::<f64>().abs() * (1.0 - 1e-9);
+    let is_extreme = |flipped: &dyn Fn(usize) -> bool| {
+        let flip = |(n, sum): (usize, &f64)| if flipped(n) { -sum } else { *sum };
+        sums.iter().enumerate().map(flip).sum::<f64>().abs() >= observed
+    };
+    if sums.is_empty() {
+        return None;
+    }
+    if sums.len() <= MOST_EXACT {
+        let all = 1u32 << sums.len();
+        let extreme = (0..all).filter(|signs| is_extreme(&|n| signs >> n & 1 == 1)).count();
+        return Some(extreme as f64 / f64::from(all));
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let extreme = (0..FLIPS).filter(|_| {
+        let signs: Vec<bool> = sums.iter().map(|_| rng.random()).collect();
+        is_extreme(&|n| signs[n])
+    });
+    // The observed signs are one of the combinations.
+    Some((extreme.count() + 1) as f64 / f64::from(FLIPS + 1))
 }
 
 /// Median (the mean of the two middle values); none without values.
@@ -135,7 +168,7 @@ fn estimate(n: usize, groups: &[[f64; 2]], statistic: impl Fn([f64; 2]) -> f64) 
         .collect();
     resampled.sort_by(f64::total_cmp);
     let at = |share: f64| resampled[(share * (resampled.len() - 1) as f64).round() as usize];
-    let interval = (groups.len() > 1 && !resampled.is_empty()).then(|| [at(0.025), at(0.975)]);
+    let interval = (groups.len() >= LEAST_GROUPS && !resampled.is_empty()).then(|| [at(0.025), at(0.975)]);
     Some(Estimate { value, interval, n })
 }
 

@@ -55,26 +55,27 @@ impl Table {
         text
     }
 
-    /// Renders the table as HTML.
+    /// Renders the table as HTML. Each cell has the name of its column, for narrow screens.
     pub fn html(&self) -> String {
-        let class = |c: usize| if self.is_numeric(c) { " class=\"n\"" } else { "" };
-        let line = |row: &[String], tag: &str| {
-            let cells = row
-                .iter()
-                .enumerate()
-                .map(|(c, text)| format!("<{tag}{}>{}</{tag}>", class(c), escaped(text)));
+        let class = |c: usize| if self.is_numeric(c) { "n" } else { "t" };
+        let head = self.head.iter().enumerate();
+        let head = head.map(|(c, text)| format!("<th class=\"{}\">{}</th>", class(c), escaped(text)));
+        let row = |row: &Vec<String>| {
+            let cells = row.iter().zip(&self.head).enumerate().map(|(c, (text, name))| {
+                format!("<td class=\"{}\" data-name=\"{}\">{}</td>", class(c), escaped(name), cell(text))
+            });
             format!("<tr>{}</tr>\n", cells.collect::<String>())
         };
-        let rows: String = self.rows.iter().map(|row| line(row, "td")).collect();
+        let rows: String = self.rows.iter().map(row).collect();
         let note = if self.note.is_empty() {
             String::new()
         } else {
             format!("<p class=\"note\">{}</p>\n", escaped(&self.note))
         };
         format!(
-            "<h3>{}</h3>\n<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n{note}",
+            "<h3>{}</h3>\n<table>\n<thead><tr>{}</tr>\n</thead>\n<tbody>\n{rows}</tbody>\n</table>\n{note}",
             escaped(&self.title),
-            line(&self.head, "th")
+            head.collect::<String>()
         )
     }
 
@@ -89,6 +90,14 @@ impl Table {
     }
 }
 
+/// A cell in HTML, the interval of a value below it.
+fn cell(text: &str) -> String {
+    match text.split_once(" [") {
+        Some((value, interval)) => format!("{}<i>[{}</i>", escaped(value), escaped(interval)),
+        None => escaped(text),
+    }
+}
+
 /// Formats a value with its interval, as `0.98 [0.95, 0.99]`; a dash if there is none.
 pub fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
     match estimate {
@@ -98,6 +107,12 @@ pub fn shown(estimate: Option<Estimate>, decimals: usize) -> String {
             format!("{value:.decimals$} [{low:.decimals$}, {high:.decimals$}]")
         }
     }
+}
+
+/// Formats the numbers of runs behind the values of a plot, as `n = 6` or `n = 4 to 6`.
+pub fn counted(counts: impl Iterator<Item = usize>) -> String {
+    let (least, most) = counts.fold((usize::MAX, 0), |(least, most), n| (least.min(n), most.max(n)));
+    if least < most { format!("n = {least} to {most}") } else { format!("n = {most}") }
 }
 
 /// Formats a number, or a dash.

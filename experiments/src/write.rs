@@ -6,7 +6,6 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use descry_agent::shell;
 use serde_json::{Value, json};
 
 use super::page::{self, Facts, Section};
@@ -42,7 +41,7 @@ pub(super) fn results(
     let numbered: Vec<Numbered<'_>> = finished.iter().enumerate().collect();
     let said = kind.summarise(&numbered);
     let failed = finished.iter().filter(|job| job.error.is_some()).count();
-    let command = format!("descry experiment {}", shell::word(&source.path.display().to_string()));
+    let command = format!("descry experiment {}", source.words());
     let facts: Facts = vec![
         ("command", command.clone()),
         ("hash of the experiment", header.hash.clone()),

@@ -92,11 +92,12 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Result<Exit, CommandErr
             Ok(Exit::Done)
         }
         Ended::Whole(results) => {
-            input::narrate(&format!("{}\n{}", results.tables, results.clock));
-            input::narrate(&format!("results: {}", options.out.join("index.html").display()));
-            if arguments.json {
-                input::print_json(&results.summary)?;
+            match arguments.json {
+                true => input::print_json(&results.summary)?,
+                false => input::print_text(results.tables.trim_end())?,
             }
+            input::narrate(&format!("\n{}", results.clock));
+            input::narrate(&format!("results: {}", options.out.join("index.html").display()));
             Ok(if results.failed == 0 { Exit::Done } else { Exit::No })
         }
     }

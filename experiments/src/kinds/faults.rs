@@ -13,7 +13,8 @@ use descry_robots::sim::{Fault, FaultPlan, SceneSpec};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::trial::{self, Measured, Trial};
+use super::paired;
+use super::trial::{self, Measured, NOTE, Trial};
 use crate::error::ExperimentError;
 use crate::job::{Job, Numbered, Outcome};
 use crate::kinds::kind::{Head, Kind, Summary, inputs_of, parse, refuse};
@@ -21,7 +22,7 @@ use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::source::Source;
 use crate::statistics::{self, Observation};
-use crate::table::{Table, shown};
+use crate::table::{Table, counted, shown};
 
 /// Keys of a file of this kind.
 #[derive(Debug, Clone, Deserialize)]
@@ -145,6 +146,10 @@ impl Faults {
     fn setting(&self, number: usize) -> (&Case, usize) {
         (&self.text.cases[number / self.text.runs], number % self.text.runs)
     }
+
+    fn seed(&self, run: usize) -> u64 {
+        self.text.first_seed.wrapping_add(run as u64)
+    }
 }
 
 impl Kind for Faults {
@@ -158,7 +163,10 @@ impl Kind for Faults {
 
     fn jobs(&self) -> Vec<Job> {
         let settings = (0..self.text.cases.len() * self.text.runs).map(|number| self.setting(number));
-        settings.map(|(case, run)| Job::new([("case", json!(case.name)), ("run", json!(run))])).collect()
+        let job = |(case, run): (&Case, usize)| {
+            Job::new([("case", json!(case.name)), ("run", json!(run))]).with_seed(self.seed(run))
+        };
+        settings.map(job).collect()
     }
 
     fn run(&self, number: usize, scratch: &Path, stop: &Stop) -> Result<Outcome, String> {
@@ -171,7 +179,7 @@ impl Kind for Faults {
             program: None,
             targets: std::slice::from_ref(&self.text.target),
             present: ((n + 1.0) * share).floor() <= (n * share).floor(),
-            seed: self.text.first_seed.wrapping_add(run as u64),
+            seed: self.seed(run),
             faults: FaultPlan { faults: case.faults.clone() },
             policy: &self.text.policy,
             first_look_here: false,
@@ -195,14 +203,13 @@ impl Kind for Faults {
         };
         let head =
             ["case", "runs", "right", "false declarations", "errors", "mishaps a run", "views", "metres"];
-        let note = "Shares with Wilson's intervals, means with intervals bootstrapped over arrangements, 95 % each. A run that \
-                    ended with an error counts as not right.";
-        let mut table = Table::new("Verdicts", note, &head);
-        let (mut cases, mut points) = (Map::new(), Vec::new());
+        let mut table = Table::new("Verdicts", NOTE, &head);
+        let (mut cases, mut points, mut counts) = (Map::new(), Vec::new(), Vec::new());
         let mut all = (0, 0);
         for (at, case) in self.text.cases.iter().enumerate() {
             let (failed, runs) = read(case);
             let n = runs.len() + failed;
+            counts.push(n);
             let right = runs.iter().filter(|(run, _)| run.right).count();
             let wrong = runs.iter().filter(|(run, _)| run.false_declaration).count();
             all = (all.0 + right, all.1 + n);
@@ -224,10 +231,22 @@ impl Kind for Faults {
             });
             cases.insert(case.name.clone(), values);
         }
+        let of_case = |case: &Case| {
+            let own = finished
+                .iter()
+                .filter(|(n, job)| self.setting(*n).0.name == case.name && job.error.is_none());
+            own.filter_map(|(n, job)| Some(((self.setting(*n).1 as u64, 0), job.rows.first()?))).collect()
+        };
+        let settings: Vec<_> =
+            self.text.cases.iter().map(|case| (case.name.as_str(), of_case(case))).collect();
+        let paired = paired::table("case", &settings).map(Section::Table);
         let overall = statistics::rate(all.0, all.1);
         let plot = Plot::Dots {
             name: "right-by-case".into(),
-            title: "Right verdicts by what goes wrong".into(),
+            title: format!(
+                "Share of right verdicts by injected fault, 95 % interval, {}",
+                counted(counts.into_iter())
+            ),
             categories: self.text.cases.iter().map(|case| case.name.clone()).collect(),
             x: Axis::fixed("share of runs", 0.0, 1.0),
             series: vec![Series { name: self.text.policy.clone(), points, broken: false }],
@@ -236,7 +255,11 @@ impl Kind for Faults {
         let values = json!({ "right": overall, "cases": cases });
         Summary {
             values: values.as_object().cloned().unwrap_or_default(),
-            sections: vec![Section::Text(text), Section::Table(table), Section::Plot(Box::new(plot))],
+            sections: [Section::Text(text), Section::Table(table)]
+                .into_iter()
+                .chain(paired)
+                .chain([Section::Plot(Box::new(plot))])
+                .collect(),
         }
     }
 }

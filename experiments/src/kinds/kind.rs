@@ -111,8 +111,7 @@ pub struct Summary {
 
 /// Parses an experiment file as TOML.
 pub(crate) fn parse<T: serde::de::DeserializeOwned>(source: &Source) -> Result<T, ExperimentError> {
-    input::parse_toml(&source.path.display().to_string(), &source.text)
-        .map_err(|e| ExperimentError::Input(e.to_string()))
+    input::parse_toml(&source.label(), &source.text).map_err(|e| ExperimentError::Input(e.to_string()))
 }
 
 /// The error for an invalid value, drawn under its line.
@@ -123,7 +122,5 @@ pub(crate) fn refuse(
     mend: impl Into<String>,
 ) -> ExperimentError {
     let objection = Objection { path: vec![Step::Key(key)], problem: problem.into(), mend: mend.into() };
-    ExperimentError::Input(
-        input::draw(&source.path.display().to_string(), &source.text, objection).to_string(),
-    )
+    ExperimentError::Input(input::draw(&source.label(), &source.text, objection).to_string())
 }

@@ -3,6 +3,7 @@
 mod faults;
 mod figure_4;
 pub mod kind;
+mod paired;
 mod tasks;
 #[doc(hidden)]
 pub mod trial;

@@ -107,7 +107,7 @@ fn default_tolerance_m() -> f64 {
 }
 
 fn nothing_goes_wrong() -> Vec<Case> {
-    vec![Case { name: "nothing".into(), robot: None, faults: Vec::new() }]
+    vec![Case { name: "none".into(), robot: None, faults: Vec::new() }]
 }
 
 /// The experiment.
@@ -276,6 +276,10 @@ impl Tasks {
         let (run, goal) = (rest / goals.len(), rest % goals.len());
         Setting { goal, case: &cases[case], policy: &policies[policy], run }
     }
+
+    fn seed(&self, run: usize) -> u64 {
+        self.text.first_seed.wrapping_add(run as u64)
+    }
 }
 
 impl Kind for Tasks {
@@ -298,6 +302,7 @@ impl Kind for Tasks {
                 ("case", json!(case.name)),
                 ("policy", json!(policy)),
             ])
+            .with_seed(self.seed(run))
         };
         (0..runs * goals.len() * cases.len() * policies.len()).map(job).collect()
     }
@@ -314,7 +319,7 @@ impl Kind for Tasks {
             program: case.robot.as_ref().map(OtherBody::command),
             targets: &said.targets,
             present,
-            seed: self.text.first_seed.wrapping_add(run as u64),
+            seed: self.seed(run),
             faults: FaultPlan { faults: case.faults.clone() },
             policy,
             first_look_here: false,

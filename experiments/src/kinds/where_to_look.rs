@@ -217,6 +217,12 @@ fn settings(text: &Text) -> Vec<Setting> {
     settings
 }
 
+impl WhereToLook {
+    fn seed(&self, setting: &Setting) -> u64 {
+        self.text.first_seed.wrapping_add(setting.scene as u64)
+    }
+}
+
 impl Kind for WhereToLook {
     fn head(&self) -> &Head {
         &self.head
@@ -234,6 +240,7 @@ impl Kind for WhereToLook {
                 ("poses", json!(s.poses)),
                 ("policy", json!(s.policy)),
             ])
+            .with_seed(self.seed(s))
         };
         self.jobs.iter().map(job).collect()
     }
@@ -249,7 +256,7 @@ impl Kind for WhereToLook {
             program: None,
             targets: std::slice::from_ref(&self.text.target),
             present: setting.present,
-            seed: self.text.first_seed.wrapping_add(setting.scene as u64),
+            seed: self.seed(setting),
             faults: FaultPlan::default(),
             policy: &setting.policy,
             first_look_here: self.text.first_look_from_start,

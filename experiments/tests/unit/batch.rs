@@ -60,7 +60,7 @@ impl Kind for Squares {
 }
 
 fn source() -> Source {
-    Source { path: "squares.toml".into(), text: "kind = \"squares\"".into() }
+    Source { path: "squares.toml".into(), text: "kind = \"squares\"".into(), assignments: Vec::new() }
 }
 
 fn options(out: &Path, shard: Option<Shard>, threads: usize) -> Options {

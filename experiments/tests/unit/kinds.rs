@@ -17,7 +17,7 @@ fn shipped(name: &str) -> String {
 }
 
 fn source(text: String) -> Source {
-    Source { path: "e.toml".into(), text }
+    Source { path: "e.toml".into(), text, assignments: Vec::new() }
 }
 
 #[test]

@@ -13,7 +13,7 @@ fn a_page_holds_everything_and_escapes_it() {
         "<h1>&lt;name&gt;</h1>",
         "<dd>h</dd>",
         "H &amp; I",
-        "<td class=\"n\">1</td>",
+        "<td class=\"n\" data-name=\"a\">1</td>",
         "a = &quot;&lt;b&gt;&quot;",
     ] {
         assert!(page.contains(part), "{part} is not in\n{page}");

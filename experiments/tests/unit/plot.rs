@@ -34,6 +34,7 @@ fn a_plot_says_everything() {
         assert!(svg.contains(part), "{part} is not in\n{svg}");
     }
     assert_eq!(svg.matches("<circle").count(), 4, "three points and one in the legend");
+    assert!(svg.contains(r#"viewBox="0 0 480 "#), "legible on a telephone: {svg}");
     numbers_are_finite(&svg);
 }
 

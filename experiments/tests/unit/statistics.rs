@@ -30,17 +30,35 @@ fn a_share_of_all_or_nothing_is_not_sure() {
     let interval = |a: f64| ratio(&pairs(a)).and_then(|e| e.interval).expect("an interval");
     let wilson = |hits: usize| rate(hits, 16).and_then(|e| e.interval).expect("an interval");
     assert_eq!((interval(3.0), interval(0.0)), (wilson(16), wilson(0)));
+    assert_eq!(ratio(&pairs(3.0)[..2]).and_then(|e| e.interval), rate(2, 2).and_then(|e| e.interval));
     assert!((interval(3.0)[0] - 0.806).abs() < 1e-3 && interval(3.0)[1] == 1.0, "{:?}", interval(3.0));
     assert_eq!(interval(1.5), [0.5, 0.5]);
 }
 
 #[test]
-fn bootstrap_of_two_groups_is_known_exactly() {
-    // Resampling the groups {0} and {10} gives the means 0, 5, 10 with chances 1/4, 1/2, 1/4: the interval is all of it.
-    let found = mean(&alone(&[0.0, 10.0]));
-    assert_eq!(found, Some(Estimate { value: 5.0, interval: Some([0.0, 10.0]), n: 2 }));
-    assert_eq!(mean(&alone(&[3.0])), Some(Estimate { value: 3.0, interval: None, n: 1 }));
-    assert_eq!(mean(&[]), None);
+fn few_groups_have_no_bootstrap_interval() {
+    for (n, has) in [(0, false), (1, false), (2, false), (7, false), (8, true)] {
+        let values: Vec<f64> = (0..n).map(f64::from).collect();
+        let found = mean(&alone(&values));
+        assert_eq!(found.map(|e| e.n), (n > 0).then_some(values.len()));
+        assert_eq!(found.is_some_and(|e| e.interval.is_some()), has, "{n} groups");
+    }
+}
+
+#[test]
+fn signs_are_flipped_by_hand() {
+    let pairs = |differences: &[f64]| -> Vec<Pair> {
+        differences.iter().zip(0..).map(|(&a, group)| Pair { group, a, b: 0.0 }).collect()
+    };
+    // Of the 8 sums of +-1 +-2 +-3 two are as far from 0 as 6, and four as far as 4.
+    assert_eq!(sign_flip(&pairs(&[1.0, 2.0, 3.0])), Some(0.25));
+    assert_eq!(sign_flip(&pairs(&[-1.0, 2.0, 3.0])), Some(0.5));
+    assert_eq!((sign_flip(&pairs(&[0.0, 0.0])), sign_flip(&[])), (Some(1.0), None));
+    let many = sign_flip(&pairs(&[1.0; 20])).unwrap_or(1.0);
+    assert!(many < 1e-3, "{many}");
+    // Copies in one group flip together.
+    let copies: Vec<Pair> = (0..20).map(|n| Pair { group: n / 10, a: 1.0, b: 0.0 }).collect();
+    assert_eq!(sign_flip(&copies), Some(0.5));
 }
 
 #[test]
@@ -55,10 +73,12 @@ fn bootstrap_agrees_with_the_normal_interval_of_a_large_sample() {
 
 #[test]
 fn runs_of_one_group_stay_together() {
-    // Ten copies in each of two groups say no more than two observations.
+    // Ten copies in each of eight groups say no more than eight observations.
+    let values: Vec<f64> = (0..8).map(f64::from).collect();
     let copies: Vec<Observation> =
-        (0..20).map(|i| Observation { group: i / 10, value: if i < 10 { 0.0 } else { 10.0 } }).collect();
-    assert_eq!(mean(&copies).and_then(|e| e.interval), Some([0.0, 10.0]));
+        (0..80).map(|i| Observation { group: i / 10, value: values[(i / 10) as usize] }).collect();
+    let interval = |observed: &[Observation]| mean(observed).and_then(|e| e.interval);
+    assert_eq!(interval(&copies), interval(&alone(&values)));
 }
 
 #[test]

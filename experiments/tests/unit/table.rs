@@ -9,7 +9,11 @@ fn markdown_is_aligned_and_html_escaped() {
     table.rows = vec![vec!["a|b".into(), "12.5".into()], vec!["<c>".into(), "-".into()]];
     let expected = "### T\n\n| policy | views |\n|--------|------:|\n| a\\|b   |  12.5 |\n| <c>    |     - |\n\nA note.\n";
     assert_eq!(table.markdown(), expected);
-    assert!(table.html().contains("<td>&lt;c&gt;</td><td class=\"n\">-</td>"));
+    let cells =
+        "<td class=\"t\" data-name=\"policy\">&lt;c&gt;</td><td class=\"n\" data-name=\"views\">-</td>";
+    assert!(table.html().contains(cells), "{}", table.html());
+    table.rows = vec![vec!["x".into(), "0.98 [0.90, 1.00]".into()]];
+    assert!(table.html().contains(">0.98<i>[0.90, 1.00]</i></td>"), "{}", table.html());
 }
 
 #[test]

@@ -54,6 +54,7 @@ pub(super) fn row(goal: &GoalText, tolerance_m: f64, present: bool, lived: &Live
         "on": report.on,
         "true_on": report.true_on,
         "mishaps": truth.events.len(),
+        "arrangement": lived.arrangement,
         "why": report.why,
     });
     let mut row = value.as_object().cloned().unwrap_or_default();

@@ -6,13 +6,13 @@ use serde_json::{Map, Value, json};
 use super::Tasks;
 use crate::job::{Numbered, Row};
 use crate::kinds::kind::Summary;
+use crate::kinds::paired;
+use crate::kinds::trial::NOTE;
 use crate::page::Section;
 use crate::plot::{Axis, Plot, Point, Series};
 use crate::statistics::{self, Estimate, Observation};
-use crate::table::{Table, shown};
+use crate::table::{Table, counted, shown};
 
-const NOTE: &str = "Shares with Wilson's intervals, means with intervals bootstrapped over arrangements, 95 % each. A run that \
-                    ended with an error counts as not right.";
 const HEAD: [&str; 11] = [
     "",
     "policy",
@@ -20,7 +20,7 @@ const HEAD: [&str; 11] = [
     "right",
     "false yes",
     "false not there",
-    "looks",
+    "views",
     "metres",
     "seconds",
     "replans",
@@ -137,8 +137,17 @@ pub(super) fn summarise(experiment: &Tasks, finished: &[Numbered<'_>]) -> Summar
         text.cases.iter().map(|case| (case.name.clone(), those(&|r| r.case == case.name))).collect();
     let (all, overall) = table("All runs", &[("all".into(), those(&|_| true))], &text.policies);
     let (goals, goal_values) = table("By goal", &by_goal, &text.policies);
-    let (cases, case_values) = table("By what goes wrong", &by_case, &text.policies);
-    let mut sections = vec![Section::Table(all), Section::Table(goals), Section::Table(cases)];
+    let (cases, case_values) = table("By injected fault", &by_case, &text.policies);
+    let parts = [(by_goal.len(), goals), (by_case.len(), cases)];
+    // A division into one part says what all runs say.
+    let parts = parts.into_iter().filter(|(parts, _)| *parts > 1).map(|(_, table)| table);
+    let mut sections: Vec<Section> = std::iter::once(all).chain(parts).map(Section::Table).collect();
+    let of_policy = |policy: &'_ String| {
+        let own = runs.iter().zip(finished).filter(|(run, _)| run.policy == policy);
+        own.filter_map(|(run, (n, _))| Some(((run.group, n / text.policies.len()), run.row?))).collect()
+    };
+    let settings: Vec<_> = text.policies.iter().map(|policy| (policy.as_str(), of_policy(policy))).collect();
+    sections.extend(paired::table("policy", &settings).map(Section::Table));
     sections.extend(stages(experiment, &runs).map(Section::Table));
     sections.extend(plots(&text.policies, &by_goal).map(|plot| Section::Plot(Box::new(plot))));
     let values = json!({ "all": overall["all"], "goals": goal_values, "cases": case_values });
@@ -187,6 +196,10 @@ fn plots(policies: &[String], parts: &[(String, Vec<&Run<'_>>)]) -> [Plot; 2] {
         };
         policies.iter().map(of).filter(|series| !series.points.is_empty()).collect()
     };
+    let counts = parts.iter().flat_map(|(_, runs)| {
+        policies.iter().map(|policy| runs.iter().filter(|r| r.policy == policy).count())
+    });
+    let n = counted(counts);
     let categories: Vec<String> = parts.iter().map(|(name, _)| name.clone()).collect();
     let dots = |name: &str, title: &str, x, series| Plot::Dots {
         name: name.into(),
@@ -196,7 +209,17 @@ fn plots(policies: &[String], parts: &[(String, Vec<&Run<'_>>)]) -> [Plot; 2] {
         series,
     };
     [
-        dots("right-by-goal", "Right", Axis::fixed("share of runs", 0.0, 1.0), series(|f| f.shares[0])),
-        dots("seconds-by-goal", "Time until the answer", Axis::free("seconds"), series(|f| f.means[2])),
+        dots(
+            "right-by-goal",
+            &format!("Share of right answers, 95 % interval, {n}"),
+            Axis::fixed("share of runs", 0.0, 1.0),
+            series(|f| f.shares[0]),
+        ),
+        dots(
+            "seconds-by-goal",
+            &format!("Time until the answer, mean, {n}"),
+            Axis::free("seconds of the robot's clock"),
+            series(|f| f.means[2]),
+        ),
     ]
 }

@@ -12,8 +12,8 @@ use crate::statistics::{self, Estimate, Observation, Pair};
 use crate::table::{Table, number, shown};
 
 const BINS: usize = 10;
-const NOTE: &str = "Shares with Wilson's intervals, means with intervals bootstrapped over scenes, 95 % each. A run without the \
-                    right verdict counts with the views that it took.";
+const NOTE: &str = "Shares with Wilson's intervals; means with intervals bootstrapped over scenes, where there are 8 or more; 95 % \
+                    each. Seconds are those of the robot's clock. A run without the right verdict counts with the views that it took.";
 
 /// A run with its setting.
 type Run<'a> = (&'a Setting, Measured);
@@ -160,13 +160,12 @@ pub(super) fn summarise(experiment: &WhereToLook, finished: &[Numbered<'_>]) -> 
     summary.sections.push(Section::Heading("In parts".into()));
     for (_, name, part) in &parts {
         let mut table = Table::new(part_title(name), "", &HEAD);
-        table.rows = experiment
-            .text
-            .policies
-            .iter()
-            .map(|policy| of(policy, part).cells(vec![policy.clone()]))
-            .collect();
-        summary.sections.push(Section::Table(table));
+        let figures = experiment.text.policies.iter().map(|policy| (policy, of(policy, part)));
+        let figures = figures.filter(|(_, figures)| figures.runs > 0);
+        table.rows = figures.map(|(policy, figures)| figures.cells(vec![policy.clone()])).collect();
+        if !table.rows.is_empty() {
+            summary.sections.push(Section::Table(table));
+        }
     }
     summary
 }
@@ -180,8 +179,16 @@ fn part_title(name: &str) -> String {
 
 fn in_words(experiment: &WhereToLook, ours: &Figures) -> String {
     let text = &experiment.text;
+    let none_absent = match text.absent_share > 0.0 && experiment.jobs.iter().all(|setting| setting.present) {
+        true => format!(
+            " None of the scenes is without the target: an absent_share of {} takes {:.0} scenes or more.",
+            text.absent_share,
+            ((1.0 / text.absent_share).ceil() - 1.0) * text.occlusions.len() as f64 + 1.0,
+        ),
+        false => String::new(),
+    };
     format!(
-        "\"{}\" in {} scenes, {} poses to look from. {}: the right verdict in {} of the runs after {} views in the mean.",
+        "\"{}\" in {} scenes, {} poses to look from. {}: the right verdict in {} of the runs after {} views in the mean.{none_absent}",
         text.goal,
         text.scenes,
         text.poses.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
@@ -193,9 +200,9 @@ fn in_words(experiment: &WhereToLook, ours: &Figures) -> String {
 
 /// Our policy against others in the same scenes with the same viewpoints: differences and savings.
 fn comparisons(experiment: &WhereToLook, runs: &[Run<'_>]) -> (Table, Value) {
-    let note = "Runs in the same scene with the same poses in pairs; intervals of 95 % bootstrapped over scenes. Saved is one less \
-                the ratio of the means.";
-    let head = ["against", "pairs", "views more", "views saved", "metres saved", "seconds saved"];
+    let note = "Runs in the same scene with the same poses in pairs; intervals of 95 % bootstrapped over scenes; p is that of the \
+                two-sided sign-flip permutation test of the views over scenes. Saved is one less the ratio of the means.";
+    let head = ["against", "pairs", "views more", "p", "views saved", "metres saved", "seconds saved"];
     let ours = &experiment.text.ours;
     let mut table = Table::new(format!("{ours} against others"), note, &head);
     let mut values = Map::new();
@@ -212,15 +219,15 @@ fn comparisons(experiment: &WhereToLook, runs: &[Run<'_>]) -> (Table, Value) {
                 .collect()
         };
         let views = pairs(|run| run.views);
-        let more = statistics::difference(&views);
+        let (more, p) = (statistics::difference(&views), statistics::sign_flip(&views));
         let saved = [
             statistics::saving(&views),
             statistics::saving(&pairs(|r| r.metres)),
             statistics::saving(&pairs(|r| r.seconds)),
         ];
-        let cells = vec![other.clone(), views.len().to_string(), shown(more, 2)];
+        let cells = vec![other.clone(), views.len().to_string(), shown(more, 2), number(p, 3)];
         table.rows.push(cells.into_iter().chain(saved.map(|s| shown(s, 3))).collect());
-        let json = json!({ "views_more": more, "views_saved": saved[0], "metres_saved": saved[1], "seconds_saved": saved[2] });
+        let json = json!({ "views_more": more, "views_more_p": p, "views_saved": saved[0], "metres_saved": saved[1], "seconds_saved": saved[2] });
         values.insert(other.clone(), json);
     }
     (table, Value::Object(values))
@@ -261,7 +268,7 @@ fn plots(experiment: &WhereToLook, of: &Of<'_>) -> Vec<Section> {
         let (name, title) = (name.into(), title.into());
         Section::Plot(Box::new(Plot::Lines { name, title, x, y, series, diagonal: false, counts: vec![] }))
     };
-    vec![
+    let mut plots = vec![
         dots(
             "views-by-policy",
             "Views until the verdict, by what can be seen from the start",
@@ -270,9 +277,15 @@ fn plots(experiment: &WhereToLook, of: &Of<'_>) -> Vec<Section> {
         ),
         dots("metres-by-policy", "Driven until the verdict", Axis::free("metres"), |f| f.metres),
         dots("success-by-policy", "Right verdicts", Axis::fixed("share of runs", 0.0, 1.0), |f| f.success),
-        over_poses("views-by-poses", "Views until the verdict", Axis::free("views"), |f| f.views),
-        over_poses("seconds-by-poses", "Time until the verdict", Axis::free("seconds"), |f| f.seconds),
-    ]
+    ];
+    if text.poses.len() > 1 {
+        let seconds = Axis::free("seconds of the robot's clock");
+        plots.extend([
+            over_poses("views-by-poses", "Views until the verdict", Axis::free("views"), |f| f.views),
+            over_poses("seconds-by-poses", "Time until the verdict", seconds, |f| f.seconds),
+        ]);
+    }
+    plots
 }
 
 fn reliability(experiment: &WhereToLook, runs: &[Run<'_>]) -> Plot {

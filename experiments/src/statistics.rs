@@ -118,7 +118,7 @@ pub fn sign_flip(pairs: &[Pair]) -> Option<f64> {
     }
     if sums.len() <= MOST_EXACT {
         let all = 1u32 << sums.len();
-        let extreme = (0..all).filter(|signs| is_extreme(&|n| signs >> n & 1 == 1)).count();
+        let extreme = (0..all).filter(|signs| is_extreme(&|n| (signs >> n) & 1 == 1)).count();
         return Some(extreme as f64 / f64::from(all));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);

@@ -16,9 +16,9 @@ const LEAST_FREE_BYTES: u64 = 64 << 20;
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("cluster").args(["slurm", "kubernetes"]).multiple(true))]
 pub struct Arguments {
-    /// Experiment file (TOML): variables and measures
+    /// Experiment file (TOML): its kind, and what it varies; each kind has its measures
     file: PathBuf,
-    /// Replace a value of the file, such as first_seed=7 or set.1.arrangements=10; may be given several times
+    /// Give a key of the file a value, such as first_seed=7 or set.1.arrangements=10; may be given several times
     #[arg(long, value_name = "KEY=VALUE", conflicts_with = "slurm")]
     set: Vec<String>,
     /// Folder of the results; results that it already holds are not computed again [default: results/ and the

@@ -23,7 +23,8 @@ pub struct Arguments {
     /// Folder of object files [default: those of the domain tabletop]
     #[arg(long, value_name = "DIR")]
     objects: Option<PathBuf>,
-    /// Recogniser: descry, or published (the score of paper 004)
+    /// Recogniser: descry, or published (the score of Niemueller et al., Towards Deliberative Active Perception
+    /// using Persistent Memory)
     #[arg(long, default_value = "descry", value_parser = ["descry", "published"])]
     recogniser: String,
     /// Position of the sensor in the frame of the cloud, metres [default: as stated in the file, or the

@@ -140,7 +140,7 @@ fn in_a_browser(folder: &Path) {
     };
     let drawn = String::from_utf8_lossy(&drawn.stdout);
     assert!(drawn.contains("r=\"0.25\""), "the body is drawn as large as it is");
-    for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"see now\"", "Seen by now: "] {
+    for part in ["<b>achieved</b>", "<title>cup A ", "<polyline", "class=\"verdict now\"", "Seen by now: "] {
         assert!(drawn.contains(part), "{part} is not drawn");
     }
 }

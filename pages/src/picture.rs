@@ -16,6 +16,8 @@ const PIXEL_M: f64 = 0.002;
 const MOST_PIXELS: f64 = 1200.0;
 /// Margin drawn around the surface, metres.
 const BESIDE_M: f64 = 0.15;
+/// Minimum probability of an object that a percept of its kind may be, for it to be named.
+const LEAST_TOLD: f64 = 0.05;
 /// Colours of the objects, in turn.
 const TINTS: [[u8; 3]; 6] =
     [[230, 85, 30], [40, 120, 220], [30, 160, 80], [190, 60, 180], [215, 160, 0], [0, 160, 175]];
@@ -45,13 +47,12 @@ pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<Str
         let count = mine.len().max(1) as f64;
         let x = mine.iter().map(|p| f64::from(p.0)).sum::<f64>() / count;
         let top = mine.iter().map(|p| p.1).min().unwrap_or(0);
-        let name = percept.label.as_deref().unwrap_or("unknown");
-        let p = percept.label.as_deref().map_or(percept.unknown, |label| percept.probability_of(label));
+        let name = named(percept);
         let [r, g, b] = tint;
         names += &format!(
-            "<text x=\"{x:.0}\" y=\"{}\" fill=\"rgb({r},{g},{b})\">{} {p:.2}</text>\n",
+            "<text x=\"{x:.0}\" y=\"{}\" fill=\"rgb({r},{g},{b})\">{}</text>\n",
             f64::from(top).max(16.0) - 4.0,
-            escaped(name),
+            escaped(&name),
         );
     }
     let mut packed = std::io::Cursor::new(Vec::new());
@@ -63,6 +64,25 @@ pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<Str
          stroke=\"#fff\" stroke-width=\"3\" paint-order=\"stroke\">\n{names}</g>\n</svg>\n",
         STANDARD.encode(packed.into_inner()),
     ))
+}
+
+/// Name of a percept with its probability: the known object, else the kind with the objects that it may be;
+/// `unknown` only where nothing else is as likely.
+fn named(percept: &Percept) -> String {
+    let kind = percept.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > percept.unknown);
+    match (&percept.label, kind) {
+        (Some(label), _) => format!("{label} {:.2}", percept.probability_of(label)),
+        (None, Some((kind, p))) => {
+            let may_be: Vec<String> = percept
+                .probabilities
+                .iter()
+                .filter(|(_, p)| *p >= LEAST_TOLD)
+                .map(|(name, p)| format!("{name} {p:.2}"))
+                .collect();
+            format!("a {kind} {p:.2} ({})", may_be.join(", "))
+        }
+        (None, None) => format!("unknown {:.2}", percept.unknown),
+    }
 }
 
 /// Size of the picture, and the pixel of each point: its own in an organised cloud, its projection

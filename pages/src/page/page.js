@@ -79,7 +79,7 @@ function way(from, to) {
 
 // Name of the viewpoint of the look at this time: the place in the step under way that is no surface and no room.
 function viewpoint(at_s) {
-  const [, ...places] = story.deeds.findLast(d => d.from_s <= at_s + 1e-6)?.call.replace(/[()]/g, "").split(" ") ?? [];
+  const places = story.deeds.findLast(d => d.from_s <= at_s + 1e-6)?.arguments ?? [];
   const areas = new Set([...story.map.surfaces, ...story.map.rooms].map(a => a.name.toLowerCase().replaceAll(" ", "-")));
   return places.find(place => !areas.has(place));
 }

@@ -104,6 +104,8 @@ struct PlanStep {
 #[derive(Debug, Serialize)]
 struct Deed {
     call: String,
+    /// Arguments of the call.
+    arguments: Vec<String>,
     from_s: f64,
     to_s: f64,
     failed: Option<String>,
@@ -318,7 +320,13 @@ fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
             _ => None,
         });
         let to_s = later[..until].iter().chain(later.get(until)).map(|(s, _)| *s).fold(*from_s, f64::max);
-        deeds.push(Deed { call: call.to_string(), from_s: *from_s, to_s, failed });
+        deeds.push(Deed {
+            call: call.to_string(),
+            arguments: call.arguments.clone(),
+            from_s: *from_s,
+            to_s,
+            failed,
+        });
     }
     deeds
 }
@@ -433,11 +441,25 @@ fn believed(at_s: f64, belief: &Belief) -> Believed {
         *known = known.max(*p);
     }
     let object = |track: &descry_memory::belief::Track| Object {
-        name: track.label().map(str::to_owned),
-        probability: track.label().map_or(track.unknown, |label| track.probability_of(label)),
+        name: track
+            .label()
+            .map(str::to_owned)
+            .or_else(|| kind_of(track).map(|(kind, _)| format!("a {kind}"))),
+        probability: match (track.label(), kind_of(track)) {
+            (Some(label), _) => track.probability_of(label),
+            (None, Some((_, probability))) => probability,
+            (None, None) => track.unknown,
+        },
         position_m: track.position_m.coords.into(),
         size_m: track.size_m,
         footprint_m: track.footprint_m.iter().map(|p| p.coords.into()).collect(),
     };
     Believed { at_s, objects: belief.tracks.iter().map(object).collect(), best }
+}
+
+/// The most probable kind of a track with its probability; none if unknown is more probable.
+fn kind_of(track: &descry_memory::belief::Track) -> Option<(&str, f64)> {
+    let kind = track.kind()?;
+    let (_, probability) = track.kinds.iter().find(|(name, _)| name == kind)?;
+    Some((kind, *probability))
 }

@@ -4,10 +4,14 @@
 #[doc(hidden)]
 pub mod joined;
 
+use std::collections::BTreeMap;
+
 use descry_perception::laser::KnownShape;
 use descry_perception::mapping::{Level, Survey};
 use descry_perception::nalgebra::{Isometry2, Point2};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::Meta;
 use crate::belief::{Belief, Track};
@@ -73,9 +77,17 @@ pub struct Remembered {
     /// Learned objects, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<LearnedThing>,
+    /// What abilities remember besides, by the name of each.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub besides: BTreeMap<String, Value>,
 }
 
 impl Remembered {
+    /// What an ability remembers besides; nothing where it has not kept any, or not in this form.
+    pub fn besides<T: DeserializeOwned>(&self, ability: &str) -> Option<T> {
+        serde_json::from_value(self.besides.get(ability)?.clone()).ok()
+    }
+
     /// Reads the memory from a store; empty for a new store.
     ///
     /// # Errors

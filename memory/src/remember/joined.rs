@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use descry_perception::laser::KnownShape;
+use serde_json::Value;
 
 use super::{MOST_GONE, Recollection, Remembered, SAME_M};
 use crate::learned::{LearnedThing, Visited};
@@ -45,10 +46,18 @@ impl Remembered {
         let is_new = |shape: &&KnownShape| ![&before.shapes, &self.shapes].iter().any(|s| s.contains(shape));
         Self {
             shapes: self.shapes.iter().chain(after.shapes.iter().filter(is_new)).cloned().collect(),
+            besides: self.besides_of(before, &after),
             visited: self.visits(before, &after),
             things: self.learned(before, &after),
             ..with_places
         }
+    }
+
+    /// What abilities remember besides: of each that the run has changed what the run leaves, of any other what is in the store.
+    fn besides_of(&self, before: &Self, after: &Self) -> BTreeMap<String, Value> {
+        let is_new = |(name, kept): &(&String, &Value)| before.besides.get(*name) != Some(*kept);
+        let ours = after.besides.iter().filter(is_new).map(|(name, kept)| (name.clone(), kept.clone()));
+        self.besides.clone().into_iter().chain(ours).collect()
     }
 
     /// Renames the objects of a run to their names in the store, and gives objects learned only by the run

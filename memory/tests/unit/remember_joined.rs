@@ -115,3 +115,16 @@ fn nothing_that_was_learned_is_lost_and_each_thing_has_a_name_of_its_own() {
     assert_eq!(known, [("kettle", 1.0, 5.0), ("thing 2", 3.0, 3.0), ("thing 3", 5.0, 5.0)]);
     assert_eq!(places(&joined.present), [("desk", 0.0, "kettle", 5.0), ("desk", 1.0, "thing 3", 5.0)]);
 }
+
+#[test]
+fn what_an_ability_remembers_besides_is_that_of_the_run_that_changed_it() {
+    let besides = |all: &[(&str, u64)]| Remembered {
+        besides: all.iter().map(|(name, kept)| (name.to_string(), (*kept).into())).collect(),
+        ..Remembered::default()
+    };
+    let (before, others) = (besides(&[("one", 1), ("two", 1)]), besides(&[("one", 1), ("two", 2)]));
+    let joined = others.joined(&before, besides(&[("one", 3), ("two", 1), ("three", 1)]), 0.0);
+    assert_eq!(joined.besides, besides(&[("one", 3), ("two", 2), ("three", 1)]).besides);
+    assert_eq!(joined.besides::<u64>("one"), Some(3));
+    assert_eq!(joined.besides::<String>("one"), None);
+}

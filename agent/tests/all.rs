@@ -6,4 +6,6 @@ mod own_body;
 
 mod example;
 mod goals;
+mod lived;
+mod renamed;
 mod unit;

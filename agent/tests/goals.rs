@@ -1,286 +1,267 @@
-//! Random goals over the words of a built-in domain, asked and pursued in a small simulated room:
-//! no answer without a look at the subject of the goal, and no more false answers than the
-//! confidence allows.
+//! Random goals over the words of the built-in domains, asked and pursued in small simulated rooms: no answer without a look at what
+//! the goal speaks of, none that the truth denies more often than the confidence says that it may, and no change made by a question.
+//!
+//! Truth is known from the simulator and judged here, in code that shares nothing with the agent's own judgement.
 
-use descry_agent::body;
-use descry_agent::keeping::Keeping;
-use descry_agent::run::{self, Folder, Settings, Task, Watcher};
-use descry_agent::stop::Stop;
+mod drawn;
+mod worlds;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use descry_agent::exit::CommandError;
+use descry_agent::report::Report;
 use descry_domains::abilities::searching::policies;
 use descry_domains::conclusion::Verdict;
-use descry_domains::config::GoalPhrase;
-use descry_domains::load::Domain;
-use descry_domains::vocabulary::Vocabulary;
-use descry_planner::Source;
 use descry_robots::truth::Truth;
+use descry_skills::Call;
+use drawn::{Draws, Goal};
+use worlds::Which;
 
-/// Objects with their kinds and their shapes in a scene.
-const THINGS: [(&str, &str, &str); 3] = [
-    ("cup-a", "cup", "name = \"cup A\"\nshape.cup = { diameter_m = 0.070, height_m = 0.104 }"),
-    ("mug", "mug", "name = \"mug\"\nshape.mug = { diameter_m = 0.080, height_m = 0.095 }"),
-    (
-        "white-cylinder",
-        "cylinder",
-        "name = \"white cylinder\"\nkind = \"cylinder\"\nshape.cylinder = { diameter_m = 0.106, height_m = 0.277 }",
-    ),
-];
-const SURFACES: [&str; 2] = ["desk", "counter"];
-const ROOM: &str = "title = \"Two tables\"\ngap_m = 0.08\n[[room]]\nname = \"study\"\nsize_m = [6.0, 5.0]\n\
-    [[surface]]\nname = \"desk\"\nposition_m = [-1.2, 0.0]\nsize_m = [1.1, 0.7]\nheight_m = 0.72\n\
-    [[surface]]\nname = \"counter\"\nposition_m = [1.4, 0.0]\nsize_m = [1.1, 0.7]\nheight_m = 0.80\n\
-    [start]\nposition_m = [0.0, -1.9]\nyaw_deg = 90.0\n";
-const DERIVED: &str = "(:derived (absent ?w - thing ?o - surface) (not (on ?w ?o)))\n\
-    (:derived (somewhere ?w - thing) (exists (?o - surface) (on ?w ?o)))\n(:durative-action move";
+use crate::lived::{Lived, lived};
 
-/// Draws numbers (splitmix64).
-struct Draws(u64);
-
-impl Draws {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) % n as u64) as usize
-    }
-}
-
-/// A condition that the truth of a scene decides.
-enum Goal {
-    /// An object stands on a surface, in one of several wordings.
-    On {
-        thing: usize,
-        on: usize,
-        wording: usize,
-    },
-    /// The object stands on neither surface, or anywhere.
-    Nowhere {
-        thing: usize,
-        wording: usize,
-    },
-    Somewhere {
-        thing: usize,
-        wording: usize,
-    },
-    /// True if any of a kind, or anything, stands on a surface.
-    Any {
-        kind: Option<usize>,
-        on: usize,
-    },
-    /// Each of a kind stands on a surface.
-    Each {
-        kind: usize,
-        on: usize,
-    },
-    Not(Box<Goal>),
-    And(Box<[Goal; 2]>),
-    Or(Box<[Goal; 2]>),
-}
-
-impl Goal {
-    fn drawn(draws: &mut Draws, depth: usize) -> Goal {
-        let (thing, on) = (draws.below(THINGS.len()), draws.below(SURFACES.len()));
-        match draws.below(if depth == 0 { 6 } else { 10 }) {
-            0 | 1 => Goal::On { thing, on, wording: draws.below(5) },
-            2 => Goal::Nowhere { thing, wording: draws.below(4) },
-            3 => Goal::Somewhere { thing, wording: draws.below(3) },
-            4 => Goal::Any { kind: [Some(thing), None][draws.below(2)], on },
-            5 => Goal::Each { kind: thing, on },
-            6 | 7 => Goal::Not(Box::new(Goal::drawn(draws, depth - 1))),
-            8 => Goal::And(Box::new([Goal::drawn(draws, depth - 1), Goal::drawn(draws, depth - 1)])),
-            _ => Goal::Or(Box::new([Goal::drawn(draws, depth - 1), Goal::drawn(draws, depth - 1)])),
-        }
-    }
-
-    fn pddl(&self) -> String {
-        match self {
-            Goal::On { thing, on, wording } => {
-                let (thing, on) = (THINGS[*thing].0, SURFACES[*on]);
-                match wording {
-                    0 => format!("(on {thing} {on})"),
-                    1 => format!("(>= (presence {thing} {on}) 0.8)"),
-                    2 => format!("(not (absent {thing} {on}))"),
-                    3 => format!("(>= (+ (presence {thing} {on}) 0.1) 0.9)"),
-                    _ => format!("(not (< (presence {thing} {on}) 0.8))"),
-                }
-            }
-            Goal::Nowhere { thing, wording } => {
-                let thing = THINGS[*thing].0;
-                match wording {
-                    0 => format!("(forall (?s - surface) (absent {thing} ?s))"),
-                    1 => format!("(not (exists (?s - surface) (on {thing} ?s)))"),
-                    2 => format!("(forall (?s - surface) (= (presence {thing} ?s) 0))"),
-                    _ => format!("(<= (+ (presence {thing} desk) (presence {thing} counter)) 0.1)"),
-                }
-            }
-            Goal::Somewhere { thing, wording } => {
-                let thing = THINGS[*thing].0;
-                match wording {
-                    0 => format!("(somewhere {thing})"),
-                    1 => format!("(exists (?s - surface) (>= (presence {thing} ?s) 0.8))"),
-                    _ => format!("(not (forall (?s - surface) (absent {thing} ?s)))"),
-                }
-            }
-            Goal::Any { kind: Some(kind), on } => {
-                let (kind, on) = (THINGS[*kind].1, SURFACES[*on]);
-                format!("(exists (?t - thing) (and (is ?t {kind}) (on ?t {on})))")
-            }
-            Goal::Any { kind: None, on } => format!("(exists (?t - thing) (on ?t {}))", SURFACES[*on]),
-            Goal::Each { kind, on } => {
-                let (kind, on) = (THINGS[*kind].1, SURFACES[*on]);
-                format!("(forall (?t - thing) (imply (is ?t {kind}) (on ?t {on})))")
-            }
-            Goal::Not(goal) => format!("(not {})", goal.pddl()),
-            Goal::And(goals) => format!("(and {} {})", goals[0].pddl(), goals[1].pddl()),
-            Goal::Or(goals) => format!("(or {} {})", goals[0].pddl(), goals[1].pddl()),
-        }
-    }
-
-    fn is_true(&self, truth: &Truth) -> bool {
-        let stands = |kind: &str, on: Option<usize>| {
-            let mut there = truth.objects.iter().filter(|o| o.present && o.surface.is_some());
-            there.any(|o| {
-                (kind.is_empty() || kind_of(&o.kind) == kind)
-                    && on.is_none_or(|on| o.surface.as_deref() == Some(SURFACES[on]))
-            })
-        };
-        match self {
-            Goal::On { thing, on, .. } => stands(THINGS[*thing].1, Some(*on)),
-            Goal::Nowhere { thing, .. } => !stands(THINGS[*thing].1, None),
-            Goal::Somewhere { thing, .. } => stands(THINGS[*thing].1, None),
-            Goal::Any { kind, on } => stands(kind.map_or("", |kind| THINGS[kind].1), Some(*on)),
-            Goal::Each { kind, on } => {
-                let mut of_kind =
-                    truth.objects.iter().filter(|o| o.present && kind_of(&o.kind) == THINGS[*kind].1);
-                of_kind.all(|o| o.surface.as_deref() == Some(SURFACES[*on]))
-            }
-            Goal::Not(goal) => !goal.is_true(truth),
-            Goal::And(goals) => goals.iter().all(|goal| goal.is_true(truth)),
-            Goal::Or(goals) => goals.iter().any(|goal| goal.is_true(truth)),
-        }
-    }
-}
-
-/// Kind of a true object; an object with a name of its own has this name as kind.
-fn kind_of(kind: &str) -> &str {
-    if kind == "cup A" { "cup" } else { kind }
-}
-
-/// Domain with derived words and one phrase, and a room with some of the objects.
-fn home(goal: &Goal, is_question: bool, draws: &mut Draws) -> Domain {
-    let mut domain = Domain::load("home").expect("a built-in domain");
-    let text = domain.pddl.text.replacen("(:durative-action move", DERIVED, 1);
-    let text = text.replacen(
-        "(:predicates",
-        "(:predicates (absent ?w - thing ?o - surface) (somewhere ?w - thing)",
-        1,
-    );
-    let text = text.replacen(":modules)", ":modules :derived-predicates)", 1);
-    domain.pddl = Source::new("domain.pddl", text);
-    domain.vocabulary = Vocabulary::read(&domain.pddl).unwrap_or_else(|e| panic!("{e}"));
-    domain.config.goal = vec![GoalPhrase {
-        say: "check it".into(),
-        also: Vec::new(),
-        means: goal.pddl(),
-        question: is_question,
-        confidence: None,
-        about: String::new(),
-        answer: Default::default(),
-    }];
-    let mut room = ROOM.to_string();
-    for (.., thing) in THINGS.iter().filter(|_| draws.below(4) > 0).collect::<Vec<_>>() {
-        room += &format!("[[object]]\n{thing}\non = [\"desk\", \"counter\"]\n");
-    }
-    domain.scenes.insert("small".into(), room);
-    domain
-}
-
-/// Result of pursuing a goal.
+/// A goal that was pursued.
 struct Fared {
-    pddl: String,
-    verdict: Verdict,
-    views: usize,
-    /// True if the goal held in the end.
-    is_true: bool,
-    why: String,
+    said: String,
+    which: Which,
+    is_question: bool,
+    outcome: Outcome,
+}
+
+enum Outcome {
+    /// A run that came to its end.
+    Ended {
+        report: Box<Report>,
+        /// Truth of the goal, as far as the places that were looked at tell it.
+        by_looks: Option<bool>,
+        /// Truth of the goal.
+        is_true: Option<bool>,
+        /// What was done although it was asked a question.
+        changed: Vec<String>,
+    },
+    /// The goal or the domain was refused, and why.
+    Refused(String),
+    /// A fault of descry.
+    Crashed(String),
 }
 
 fn pursued(seed: u64, is_question: bool) -> Fared {
     let mut draws = Draws(seed);
-    let goal = Goal::drawn(&mut draws, 2);
-    let domain = home(&goal, is_question, &mut draws);
-    let body = body::open("sim", Some("small"), seed, &domain).unwrap_or_else(|e| panic!("{seed}: {e}"));
-    let understood = run::understood("check it", &domain, &*body.robot, None);
-    let understood = understood.unwrap_or_else(|e| panic!("{seed}, {}: {e}", goal.pddl()));
-    let settings = Settings {
-        robot: "sim".into(),
-        scene: Some("small".into()),
-        seed,
-        domain: "home".into(),
-        policy: policies::PLAN.into(),
-        keeping: Keeping::default(),
-        remember: None,
+    let which = worlds::ALL[[0, 1, 0, 1, 2, 3, 0, 1, 4, 5, 2, 0][(seed % 12) as usize]];
+    let nouns = which.nouns();
+    let goal = Goal::drawn(&mut draws, &nouns, &which.patterns(), 2, false);
+    let pddl = goal.pddl(&nouns);
+    let verb = if is_question { "asks" } else { "does" };
+    let said = format!("{seed} {} {verb} {pddl}", which.name());
+    let came = catch_unwind(AssertUnwindSafe(|| ended(which, &pddl, is_question, &mut draws, seed)));
+    let outcome = match came {
+        Err(_) => Outcome::Crashed("a panic".into()),
+        Ok(Err(CommandError::BadInput(why))) => Outcome::Refused(why),
+        Ok(Err(why)) => Outcome::Crashed(why.to_string()),
+        Ok(Ok(Ended { report, mut seen, looked, changed })) => {
+            let all = nouns.places.iter().copied().chain([nouns.door]).map(str::to_string);
+            seen.looked = all.collect();
+            let is_true = goal.truth(&seen, &nouns, 0);
+            seen.looked = looked;
+            let by_looks = goal.truth(&seen, &nouns, 0);
+            Outcome::Ended { report: Box::new(report), by_looks, is_true, changed }
+        }
     };
-    let scratch = tempfile::TempDir::new().expect("a folder can be made");
-    let folder = Folder::of_new_run(Some(&scratch.path().join("run")), &understood).expect("a run's folder");
-    let watcher = Watcher { stop: &Stop::default(), tell: &mut |_| {} };
-    let chooser = policies::named(policies::PLAN, seed, None).expect("the planner");
-    let task = Task { domain: &domain, goal: &understood, past: None };
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
-    let report = runtime.block_on(run::pursue(task, &body, &folder, &settings, chooser, watcher));
-    let report = report.unwrap_or_else(|e| panic!("{seed}, {}: {e}", goal.pddl()));
-    let truth = body.truth().expect("the simulator's").expect("it knows");
-    let is_true = goal.is_true(&truth);
-    Fared { pddl: goal.pddl(), verdict: report.verdict, views: report.views, is_true, why: report.why }
+    Fared { said, which, is_question, outcome }
 }
 
-/// Pursues goals by their seeds, each as a question or a task; returns the numbers of answers, of
-/// wrong ones, and of undecided ones.
-fn check(seeds: std::ops::Range<u64>) -> [usize; 3] {
-    let [mut answered, mut wrong, mut open] = [0; 3];
-    for seed in seeds {
-        let is_question = seed % 2 == 0;
-        let Fared { pddl, verdict, views, is_true, why } = pursued(seed, is_question);
-        let told = format!(
-            "{seed} {} {pddl}: {verdict:?}, in truth {is_true}: {why}",
-            if is_question { "asks" } else { "does" }
-        );
-        let claims = match verdict {
-            Verdict::Achieved => Some(true),
-            Verdict::NotFound if is_question => Some(false),
-            _ => None,
-        };
-        match claims {
-            Some(claim) => {
-                assert!(views > 0, "no look was taken: {told}");
-                answered += 1;
-                if claim != is_true {
-                    wrong += 1;
-                    println!("wrong: {told}");
-                }
+/// A run, with what is where in truth at its end.
+struct Ended {
+    report: Report,
+    seen: drawn::Seen,
+    looked: BTreeSet<String>,
+    changed: Vec<String>,
+}
+
+fn ended(
+    which: Which,
+    pddl: &str,
+    is_question: bool,
+    draws: &mut Draws,
+    seed: u64,
+) -> Result<Ended, CommandError> {
+    let scratch = tempfile::TempDir::new().expect("a folder can be made");
+    let domain = which.domain(pddl, is_question, draws, scratch.path());
+    let Lived { report, done, truth: [before, after] } =
+        lived(&domain, "check it", which.scene(), seed, policies::PLAN)?;
+    let looked = looked_at(which, &done);
+    let changing = done.iter().filter(|(call, _)| which.changing().contains(&call.action.as_str()));
+    let mut changed: Vec<String> = changing.map(|(call, _)| call.to_string()).collect();
+    changed.extend(moved(&before, &after));
+    changed.retain(|_| is_question);
+    Ok(Ended { report, seen: which.seen(&after, scratch.path()), looked, changed })
+}
+
+/// The places that were looked at.
+fn looked_at(which: Which, done: &[(Call, bool)]) -> BTreeSet<String> {
+    let looks = done.iter().filter(|(_, is_well)| *is_well);
+    looks.filter_map(|(call, _)| which.looked_at(&call.action, &call.arguments)).collect()
+}
+
+/// Names of what stands or is otherwise than before.
+fn moved(before: &Truth, after: &Truth) -> Vec<String> {
+    let objects = before.objects.iter().zip(&after.objects);
+    let doors = before.doors.iter().zip(&after.doors);
+    let stood = objects.filter(|(a, b)| a.map_from_object != b.map_from_object || a.in_hand != b.in_hand);
+    let names = stood.map(|(object, _)| object.name.clone());
+    names.chain(doors.filter(|(a, b)| a.shut != b.shut).map(|(door, _)| door.name.clone())).collect()
+}
+
+/// Counts of what became of goals.
+#[derive(Default, Clone, Copy)]
+struct Counts {
+    asked: usize,
+    yes: usize,
+    no: usize,
+    open: usize,
+    refused: usize,
+    wrong: usize,
+    /// Answers that no look has told.
+    blind: usize,
+    changed: usize,
+    crashed: usize,
+}
+
+/// Pursues goals by their seeds, each as a question and as a task, and prints a table.
+fn check(seeds: std::ops::Range<u64>) -> Counts {
+    let mut rows: BTreeMap<(Which, bool), Counts> = BTreeMap::new();
+    let mut said_with: Vec<(f64, bool)> = Vec::new();
+    for (seed, is_question) in seeds.flat_map(|seed| [(seed, true), (seed, false)]) {
+        let Fared { said, which, is_question, outcome } = pursued(seed, is_question);
+        let row = rows.entry((which, is_question)).or_default();
+        row.asked += 1;
+        match outcome {
+            Outcome::Refused(why) => {
+                row.refused += 1;
+                println!("refused: {said}: {why}");
             }
-            None => {
-                open += 1;
-                println!("open: {told}");
+            Outcome::Crashed(why) => {
+                row.crashed += 1;
+                println!("CRASHED: {said}: {why}");
+            }
+            Outcome::Ended { report, by_looks, is_true, changed } => {
+                let claim = match report.verdict {
+                    Verdict::Achieved => Some(true),
+                    Verdict::NotFound => Some(false),
+                    Verdict::Impossible if !is_question => Some(false),
+                    _ => None,
+                };
+                match claim {
+                    Some(true) => row.yes += 1,
+                    Some(false) => row.no += 1,
+                    None => row.open += 1,
+                }
+                let told = format!(
+                    "{said}: {:?} ({:.2}), in truth {is_true:?}, by looks {by_looks:?}: {}",
+                    report.verdict, report.confidence, report.why
+                );
+                if !changed.is_empty() {
+                    row.changed += 1;
+                    println!("CHANGED: {changed:?}: {told}");
+                }
+                let Some(claim) = claim else {
+                    println!("open: {told}");
+                    continue;
+                };
+                let is_wrong = is_true.is_some_and(|is_true| is_true != claim);
+                row.wrong += usize::from(is_wrong);
+                row.blind += usize::from(by_looks.is_none());
+                said_with.push((report.confidence, is_wrong));
+                if is_wrong {
+                    println!("WRONG: {told}");
+                }
+                if by_looks.is_none() {
+                    println!("BLIND: {told}");
+                }
             }
         }
     }
-    println!("answered {answered}, of which wrong {wrong}; not told {open}");
-    [answered, wrong, open]
+    print(&rows, &said_with);
+    rows.into_values().fold(Counts::default(), |a, b| Counts {
+        asked: a.asked + b.asked,
+        yes: a.yes + b.yes,
+        no: a.no + b.no,
+        open: a.open + b.open,
+        refused: a.refused + b.refused,
+        wrong: a.wrong + b.wrong,
+        blind: a.blind + b.blind,
+        changed: a.changed + b.changed,
+        crashed: a.crashed + b.crashed,
+    })
+}
+
+fn print(rows: &BTreeMap<(Which, bool), Counts>, said_with: &[(f64, bool)]) {
+    println!(
+        "| domain | as | goals | yes | no | cannot tell | refused | wrong | unlooked | changed | crashed |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for ((which, is_question), c) in rows {
+        let how = if *is_question { "question" } else { "task" };
+        println!(
+            "| {} | {how} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            which.name(),
+            c.asked,
+            c.yes,
+            c.no,
+            c.open,
+            c.refused,
+            c.wrong,
+            c.blind,
+            c.changed,
+            c.crashed
+        );
+    }
+    println!("\n| answers said with | of them | wrong |\n|---|---|---|");
+    for (from, to) in [(0.0, 0.5), (0.5, 0.8), (0.8, 0.9), (0.9, 0.95), (0.95, 0.99), (0.99, 1.01)] {
+        let within = || said_with.iter().filter(|(p, _)| (from..to).contains(p));
+        let wrong = within().filter(|(_, is_wrong)| *is_wrong).count();
+        println!("| {from:.2} to {:.2} | {} | {wrong} |", f64::min(to, 1.0), within().count());
+    }
+}
+
+/// Asks whether a condition holds in a scene, or in the household as its benchmark lays it out; the verdict, and what was looked at.
+fn asked(which: Which, scene: &str, pddl: &str) -> (Verdict, BTreeSet<String>) {
+    let scratch = tempfile::TempDir::new().expect("a folder can be made");
+    let domain = which.domain(pddl, true, &mut Draws(1), scratch.path());
+    let came = lived(&domain, "check it", scene, 1, policies::PLAN).unwrap_or_else(|e| panic!("{pddl}: {e}"));
+    (came.report.verdict, looked_at(which, &came.done))
+}
+
+#[test]
+fn a_question_of_what_no_one_has_seen_is_answered_by_looking() {
+    let check = |which, scene, pddl, verdict, place: &str| {
+        let (found, looked) = asked(which, scene, pddl);
+        assert_eq!(found, verdict, "{pddl}");
+        assert!(looked.contains(place), "{pddl}: looked at {looked:?}");
+    };
+    // The chair is there, the bin is not, and before a sweep nothing is known of either.
+    check(Which::Shapes, "big-chair", "(<= (found big-chair) 0.1)", Verdict::NotFound, "floor");
+    check(Which::Shapes, "big-chair", "(not (lies recycle-bin))", Verdict::Achieved, "floor");
+    // What a program has not found out is not denied.
+    let nowhere = "(not (located notebook start))";
+    check(Which::Household, "default", nowhere, Verdict::Achieved, "start");
 }
 
 #[test]
 fn random_goals_are_answered_by_looks_and_as_the_truth_says() {
-    let [answered, wrong, _] = check(0..4);
-    assert!(answered > 0 && wrong == 0, "{answered} answered, {wrong} wrong");
+    let Counts { yes, no, wrong, blind, changed, crashed, .. } = check(0..2);
+    assert!(yes + no > 0);
+    assert_eq!([wrong, blind, changed, crashed], [0; 4], "wrong, unlooked, changed, crashed");
 }
 
-/// Requested confidence that allows one wrong answer in five; seeds by `GOALS=0..500`.
+/// The confidence that is asked for allows one wrong answer in five; seeds by `GOALS=0..500`.
 #[test]
-#[ignore = "slow: 500 runs"]
+#[ignore = "slow: 500 goals, each as a question and as a task"]
 fn five_hundred_random_goals_are_answered_by_looks_and_as_the_truth_says() {
     let range = std::env::var("GOALS").unwrap_or_else(|_| "0..500".into());
     let (from, to) = range.split_once("..").expect("FROM..TO");
-    let [answered, wrong, _] = check(from.parse().expect("a seed")..to.parse().expect("a seed"));
-    assert!(wrong * 5 <= answered, "{wrong} wrong of {answered}");
+    let counts = check(from.parse().expect("a seed")..to.parse().expect("a seed"));
+    let Counts { yes, no, wrong, blind, changed, crashed, .. } = counts;
+    assert_eq!([blind, changed, crashed], [0; 3], "unlooked, changed, crashed");
+    assert!(wrong * 5 <= yes + no, "{wrong} wrong of {}", yes + no);
 }

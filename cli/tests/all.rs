@@ -21,7 +21,6 @@ mod page;
 mod programs;
 mod readme;
 mod record;
-mod renamed;
 mod serve;
 mod shapes;
 mod signals;

@@ -18,7 +18,7 @@ use crate::note::Note;
 use crate::objective::Goal;
 use crate::own_map::OwnMap;
 use crate::past::Past;
-use crate::range::Bounds;
+use crate::range::{Bounds, Referent};
 use crate::situation::Situation;
 use crate::states::States;
 use crate::vocabulary::Vocabulary;
@@ -54,6 +54,8 @@ pub struct Ability {
     pub objects: Option<fn(&Situation) -> Vec<(&'static str, Vec<String>)>>,
     /// Names learned by the ability, each with its type, if any.
     pub names: Option<fn(&Known) -> Vec<(&'static str, String)>>,
+    /// Objects besides those of the problem, with their types: seen and without a name, or perhaps there and not seen by anybody.
+    pub others: Option<Others>,
     /// Learned object with a symbol, if the ability learns objects.
     pub thing: Option<fn(&States, &str) -> Option<Thing>>,
     /// Recognition among percepts, in any domain, if any.
@@ -66,6 +68,9 @@ pub struct Ability {
 
 /// State of an ability at the beginning of a run, and the body's own map if any.
 pub type Recalls = fn(&Domain, Option<&Past>, &dyn Robot, &mut States) -> Option<Arc<dyn OwnMap>>;
+
+/// Objects that quantified conditions speak of though no name denotes them, with their types.
+pub type Others = for<'a> fn(&'a Situation) -> Vec<(&'static str, Referent<'a>)>;
 
 /// Adds to the persistent belief.
 pub type Keeps = fn(&Known, &Past, &mut Remembered);
@@ -91,6 +96,7 @@ impl Ability {
             keeps: None,
             objects: None,
             names: None,
+            others: None,
             thing: None,
             again: None,
             has_driven: None,
@@ -110,7 +116,7 @@ pub struct Fact {
     pub about: &'static str,
     /// The instances that hold now, a line of PDDL each.
     pub states: fn(&Situation) -> Vec<String>,
-    /// Bounds on the value after further looks; `None`: the value is known.
+    /// Bounds on the value after further looks; `None`: the value is known for each object that was seen.
     pub bounds: Option<Bounds>,
 }
 

@@ -3,7 +3,8 @@
 
 use std::sync::Arc;
 
-use descry_planner::{Answer, Attachment, CallError, Read, Step, Task};
+use descry_planner::{Attachment, CallError, Read, Step, Task};
+use descry_robots::Answer;
 use descry_skills::{Call, Outcome, Skill, SkillFailure};
 use serde_json::{Value, json};
 
@@ -227,7 +228,7 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
     match outcome {
         Outcome::Driven(d) => json!({ "distance_m": d.distance_m, "duration_s": d.duration_s }),
         Outcome::Seen(s) => json!({ "stamp_ns": s.stamp_ns }),
-        Outcome::Scanned(s) => json!({ "stamp_ns": s.stamp_ns }),
+        Outcome::Answered(answer) => answered(answer),
         Outcome::Aligned(a) => json!({
             "boundary_before_m2": a.before.boundary_m2,
             "boundary_after_m2": a.after.boundary_m2,
@@ -241,14 +242,21 @@ pub(crate) fn outcome(outcome: &Outcome) -> Value {
             "looks": m.model.as_ref().map(|model| model.looks.clone()).unwrap_or_default(),
             "because": m.model.as_ref().err(),
         }),
-        Outcome::Read(r) => json!({ "stamp_ns": r.stamp_ns, "said": r.said }),
-        Outcome::Pushed(p) => json!({ "moved_m": p.moved_m, "duration_s": p.duration_s }),
-        Outcome::Opened(o) => json!({ "duration_s": o.duration_s }),
         Outcome::Grasped(g, hand) => {
             json!({ "width_m": g.width_m, "duration_s": g.duration_s, "holds": hand.holds })
         }
-        Outcome::Placed(p) => json!({ "duration_s": p.duration_s }),
         Outcome::Told(word) => json!({ "said": word }),
+    }
+}
+
+/// An answer of the body as it is recorded; of a sweep only when it was taken, since the record has the sweep itself.
+fn answered(answer: &Answer) -> Value {
+    match answer {
+        Answer::Scanned(scanned) => json!({ "stamp_ns": scanned.stamp_ns }),
+        answer => match json!(answer) {
+            Value::Object(answer) => answer.into_iter().next().map_or(Value::Null, |(_, said)| said),
+            said => said,
+        },
     }
 }
 
@@ -265,7 +273,7 @@ impl Attachment for Bound {
         self.reads.clone()
     }
 
-    fn evaluate(&self, call: &descry_planner::Call) -> Result<Answer, CallError> {
+    fn evaluate(&self, call: &descry_planner::Call) -> Result<descry_planner::Answer, CallError> {
         (self.meaning.answers)(&self.situation, call)
     }
 }

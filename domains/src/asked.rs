@@ -8,7 +8,7 @@ use crate::declared;
 use crate::lexicon::Lexicon;
 use crate::load::Domain;
 use crate::mentions::mentions;
-use crate::objective::Asked;
+use crate::objective::{Asked, VARIABLE};
 use crate::vocabulary::Vocabulary;
 
 /// Function for the certainty that a thing is on a surface; a question about that surface alone.
@@ -59,6 +59,7 @@ impl Asked {
         let mut scope = visit.scope(task.goal.slots);
         visit.condition(&task.goal.body, Wanted::MORE, &mut scope, &[]);
         let Visit { mut asked, placed, whole, .. } = visit;
+        asked.plain = is_plain(&task.goal.body);
         for thing in placed {
             if asked.things.iter().all(|(known, _)| *known != thing) {
                 asked.things.push((thing, None));
@@ -71,6 +72,18 @@ impl Asked {
             }
         }
         asked
+    }
+}
+
+/// True if a condition is one word alone, wanted to hold or to be at least a number.
+fn is_plain(own: &Condition) -> bool {
+    match own {
+        Condition::And(parts) => matches!(parts.as_slice(), [only] if is_plain(only)),
+        Condition::Atom(_) => true,
+        Condition::Compare(Comparison::Greater | Comparison::GreaterOrEqual, sides, _) => {
+            matches!(&**sides, [Expression::Fluent(_), Expression::Number(_)])
+        }
+        _ => false,
     }
 }
 
@@ -248,7 +261,7 @@ impl<'t> Visit<'t> {
         let Some(word) = self.vocabulary.word(name) else { return };
         let text = |argument: &Argument| match argument {
             Argument::Name(name) => name.clone(),
-            Argument::Variable(_) => "?".into(),
+            Argument::Variable(_) => VARIABLE.into(),
         };
         self.asked.words.push((word.name.clone(), arguments.iter().map(text).collect()));
         let is_denied = wanted.less && OF_OBJECTS.contains(&word.name.as_str());

@@ -240,6 +240,9 @@ pub struct WordConfig {
     /// Time for its answer, seconds.
     #[serde(default = "default_program_time_s")]
     pub time_limit_s: f64,
+    /// Another word of the same arguments: where that one holds, the program has yet to find out, and its silence denies
+    /// nothing.
+    pub untold: Option<String>,
     /// `remembered`, `fixed` or `planned`, where it should be said rather than follow from the effects of the actions.
     pub is: Option<Source>,
 }

@@ -13,7 +13,6 @@ use descry_planner::task::{
 };
 use descry_planner::{Attachments, Semantics};
 
-use crate::actions;
 use crate::config::ActionKind;
 use crate::load::Domain;
 use crate::origin::{self, Origin};
@@ -21,6 +20,7 @@ use crate::range::{Bounds, Range, Referent};
 use crate::situation::Situation;
 use crate::vocabulary::Word;
 use crate::words::Words;
+use crate::{abilities, actions};
 
 /// Truth of a condition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -199,29 +199,27 @@ impl<'a> Judge<'a> {
             decides,
             values.into_iter().map(|value| {
                 scope[first.slot.index()] = Some(value);
-                self.each(decides, rest, inner, scope, open)
+                let judged = self.each(decides, rest, inner, scope, open);
+                // What nobody has seen may not be there at all.
+                let may_lack = judged.value == decides && matches!(value, Held::Other(Referent::Unseen));
+                if may_lack { Judgement { value: Truth::Unknown, ..judged } } else { judged }
             }),
         )
     }
 
-    /// Values of a variable besides the objects of the problem.
+    /// Values of a variable besides the objects of the problem. Of an object of a wider type it is not known if it is one.
     fn others(&self, variable: &Quantified) -> Vec<Referent<'a>> {
-        let task = self.semantics.task;
-        let takes = |wanted: &str| {
-            let is = |id: &descry_planner::task::TypeId| {
-                let name = &task.type_of(*id).name;
-                name == wanted || self.domain.vocabulary.is_a(wanted, name)
-            };
-            variable.parameter.types.iter().any(is)
+        let (task, vocabulary) = (self.semantics.task, &self.domain.vocabulary);
+        let takes = |of: &str, other: Referent<'a>| {
+            let name = |id: &descry_planner::task::TypeId| task.type_of(*id).name.as_str();
+            let mut taken = variable.parameter.types.iter().map(name);
+            if taken.clone().any(|taken| taken == of || vocabulary.is_a(of, taken)) {
+                return Some(other);
+            }
+            taken.any(|taken| vocabulary.is_a(taken, of)).then_some(Referent::Unseen)
         };
-        let mut others = Vec::new();
-        if takes("thing") {
-            others.extend(self.s.strangers().map(Referent::Seen));
-            others.push(Referent::Unseen);
-        } else if takes("surface") && self.s.robot.surfaces().is_empty() {
-            others.push(Referent::Unseen);
-        }
-        others
+        let finders = abilities::used(&self.domain.config.uses).filter_map(|ability| ability.others);
+        finders.flat_map(|others| others(self.s)).filter_map(|(of, other)| takes(of, other)).collect()
     }
 
     fn atom(
@@ -247,6 +245,7 @@ impl<'a> Judge<'a> {
                 (value, true)
             }
             None if holds => (Truth::True, false),
+            None if self.is_told_of_seen_alone(&declared.name, arguments) => (Truth::Unknown, true),
             None if self.is_known(&declared.name, arguments) => (Truth::False, false),
             None => (Truth::Unknown, false),
         };
@@ -377,6 +376,20 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// True if what states a word says nothing of one of its objects, for nobody has seen that.
+    fn is_told_of_seen_alone(&self, name: &str, arguments: &[Held<'a>]) -> bool {
+        let is_sensed = |word: &Word| origin::is_sensed(self.domain, word);
+        arguments.iter().any(|held| matches!(held, Held::Other(Referent::Unseen)))
+            && self.vocabulary.iter().find(|word| word.name == name).is_some_and(is_sensed)
+    }
+
+    /// True if the word that marks a value as not found out yet holds.
+    fn is_untold(&self, mark: &str, arguments: &[Held<'a>]) -> bool {
+        let id = self.semantics.task.find_predicate(mark);
+        let objects: Option<Vec<ObjectId>> = arguments.iter().map(Held::object).collect();
+        id.zip(objects).is_none_or(|(id, objects)| self.state.holds(id, &objects))
+    }
+
     /// True if a word that is not stated to hold is known to be false.
     fn is_known(&self, name: &str, arguments: &[Held<'a>]) -> bool {
         let Some(word) = self.vocabulary.iter().find(|word| word.name == name) else { return true };
@@ -384,7 +397,11 @@ impl<'a> Judge<'a> {
         let is_told = objects.is_some_and(|objects| self.words.is_told(name, &objects));
         match origin::of(self.domain, word) {
             Origin::Remembered => is_told || is_own(self.domain, name) || self.words.is_spoken_of(name),
-            _ => is_told || !origin::is_revealed(self.domain, word),
+            _ => {
+                let mark = self.domain.config.word.get(name).and_then(|word| word.untold.as_ref());
+                let is_open = || origin::is_revealed(self.domain, word);
+                is_told || !mark.map_or_else(is_open, |mark| self.is_untold(mark, arguments))
+            }
         }
     }
 

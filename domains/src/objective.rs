@@ -2,6 +2,9 @@
 
 use crate::config::Answers;
 
+/// What stands for a variable among the objects of a word.
+pub const VARIABLE: &str = "?";
+
 /// Goal as given by a person, with its PDDL meaning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goal {
@@ -52,8 +55,10 @@ pub struct Asked {
     pub denies: bool,
     /// True if the goal needs more than looking.
     pub more: bool,
+    /// True if the condition is a single word that must hold or reach a number.
+    pub plain: bool,
     /// Words of the condition with their objects, in order, including those behind derived words;
-    /// variables are `?`.
+    /// variables are [`VARIABLE`].
     pub words: Vec<(String, Vec<String>)>,
 }
 

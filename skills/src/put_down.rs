@@ -1,8 +1,9 @@
 //! `put-down`: places the held object.
 
 use async_trait::async_trait;
-use descry_robots::{Failure, Placing};
+use descry_robots::{Failure, Placing, Request};
 
+use crate::ask::Ask;
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
 /// Places the held object.
@@ -18,6 +19,6 @@ impl Skill for PutDown {
         if !hand.holds {
             return Err(Failure::Slipped { because: "the hand is empty".into(), moved_m: 0.0 }.into());
         }
-        Ok(Outcome::Placed(context.robot.place(&self.placing, &context.watch()).await?))
+        Ask(Request::Place(self.placing)).perform(context).await
     }
 }

@@ -3,8 +3,7 @@
 use async_trait::async_trait;
 use descry_robots::perception::laser::Alignment;
 use descry_robots::{
-    CancellationToken, Driven, Failure, Grasped, Hand, Opened, Placed, Progress, Pushed, Reading, Robot,
-    Scanned, Sensed, Watch,
+    Answer, CancellationToken, Driven, Failure, Grasped, Hand, Progress, Robot, Sensed, Watch,
 };
 
 use crate::model::Modelled;
@@ -54,24 +53,26 @@ pub enum Outcome {
     Driven(Driven),
     /// A view was taken.
     Seen(Box<Sensed>),
-    /// The laser took a sweep.
-    Scanned(Box<Scanned>),
-    /// A sensor was read.
-    Read(Reading),
+    /// The body has answered a request.
+    Answered(Box<Answer>),
     /// Scans were registered.
     Aligned(Box<Alignment>),
     /// Views of an object were registered, and a model learned.
     Modelled(Box<Modelled>),
-    /// An object was pushed.
-    Pushed(Pushed),
-    /// A door was opened.
-    Opened(Opened),
     /// An object was lifted, with the state of the hand.
     Grasped(Grasped, Hand),
-    /// An object was placed.
-    Placed(Placed),
     /// An external program succeeded, with its message.
     Told(String),
+}
+
+impl Outcome {
+    /// Answer of the body, where the skill was one request.
+    pub fn answer(&self) -> Option<&Answer> {
+        match self {
+            Outcome::Answered(answer) => Some(answer),
+            _ => None,
+        }
+    }
 }
 
 /// Failure of a skill.

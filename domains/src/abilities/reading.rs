@@ -1,7 +1,8 @@
 //! *reading*: the body's other senses. Readings go into the record and to the programs behind
 //! facts.
 
-use descry_skills::{Outcome, Read};
+use descry_robots::{Answer, Request};
+use descry_skills::Ask;
 use serde_json::json;
 
 use crate::ability::{Ability, ActionKind, NOTHING_MORE, SkillWord};
@@ -22,11 +23,13 @@ pub const ABILITY: Ability = Ability {
         ground: |s, arguments| {
             let sense =
                 called(s, arguments[0]).ok_or_else(|| format!("the body has no sense {}", arguments[0]))?;
-            Ok(Box::new(Read { sense: sense.name.clone() }))
+            Ok(Box::new(Ask(Request::Read(sense.name.clone()))))
         },
         because: |s, arguments| called(s, arguments[0]).map_or_else(String::new, |sense| sense.about.clone()),
         learn: |mind, eyes, s, arguments, outcome, _| {
-            let Outcome::Read(reading) = outcome else { return Err(WorldError::strange(outcome)) };
+            let Some(Answer::Read(reading)) = outcome.answer() else {
+                return Err(WorldError::strange(outcome));
+            };
             let about = called(s, arguments[0]).map(|sense| &sense.about);
             let body = json!({ "sense": arguments[0], "about": about, "said": reading.said });
             eyes.record.put_document(READING, reading.stamp_ns, body, Vec::new())?;

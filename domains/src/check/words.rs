@@ -82,10 +82,27 @@ impl Check<'_> {
                     list.push(self.error("two-sources", message, place, "leave `is` or `program` out"));
                 }
             }
+            list.extend(configured.untold.as_ref().and_then(|untold| self.untold(name, untold)));
         }
         list.extend(self.init());
         list.extend(self.said());
         list
+    }
+
+    /// Checks that what tells that a word is not known yet is a predicate of the same arguments.
+    fn untold(&self, name: &str, untold: &str) -> Option<Diagnostic> {
+        let vocabulary = &self.domain.vocabulary;
+        let (own, other) = (vocabulary.word(name)?, vocabulary.word(untold));
+        if other.is_some_and(|other| !other.is_number && !own.is_number && other.types == own.types) {
+            return None;
+        }
+        let message = format!("`{untold}` is no predicate of the arguments of `{name}`");
+        let types: String = own.types.iter().map(|of| format!(" {of}")).collect();
+        let fitting = vocabulary.words().into_iter().filter(|w| !w.is_number && w.types == own.types);
+        let fitting: Vec<String> = fitting.map(|w| w.name).filter(|w| w != name).collect();
+        let help =
+            format!("name a predicate of{types}; {}", self.known(untold, fitting.iter().map(String::as_str)));
+        Some(self.error("untold", message, self.toml.at(&["word", name, "untold"]), help))
     }
 
     /// Checks that each line of `[said]` names an action, word or call, and uses its parameters.

@@ -75,7 +75,8 @@ impl World<'_> {
     /// Final answer of a run.
     pub fn answer(&self, round: &Round, ended: &Ended) -> Conclusion {
         let abilities = || abilities::used(&self.setting.domain.config.uses);
-        let own = abilities().find_map(|a| a.answers);
+        // A question has the answer that its condition has.
+        let own = abilities().find_map(|a| a.answers).filter(|_| !self.setting.goal.question);
         let body = round.situation.robot.description();
         let lacks = abilities().flat_map(|a| a.needs).copied().find(|part| !body.has(*part));
         let (domain, goal) = (self.setting.domain, self.setting.goal);

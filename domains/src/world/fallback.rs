@@ -9,6 +9,7 @@ use crate::error::WorldError;
 use crate::judge::{Decisive, Judge, Judgement, Truth};
 use crate::looking::looks;
 use crate::round::Round;
+use crate::situation::Situation;
 use crate::{abilities, actions, culprit, origin, words};
 
 impl World<'_> {
@@ -23,12 +24,17 @@ impl World<'_> {
         if self.is_beyond_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
-        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
-        let all = own.map_or_else(|| looks::look_deeds(s), |fallback| fallback(s));
+        let all = self.own_fallback(s).unwrap_or_else(|| looks::look_deeds(s));
         match self.first_of(round, &all) {
             Some(choice) => Ok(choice),
             None => self.behind(round),
         }
+    }
+
+    /// The fallback of the first ability that has its own.
+    fn own_fallback(&self, s: &Situation) -> Option<Vec<Vec<Deed>>> {
+        let own = abilities::used(&self.setting.domain.config.uses).find_map(|a| a.fallback);
+        own.map(|fallback| fallback(s))
     }
 
     /// Look behind a shut door.
@@ -107,7 +113,8 @@ impl World<'_> {
         if s.held.is_some() || !self.is_open_to_looks(round) {
             return Ok(Choice::Nothing(NOTHING_LEFT.into()));
         }
-        match self.first_of(round, &looks::look_deeds(s)) {
+        let looks = looks::look_deeds(s).into_iter().chain(self.own_fallback(s).unwrap_or_default());
+        match self.first_of(round, &looks.collect::<Vec<_>>()) {
             Some(choice) => Ok(choice),
             None => self.behind(round),
         }
@@ -127,7 +134,8 @@ impl World<'_> {
             s.things.iter().any(|t| t.track.is_none()) || !(s.kinds.is_empty() && s.asked.is_empty());
         let is_late = s.time_left_s.is_some() && is_of_objects;
         let may_look = (is_late || is_asked) && s.held.is_none() && is_searching;
-        let looks = if may_look { looks::look_deeds(s) } else { Vec::new() };
+        let mut looks = if may_look { looks::look_deeds(s) } else { Vec::new() };
+        looks.extend(self.own_fallback(s).filter(|_| is_asked && s.held.is_none()).unwrap_or_default());
         Ok(self.first_of(round, &looks).unwrap_or_else(|| Choice::Nothing(NOTHING_LEFT.into())))
     }
 }

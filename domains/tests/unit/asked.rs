@@ -24,6 +24,7 @@ fn what_is_asked_is_read_off_the_condition() {
             surfaces: own(surfaces),
             denies: false,
             more: condition.contains("observed"),
+            plain: condition.matches('(').count() < 3,
             words: Vec::new(),
         };
         let found = Asked { words: Vec::new(), ..asked(&domain, condition) };

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use descry_memory::belief::Track;
 use descry_perception::nalgebra::{Point3, Vector3};
-use descry_planner::{Answer, Call, CallError};
-use descry_robots::{Description, Failure, Grasp, Part, Place, Placing};
+use descry_planner::{Call, CallError};
+use descry_robots::{Answer, Description, Failure, Grasp, Part, Place, Placing};
 use descry_skills::{Outcome, PickUp, PutDown, SkillFailure};
 
 use crate::ability::{Ability, ActionKind, Deed, Fact, Meaning, SkillWord, argument, quickest_first};
@@ -19,6 +19,7 @@ use crate::looking::change::Change;
 use crate::looking::{looks, perceive};
 use crate::mind::Mind;
 use crate::note::Note;
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 
 /// Margin around the picked-up object within which the hand may touch its neighbours, metres.
@@ -42,7 +43,7 @@ pub const ABILITY: Ability = Ability {
             types: &["thing"],
             about: "the thing is in the hand",
             states: holding,
-            bounds: None,
+            bounds: Some(is_in_hand),
         },
         Fact {
             name: "hand-free",
@@ -129,6 +130,16 @@ fn holding(s: &Situation) -> Vec<String> {
     held.map(|thing| format!("(holding {})", thing.symbol)).collect()
 }
 
+/// Bounds on `(holding ?thing)`: what is in the hand was seen.
+fn is_in_hand(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let is_it = |track: &Track| match of {
+        [Referent::Named(name)] => s.things.iter().any(|t| t.symbol == **name && is_held(s, t, track)),
+        [Referent::Seen(seen)] => seen.id == track.id,
+        _ => false,
+    };
+    Range::exactly(f64::from(u8::from(held(s).is_some_and(is_it))))
+}
+
 /// True if the object in the hand is the thing.
 fn is_held(s: &Situation, thing: &Thing, track: &Track) -> bool {
     match thing.track {
@@ -194,7 +205,7 @@ fn reaches(s: &Situation, from: usize, p: &Point3<f64>) -> bool {
 }
 
 /// `[can-grasp ?from ?what ?on]`: an object not found yet may stand anywhere on the surface.
-fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+fn can_grasp(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallError> {
     let from = s.candidate(argument(call, 0)?)?;
     let body = s.robot.description();
     let within = |p: Point3<f64>| reaches(s, from, &p);
@@ -208,13 +219,13 @@ fn can_grasp(s: &Situation, call: &Call) -> Result<Answer, CallError> {
             body.has(Part::Hand) && s.surfaces[on].centre().is_some_and(within)
         }
     };
-    Ok(Answer::Truth(can))
+    Ok(descry_planner::Answer::Truth(can))
 }
 
 /// `[can-put ?from ?on]`.
-fn can_put(s: &Situation, call: &Call) -> Result<Answer, CallError> {
+fn can_put(s: &Situation, call: &Call) -> Result<descry_planner::Answer, CallError> {
     let (from, on) = (s.candidate(argument(call, 0)?)?, s.surface(argument(call, 1)?)?);
-    Ok(Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
+    Ok(descry_planner::Answer::Truth(spot::free(s, from, on, spot::USUAL_RADIUS_M, true).is_some()))
 }
 
 /// Position at which the held object is put down.
@@ -285,7 +296,7 @@ fn put_down(
     outcome: &Outcome,
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
-    let Outcome::Placed(placed) = outcome else { return Err(WorldError::strange(outcome)) };
+    let Some(Answer::Placed(placed)) = outcome.answer() else { return Err(WorldError::strange(outcome)) };
     let foot = place(s, arguments).map_err(WorldError::Bug)?;
     if let Some(held) = mind.known.held.take() {
         let belief = Arc::make_mut(&mut mind.known.belief);

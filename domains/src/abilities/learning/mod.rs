@@ -26,6 +26,7 @@ use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
 use crate::objective::Goal;
+use crate::range::Referent;
 use crate::situation::Situation;
 use crate::viewpoint::Candidate;
 
@@ -100,6 +101,11 @@ pub const ABILITY: Ability = Ability {
         None
     }),
     keeps: Some(News::keep),
+    others: Some(|s| {
+        let places = &s.news().places;
+        let is_open = places.is_empty() || places.iter().any(|place| !place.is_visited);
+        is_open.then_some(("novelty", Referent::Unseen)).into_iter().collect()
+    }),
     objects: Some(|s| vec![("novelty", s.news().novelties.iter().map(|n| n.symbol.clone()).collect())]),
     names: Some(|known| known.news().things.iter().map(|thing| ("thing", thing.name.clone())).collect()),
     thing: Some(news::thing),

@@ -4,7 +4,8 @@ mod at;
 mod path_cost;
 mod time_left;
 
-use descry_skills::{Circle, Move, OpenDoor, Outcome};
+use descry_robots::{Answer, Request};
+use descry_skills::{Ask, Circle, Move};
 
 use crate::ability::{Ability, ActionKind, Fact, MOVE, Meaning, NOTHING_MORE, Reads, SkillWord, Trace};
 use crate::drive;
@@ -94,12 +95,12 @@ pub const ABILITY: Ability = Ability {
             about: "opens a door from beside it",
             ground: |s, arguments| {
                 let door = s.door(arguments[1]).map_err(|e| e.to_string())?;
-                Ok(Box::new(OpenDoor { door: s.doors[door].door.name.clone() }))
+                Ok(Box::new(Ask(Request::OpenDoor(s.doors[door].door.name.clone()))))
             },
             because: |_, _| "it is shut and in the way".into(),
-            learn: |_, _, _, _, outcome, _| match outcome {
-                Outcome::Opened(opened) => Ok(format!("it is open after {:.1} s", opened.duration_s)),
-                other => Err(WorldError::strange(other)),
+            learn: |_, _, _, _, outcome, _| match outcome.answer() {
+                Some(Answer::Opened(opened)) => Ok(format!("it is open after {:.1} s", opened.duration_s)),
+                _ => Err(WorldError::strange(outcome)),
             },
             failed: NOTHING_MORE,
         },

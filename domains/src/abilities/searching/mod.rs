@@ -6,8 +6,8 @@ mod facts;
 pub mod policies;
 
 pub use calls::FirstLook;
-use descry_robots::Part;
-use descry_skills::{Observe, Outcome, PushAside, SkillFailure};
+use descry_robots::{Answer, Part, Request};
+use descry_skills::{Ask, Observe, Outcome, SkillFailure};
 
 use crate::ability::{Ability, ActionKind, OBSERVE, SkillWord, Trace};
 use crate::belief::doubt::{Doubt, Taken};
@@ -18,7 +18,12 @@ use crate::eyes::Eyes;
 use crate::looking::{perceive, recording};
 use crate::mind::Mind;
 use crate::note::Note;
+use crate::range::Referent;
 use crate::situation::Situation;
+
+/// Types of what is looked for, and of what that stands on.
+const THING: &str = "thing";
+const SURFACE: &str = "surface";
 
 /// The ability *searching*.
 pub const ABILITY: Ability = Ability {
@@ -59,7 +64,7 @@ pub const ABILITY: Ability = Ability {
                 let from = s.candidate(arguments[0]).map_err(|e| e.to_string())?;
                 let what = s.obstacle(arguments[1]).map_err(|e| e.to_string())?;
                 let push = obstacle::push(s, from, &s.obstacles()[what]);
-                Ok(Box::new(PushAside { push: push.ok_or("the arm does not reach it")? }))
+                Ok(Box::new(Ask(Request::PushAside(push.ok_or("the arm does not reach it")?))))
             },
             because: |s, arguments| match s.obstacle(arguments[1]) {
                 Ok(what) => {
@@ -74,11 +79,19 @@ pub const ABILITY: Ability = Ability {
     ],
     needs: &[Part::Camera],
     objects: Some(|s| vec![("obstacle", s.obstacles().iter().map(|o| o.symbol.clone()).collect())]),
+    others: Some(others),
     ..Ability::named(
         "searching",
         "looks for things on surfaces until it is sure, pushes aside what hides them",
     )
 };
+
+/// Things that nobody asked for, and things and surfaces that nobody has seen.
+fn others(s: &Situation) -> Vec<(&'static str, Referent<'_>)> {
+    let seen = s.strangers().map(|track| (THING, Referent::Seen(track)));
+    let unmapped = s.robot.surfaces().is_empty().then_some((SURFACE, Referent::Unseen));
+    seen.chain([(THING, Referent::Unseen)]).chain(unmapped).collect()
+}
 
 /// Handles a finished look: records the view and updates the belief from all views of the surface.
 fn seen(
@@ -121,7 +134,7 @@ fn pushed(
     outcome: &Outcome,
     _: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
-    let Outcome::Pushed(pushed) = outcome else { return Err(WorldError::strange(outcome)) };
+    let Some(Answer::Pushed(pushed)) = outcome.answer() else { return Err(WorldError::strange(outcome)) };
     perceive::pushed(mind, eyes, situation, arguments[1], pushed.moved_m)?;
     Ok(format!("the hand moved {:.2} m with it", pushed.moved_m))
 }

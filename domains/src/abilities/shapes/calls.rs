@@ -129,7 +129,7 @@ fn expected_found(s: &Situation, call: &Call) -> Result<Answer, CallError> {
 
 fn expected_discovery(s: &Situation, call: &Call) -> Result<Answer, CallError> {
     let (from, shape) = (s.candidate(argument(call, 0)?)?, argument(call, 1)?);
-    let passes = s.floor().sought.as_deref() == Some(shape)
+    let passes = s.floor().sought.iter().any(|sought| sought == shape)
         && s.floor().knows(shape)
         && s.floor().promising.contains(&s.candidates[from].symbol);
     Ok(Answer::Number(if passes { 1.0 } else { 0.0 }))
@@ -140,13 +140,14 @@ const WORTH_M: f64 = 0.001;
 
 /// Fallback: the quickest single scan or alignment with an expected gain.
 pub(super) fn fallback(s: &Situation) -> Vec<Vec<Deed>> {
+    let sought = &s.floor().sought;
     // What nobody has learned is known by no scan.
-    if s.floor().sought.as_ref().is_some_and(|shape| !s.floor().knows(shape)) {
+    if !sought.is_empty() && !sought.iter().any(|shape| s.floor().knows(shape)) {
         return Vec::new();
     }
-    let is_open = |t: &&FloorThing| match &s.floor().sought {
-        Some(shape) => t.may_have(shape, s.floor().known.len(), s.threshold),
-        None => t.symbol == THIS,
+    let is_open = |t: &&FloorThing| match sought.is_empty() {
+        false => s.floor().may_be_sought(t, s.threshold),
+        true => t.symbol == THIS,
     };
     let open: Vec<&FloorThing> = s.floor().things.iter().filter(is_open).collect();
     if let Some(thing) = open.iter().find(|t| t.outline.is_some() && t.taken_for.is_none()) {

@@ -1,7 +1,8 @@
 //! The words that *shapes* states.
 
-use super::floor::{NOTHING_KNOWN_M, THIS};
+use super::floor::{FloorThing, NOTHING_KNOWN_M, THIS};
 use crate::ability::Fact;
+use crate::range::{Range, Referent};
 use crate::situation::Situation;
 use crate::symbol::symbol;
 
@@ -26,7 +27,7 @@ pub(super) const ALL: &[Fact] = &[
         types: &["spot"],
         about: "how far on average it may reach beyond what was met of it, metres",
         states: looseness,
-        bounds: None,
+        bounds: Some(looseness_bounds),
     },
     Fact {
         name: "aligned",
@@ -40,21 +41,21 @@ pub(super) const ALL: &[Fact] = &[
         types: &["spot"],
         about: "how sure it is what it is, or that it is none of the known",
         states: sureness,
-        bounds: None,
+        bounds: Some(sureness_bounds),
     },
     Fact {
         name: "may-be",
         types: &["spot", "shape"],
         about: "its scans fit that shape",
         states: may_be,
-        bounds: None,
+        bounds: Some(may_be_bounds),
     },
     Fact {
         name: "found",
         types: &["shape"],
         about: "how sure it is that something on the floor has that shape",
         states: found,
-        bounds: None,
+        bounds: Some(found_bounds),
     },
     Fact {
         name: "learned",
@@ -66,7 +67,7 @@ pub(super) const ALL: &[Fact] = &[
 ];
 
 fn around(s: &Situation) -> Vec<String> {
-    let of = |t: &super::floor::FloorThing| {
+    let of = |t: &FloorThing| {
         t.ring.iter().map(|pose| format!("(around {pose} {})", t.symbol)).collect::<Vec<_>>()
     };
     s.floor().things.iter().flat_map(of).collect()
@@ -102,7 +103,7 @@ fn sureness(s: &Situation) -> Vec<String> {
         .floor()
         .things
         .iter()
-        .map(|t| format!("(= (sureness {}) {:.5})", t.symbol, t.sureness(known)))
+        .map(|t| format!("(= (sureness {}) {:.6})", t.symbol, t.sureness(known)))
         .collect();
     if s.floor().thing(THIS).is_none() {
         lines.push(format!("(= (sureness {THIS}) 0)"));
@@ -111,7 +112,7 @@ fn sureness(s: &Situation) -> Vec<String> {
 }
 
 fn may_be(s: &Situation) -> Vec<String> {
-    let of = |t: &super::floor::FloorThing| {
+    let of = |t: &FloorThing| {
         let names = t.may_be().unwrap_or_default();
         names.iter().map(|name| format!("(may-be {} {})", t.symbol, symbol(name))).collect::<Vec<_>>()
     };
@@ -119,8 +120,44 @@ fn may_be(s: &Situation) -> Vec<String> {
 }
 
 fn found(s: &Situation) -> Vec<String> {
-    let line = |name: &String| format!("(= (found {name}) {:.5})", s.floor().surest(name));
+    let line = |name: &String| format!("(= (found {name}) {:.6})", s.floor().surest(name));
     s.floor().names.iter().map(|(name, _)| line(name)).collect()
+}
+
+/// The thing on the floor that a referent denotes, if it was found.
+fn thing_of<'a>(s: &'a Situation, of: Option<&Referent<'_>>) -> Option<&'a FloorThing> {
+    match of {
+        Some(Referent::Named(name)) => s.floor().thing(name),
+        _ => None,
+    }
+}
+
+/// Bounds on the looseness: scans lessen it.
+fn looseness_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let now_m = thing_of(s, of.first()).map_or(NOTHING_KNOWN_M, FloorThing::looseness_m);
+    Range { believed: now_m, least: 0.0, greatest: now_m }
+}
+
+/// Bounds on the certainty of what a thing is.
+fn sureness_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let sure = |t: &FloorThing| Range::certainty(t.sureness(s.floor().known.len()), s.threshold);
+    thing_of(s, of.first()).map_or(Range::UNKNOWN, sure)
+}
+
+/// Bounds on the truth: before all scans of a thing are brought together, it may be of any shape.
+fn may_be_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [spot, Referent::Named(shape)] = of else { return Range::UNKNOWN };
+    let names = thing_of(s, Some(spot)).and_then(FloorThing::may_be);
+    let fits = |names: &[String]| names.iter().any(|name| symbol(name) == **shape);
+    names.map_or(Range::UNKNOWN, |names| Range::exactly(f64::from(u8::from(fits(names)))))
+}
+
+/// Bounds on the certainty. It is zero for a shape that nothing on the floor has.
+fn found_bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
+    let [Referent::Named(shape)] = of else { return Range::UNKNOWN };
+    let sure = Range::certainty(s.floor().surest(shape), s.threshold);
+    let is_absent = sure.believed < s.threshold && s.floor().has_none(shape, s.threshold);
+    if is_absent { Range::exactly(0.0) } else { sure }
 }
 
 fn learned(s: &Situation) -> Vec<String> {

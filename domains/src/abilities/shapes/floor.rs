@@ -44,11 +44,11 @@ pub struct Floor {
     pub records: Vec<descry_memory::RecordId>,
     /// Floor that no sweep has passed over.
     pub unseen: UnseenFloor,
-    /// Symbol of the shape whose place is requested; `None`: the goal is about [`THIS`].
-    pub sought: Option<String>,
+    /// Symbols of the requested shapes; empty: the goal is about [`THIS`].
+    pub sought: Vec<String>,
     /// Spoken names of shapes, by symbol.
     pub names: Vec<(String, String)>,
-    /// Unobserved places where an object of the sought shape may stand.
+    /// Unobserved places where an object of a sought shape may stand.
     pub room: Vec<Point2<f64>>,
     /// Viewpoints of some of these places.
     pub promising: BTreeSet<String>,
@@ -92,6 +92,23 @@ impl Floor {
     /// True if a shape with this name is known.
     pub fn knows(&self, shape: &str) -> bool {
         self.known.iter().any(|k| symbol(&k.name) == shape)
+    }
+
+    /// True if something may stand on the floor that no sweep has met.
+    pub fn may_hide_more(&self) -> bool {
+        self.sweeps.is_empty() || self.sought.is_empty() || !self.room.is_empty()
+    }
+
+    /// True if a thing may be of one of the sought shapes, as far as its scans tell.
+    pub fn may_be_sought(&self, thing: &FloorThing, threshold: f64) -> bool {
+        self.sought.iter().any(|shape| thing.may_have(shape, self.known.len(), threshold))
+    }
+
+    /// True if nothing of a shape stands anywhere on the floor, as far as sweeps and scans tell.
+    pub fn has_none(&self, shape: &str, threshold: f64) -> bool {
+        let may_have = |t: &FloorThing| t.may_have(shape, self.known.len(), threshold);
+        let is_sought = self.sought.iter().any(|sought| sought == shape);
+        is_sought && self.knows(shape) && !self.may_hide_more() && !self.things.iter().any(may_have)
     }
 
     /// Highest confidence among objects that fit this name alone; 0 if none does.

@@ -14,8 +14,8 @@ pub mod unseen;
 use std::sync::Arc;
 
 use descry_perception::laser::{KnownShape, Verdict};
-use descry_robots::Part;
-use descry_skills::{Align, Circle, Outcome, Scan};
+use descry_robots::{Answer, Part, Request};
+use descry_skills::{Align, Ask, Circle, Outcome};
 use floor::{Floor, Outline, thing};
 use unseen::UnseenFloor;
 
@@ -27,7 +27,8 @@ use crate::eyes::Eyes;
 use crate::load::Domain;
 use crate::mind::Mind;
 use crate::note::Note;
-use crate::objective::Goal;
+use crate::objective::{Goal, VARIABLE};
+use crate::range::Referent;
 use crate::situation::Situation;
 use crate::slots::type_of_slot;
 use crate::symbol::symbol;
@@ -48,7 +49,7 @@ pub const ABILITY: Ability = Ability {
             kind: ActionKind::Sensing,
             types: &["pose", "spot"],
             about: "sweeps the laser from a pose around it",
-            ground: |_, _| Ok(Box::new(Scan)),
+            ground: |_, _| Ok(Box::new(Ask(Request::Scan))),
             because: calls::hope_of_scan,
             learn: scanned,
             failed: NOTHING_MORE,
@@ -58,7 +59,7 @@ pub const ABILITY: Ability = Ability {
             kind: ActionKind::Sensing,
             types: &["pose"],
             about: "sweeps the laser over floor that was not seen yet",
-            ground: |_, _| Ok(Box::new(Scan)),
+            ground: |_, _| Ok(Box::new(Ask(Request::Scan))),
             because: |s, _| match s.floor().room.len() {
                 1 => "there is one place left where it may stand".into(),
                 places => format!("there are {places} places left where it may stand"),
@@ -106,6 +107,7 @@ pub const ABILITY: Ability = Ability {
     fallback: Some(calls::fallback),
     answers: Some(telling::answer),
     keeps: Some(|known, _, later| later.shapes.extend(known.floor().learned.iter().cloned())),
+    others: Some(|s| s.floor().may_hide_more().then_some(("spot", Referent::Unseen)).into_iter().collect()),
     objects: Some(|s| {
         let spots = s.floor().things.iter().map(|t| t.symbol.clone()).collect();
         vec![("spot", spots), (SHAPE, s.floor().names.iter().map(|(symbol, _)| symbol.clone()).collect())]
@@ -133,8 +135,11 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
             names.push((symbol(name), name.clone()));
         }
     }
-    let sought = goal.asked.of_word("found").find_map(|objects| objects.first().cloned());
-    if sought.is_some() {
+    let asked = ["found", "may-be"].into_iter().flat_map(|word| goal.asked.of_word(word));
+    let asked: Vec<&String> = asked.filter_map(|objects| objects.last()).collect();
+    let is_asked = |shape: &String| asked.iter().any(|name| *name == shape || *name == VARIABLE);
+    let sought: Vec<String> = names.iter().map(|(symbol, _)| symbol.clone()).filter(is_asked).collect();
+    if !sought.is_empty() {
         poses::survey(mind, &*robot);
     }
     *mind.known.floor_mut() = Floor {
@@ -145,7 +150,7 @@ fn begins(mind: &mut Mind, domain: &Domain, goal: &Goal) {
             .known
             .candidates
             .iter()
-            .filter(|_| sought.is_some())
+            .filter(|_| !sought.is_empty())
             .map(|c| c.symbol.clone())
             .collect(),
         sought,
@@ -183,7 +188,7 @@ fn scanned(
     outcome: &Outcome,
     notes: &mut Vec<Note>,
 ) -> Result<String, WorldError> {
-    let Outcome::Scanned(scanned) = outcome else { return Err(WorldError::strange(outcome)) };
+    let Some(Answer::Scanned(scanned)) = outcome.answer() else { return Err(WorldError::strange(outcome)) };
     notes.push(taken::take(mind, eyes, arguments[0], scanned)?);
     Ok(String::new())
 }

@@ -158,7 +158,7 @@ fn assign(floor: &mut Floor, cluster: &Cluster, laser: &Vector2<f64>) -> usize {
 /// Adds viewpoints around an object if requested and not yet done; true if added.
 fn make_ring(mind: &mut Mind, eyes: Eyes<'_>, index: usize) -> bool {
     let thing = &mind.known.floor().things[index];
-    let is_asked = mind.known.floor().sought.is_some() || thing.symbol == THIS;
+    let is_asked = !mind.known.floor().sought.is_empty() || thing.symbol == THIS;
     if !is_asked || !thing.ring.is_empty() {
         return false;
     }
@@ -243,10 +243,9 @@ fn look_over_floor(mind: &mut Mind, eyes: Eyes<'_>, scan: &Scan) {
 }
 
 impl Floor {
-    /// Radius of the largest disc inside the sought shape, slightly reduced for its uncertainty.
+    /// Radius of the largest disc inside the smallest sought shape, slightly reduced for its uncertainty.
     fn sought_radius_m(&self) -> Option<f64> {
-        let sought = self.sought.as_ref()?;
-        let of = self.known.iter().filter(|k| symbol(&k.name) == *sought);
+        let of = self.known.iter().filter(|k| self.sought.contains(&symbol(&k.name)));
         let least = of.map(|k| least_width_m(&k.model.hull().corners)).reduce(f64::min)?;
         Some(0.4 * least)
     }

@@ -15,11 +15,12 @@ use crate::symbol::symbol;
 /// Open length of an outline above which the answer mentions it, metres.
 const OPEN_M: f64 = 0.02;
 
-/// Answers a goal about shapes; `s` is the situation of the last round.
+/// Answers a goal about one shape or one thing; `s` is the situation of the last round. None for other goals.
 pub(super) fn answer(goal: &Goal, mind: &Mind, s: &Situation, ended: &Ended) -> Option<Conclusion> {
+    goal.asked.plain.then_some(())?;
     let teller = Teller { mind, s };
     let is_to_learn = goal.asked.of_word("learned").next().is_some();
-    let (verdict, why, thing) = match &s.floor().sought {
+    let (verdict, why, thing) = match s.floor().sought.first() {
         Some(shape) => teller.where_is(shape, ended),
         None if is_to_learn => teller.learned(ended),
         None => teller.which(ended),
@@ -209,9 +210,9 @@ impl<'a> Teller<'a> {
         let label = thing.is().map(str::to_string);
         let room = s.robot.rooms().iter().find(|r| within(&r.outline_m, &middle)).map(|r| r.name.clone());
         Believed {
-            asked: match &s.floor().sought {
-                Some(shape) => label.as_ref().is_some_and(|l| symbol(l) == *shape),
-                None => thing.symbol == THIS,
+            asked: match s.floor().sought.is_empty() {
+                false => label.as_ref().is_some_and(|l| s.floor().sought.contains(&symbol(l))),
+                true => thing.symbol == THIS,
             },
             kind: label.clone(),
             label,

@@ -223,7 +223,11 @@ impl Which {
         if let Some((_, toml)) = files.get_mut("domain.toml") {
             let phrase =
                 format!("[[goal]]\nsay = \"check it\"\nmeans = \"{means}\"\nquestion = {is_question}\n");
-            *toml = toml.replacen("\n[said]", &format!("\n{phrase}\n[said]"), 1);
+            *toml = toml.replacen("\n[said]", &format!("\n{phrase}\n[said]"), 1).replacen(
+                "scene = \"",
+                &format!("scene = \"{}\" # ", self.scene()),
+                1,
+            );
         }
         let scene = self.room(draws);
         if self == Which::Household {

@@ -4,6 +4,7 @@
 #[path = "../examples/own_body.rs"]
 mod own_body;
 
+mod colours;
 mod example;
 mod goals;
 mod lived;

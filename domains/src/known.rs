@@ -7,6 +7,7 @@ use descry_memory::belief::{Belief, Track};
 use descry_memory::space::Space;
 use descry_perception::nalgebra::Isometry3;
 use descry_perception::recognise::ObjectModel;
+use descry_perception::recognise::colour::coloured;
 use descry_robots::Robot;
 
 use crate::geometry::Geometry;
@@ -27,6 +28,8 @@ pub struct Thing {
     pub name: String,
     /// Models of the objects that may be the target.
     pub models: Vec<ObjectModel>,
+    /// Colour of the target, where the goal asks for one; the name begins with it.
+    pub colour: Option<&'static str>,
     /// Surfaces that the goal restricts the target to; `None`: anywhere.
     pub on: Option<Vec<usize>>,
     /// Track number, if the target is one particular seen object.
@@ -129,24 +132,38 @@ impl Known {
     }
 }
 
-/// True if two known objects have equal shape and size, and differ in name alone.
+/// True if two known objects have equal shape and size and may have the same colour: they differ in name alone.
 pub(crate) fn is_alike(one: &ObjectModel, other: &ObjectModel) -> bool {
     let named = ObjectModel {
         name: one.name.clone(),
         kind: one.kind.clone(),
         phrases: one.phrases.clone(),
+        colours: one.colours.clone(),
         ..other.clone()
     };
-    named == *one
+    let is_any = one.colours.is_empty() || other.colours.is_empty();
+    named == *one && (is_any || one.colours.iter().any(|colour| other.colours.contains(colour)))
 }
 
-/// Search target of a goal from the domain's models: a known object, or a kind.
+/// Search target of a goal from the domain's models: a known object, or a kind, either of any colour or of a stated one.
 pub fn thing(domain: &Domain, wanted: &str) -> Thing {
+    let plain = thing_of_any_colour(domain, wanted);
+    match coloured(wanted).filter(|_| plain.models.is_empty()) {
+        Some((colour, rest)) => {
+            let plain = thing_of_any_colour(domain, rest);
+            let name = format!("{colour} {}", plain.name);
+            Thing { symbol: wanted.into(), name, colour: Some(colour), ..plain }
+        }
+        None => plain,
+    }
+}
+
+fn thing_of_any_colour(domain: &Domain, wanted: &str) -> Thing {
     let single = domain.objects.iter().find(|o| symbol(&o.name) == wanted);
     let models: Vec<ObjectModel> = match single {
         Some(model) => vec![model.clone()],
         None => domain.objects.iter().filter(|o| symbol(&o.kind) == wanted).cloned().collect(),
     };
     let name = single.map(|m| m.name.clone()).or_else(|| models.first().map(|m| m.kind.clone()));
-    Thing { symbol: wanted.into(), name: name.unwrap_or_default(), models, on: None, track: None }
+    Thing { symbol: wanted.into(), name: name.unwrap_or_default(), models, ..Thing::default() }
 }

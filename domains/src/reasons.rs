@@ -53,7 +53,21 @@ pub fn left_about(s: &Situation, what: usize) -> Option<String> {
 /// Known object that a track more likely is, with its probability; empty if there is none.
 pub fn rather(track: &Track, thing: &Thing) -> String {
     let is_it = |name: &str| thing.models.iter().any(|m| m.name == name);
-    likelier(&track.probabilities, track.probability_of(&thing.name), is_it)
+    likelier(&track.probabilities, track.probability_of(&thing.name), is_it) + &colour(track, thing)
+}
+
+/// The colour that a track is likelier to have than the one that is asked for, with its probability, or that none was seen; empty if
+/// colour decides nothing.
+fn colour(track: &Track, thing: &Thing) -> String {
+    let decides = thing.colour.is_some() || thing.models.iter().any(|m| !m.colours.is_empty());
+    match thing.colour {
+        _ if decides && track.colours.is_empty() => "; its colour was not seen".into(),
+        Some(asked) => {
+            let p = track.colours.iter().find(|(name, _)| name == asked).map_or(0.0, |(_, p)| *p);
+            likelier(&track.colours, p, |name| name == asked)
+        }
+        None => String::new(),
+    }
 }
 
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 //! percepts of later merges are associated with earlier objects.
 
 use descry_perception::nalgebra::Point3;
-use descry_perception::recognise::{Evidence, Percept};
+use descry_perception::recognise::{Evidence, Percept, probability_of};
 use pathfinding::prelude::{Matrix, kuhn_munkres_min};
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +40,9 @@ pub struct Track {
     pub kinds: Vec<(String, f64)>,
     /// Probability of being none of the known objects.
     pub unknown: f64,
+    /// Probability of each basic colour; empty if its colour was not seen.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub colours: Vec<(String, f64)>,
     /// Share of the visible hull that some view measured or looked past, 0 to 1.
     pub seen_fraction: f64,
     /// Positions of the cameras that saw the object, world frame, metres.
@@ -80,11 +83,10 @@ pub struct Belief {
 }
 
 impl Track {
-    /// Probability of being the known object, or of being of the kind, called `name`; 0 for a name without a
-    /// model.
+    /// Probability of being the known object, or of being of the kind, called `name`, which may begin with a colour; 0 for a name
+    /// without a model.
     pub fn probability_of(&self, name: &str) -> f64 {
-        let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
-        of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)
+        probability_of(name, [&self.probabilities, &self.kinds], &self.colours)
     }
 
     /// The most probable known object; none: unknown.
@@ -93,10 +95,12 @@ impl Track {
         (best.1 > self.unknown).then_some(best.0.as_str())
     }
 
-    /// The most probable kind; none: unknown.
+    /// The most probable kind; none: of no known kind. What is like a known object but of another colour is of its kind.
     pub fn kind(&self) -> Option<&str> {
         let best = self.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (best.1 > self.unknown).then_some(best.0.as_str())
+        let all = |list: &[(String, f64)]| list.iter().map(|(_, p)| p).sum::<f64>();
+        let recoloured = all(&self.kinds) - all(&self.probabilities);
+        (best.1 > self.unknown - recoloured).then_some(best.0.as_str())
     }
 
     /// True if views may have blurred the object into another one over its place, a much larger
@@ -225,6 +229,7 @@ fn seen(on: &str, sighted: &Sighted<'_>, stamp_ns: i64, cites: &[RecordId]) -> T
         probabilities: p.probabilities.clone(),
         kinds: p.kinds.clone(),
         unknown: p.unknown,
+        colours: p.colours.clone(),
         seen_fraction: p.seen_fraction,
         viewpoints_m: sighted.viewpoints_m.to_vec(),
         evidence: p.evidence.clone(),

@@ -57,6 +57,7 @@ fn cup() -> ObjectModel {
         taper: Range { low: 0.95, high: 1.05 },
         top: Top::Open,
         handle: Handle::None,
+        colours: Vec::new(),
     }
 }
 

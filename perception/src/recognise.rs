@@ -4,6 +4,7 @@
 pub mod asker;
 #[doc(hidden)]
 pub mod body;
+pub mod colour;
 mod descry;
 #[doc(hidden)]
 pub mod ends;
@@ -11,6 +12,7 @@ mod evidence;
 mod likelihood;
 mod model;
 mod necked;
+mod painted;
 mod parting;
 mod percept;
 mod published;
@@ -26,9 +28,10 @@ mod verify;
 use crate::segment::Scene;
 use crate::visibility::Visibility;
 
+pub use colour::Colour;
 pub use descry::Descry;
 pub use model::{Handle, ModelError, ObjectModel, Range, Shape, Top, check_models};
-pub use percept::{Evidence, Percept, Sighting, Stance};
+pub use percept::{Evidence, Percept, Sighting, Stance, probability_of};
 pub use published::Published;
 
 /// Recogniser: assigns known objects to segments.

@@ -32,6 +32,8 @@ pub struct DepthMap {
     pub camera_from_world: Isometry3<f64>,
     /// Depth along z, metres, row by row; NaN for missing returns.
     pub depths_m: Arc<[f32]>,
+    /// Red, green and blue of the same pixels, if the camera gives them.
+    pub colours: Option<Arc<[[u8; 3]]>>,
 }
 
 /// All that the cameras of a scene saw.
@@ -57,7 +59,8 @@ impl DepthMap {
             (None, None) => return None,
         };
         let depths_m = view.cloud.points.iter().map(|p| if is_finite(p) { p.z } else { f32::NAN }).collect();
-        Some(DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m })
+        let colours = view.cloud.colours.as_deref().map(Arc::from);
+        Some(DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m, colours })
     }
 
     /// Depth map from projecting a cloud (minimum depth per pixel); holes stay missing returns.
@@ -68,7 +71,8 @@ impl DepthMap {
         world_from_camera: &Isometry3<f64>,
     ) -> DepthMap {
         let mut depths_m = vec![f32::NAN; intrinsics.width * intrinsics.height];
-        for p in cloud.points.iter().filter(|p| is_finite(p)) {
+        let mut colours = cloud.colours.as_ref().map(|_| vec![[0; 3]; depths_m.len()]);
+        for (n, p) in cloud.points.iter().enumerate().filter(|(_, p)| is_finite(p)) {
             let q = camera_from_cloud * p.cast::<f64>();
             let Some(pixel) = intrinsics.project(&q).and_then(|(u, v)| intrinsics.pixel(u, v)) else {
                 continue;
@@ -76,9 +80,13 @@ impl DepthMap {
             let depth = &mut depths_m[pixel];
             if depth.is_nan() || *depth > q.z as f32 {
                 *depth = q.z as f32;
+                if let Some((shown, all)) = colours.as_mut().zip(cloud.colours.as_ref()) {
+                    shown[pixel] = all[n];
+                }
             }
         }
-        DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m: depths_m.into() }
+        let (camera_from_world, depths_m) = (world_from_camera.inverse(), depths_m.into());
+        DepthMap { intrinsics, camera_from_world, depths_m, colours: colours.map(Arc::from) }
     }
 
     /// Position of the camera in the world, metres.

@@ -2,6 +2,7 @@
 //! once.
 
 mod boxes;
+mod colours;
 mod composed;
 mod constants;
 mod corridor;

@@ -23,6 +23,7 @@ pub fn cup_a() -> ObjectModel {
         taper: Range { low: 0.95, high: 1.05 },
         top: Top::Open,
         handle: Handle::None,
+        colours: Vec::new(),
     }
 }
 

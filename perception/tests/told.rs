@@ -21,6 +21,7 @@ fn models() -> Vec<ObjectModel> {
         taper: Range { low: 0.95, high: 1.05 },
         top: Top::Open,
         handle: Handle::None,
+        colours: Vec::new(),
     };
     vec![cup("cup A", 0.070, 0.104), cup("cup B", 0.088, 0.155)]
 }

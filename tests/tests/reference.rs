@@ -15,6 +15,7 @@ use syn::{Attribute, Expr, Fields, Item, ItemEnum, ItemStruct, Lit, Meta, Stmt, 
 /// Files with the types that read users' files.
 const FORMATS: &[&str] = &[
     "domains/src/config.rs",
+    "perception/src/recognise/colour.rs",
     "perception/src/recognise/model.rs",
     "robots/src/sim/scene/mod.rs",
     "robots/src/sim/scene/room.rs",
@@ -25,6 +26,7 @@ const FORMATS: &[&str] = &[
     "robots/src/sim/composed.rs",
     "robots/src/sim/faults.rs",
     "robots/src/sim/stereo.rs",
+    "robots/src/sim/light.rs",
     "robots/src/recorded/settings.rs",
     "robots/src/program/hello.rs",
     "robots/src/program/message.rs",
@@ -149,6 +151,7 @@ fn in_words(text: &str) -> String {
         "OtherBody" => "text".into(),
         "Steps" => "text, or list of texts".into(),
         "Range" => "number, or least and greatest".into(),
+        "Colour" => "names or ranges".into(),
         named => format!("`{named}`"),
     }
 }

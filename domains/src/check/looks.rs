@@ -30,7 +30,7 @@ impl Check<'_> {
                 continue;
             };
             let message = format!(
-                "nothing tells \"{}\" from \"{}\": shape and size are the same",
+                "nothing tells \"{}\" from \"{}\": shape, size and colour may be the same",
                 one.name, other.name
             );
             let named = |source: &Source| source.text.find(&format!("\"{}\"", one.name));
@@ -40,7 +40,7 @@ impl Check<'_> {
                 let end = start + one.name.len() + 2;
                 Some(Span { source: bytes(first_source + at), start: bytes(start), end: bytes(end) })
             });
-            let help = "give it other measures, or leave one of the two out: colour is not looked at";
+            let help = "give it other measures, say of both which colours they have, as in colour = \"red\", or leave one of the two out";
             list.push(
                 Diagnostic::warning("alike", message, place.unwrap_or_default(), "here").with_help(help),
             );

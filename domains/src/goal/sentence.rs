@@ -3,9 +3,12 @@
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
+use descry_perception::recognise::colour::basic;
+
 use super::{GoalError, fits, pattern};
 use crate::config::GoalPhrase;
 use crate::english;
+use crate::known::thing;
 use crate::lexicon::{Lexicon, Named};
 use crate::load::Domain;
 use crate::objective::Filled;
@@ -291,10 +294,25 @@ impl<'a> Reader<'a> {
             let name = self.lexicon.name_of(&named.symbol).to_string();
             return Some(Noun { symbol: named.symbol.clone(), name, within: None });
         }
+        if let Some(noun) = self.coloured(of_type, words) {
+            return Some(noun);
+        }
         let name = crate::english::without_article(&words.join(" ")).to_string();
         let is_open = self.domain.config.open.iter().any(|of| of == of_type);
         let is_free = is_open && self.lexicon.is_free(&symbol(&name));
         is_free.then(|| Noun { symbol: symbol(&name), name, within: None })
+    }
+}
+
+impl Reader<'_> {
+    /// A colour before the name of an object or a kind that looks tell: "red cup".
+    fn coloured(&self, of_type: &str, words: &[String]) -> Option<Noun> {
+        let (first, rest) = english::without_determiners(words).split_first()?;
+        let colour = basic(&first.to_lowercase()).filter(|_| ["thing", "kind"].contains(&of_type))?;
+        let known = named(self.lexicon.of_type(of_type), rest)?;
+        let is_seen = !thing(self.domain, &known.symbol).models.is_empty();
+        let name = format!("{colour} {}", self.lexicon.name_of(&known.symbol));
+        is_seen.then(|| Noun { symbol: format!("{colour}-{}", known.symbol), name, within: None })
     }
 }
 

@@ -20,6 +20,7 @@ fn chance(sides: f64, views: usize, height_m: f64) -> f64 {
         probabilities: Vec::new(),
         kinds: Vec::new(),
         unknown: 1.0,
+        colours: Vec::new(),
         position_m: Point3::origin(),
         position_sigma_m: 0.001,
         size_m: [0.05, 0.05, height_m],

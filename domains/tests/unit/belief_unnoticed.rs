@@ -23,7 +23,12 @@ fn seen_from_above(disc_m: f64) -> Space {
     let world_from_camera = Isometry3::from_parts(Translation3::new(0.0, 0.0, 2.0), down);
     let depths_m = (0..320 * 240).map(depth_m).collect();
     let mut space = Space::default();
-    space.integrate(&DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m });
+    space.integrate(&DepthMap {
+        intrinsics,
+        camera_from_world: world_from_camera.inverse(),
+        depths_m,
+        colours: None,
+    });
     space
 }
 
@@ -46,7 +51,12 @@ fn seen_from_the_side(low_m: f64, high_m: f64, aside_m: f64) -> Space {
     let world_from_camera = Isometry3::from_parts(Translation3::new(-1.0, 0.0, 0.05), ahead);
     let depths_m = (0..320 * 240).map(depth_m).collect();
     let mut space = Space::default();
-    space.integrate(&DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m });
+    space.integrate(&DepthMap {
+        intrinsics,
+        camera_from_world: world_from_camera.inverse(),
+        depths_m,
+        colours: None,
+    });
     space
 }
 
@@ -128,6 +138,7 @@ fn disc() -> Track {
         probabilities: vec![("cup A".into(), 0.01)],
         kinds: vec![("cup".into(), 0.01)],
         unknown: 0.99,
+        colours: Vec::new(),
         seen_fraction: 0.5,
         viewpoints_m: vec![],
         evidence: Evidence::default(),

@@ -381,5 +381,38 @@ fn objects_that_nothing_tells_apart_are_found() {
     let found = |files: &Files| findings(&from_files(files.clone(), None).unwrap_or_else(|e| panic!("{e}")));
     let all = found(&files);
     assert_eq!(all.list.iter().map(|d| d.code).collect::<Vec<_>>(), ["alike"], "{all}");
-    assert!(all.to_string().contains("colour is not looked at"), "{all}");
+    assert!(all.to_string().contains("colour = \"red\""), "{all}");
+    let mut painted = |colours: [&str; 2], expected: &[&str]| {
+        for ((key, text), colour) in
+            [("mug", named("blue mug")), ("red-mug", other.clone())].into_iter().zip(colours)
+        {
+            let key = format!("objects/{key}.toml");
+            files.insert(key.clone(), (key, format!("{text}\n{colour}\n")));
+        }
+        let found = found(&files);
+        assert_eq!(found.list.iter().map(|d| d.code).collect::<Vec<_>>(), expected, "{colours:?}: {found}");
+    };
+    painted(["colour = \"blue\"", "colours = [\"red\", \"white\"]"], &[]);
+    painted(["colour = \"red\"", "colours = [\"red\", \"white\"]"], &["alike"]);
+    painted(["", "colour = \"red\""], &["alike"]);
+    painted(["colour = \"blue\"", "colour = { hue_deg = [10, 35], saturation = [0.2, 0.5] }"], &[]);
+}
+
+#[test]
+fn colours_that_mean_nothing_are_refused_at_their_place() {
+    let check = |colour: &str, words: &[&str]| {
+        let mut files: Files = template::files("mine")
+            .into_iter()
+            .map(|(path, text)| (path.display().to_string(), (path.display().to_string(), text)))
+            .collect();
+        let (_, mug) = files.get("objects/mug.toml").expect("the template's mug").clone();
+        let text = format!("{mug}\n{colour}\n");
+        files.insert("objects/mug.toml".into(), ("objects/mug.toml".into(), text));
+        let found = from_files(files, None).map(|_| ()).expect_err(colour).to_string();
+        words.iter().for_each(|word| assert!(found.contains(word), "{colour}: {found}"));
+    };
+    check("colour = \"rde\"", &["`rde` is no colour name: did you mean `red`?", "colour = \"rde\"", "^^^"]);
+    check("colours = [\"white\", \"turquoise\"]", &["`turquoise` is no colour name: known are black", "^^^"]);
+    check("colour = { hue_deg = [40, 20] }", &["`hue_deg` = [40, 20] holds no colour"]);
+    check("colour = { hue = [20, 40] }", &["unknown field `hue`", "hue_deg"]);
 }

@@ -15,7 +15,7 @@ fn seen_from_above(height_m: f64) -> DepthMap {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
     let world_from_camera = Isometry3::from_parts(Translation3::new(0.0, 0.0, 2.0), down);
     let depths_m = vec![(2.0 - height_m) as f32; 64 * 48].into();
-    DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m }
+    DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m, colours: None }
 }
 
 fn track(id: u64, x: f64, cup: f64, side_m: f64) -> Track {
@@ -29,6 +29,7 @@ fn track(id: u64, x: f64, cup: f64, side_m: f64) -> Track {
         probabilities: vec![("cup A".into(), cup)],
         kinds: vec![("cup".into(), cup)],
         unknown: 1.0 - cup,
+        colours: Vec::new(),
         seen_fraction: 0.5,
         viewpoints_m: vec![],
         evidence: Evidence::default(),

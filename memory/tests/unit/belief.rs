@@ -13,6 +13,7 @@ pub fn percept(x: f64, cup: f64) -> Percept {
         probabilities: vec![("cup A".into(), cup)],
         kinds: vec![("cup".into(), cup)],
         unknown: 1.0 - cup,
+        colours: Vec::new(),
         position_m: Point3::new(x, 0.0, 0.0),
         position_sigma_m: 0.002,
         size_m: [0.07, 0.07, 0.1],

@@ -10,7 +10,12 @@ fn seen() -> Space {
     let intrinsics = Intrinsics { width: 160, height: 120, fx: 130.0, fy: 130.0, cx: 80.0, cy: 60.0 };
     let depths_m = (0..160 * 120).map(|i| if i % 160 < 80 { 1.0 } else { 2.0 }).collect();
     let mut space = Space::default();
-    space.integrate(&DepthMap { intrinsics, camera_from_world: Isometry3::identity(), depths_m });
+    space.integrate(&DepthMap {
+        intrinsics,
+        camera_from_world: Isometry3::identity(),
+        depths_m,
+        colours: None,
+    });
     space
 }
 
@@ -50,7 +55,7 @@ fn a_surface_seen_at_a_grazing_angle_is_no_free_space() {
     for below_m in (0..10).map(|mm| 0.141 + 0.002 * f64::from(mm)) {
         let depth = |row: usize| if row > 280 { below_m * 525.0 / (row as f64 - 240.0) } else { f64::NAN };
         let depths_m = (0..64 * 480).map(|at| depth(at / 64) as f32).collect();
-        let map = DepthMap { intrinsics, camera_from_world: Isometry3::identity(), depths_m };
+        let map = DepthMap { intrinsics, camera_from_world: Isometry3::identity(), depths_m, colours: None };
         let mut space = Space::default();
         space.integrate(&map);
         for z in [0.6, 0.7, 0.8] {
@@ -101,6 +106,7 @@ fn later_looks_outweigh_earlier_ones() {
         intrinsics,
         camera_from_world: Isometry3::identity(),
         depths_m: vec![3.0; 160 * 120].into(),
+        colours: None,
     };
     (0..4).for_each(|_| space.integrate(&away));
     assert_eq!(space.cell(&Point3::new(-0.2, 0.0, 1.0)), Cell::Free, "it was taken away");

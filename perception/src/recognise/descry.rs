@@ -14,7 +14,7 @@ use super::likelihood::{
 use super::model::{Handle, ObjectModel, Range, Shape, Top};
 use super::necked::{self, Necked};
 use super::parting::{Held, Standing, parted_log, within_log};
-use super::percept::{Percept, Stance};
+use super::percept::{Percept, Stance, kinds};
 use super::rays::PIXELS;
 use super::resting::{self, Resting};
 use super::toppled::Toppled;
@@ -259,9 +259,15 @@ fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
     residuals.fit(&KINECT)
 }
 
+/// Number of things like a known object of stated colours that have another one, for each such object.
+/// From: chosen, as many as have another handle.
+const OTHER_COLOUR: f64 = 0.5;
+
 /// Probability of each model, and its likelier stance.
 struct Weighed {
     probabilities: Vec<f64>,
+    /// Probability that it is like each model but of another colour.
+    recoloured: Vec<f64>,
     stances: Vec<Stance>,
 }
 
@@ -336,14 +342,17 @@ impl Descry {
         segment: &Segment,
         measured: Measured,
         models: &[ObjectModel],
-        Weighed { probabilities, stances }: Weighed,
+        Weighed { probabilities, recoloured, stances }: Weighed,
     ) -> Percept {
         let unknown = 1.0 - probabilities.iter().sum::<f64>();
         let best =
             (0..models.len()).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)));
         let named = best.filter(|&b| probabilities[b] >= self.least);
+        let of_kind = |(p, other): (&f64, &f64)| p + other;
+        let of_kinds = probabilities.iter().zip(&recoloured).map(of_kind);
+        let kinds = kinds(models, of_kinds);
         let probabilities = models.iter().zip(probabilities).map(|(m, p)| (m.name.clone(), p)).collect();
-        percept(setting.scene, segment, measured, models, named, stances, probabilities, unknown)
+        percept(setting.scene, segment, measured, models, named, stances, (probabilities, kinds), unknown)
     }
 
     /// Probability and stance of each model; `against`: log likelihood of further evidence against
@@ -358,7 +367,7 @@ impl Descry {
         let each = self.known / models.len().max(1) as f64;
         let mut stances = vec![Stance::Upright; models.len()];
         let log = |model: &ObjectModel, stance: Stance| self.model_log(model, stance, measured);
-        let logs: Vec<f64> = models
+        let shaped: Vec<f64> = models
             .iter()
             .zip(&mut stances)
             .zip(against)
@@ -379,6 +388,12 @@ impl Descry {
                 log_sum(&[&[stands], lies.as_slice()].concat())
             })
             .collect();
+        let coloured = models.iter().zip(&shaped).map(|(model, shaped)| {
+            let [own, other] = measured.painted.weigh(&model.colours);
+            let stated = !model.colours.is_empty();
+            (shaped + own, if stated { OTHER_COLOUR.ln() + shaped + other } else { f64::NEG_INFINITY })
+        });
+        let (logs, recoloured): (Vec<f64>, Vec<f64>) = coloured.unzip();
         let families = FAMILIES.iter().flat_map(|family| {
             let share = ((1.0 - self.known) * family.share).ln();
             let log = |m: &Measured| share + stranger_log(family, models, m) + self.family_log(family, m);
@@ -401,9 +416,10 @@ impl Descry {
             std::iter::once(log(measured, 1.0)).chain(lies)
         });
         let rest: Vec<f64> = families.chain(alike).collect();
-        let total = log_sum(&[logs.as_slice(), &rest].concat());
+        let total = log_sum(&[logs.as_slice(), &rest, &recoloured].concat());
         let share = |log: &f64| if total.is_finite() { (log - total).exp() } else { 0.0 };
-        Weighed { probabilities: logs.iter().map(share).collect(), stances }
+        let [probabilities, recoloured] = [logs, recoloured].map(|logs| logs.iter().map(share).collect());
+        Weighed { probabilities, recoloured, stances }
     }
 
     /// Log likelihoods of a closed object lying, with either end as foot; empty if it cannot lie.
@@ -553,10 +569,9 @@ fn percept(
     models: &[ObjectModel],
     named: Option<usize>,
     stances: Vec<Stance>,
-    probabilities: Vec<(String, f64)>,
+    (probabilities, kinds): (Vec<(String, f64)>, Vec<(String, f64)>),
     unknown: f64,
 ) -> Percept {
-    let kinds = kinds(models, &probabilities);
     let stance = named.map_or(Stance::Unknown, |i| stances[i]);
     let stands = measured.round.filter(|_| stance != Stance::Lying);
     let round_fits =
@@ -569,6 +584,7 @@ fn percept(
         probabilities,
         kinds,
         unknown: unknown.max(0.0),
+        colours: measured.painted.names(),
         position_m: scene.surface.surface_from_world.inverse() * Point3::new(x, y, segment.base_m),
         position_sigma_m: sigma,
         size_m: [measured.footprint.sides_m[0], measured.footprint.sides_m[1], measured.height_m],
@@ -578,16 +594,4 @@ fn percept(
         evidence: measured.evidence,
         indices: segment.indices.clone(),
     }
-}
-
-/// Sums the models' probabilities by kind, in order of first mention.
-pub(super) fn kinds(models: &[ObjectModel], probabilities: &[(String, f64)]) -> Vec<(String, f64)> {
-    let mut kinds: Vec<(String, f64)> = Vec::new();
-    for (model, (_, p)) in models.iter().zip(probabilities) {
-        match kinds.iter_mut().find(|(kind, _)| *kind == model.kind) {
-            Some((_, sum)) => *sum += p,
-            None => kinds.push((model.kind.clone(), *p)),
-        }
-    }
-    kinds
 }

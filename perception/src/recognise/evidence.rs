@@ -4,6 +4,7 @@ use super::asker::{Asker, IN_VIEW_M};
 use super::body::Frustum;
 use super::ends::{Side, sides, top_hidden};
 use super::model::{ObjectModel, Range};
+use super::painted::Painted;
 use super::percept::{Evidence, Sighting};
 use super::rays::{Around, EDGE_PIXELS, PIXELS, Rays};
 use super::settle::settle;
@@ -83,6 +84,8 @@ pub(super) struct Measured {
     pub seen_fraction: f64,
     /// Evidence of rays about the upper end.
     pub upper: Upper,
+    /// Pixels of the body.
+    pub painted: Painted,
 }
 
 impl Measured {
@@ -246,6 +249,7 @@ pub(super) fn measure(setting: &Setting, segment: &Segment, seen: &Visibility) -
         sigma_m,
         seen_fraction: 0.0,
         upper: Upper::default(),
+        painted: Painted::of(&this.points, &world_from_surface, seen),
     };
     measured.evidence.views = views_of(&asker, &place);
     if let Some(rectangle) = &measured.rectangle {

@@ -24,7 +24,7 @@ pub(super) fn inside(value: f64, sigma: f64, r: Range) -> f64 {
 const ASTRAY: f64 = 0.002;
 
 /// Density of a measure under a range: a uniform, blurred by the measurement.
-fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
+pub(super) fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
     /// Width below which a range is a single value, as a share of the measurement's spread. From: chosen.
     const NARROW: f64 = 0.2;
     let width = r.high - r.low;

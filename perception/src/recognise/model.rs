@@ -1,5 +1,6 @@
 //! What an object is like, as an object file says it.
 
+use super::colour::{self, Colour};
 use serde::{Deserialize, Serialize};
 
 /// Least and greatest value of a measure. Reads from one number or from `[low, high]`.
@@ -106,6 +107,10 @@ pub struct ObjectModel {
     /// Handle or none.
     #[serde(default)]
     pub handle: Handle,
+    /// Colours of the body; any if left out. One may be given as `colour`.
+    #[serde(default, alias = "colour", deserialize_with = "colour::one_or_more")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub colours: Vec<Colour>,
 }
 
 impl ObjectModel {

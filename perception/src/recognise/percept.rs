@@ -1,5 +1,7 @@
 //! Results of recognition: percepts with evidence. Identities over time are assigned in memory.
 
+use super::colour::coloured;
+use super::model::ObjectModel;
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
@@ -78,6 +80,9 @@ pub struct Percept {
     pub kinds: Vec<(String, f64)>,
     /// Probability that the object is none of the models.
     pub unknown: f64,
+    /// Probability of each basic colour; the rest is that it has several. Empty: colour not seen.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub colours: Vec<(String, f64)>,
     /// Position, world frame, metres: centre of the body's footprint on its support.
     pub position_m: Point3<f64>,
     /// Standard deviation of each coordinate of the position within the cloud, metres, without
@@ -119,9 +124,35 @@ impl Percept {
         self.probabilities.iter().map(|(_, p)| *p).fold(0.0, f64::max)
     }
 
-    /// Probability that the object is, or is of the kind, `name`; 0 for names without a model.
+    /// Probability that the object is, or is of the kind, `name`, which may begin with a colour; 0 for
+    /// names without a model.
     pub fn probability_of(&self, name: &str) -> f64 {
-        let of = |list: &[(String, f64)]| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
-        of(&self.probabilities).or_else(|| of(&self.kinds)).unwrap_or(0.0)
+        probability_of(name, [&self.probabilities, &self.kinds], &self.colours)
     }
+}
+
+/// Probability of a colour that was asked for and not seen: as likely as not. From: derived, a question with two answers.
+const UNSEEN_COLOUR: f64 = 0.5;
+
+/// Probability of a name, or of a colour and a name ("red cup"), by lists of names and the probabilities of colours.
+pub fn probability_of(name: &str, names: [&[(String, f64)]; 2], colours: &[(String, f64)]) -> f64 {
+    let of = |list: &[(String, f64)], name: &str| list.iter().find(|(n, _)| n == name).map(|&(_, p)| p);
+    let named = |name: &str| names.into_iter().find_map(|list| of(list, name));
+    let coloured = || {
+        let (colour, rest) = coloured(name)?;
+        Some(named(rest)? * of(colours, colour).unwrap_or(UNSEEN_COLOUR))
+    };
+    named(name).or_else(coloured).unwrap_or(0.0)
+}
+
+/// Sums the models' probabilities by kind, in order of first mention.
+pub(super) fn kinds(models: &[ObjectModel], probabilities: impl Iterator<Item = f64>) -> Vec<(String, f64)> {
+    let mut kinds: Vec<(String, f64)> = Vec::new();
+    for (model, p) in models.iter().zip(probabilities) {
+        match kinds.iter_mut().find(|(kind, _)| *kind == model.kind) {
+            Some((_, sum)) => *sum += p,
+            None => kinds.push((model.kind.clone(), p)),
+        }
+    }
+    kinds
 }

@@ -1,10 +1,9 @@
 //! The recogniser of paper 004: similarity of size and share of cylinder inliers, averaged.
 
 use super::Recogniser;
-use super::descry::kinds;
 use super::evidence::{Setting, measure};
 use super::model::{ObjectModel, Range, Shape};
-use super::percept::{Percept, Stance};
+use super::percept::{Percept, Stance, kinds};
 use crate::noise::KINECT;
 use crate::scale::APART_M;
 use crate::segment::Scene;
@@ -55,9 +54,10 @@ impl Recogniser for Published {
                 Percept {
                     label: best.map(|b| models[b].name.clone()),
                     kind: best.map(|b| models[b].kind.clone()),
-                    kinds: kinds(models, &probabilities),
+                    kinds: kinds(models, probabilities.iter().map(|(_, p)| *p)),
                     probabilities,
                     unknown: 1.0 - score,
+                    colours: measured.painted.names(),
                     position_m: scene.surface.surface_from_world.inverse() * place,
                     position_sigma_m: APART_M,
                     size_m: size,

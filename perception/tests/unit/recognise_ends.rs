@@ -40,7 +40,12 @@ fn seen_from(eyes: &[(f64, f64)], aside_m: f64) -> Visibility {
         let world_from_camera = Isometry3::from_parts(Translation3::from(eye.coords), turn);
         let depths_m = (0..width * height).map(depth_m).collect();
         let aside = Translation3::new(aside_m * f64::from(n % 2), -aside_m * f64::from(n / 2), 0.0);
-        DepthMap { intrinsics, camera_from_world: (aside * world_from_camera).inverse(), depths_m }
+        DepthMap {
+            intrinsics,
+            camera_from_world: (aside * world_from_camera).inverse(),
+            depths_m,
+            colours: None,
+        }
     };
     Visibility { maps: eyes.iter().zip(0..).map(map).collect(), held: true }
 }

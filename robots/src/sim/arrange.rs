@@ -57,6 +57,7 @@ pub fn arrange(spec: &SceneSpec, seed: u64) -> Result<Scene, InputError> {
         target_visible_from_start: None,
         mapped: spec.mapped,
         stereo: spec.stereo,
+        light: spec.light,
         visit: spec.visit,
     };
     let router = Router::new(&scene.map(), RADIUS_M + SAFETY_M, SPEEDS);

@@ -10,6 +10,7 @@ pub mod frame;
 mod hand;
 mod handling;
 pub mod laser;
+pub mod light;
 pub mod noise;
 pub mod outline;
 pub mod push;

@@ -366,12 +366,15 @@ impl SimRobot {
         let mut state = self.lock();
         let number = self.trigger(&mut state, FRAME_S)?;
         let stamp_ns = state.now_ns;
-        let frame = self.render(&state);
+        let mut frame = self.render(&state);
         let base_from_camera = head::base_from_camera(&HEAD, &state.gaze);
         let map_from_base = state.estimate.isometry();
         let truly = state.map_from_base() * base_from_camera;
-        let (stereo, seed) = (state.scene.stereo, self.options.seed);
+        let (stereo, light, seed) = (state.scene.stereo, state.scene.light, self.options.seed);
         drop(state);
+        if let Some(light) = light {
+            light.fall_on(&mut frame, seed, number);
+        }
         let depth_m = match stereo {
             Some(stereo) => stereo.observe(&frame, &truly, |label| label == LABEL_ROOM, seed, number),
             None => noise::observe(&frame, &self.options.noise, self.camera.range_m, seed, number),

@@ -3,6 +3,7 @@
 use crate::body::Pose2;
 use crate::grid::OccupancyGrid;
 use crate::sim::composed::Paint;
+use crate::sim::light::Light;
 use crate::sim::outline::upright;
 use crate::sim::scene::{Doorway, ObstacleSpec, RoomSpec, SurfaceKind, SurfaceSpec, TargetSpec};
 use crate::sim::shape::{Cuboid, Hit, Primitive, Shape};
@@ -116,6 +117,9 @@ pub struct Scene {
     pub mapped: bool,
     /// Stereo camera, if it replaces the depth camera.
     pub stereo: Option<Stereo>,
+    /// Light that the seed draws.
+    #[serde(default)]
+    pub light: Option<Light>,
     /// Number of the visit.
     pub visit: usize,
 }

@@ -2,4 +2,5 @@
 
 mod sim_composed;
 mod sim_laser;
+mod sim_light;
 mod sim_stereo;

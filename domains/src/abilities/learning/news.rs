@@ -306,6 +306,7 @@ fn model(thing: &LearnedThing) -> ObjectModel {
         taper: Range { low: 1.0, high: 1.0 },
         top: Top::Any,
         handle: Handle::Any,
+        colours: Vec::new(),
     }
 }
 

@@ -117,6 +117,7 @@ fn bottle() -> ObjectModel {
         taper: range(2.0, 3.0),
         top: Top::Closed,
         handle: Handle::None,
+        colours: Vec::new(),
     }
 }
 

@@ -1,8 +1,9 @@
 //! Segmentation, merging and recognition compared with ground truth, times of single views, and the origin of
 //! all constants, as tables:
-//! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
+//! `cargo run --release -p descry-measure --bin evaluate -- constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]`.
 
 mod clutter;
+mod colours;
 mod composed;
 #[path = "../../../../perception/tests/constants/mod.rs"]
 mod constants;
@@ -46,6 +47,10 @@ fn main() -> ExitCode {
             (Ok(count), Ok(first)) => composed::run(count, first, only.first().copied().unwrap_or_default()),
             _ => Err(format!("`{count}` and `{first}` are no number of scenes and first seed")),
         },
+        ["colours", count, first] => match (count.parse(), first.parse()) {
+            (Ok(count), Ok(first)) => colours::run(count, first),
+            _ => Err(format!("`{count}` and `{first}` are no number of scenes and first seed")),
+        },
         ["mismatched", count, seed, further @ ..] => match (count.parse(), seed.parse()) {
             (Ok(count), Ok(seed)) => {
                 let only = further.first().copied().unwrap_or_default();
@@ -63,7 +68,7 @@ fn main() -> ExitCode {
         },
         ["variants", dirs @ ..] => variants::run(dirs),
         _ => Err(
-            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
+            "usage: evaluate constants | mosd DIR [PICTURES] | kitchen DIR | surfaces DIR... | table COUNT [PICTURES] | clutter COUNT SEED [PICTURES] | composed COUNT SEED [KIND] | colours COUNT SEED | mismatched COUNT SEED [WORLD [PICTURES]] | times REPETITIONS merged | [made | DIR]... | variants DIR... | further VIEWS [anew | kept]"
                 .to_owned(),
         ),
     };

@@ -24,6 +24,7 @@ pub fn cup() -> ObjectModel {
         taper: Range { low: 0.7, high: 1.05 },
         top: Top::Open,
         handle: Default::default(),
+        colours: Vec::new(),
     }
 }
 

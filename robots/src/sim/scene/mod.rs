@@ -66,6 +66,16 @@
 //! textured = 0.5                    # share of floor and walls on which anything can be matched
 //! ```
 //!
+//! Light that differs from seed to seed is said by ranges:
+//!
+//! ```toml
+//! [light]
+//! gain = [0.5, 1.3]                 # brightness
+//! cast = 0.15                       # spread of the gains of red and of blue
+//! gloss = 0.8                       # white in highlights
+//! noise = 4.0                       # of 255, each channel of each pixel
+//! ```
+//!
 //! What comes, goes and moves between visits stands in one scene; `visit = 2` at its beginning makes it that of the second:
 //!
 //! ```toml
@@ -113,6 +123,7 @@ pub use surface::{ObstacleSpec, SurfaceKind, SurfaceSpec};
 
 use crate::input::{self, InputError, Objection, Step};
 use crate::sim::faults::{Fault, FaultPlan};
+use crate::sim::light::Light;
 use crate::sim::stereo::Stereo;
 use check::{finite, object, positive};
 use nalgebra::Point2;
@@ -154,6 +165,9 @@ pub struct SceneSpec {
     /// Stereo camera in place of the depth camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stereo: Option<Stereo>,
+    /// Light that the seed draws; without it, colours are as stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<Light>,
     /// Number of visits, between which objects appear, disappear and move.
     #[serde(default = "default_one")]
     pub visits: usize,
@@ -246,6 +260,7 @@ impl SceneSpec {
             self.check_object(i, o)?;
         }
         self.check_stereo()?;
+        self.check_light()?;
         self.check_visits()?;
         self.check_target()
     }
@@ -289,6 +304,23 @@ impl SceneSpec {
                 "leave [target] out".into(),
             )),
             _ => Ok(()),
+        }
+    }
+
+    fn check_light(&self) -> Result<(), Objection> {
+        let Some(light) = &self.light else { return Ok(()) };
+        let at = |key| [Step::Key("light"), Step::Key(key)];
+        positive(&[light.gain.0, light.gain.1], &at("gain"))?;
+        if light.gain.1 < light.gain.0 {
+            let problem = format!("found [{}, {}]", light.gain.0, light.gain.1);
+            return Err(object(&at("gain"), problem, "write [least, greatest]".into()));
+        }
+        let rest = [("cast", light.cast, 1.0), ("gloss", light.gloss, 1.0), ("noise", light.noise, 255.0)];
+        match rest.into_iter().find(|(_, value, most)| !(0.0..=*most).contains(value)) {
+            Some((key, value, most)) => {
+                Err(object(&at(key), format!("found {value}"), format!("a number from 0 to {most}")))
+            }
+            None => Ok(()),
         }
     }
 

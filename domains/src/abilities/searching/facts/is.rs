@@ -34,7 +34,8 @@ pub(super) fn bounds(s: &Situation, of: &[Referent<'_>]) -> Range {
             let count = thing.models.iter().filter(|model| is(model)).count();
             match thing.track {
                 Some(id) => s.belief.tracks.iter().find(|t| t.id == id).map_or(Range::UNKNOWN, of_track),
-                // What a known object is, its name says.
+                // What a known object is, its name says, but for its colour.
+                None if s.kinds[of].colour != thing.colour && count > 0 => Range::UNKNOWN,
                 None if count == 0 => Range::exactly(0.0),
                 None if count == thing.models.len() => Range::exactly(1.0),
                 None => Range::UNKNOWN,

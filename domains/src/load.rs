@@ -249,6 +249,6 @@ fn no_toml(path: &str, text: &str, error: &toml::de::Error) -> Findings {
     let near = quoted.next().zip(Some(quoted.collect::<Vec<_>>()));
     let near = near.and_then(|(found, known)| english::nearest(found, &known));
     let mut finding = Diagnostic::error("unreadable", clipped(&problem), span, "here");
-    finding.help = Some(near.map_or(mend.to_string(), |near| format!("did you mean `{near}`?")));
+    finding.help = near.map(|near| format!("did you mean `{near}`?")).or(mend.map(str::to_string));
     Findings { sources: vec![Source::new(path, text)], list: vec![finding] }
 }

@@ -163,12 +163,12 @@ pub fn parse_toml<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Inpu
     toml::from_str(text).map_err(|e| {
         let byte = e.span().map_or(0, |s| s.start);
         let (problem, mend) = toml_problem(&e);
-        InputError::at(file, text, byte, &problem, mend)
+        InputError::at(file, text, byte, &problem, mend.unwrap_or("this is no TOML from here on"))
     })
 }
 
-/// Error of the TOML parser in words for people, and its mend.
-pub fn toml_problem(error: &toml::de::Error) -> (String, &'static str) {
+/// Error of the TOML parser in words for people, and its mend, if the error itself says none.
+pub fn toml_problem(error: &toml::de::Error) -> (String, Option<&'static str>) {
     const TYPES: [(&str, &str); 4] = [
         ("f64", "a number"),
         ("u8", "a number from 0 to 255"),
@@ -181,7 +181,7 @@ pub fn toml_problem(error: &toml::de::Error) -> (String, &'static str) {
     (problem, mend)
 }
 
-fn mend_of(problem: &str) -> &'static str {
+fn mend_of(problem: &str) -> Option<&'static str> {
     let mends = [
         ("unknown field", "take one of the names that are known, or remove it"),
         ("unknown variant", "take one of the names that are known"),
@@ -189,10 +189,7 @@ fn mend_of(problem: &str) -> &'static str {
         ("duplicate", "keep one of them"),
         ("invalid", "write what is expected"),
     ];
-    mends
-        .iter()
-        .find(|(word, _)| problem.contains(word))
-        .map_or("this is no TOML from here on", |(_, mend)| mend)
+    mends.iter().find(|(word, _)| problem.contains(word)).map(|(_, mend)| *mend)
 }
 
 /// Draws an objection under the deepest part of its path that exists in the text.

@@ -411,8 +411,8 @@ fn colours_that_mean_nothing_are_refused_at_their_place() {
         let found = from_files(files, None).map(|_| ()).expect_err(colour).to_string();
         words.iter().for_each(|word| assert!(found.contains(word), "{colour}: {found}"));
     };
-    check("colour = \"rde\"", &["`rde` is no colour name: did you mean `red`?", "colour = \"rde\"", "^^^"]);
-    check("colours = [\"white\", \"turquoise\"]", &["`turquoise` is no colour name: known are black", "^^^"]);
+    check("colour = \"rde\"", &["`rde` is no colour name: did you mean `red`?", "colour = \"rde\"", "──┬──"]);
+    check("colours = [\"white\", \"turquoise\"]", &["`turquoise` is no colour name: known are black", "╰──"]);
     check("colour = { hue_deg = [40, 20] }", &["`hue_deg` = [40, 20] holds no colour"]);
     check("colour = { hue = [20, 40] }", &["unknown field `hue`", "hue_deg"]);
 }

@@ -409,7 +409,7 @@ pub struct MetricAst {
 
 /// A problem file.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Problem {
+pub struct ProblemAst {
     /// True if a part of the problem could not be parsed.
     pub unread: bool,
     /// Name.

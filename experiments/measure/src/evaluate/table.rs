@@ -21,6 +21,7 @@ fn model(name: &str, kind: &str, diameter: f64, height: f64, top: Top, handle: H
         name: name.into(),
         kind: kind.into(),
         phrases: Vec::new(),
+        colours: Vec::new(),
         shape: Default::default(),
         height_m: exactly(height),
         diameter_m: Some(exactly(diameter)),

@@ -205,7 +205,7 @@ impl<'a> Checker<'a> {
         self.findings.push(finding);
     }
 
-    fn domain(&mut self, domain: &ast::Domain, problem: Option<&ast::Problem>) {
+    fn domain(&mut self, domain: &ast::Domain, problem: Option<&ast::ProblemAst>) {
         self.task.domain = domain.name.map(|name| self.name(name.symbol).to_string()).unwrap_or_default();
         self.declare_types(&domain.types);
         self.declare_objects(&domain.constants);
@@ -229,7 +229,7 @@ impl<'a> Checker<'a> {
         self.task.module_options = self.options(&domain.module_options);
     }
 
-    fn problem(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
+    fn problem(&mut self, problem: &ast::ProblemAst, domain: &ast::Domain) {
         self.task.problem = problem.name.map(|name| self.name(name.symbol).to_string()).unwrap_or_default();
         self.same_domain(problem, domain);
         self.initial(&problem.initial);
@@ -249,7 +249,7 @@ impl<'a> Checker<'a> {
         self.task.module_exit_options = self.options(&problem.module_exit_options);
     }
 
-    fn same_domain(&mut self, problem: &ast::Problem, domain: &ast::Domain) {
+    fn same_domain(&mut self, problem: &ast::ProblemAst, domain: &ast::Domain) {
         let Some(is) = domain.name else { return };
         let Some(said) = problem.domain else { return self.no_domain(problem, is) };
         if said.symbol != is.symbol {
@@ -263,7 +263,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn no_domain(&mut self, problem: &ast::Problem, is: ast::Name) {
+    fn no_domain(&mut self, problem: &ast::ProblemAst, is: ast::Name) {
         if let Some(name) = problem.name {
             let message = "the problem does not say which domain it belongs to";
             self.push(
@@ -273,7 +273,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn no_goal(&mut self, problem: &ast::Problem) {
+    fn no_goal(&mut self, problem: &ast::ProblemAst) {
         if let Some(name) = problem.name {
             self.push(
                 Diagnostic::error("no-goal", "the problem has no goal", name.span, "this problem")

@@ -3,7 +3,7 @@
 use super::Checker;
 use super::conditions::span_of_formula;
 use crate::diagnostic::{Diagnostic, Span};
-use crate::pddl::ast::{ActionAst, Domain, EffectAst, Formula, Problem};
+use crate::pddl::ast::{ActionAst, Domain, EffectAst, Formula, ProblemAst};
 
 /// Language feature, with all requirements that allow it, narrowest first.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -54,7 +54,7 @@ type Uses = Vec<(Feature, Span)>;
 
 impl Checker<'_> {
     /// Warns once per missing requirement, at its first use.
-    pub(super) fn requirements(&mut self, domain: &Domain, problem: Option<&Problem>) {
+    pub(super) fn requirements(&mut self, domain: &Domain, problem: Option<&ProblemAst>) {
         let mut uses = Uses::new();
         uses.extend(domain.types.first().map(|first| (Feature::Typing, first.name.span)));
         domain.actions.iter().for_each(|action| in_action(action, &mut uses));

@@ -6,7 +6,7 @@ mod declarations;
 mod effects;
 mod formulas;
 
-use super::ast::{ActionAst, Domain, DurationBoundAst, Formula, MetricAst, Name, Problem, Typed};
+use super::ast::{ActionAst, Domain, DurationBoundAst, Formula, MetricAst, Name, ProblemAst, Typed};
 use super::lex::{self, Children, Kind, Symbols, Tree};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::nearest;
@@ -29,10 +29,10 @@ pub fn domain(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec
 }
 
 /// Reads a problem file (source number `source`).
-pub fn problem(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Problem {
+pub fn problem(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> ProblemAst {
     let tree = lex::read(text, source, symbols, findings);
     let mut parser = Parser { tree: &tree, text, source, symbols, findings };
-    let mut problem = Problem::default();
+    let mut problem = ProblemAst::default();
     let sections = parser.definition("problem", &mut problem.name);
     problem.unread = sections.is_none();
     for section in sections.into_iter().flatten() {
@@ -278,7 +278,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn problem_section(&mut self, section: usize, keyword: &str, problem: &mut Problem) {
+    fn problem_section(&mut self, section: usize, keyword: &str, problem: &mut ProblemAst) {
         match keyword {
             ":domain" if problem.domain.is_some() => self.second(section, keyword),
             ":domain" => match self.children(section).nth(1) {
@@ -369,7 +369,7 @@ impl<'a> Parser<'a> {
         );
     }
 
-    fn goal(&mut self, section: usize, problem: &mut Problem) {
+    fn goal(&mut self, section: usize, problem: &mut ProblemAst) {
         let parts: Vec<usize> = self.children(section).skip(1).collect();
         let formulas: Vec<Formula> = parts.iter().filter_map(|&part| self.formula(part, false)).collect();
         if parts.len() > 1 {

@@ -229,7 +229,7 @@ pub enum GroundOutcome {
         /// Change a second.
         rate: GroundExpression,
     },
-    /// An effect module writes the numbers that [`Call::writes`] lists.
+    /// An effect module writes the numbers that [`GroundCall::writes`] lists.
     Call(CallId),
 }
 
@@ -300,7 +300,7 @@ pub struct GroundAction {
     pub condition: Conjunction,
     /// Effects.
     pub effects: Vec<GroundEffect>,
-    /// Contribution to the metric; see [`Metric::additive`].
+    /// Contribution to the metric; see [`GroundMetric::additive`].
     pub cost: GroundExpression,
 }
 
@@ -319,11 +319,11 @@ pub struct DurativeAction {
     pub at_end: Conjunction,
     /// Effects at the start.
     pub start_effects: Vec<GroundEffect>,
-    /// Continuous effects ([`Outcome::Flow`] only).
+    /// Continuous effects ([`GroundOutcome::Flow`] only).
     pub flow_effects: Vec<GroundEffect>,
     /// Effects at the end.
     pub end_effects: Vec<GroundEffect>,
-    /// Contribution to the metric besides time; see [`Metric::additive`].
+    /// Contribution to the metric besides time; see [`GroundMetric::additive`].
     pub cost: GroundExpression,
 }
 

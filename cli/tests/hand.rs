@@ -66,7 +66,7 @@ fn what_slid_out_of_the_hand_is_looked_for_where_it_did() {
 fn what_was_found_is_not_looked_for_elsewhere() {
     let said = achieved("bring cup A to the desk", 91004, "[[fault]]\nkind = \"grasp_slips\"\nat = 1\n");
     let taken = said.find("the hand is closed to").expect("it was taken");
-    assert!(said[..taken].contains("cup A            0.8"), "it had been found: {said}");
+    assert!(said[..taken].contains("cup A              8"), "it had been found: {said}");
     assert!(!said[..taken].contains(" from desk-"), "{said}");
 }
 

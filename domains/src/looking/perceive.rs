@@ -389,7 +389,7 @@ pub fn in_a_line(p: &Percept) -> String {
     let at = english::position(p.position_m.coords.into());
     let ([w, d, h], seen) = (p.size_m.map(|m| m * 100.0), p.seen_fraction * 100.0);
     let sure = english::percent(probability);
-    format!("{name:16} {sure:>6} sure {at}, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % of it seen")
+    format!("{name:16} {sure:>6} {at}, {w:.0}x{d:.0}x{h:.0} cm, {seen:.0} % seen")
 }
 
 /// Adds the views of a surface to its observed space; rebuilds the space if a view was dropped,

@@ -36,7 +36,7 @@ enum Outcome {
         by_looks: Option<bool>,
         /// Truth of the goal.
         is_true: Option<bool>,
-        /// What was done although it was asked a question.
+        /// Changes made in answering a question.
         changed: Vec<String>,
     },
     /// The goal or the domain was refused, and why.

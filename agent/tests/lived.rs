@@ -14,7 +14,7 @@ use descry_skills::Call;
 /// A run that came to its end.
 pub struct Lived {
     pub report: Report,
-    /// What was done, and whether it succeeded.
+    /// Calls that were carried out, each with its success.
     pub done: Vec<(Call, bool)>,
     /// Truth of the scene before and after.
     pub truth: [Truth; 2],

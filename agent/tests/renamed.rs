@@ -33,7 +33,7 @@ fn with_names(text: &str, is_other: &dyn Fn(&str) -> bool) -> String {
     renamed
 }
 
-/// What may be said, in other words; slots stay.
+/// Phrases in other words; slots stay.
 fn with_phrases(text: &str) -> String {
     let word = |word: &str| match word.starts_with('<') || word.is_empty() {
         true => word.to_string(),
@@ -116,7 +116,7 @@ fn both(name: &str) -> [Domain; 2] {
     [own, from_files(files, None).unwrap_or_else(|e| panic!("{e}"))]
 }
 
-/// What a run came to, without the words that the domain gives: report and steps.
+/// Outcome of a run without the words of the domain: report and steps.
 fn came_to(lived: Lived) -> (BTreeMap<String, Value>, Vec<(String, Vec<String>, bool)>) {
     let report = serde_json::to_value(&lived.report).expect("JSON");
     let Value::Object(report) = report else { panic!("a report is an object") };

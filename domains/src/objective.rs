@@ -2,7 +2,7 @@
 
 use crate::config::Answers;
 
-/// What stands for a variable among the objects of a word.
+/// Placeholder of a variable among the objects of a word.
 pub const VARIABLE: &str = "?";
 
 /// Goal as given by a person, with its PDDL meaning.

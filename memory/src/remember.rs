@@ -77,13 +77,13 @@ pub struct Remembered {
     /// Learned objects, oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub things: Vec<LearnedThing>,
-    /// What abilities remember besides, by the name of each.
+    /// Memory of further abilities, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub besides: BTreeMap<String, Value>,
 }
 
 impl Remembered {
-    /// What an ability remembers besides; nothing where it has not kept any, or not in this form.
+    /// Memory of an ability; none if it kept nothing, or kept it in another form.
     pub fn besides<T: DeserializeOwned>(&self, ability: &str) -> Option<T> {
         serde_json::from_value(self.besides.get(ability)?.clone()).ok()
     }

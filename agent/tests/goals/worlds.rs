@@ -38,7 +38,7 @@ const THINGS: [(&str, &str, &str); 3] = [
         "name = \"white cylinder\"\nkind = \"cylinder\"\nshape.cylinder = { diameter_m = 0.106, height_m = 0.277 }",
     ),
 ];
-/// What may stand about besides.
+/// Further objects that may stand about.
 const OTHERS: [&str; 2] = [
     "name = \"second cup\"\nkind = \"cup A\"\nshape.cup = { diameter_m = 0.070, height_m = 0.104 }",
     "name = \"carton\"\nkind = \"box\"\nshape.box = { size_m = [0.10, 0.06, 0.20] }",
@@ -325,7 +325,7 @@ impl Which {
         }
     }
 
-    /// What is where in truth.
+    /// True places of the objects.
     pub fn seen(self, truth: &Truth, scratch: &Path) -> Seen {
         let standing = match self {
             Which::Household => household(&scratch.join("household/world.json")),

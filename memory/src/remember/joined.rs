@@ -53,7 +53,7 @@ impl Remembered {
         }
     }
 
-    /// What abilities remember besides: of each that the run has changed what the run leaves, of any other what is in the store.
+    /// Memory of further abilities: of each that the run has changed what the run leaves, of any other what is in the store.
     fn besides_of(&self, before: &Self, after: &Self) -> BTreeMap<String, Value> {
         let is_new = |(name, kept): &(&String, &Value)| before.besides.get(*name) != Some(*kept);
         let ours = after.besides.iter().filter(is_new).map(|(name, kept)| (name.clone(), kept.clone()));

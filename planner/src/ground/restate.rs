@@ -30,7 +30,7 @@ pub enum Regrounded {
     /// Facts hold together that exclude each other in the grounded task, or none of those of which one always held.
     #[error("facts hold together, or are all false, that never were")]
     Exclusive,
-    /// What happens by itself at a time has changed.
+    /// Timed literals have changed.
     #[error("other things happen by themselves at a time")]
     Timed,
     /// The goal asks for more than facts and comparisons of numbers that are part of the grounded task.
@@ -50,7 +50,7 @@ pub(crate) struct Restated {
     facts: FxHashMap<Fact, GroundFact>,
     objects: FxHashMap<GroundFluent, FxHashMap<ObjectId, GroundFact>>,
     numbers: FxHashMap<GroundFluent, u32>,
-    /// What holds or has a value without being a part of the grounded task.
+    /// Facts and values outside the grounded task.
     granted_facts: FxHashSet<Fact>,
     granted_numbers: FxHashMap<GroundFluent, f64>,
     granted_objects: FxHashMap<GroundFluent, ObjectId>,
@@ -110,7 +110,7 @@ impl Restated {
     /// Puts the grounded task in the present state of the lifted one, and gives it its goal.
     ///
     /// # Errors
-    /// Why another task has to be grounded for it; this one is then of no more use.
+    /// Reason for grounding another task; this one is then of no more use.
     pub fn restate(&mut self, task: &Task) -> Result<(), Regrounded> {
         let same = |(one, other): (&TimedInitial, &TimedInitial)| {
             one.time_s == other.time_s && one.change == other.change

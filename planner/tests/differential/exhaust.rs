@@ -146,7 +146,7 @@ impl Oracle<'_> {
         all
     }
 
-    /// What happens by itself, by time.
+    /// Timed literals, by time.
     fn due(&self, epoch: &Epoch, given: &[usize]) -> Vec<(f64, Event<'static>)> {
         let end_s = |running: &Running| {
             let step: &Step = &epoch.plan[running.step];

@@ -348,7 +348,7 @@ impl<'t> Oracle<'t> {
         Some(last)
     }
 
-    /// Where between two states a comparison that matters to the actions in progress turns, as parts of the way.
+    /// Crossings between two states of the comparisons that matter to the actions in progress, as parts of the way.
     fn crossings(&self, first: &World, last: &World) -> Vec<f64> {
         let [before, after] = [first, last].map(|world| {
             let mut found = Vec::new();

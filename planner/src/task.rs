@@ -1,8 +1,9 @@
-//! The lifted task: a checked domain and problem with every name looked up.
+//! Lifted task: a checked domain and problem in which every name is replaced by an index.
 //!
-//! Conditions are in negation normal form (`Not` stands only before an atom, an equation of objects, a numeric
-//! `=` or a call; `imply` is an `or`). Variables are slots: an action's parameters are slots `0..parameters.len()`, quantified
-//! variables follow, each with a slot of its own, so that one flat array of `slots` objects binds everything.
+//! Conditions are in negation normal form (`Not` stands only before an atom, an equation of objects, a
+//! numeric `=` or a call; `imply` is an `or`). Every variable has a slot of its own: an action's
+//! parameters are slots `0..parameters.len()`, quantified variables follow. One flat array with an
+//! object per slot binds them all.
 
 use std::sync::Arc;
 
@@ -19,7 +20,7 @@ macro_rules! identifiers {
         pub struct $name(pub u32);
 
         impl $name {
-            /// Index into the task's list.
+            /// Identifier as a list index.
             pub fn index(self) -> usize {
                 self.0 as usize
             }
@@ -42,11 +43,11 @@ identifiers! {
     ActionId
     /// Index into [`Task::preferences`].
     PreferenceId
-    /// Variable of an action, rule or formula: index into a binding.
+    /// Variable of an action, rule or formula: index into the objects of a binding.
     Slot
 }
 
-/// A checked domain and problem.
+/// A checked domain and problem, with variables (lifted).
 #[derive(Debug, Clone)]
 pub struct Task {
     /// The two texts that all spans point into: domain and problem.
@@ -55,7 +56,7 @@ pub struct Task {
     pub domain: String,
     /// Name of the problem.
     pub problem: String,
-    /// Types; number 0 is `object`.
+    /// Types; the first is `object`.
     pub types: Vec<Type>,
     /// Constants of the domain, then objects of the problem.
     pub objects: Vec<Object>,
@@ -63,7 +64,7 @@ pub struct Task {
     pub predicates: Vec<Predicate>,
     /// Functions, numeric and object-valued.
     pub functions: Vec<Function>,
-    /// Semantic modules.
+    /// Semantic modules: external functions that conditions, effects and costs call (PDDL/M).
     pub modules: Vec<Module>,
     /// Rules of the derived predicates, lower strata first.
     pub rules: Vec<Rule>,
@@ -75,36 +76,36 @@ pub struct Task {
     pub goal: Scoped<Condition>,
     /// Span of the goal.
     pub goal_span: Span,
-    /// Trajectory constraints; preferred ones refer to their preference.
+    /// Trajectory constraints, hard and preferred.
     pub constraints: Vec<Trajectory>,
-    /// Preferences by name; a shared name sums the violations.
+    /// Preferences, one per name; violations of all conditions under one name are summed.
     pub preferences: Vec<Preference>,
-    /// Metric.
+    /// Metric; `None` if the problem has none.
     pub metric: Option<Metric>,
-    /// `:moduleoptions` of the problem.
+    /// Lines of the problem's `:moduleoptions`.
     pub module_options: Vec<ModuleOption>,
-    /// `:moduleexitoptions` of the problem.
+    /// Lines of the problem's `:moduleexitoptions`.
     pub module_exit_options: Vec<ModuleOption>,
-    /// Objects by name.
+    /// Identifier of each object, by name.
     pub(crate) objects_by_name: Arc<FxHashMap<String, ObjectId>>,
 }
 
-/// A type.
+/// An object type.
 #[derive(Debug, Clone)]
 pub struct Type {
     /// Name, lower case.
     pub name: String,
-    /// Direct supertypes; none for `object` alone.
+    /// Direct supertypes; empty only for `object`.
     pub parents: Vec<TypeId>,
     /// The type itself, then all its supertypes.
     pub ancestors: Vec<TypeId>,
-    /// Objects of this type and its subtypes, ascending.
+    /// Objects of this type and its subtypes, in ascending order.
     pub objects: Vec<ObjectId>,
     /// Span of the declaration.
     pub span: Span,
 }
 
-/// An object or constant.
+/// An object of the problem or a constant of the domain.
 #[derive(Debug, Clone)]
 pub struct Object {
     /// Name, lower case.
@@ -115,20 +116,20 @@ pub struct Object {
     pub span: Span,
 }
 
-/// Variable with the alternatives of its type.
+/// A typed variable; `either` gives several alternative types.
 #[derive(Debug, Clone)]
 pub struct Parameter {
     /// Name, with the question mark.
     pub name: String,
-    /// Types of which a fitting object has at least one.
+    /// Alternative types; an object fits if it is of one of them.
     pub types: Vec<TypeId>,
-    /// Objects that fit, in rising order.
+    /// Objects that fit one of the types, in ascending order.
     pub objects: Arc<[ObjectId]>,
     /// Span of the declaration.
     pub span: Span,
 }
 
-/// A predicate.
+/// A predicate, basic or derived.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     /// Name, lower case.
@@ -142,7 +143,7 @@ pub struct Predicate {
     pub span: Span,
 }
 
-/// A function.
+/// A function, numeric or object-valued.
 #[derive(Debug, Clone)]
 pub struct Function {
     /// Name, lower case.
@@ -155,49 +156,49 @@ pub struct Function {
     pub span: Span,
 }
 
-/// A semantic module of PDDL/M.
+/// A semantic module of PDDL/M: an external function that the planner calls.
 #[derive(Debug, Clone)]
 pub struct Module {
     /// Name, case kept.
     pub name: String,
-    /// Kind.
+    /// Kind of the module's answer.
     pub kind: CallKind,
-    /// Parameters: slots `0..parameters.len()` of `writes`.
+    /// Parameters; the terms in `writes` refer to them as slots `0..parameters.len()`.
     pub parameters: Vec<Parameter>,
-    /// Terms written by an effect module, over its parameters, in answer order.
+    /// Terms that an effect module writes, in the order of the values in its answer.
     pub writes: Vec<Written>,
-    /// Binding as written, `fn@lib.so`, case kept.
+    /// External function as written in the domain (`fn@lib.so`), case kept.
     pub function: String,
     /// Span of the declaration.
     pub span: Span,
 }
 
-/// Term written by an effect module.
+/// Term that an effect module writes.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Written {
-    /// A number.
+    /// Value of a numeric function.
     Number(Fluent),
     /// Value of an object function.
     Object(Fluent),
-    /// The truth of an atom.
+    /// Truth of an atom.
     Truth(Atom),
 }
 
-/// A line of `:moduleoptions`.
+/// A line of `:moduleoptions` or `:moduleexitoptions`.
 #[derive(Debug, Clone)]
 pub struct ModuleOption {
-    /// The token `init@lib`, case kept.
+    /// External function as written (`init@lib`), case kept.
     pub function: String,
     /// Arguments, case kept.
     pub arguments: Vec<String>,
-    /// Span.
+    /// Span of the line.
     pub span: Span,
 }
 
-/// Formula or expression with its number of slots.
+/// Formula or expression, with the number of variable slots that a binding for it needs.
 #[derive(Debug, Clone)]
 pub struct Scoped<T> {
-    /// Number of slots.
+    /// Number of variable slots.
     pub slots: usize,
     /// Formula or expression.
     pub body: T,
@@ -210,7 +211,7 @@ pub enum Term {
     Variable(Slot),
     /// An object.
     Object(ObjectId),
-    /// Value of an object function; may be undefined, which equals nothing.
+    /// Value of an object function; may be undefined, and an undefined value equals no object.
     Function(Box<Fluent>),
 }
 
@@ -221,7 +222,7 @@ pub struct Atom {
     pub predicate: PredicateId,
     /// Arguments.
     pub arguments: Vec<Term>,
-    /// Span.
+    /// Span of the atom.
     pub span: Span,
 }
 
@@ -232,7 +233,7 @@ pub struct Fluent {
     pub function: FunctionId,
     /// Arguments.
     pub arguments: Vec<Term>,
-    /// Span.
+    /// Span of the term.
     pub span: Span,
 }
 
@@ -243,7 +244,7 @@ pub struct CallTerm {
     pub module: ModuleId,
     /// Arguments.
     pub arguments: Vec<Term>,
-    /// Span.
+    /// Span of the call.
     pub span: Span,
 }
 
@@ -283,7 +284,7 @@ impl Condition {
 /// Quantified variable with its slot.
 #[derive(Debug, Clone)]
 pub struct Quantified {
-    /// Slot.
+    /// Slot of the variable.
     pub slot: Slot,
     /// Name, type and objects.
     pub parameter: Parameter,
@@ -295,7 +296,7 @@ impl PartialEq for Quantified {
     }
 }
 
-/// A number.
+/// A numeric expression.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expression {
     /// A constant.
@@ -310,21 +311,21 @@ pub enum Expression {
     Multiply(Vec<Expression>),
     /// Quotient of two numbers.
     Divide(Box<[Expression; 2]>),
-    /// The negative.
+    /// Negation of a number.
     Negative(Box<Expression>),
     /// `?duration` of the action, in seconds.
     Duration,
     /// Makespan of the plan, seconds (metrics only); the number of steps for plans of instantaneous
     /// actions.
     TotalTime,
-    /// Number of violations of preferences of this name; in metrics alone.
+    /// Number of violations of a preference (metrics only).
     Violated(PreferenceId),
-    /// Answer of a cost module.
+    /// Number that a cost module answers.
     Call(CallTerm),
 }
 
-/// Parts of an action at start, over all and at end; an instantaneous action has everything at
-/// start.
+/// Values for the start, the over-all interval and the end of an action; instantaneous actions use
+/// `start` only.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timed<T> {
     /// At start.
@@ -341,28 +342,28 @@ impl Default for Condition {
     }
 }
 
-/// An action.
+/// An action schema, instantaneous or durative.
 #[derive(Debug, Clone)]
 pub struct Action {
     /// Name, lower case.
     pub name: String,
-    /// Parameters: slots `0..parameters.len()`.
+    /// Parameters; parameter `i` is slot `i`.
     pub parameters: Vec<Parameter>,
-    /// Slots in all, quantified variables included.
+    /// Number of variable slots, including those of quantified variables.
     pub slots: usize,
     /// Bounds on the duration (all must hold); `None` for an instantaneous action.
     pub duration: Option<Vec<DurationBound>>,
-    /// Precondition.
+    /// Conditions at start, over all and at end.
     pub condition: Timed<Condition>,
     /// Effects at start and at end (`over_all` is always empty).
     pub effects: Timed<Vec<Effect>>,
-    /// Changes at a rate over the whole duration, from `#t`.
+    /// Continuous effects (`#t`): numbers that change at a rate over the whole duration.
     pub continuous: Vec<Rate>,
-    /// Calls of grounding modules that propose parameters.
+    /// Calls of grounding modules; each proposes the values of one further argument.
     pub grounding: Vec<CallTerm>,
-    /// Preferences over the action's conditions; every violation counts.
+    /// Preferred conditions of the action, each with its preference.
     pub preferences: Vec<(PreferenceId, Timed<Condition>)>,
-    /// Span of the name.
+    /// Span of the action's name.
     pub span: Span,
 }
 
@@ -373,56 +374,56 @@ impl Action {
     }
 }
 
-/// `?duration` compared with a bound, in seconds.
+/// Bound on `?duration`, in seconds.
 #[derive(Debug, Clone)]
 pub struct DurationBound {
-    /// Time at which the bound is evaluated: start or end.
+    /// Time at which the bound's value is evaluated: start or end.
     pub when: When,
     /// Comparison with `?duration` on the left-hand side: `<=`, `=`, `>=`, `<` or `>`.
     pub comparison: Comparison,
-    /// The bound.
+    /// Value of the bound, in seconds.
     pub value: Expression,
-    /// Span.
+    /// Span of the bound.
     pub span: Span,
 }
 
-/// Conditional change, for all objects of its quantified variables.
+/// Conditional effect, applied for every binding of its quantified variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Effect {
-    /// Quantified variables.
+    /// Quantified variables of the effect.
     pub forall: Vec<Quantified>,
-    /// Condition of the effect. An effect at start has a `start` condition only; for one at end,
-    /// `start` and `over_all` are conditions on those earlier times.
+    /// Condition of the effect. An effect at start has a `start` condition only; for an effect at end,
+    /// `start` and `over_all` are conditions on earlier times of the same action.
     pub when: Timed<Condition>,
-    /// Change.
+    /// Change that the effect makes.
     pub change: Change,
-    /// Span.
+    /// Span of the effect.
     pub span: Span,
 }
 
-/// Change by an effect. Deletions happen before additions.
+/// Change made by an effect. Deletions are applied before additions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// The atom becomes true.
     Add(Atom),
     /// The atom becomes false.
     Delete(Atom),
-    /// A number changes.
+    /// The numeric fluent is assigned, increased, decreased or scaled by the value.
     Number(Assignment, Fluent, Expression),
-    /// Assigns an object function, or makes it undefined.
+    /// The object function gets the value of the term, or becomes undefined (`None`).
     Object(Fluent, Option<Term>),
-    /// Writes the fluents of an effect module.
+    /// An effect module gives new values to the terms that it writes.
     Call(CallTerm),
 }
 
-/// A number that changes at a rate while an action runs.
+/// Continuous effect: a number that changes at a rate while an action runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rate {
-    /// The number.
+    /// Number that changes.
     pub fluent: Fluent,
     /// Change per second, sign included.
     pub per_second: Expression,
-    /// Span.
+    /// Span of the effect.
     pub span: Span,
 }
 
@@ -431,9 +432,9 @@ pub struct Rate {
 pub struct Rule {
     /// The predicate of the head.
     pub predicate: PredicateId,
-    /// Variables: slots `0..parameters.len()`.
+    /// Variables of the head; variable `i` is slot `i`.
     pub parameters: Vec<Parameter>,
-    /// Slots in all.
+    /// Number of variable slots, including those of quantified variables.
     pub slots: usize,
     /// The body.
     pub body: Condition,
@@ -441,7 +442,7 @@ pub struct Rule {
     pub span: Span,
 }
 
-/// A ground fact.
+/// A ground fact: a predicate with objects as arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Fact {
     /// The predicate.
@@ -450,7 +451,7 @@ pub struct Fact {
     pub arguments: Box<[ObjectId]>,
 }
 
-/// A ground fluent.
+/// A ground fluent: a function with objects as arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GroundFluent {
     /// The function.
@@ -464,22 +465,22 @@ pub struct GroundFluent {
 pub struct Init {
     /// True facts; all others are false.
     pub facts: Vec<Fact>,
-    /// Numbers; every other one is undefined.
+    /// Values of numeric functions; all others are undefined.
     pub numbers: Vec<(GroundFluent, f64)>,
-    /// Values of object functions; every other one is undefined.
+    /// Values of object functions; all others are undefined.
     pub objects: Vec<(GroundFluent, ObjectId)>,
     /// Timed initial literals, in order of time.
     pub timed: Vec<TimedInitial>,
 }
 
-/// A timed initial literal or fluent.
+/// A timed initial literal, or a timed change of a number or object function.
 #[derive(Debug, Clone)]
 pub struct TimedInitial {
-    /// When, from the beginning of the plan.
+    /// Time of the change, in seconds from the beginning of the plan.
     pub time_s: f64,
     /// Change.
     pub change: GroundChange,
-    /// Span.
+    /// Span of the literal.
     pub span: Span,
 }
 
@@ -490,7 +491,7 @@ pub enum GroundChange {
     Add(Fact),
     /// The fact becomes false.
     Delete(Fact),
-    /// The number becomes this.
+    /// The number gets this value.
     Number(GroundFluent, f64),
     /// The object function gets this value.
     Object(GroundFluent, ObjectId),
@@ -503,49 +504,51 @@ pub struct Trajectory {
     pub forall: Vec<Quantified>,
     /// The operator.
     pub operator: Modal,
-    /// Times, in seconds.
+    /// Times that the operator takes, in seconds, such as `t` of `(within t f)`; empty if it takes
+    /// none.
     pub times_s: Vec<f64>,
-    /// One or two conditions.
+    /// Conditions that the operator takes: one, or two for operators such as `sometime-after`.
     pub conditions: Vec<Condition>,
-    /// Slots in all.
+    /// Number of variable slots.
     pub slots: usize,
-    /// Preference of the constraint, counted per binding of `forall`; `None` for a hard constraint.
+    /// Preference of the constraint, violated once per binding of `forall` that breaks it; `None` for a
+    /// hard constraint.
     pub preference: Option<PreferenceId>,
-    /// Span.
+    /// Span of the constraint.
     pub span: Span,
 }
 
-/// Named preference with its goal conditions; constraints and action conditions refer to it.
+/// A named preference. Constraints and action conditions refer to it by identifier.
 #[derive(Debug, Clone)]
 pub struct Preference {
     /// Name.
     pub name: String,
-    /// Conditions on the final state; each counts one violation per binding of its quantified
-    /// variables.
+    /// Preferred conditions on the final state; each binding of a condition's quantified variables that
+    /// violates it counts as one violation.
     pub goals: Vec<PreferredGoal>,
 }
 
 /// A condition on the last state that is only preferred.
 #[derive(Debug, Clone)]
 pub struct PreferredGoal {
-    /// Quantified variables; each binding is an instance.
+    /// Quantified variables; each binding that violates the condition counts as one violation.
     pub forall: Vec<Quantified>,
     /// The condition.
     pub condition: Condition,
-    /// Slots in all.
+    /// Number of variable slots.
     pub slots: usize,
-    /// Span.
+    /// Span of the condition.
     pub span: Span,
 }
 
-/// The metric.
+/// The metric of plans.
 #[derive(Debug, Clone)]
 pub struct Metric {
     /// True to minimise, false to maximise.
     pub minimise: bool,
     /// Expression to minimise or maximise.
     pub value: Expression,
-    /// Span.
+    /// Span of the metric.
     pub span: Span,
 }
 
@@ -580,7 +583,7 @@ impl Task {
         &self.actions[id.index()]
     }
 
-    /// True if an object is of one of the types.
+    /// True if an object is of at least one of the types.
     pub fn fits(&self, object: ObjectId, types: &[TypeId]) -> bool {
         self.object(object)
             .types
@@ -588,7 +591,7 @@ impl Task {
             .any(|&own| types.iter().any(|wanted| self.type_of(own).ancestors.contains(wanted)))
     }
 
-    /// True if an action takes time or a timed initial literal exists: plans then carry times.
+    /// True if plans carry times: some action is durative, or there are timed initial literals.
     pub fn is_temporal(&self) -> bool {
         !self.init.timed.is_empty() || self.actions.iter().any(Action::is_durative)
     }

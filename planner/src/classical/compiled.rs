@@ -10,14 +10,14 @@ use crate::model::agreement::reset;
 use super::measure::ClassicalMeasure;
 use super::numbers::{Numbers, is_plain};
 
-/// Candidate factors that make all costs whole numbers; if none does, costs are scaled by the first
-/// and rounded for the search. Plans report exact costs.
+/// Factors tried, in this order, to make all costs whole numbers; if none does, costs are scaled by the
+/// first one and rounded for the search. Reported plan costs are exact.
 const COST_SCALES: [f64; 4] = [1e3, 1e4, 1e5, 1e6];
-/// Maximum distance from a whole number at which a number counts as whole.
+/// Maximum distance from a whole number at which a cost counts as whole.
 const WHOLE: f64 = 1e-6;
-/// Costs above this are scaled down for the search.
+/// Maximum operator cost in the search; larger costs are scaled down.
 const LARGEST_COST: f64 = 1.0e6;
-/// Maximum plan cost that the search can represent; infinite bounds are one above.
+/// Maximum plan cost that the search can represent; `u32::MAX` means infinite.
 pub(crate) const MOST_COUNTED: u32 = u32::MAX - 1;
 
 /// Lists of different lengths, stored in one array.
@@ -28,7 +28,7 @@ pub struct Lists<T> {
 }
 
 impl<T> Lists<T> {
-    /// Empty collection.
+    /// Collection without lists.
     pub(crate) fn new() -> Self {
         Lists { starts: vec![0], items: Vec::new() }
     }
@@ -77,70 +77,72 @@ impl<T> Lists<T> {
     }
 }
 
-/// Conditional effect on one fact.
+/// Effect on one fact, with its conditions.
 #[derive(Clone, Copy, Debug)]
 pub struct Achieve {
-    /// First condition in [`Compiled::conditions`].
+    /// Begin of the effect's range in [`Compiled::conditions`]; the range is empty for an unconditional
+    /// effect.
     pub from: u32,
-    /// End of the range, exclusive.
+    /// End of the effect's range in [`Compiled::conditions`], exclusive.
     pub to: u32,
-    /// The fact.
+    /// Fact that the effect makes true.
     pub fact: GroundFact,
 }
 
-/// The task.
+/// Task of instantaneous actions, stored in flat arrays.
 #[derive(Clone, Debug)]
 pub struct Compiled {
-    /// Domain size of each variable; derived variables after the others, numeric conditions last.
+    /// Domain size of each variable: basic variables first, then derived ones, then numeric conditions.
     pub domains: Vec<u32>,
-    /// Number of variables that are not derived.
+    /// Number of basic variables, which are neither derived nor numeric conditions.
     pub basic: usize,
-    /// First fact of each variable.
+    /// Identifier of each variable's first fact; fact = offset + value.
     pub offsets: Vec<u32>,
     /// Number of facts.
     pub facts: usize,
     /// Preconditions by operator.
     pub preconditions: Lists<GroundFact>,
-    /// Effects by operator.
+    /// Effects on facts, by operator.
     pub effects: Lists<Achieve>,
-    /// Conditions of conditional effects.
+    /// Conditions of all effects, in ranges given by [`Achieve`].
     pub conditions: Vec<GroundFact>,
-    /// True, by operator, if its effects may give one object fluent several values at once; empty
-    /// if no operator can.
+    /// True, by operator, if its effects may give one object fluent several values at once; empty if
+    /// this holds for no operator.
     contested: Vec<bool>,
-    /// True, by basic variable, for object fluents.
+    /// True, by variable, if it stands for an object fluent.
     objects: Vec<bool>,
-    /// Search costs by operator.
+    /// Operator costs of the search: whole numbers, scaled by `cost_scale`.
     pub costs: Vec<u32>,
     /// Measure of a plan's cost.
     pub measure: ClassicalMeasure,
     /// Factor from exact costs to search costs.
     pub cost_scale: f64,
-    /// True if all costs are one.
+    /// True if every operator costs one.
     pub unit_cost: bool,
-    /// True if some operator has zero cost.
+    /// True if some operator costs nothing.
     pub free_operators: bool,
-    /// Bodies of axioms, by stratum in rising order.
+    /// Body facts of each axiom, axioms of lower strata first.
     pub axiom_bodies: Lists<GroundFact>,
-    /// Heads of axioms.
+    /// Head fact of each axiom.
     pub axiom_heads: Vec<GroundFact>,
-    /// First axiom of each stratum, and the number of axioms.
+    /// Index of the first axiom of each stratum; the last entry is the number of axioms.
     pub strata: Vec<usize>,
-    /// Axioms by body fact.
+    /// Axioms whose body contains a fact, by fact.
     pub axioms_with: Lists<u32>,
     /// Goal facts.
     pub goal: Vec<GroundFact>,
-    /// First state, derived variables included.
+    /// Initial state, derived variables and numbers included.
     pub initial: Vec<u32>,
-    /// Predicate or function by fact; `u32::MAX` for "none of these atoms".
+    /// Predicate or function of each fact, encoded as one number; `u32::MAX` for facts of no single
+    /// predicate or function.
     pub symbols: Vec<u32>,
-    /// Variable by fact.
+    /// Variable of each fact.
     pub variables: Vec<u32>,
     /// Numeric fluents and their changes.
     pub numbers: Arc<Numbers>,
 }
 
-/// True if the search over instantaneous actions alone can plan for the task.
+/// True if search over instantaneous actions can solve the task: no durations, timed literals or calls.
 pub fn is_classical(task: &GroundTask) -> bool {
     let plain = |c: &Conjunction| c.calls.is_empty();
     let plain_effect = |e: &GroundEffect| {
@@ -163,8 +165,8 @@ pub fn is_classical(task: &GroundTask) -> bool {
             .all(|a| plain(&a.condition) && is_plain(&a.cost) && a.effects.iter().all(plain_effect))
 }
 
-/// True, by action, if its effects may give one object fluent several values at once; empty if no
-/// action can.
+/// True, by action, if its effects may give one object fluent several values at once; empty if this
+/// holds for no action.
 fn contested(task: &GroundTask) -> Vec<bool> {
     let is_contested = |action: &GroundAction| GroundEffect::some_contest(&action.effects, &task.variables);
     let contested: Vec<bool> = task.actions.iter().map(is_contested).collect();
@@ -172,7 +174,7 @@ fn contested(task: &GroundTask) -> Vec<bool> {
 }
 
 impl Compiled {
-    /// Task in flat arrays, for tasks that [`is_classical`].
+    /// Compiles a ground task that [`is_classical`].
     pub fn new(task: &GroundTask) -> Compiled {
         let compared = std::iter::repeat_n(2, task.comparisons.len());
         let domains: Vec<u32> = task.variables.iter().map(|v| v.domain_size()).chain(compared).collect();
@@ -254,27 +256,29 @@ impl Compiled {
         compiled
     }
 
-    /// Number of a fact.
+    /// Identifier of a fact.
     #[inline]
     pub(crate) fn id(&self, fact: GroundFact) -> u32 {
         self.offsets[fact.variable as usize] + fact.value
     }
 
-    /// True if a fact holds.
+    /// True if a fact, given by its identifier, holds in a state.
     #[inline]
     pub(crate) fn holds(&self, fact: u32, state: &[u32]) -> bool {
         let variable = self.variables[fact as usize] as usize;
         self.offsets[variable] + state[variable] == fact
     }
 
-    /// Variables that an operator writes, and behind all variables the numbers.
+    /// Variables and numbers that an operator writes; numeric fluent `n` has index `n` plus the number
+    /// of variables.
     pub(crate) fn written(&self, operator: u32) -> impl Iterator<Item = u32> + '_ {
         let base = self.domains.len() as u32;
         let numbers = self.numbers.writes(operator).map(move |n| base + n);
         self.effects.get(operator as usize).iter().map(|e| e.fact.variable).chain(numbers)
     }
 
-    /// Variables that an operator reads, and behind all variables the numbers.
+    /// Variables and numbers that an operator reads; numeric fluent `n` has index `n` plus the number
+    /// of variables.
     pub(crate) fn read(&self, operator: u32) -> Vec<u32> {
         let effects = self.effects.get(operator as usize);
         let conditions = effects.iter().flat_map(|e| &self.conditions[e.from as usize..e.to as usize]);
@@ -295,15 +299,15 @@ impl Compiled {
         self.costs.len()
     }
 
-    /// True if the operator is applicable.
+    /// True if an operator is applicable in a state.
     #[inline]
     pub fn applicable(&self, operator: u32, state: &[u32]) -> bool {
         self.preconditions.get(operator as usize).iter().all(|f| state[f.variable as usize] == f.value)
             && self.possible(operator, state)
     }
 
-    /// True if an operator leaves all numbers defined and finite, and gives each object one value;
-    /// preconditions are assumed.
+    /// True if an operator whose preconditions hold leaves all numbers defined and finite, and gives
+    /// each object fluent at most one value.
     #[inline]
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         (self.numbers.is_empty() || self.numbers.possible(operator, state))
@@ -328,12 +332,12 @@ impl Compiled {
         reset(set.map(|effect| (effect.fact.variable, effect.fact.value))).is_none()
     }
 
-    /// True if the goal holds.
+    /// True if the goal holds in a state.
     pub fn is_goal(&self, state: &[u32]) -> bool {
         self.goal.iter().all(|f| state[f.variable as usize] == f.value)
     }
 
-    /// State after the operator, derived variables up to date.
+    /// Writes the state after an operator to `next`, derived variables included.
     pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut Vec<u32>) {
         next.clear();
         next.extend_from_slice(state);
@@ -349,7 +353,7 @@ impl Compiled {
         self.derive(next);
     }
 
-    /// Applies the operator in place.
+    /// Applies an operator to a state in place.
     pub fn advance(&self, operator: u32, state: &mut [u32]) {
         let effects = self.effects.get(operator as usize);
         let conditional = effects.iter().any(|e| e.from != e.to);
@@ -399,13 +403,13 @@ impl Compiled {
         }
     }
 
-    /// True if the search counts costs exactly as the metric does.
+    /// True if the search's operator costs equal those of the metric.
     pub(crate) fn has_exact_costs(&self) -> bool {
         let exact = |(&counted, &exact): (&u32, &f64)| f64::from(counted) == exact;
         self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(exact)
     }
 
-    /// True if search costs are proportional to metric costs.
+    /// True if the search's operator costs are proportional to those of the metric.
     pub(crate) fn has_proportional_costs(&self) -> bool {
         let proportional = |(&counted, &exact): (&u32, &f64)| {
             let scaled = exact * self.cost_scale;
@@ -414,27 +418,27 @@ impl Compiled {
         self.measure.is_sum() && self.costs.iter().zip(&self.measure.estimates).all(proportional)
     }
 
-    /// A cost of the search's in the metric's unit.
+    /// Converts a cost of the search to the unit of the metric.
     pub(crate) fn unscaled(&self, cost: u32) -> f64 {
         f64::from(cost) / self.cost_scale
     }
 
-    /// The cost of a plan as the search counts.
+    /// Cost of a plan in the search's unit.
     pub(crate) fn search_cost(&self, plan: &[u32]) -> u32 {
         plan.iter().fold(0, |sum, &op| self.with_cost(sum, op))
     }
 
-    /// Search cost of a plan prefix extended by one operator, saturating.
+    /// Cost of a plan, in the search's unit, after one more operator; cut at [`MOST_COUNTED`].
     pub(crate) fn with_cost(&self, cost: u32, operator: u32) -> u32 {
         cost.saturating_add(self.costs[operator as usize]).min(MOST_COUNTED)
     }
 
-    /// A bound on costs as the search counts.
+    /// Converts a cost bound of the metric to the search's unit, rounded up.
     pub(crate) fn scaled(&self, cost: f64) -> u32 {
         (cost * self.cost_scale).ceil().clamp(0.0, f64::from(u32::MAX)) as u32
     }
 
-    /// The exact cost of a plan.
+    /// Cost of a plan in the unit of the metric, exact.
     pub(crate) fn plan_cost(&self, plan: &[u32]) -> f64 {
         self.measure.of(self, plan)
     }

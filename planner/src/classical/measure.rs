@@ -1,31 +1,31 @@
-//! Cost of a plan: a sum over its operators if the metric is one, else a function of its states.
+//! Plan cost: a sum of operator costs if the metric is such a sum, else a function of the states.
 
 use crate::ground::{GroundExpression, GroundTask};
 
 use super::compiled::Compiled;
 use super::numbers::{Linear, Numbers, add_linear};
 
-/// Measure of plans.
+/// Measure of a plan's cost; maximised metrics are negated.
 #[derive(Clone, Debug)]
 pub struct ClassicalMeasure {
     kind: Kind,
-    /// Cost by operator; an estimate for state-dependent costs.
+    /// Estimated cost of each operator; exact if plan cost is a sum of constant operator costs.
     pub estimates: Vec<f64>,
 }
 
 #[derive(Clone, Debug)]
 enum Kind {
-    /// The estimates are exact.
+    /// Plan cost is the sum of `estimates`.
     Sum,
-    /// State-dependent cost of each operator, evaluated in the state before it, with the metric's
-    /// sign.
+    /// Plan cost is a sum of operator costs that depend on the state before the operator; each is
+    /// multiplied by the sign (-1 to maximise).
     Adding(Vec<GroundExpression>, f64),
-    /// Metric of the last state, times the sign.
+    /// Plan cost is an expression over the final state, multiplied by the sign (-1 to maximise).
     Last(GroundExpression, f64),
 }
 
 impl ClassicalMeasure {
-    /// Measure of the plans of a task.
+    /// Measure of a task's plans.
     pub(crate) fn new(task: &GroundTask, numbers: &Numbers) -> ClassicalMeasure {
         let sign = if task.metric.as_ref().is_none_or(|m| m.minimise) { 1.0 } else { -1.0 };
         if let Some(metric) = task.metric.as_ref().filter(|m| !m.additive) {
@@ -46,13 +46,12 @@ impl ClassicalMeasure {
         ClassicalMeasure { kind, estimates }
     }
 
-    /// True if plan cost is the sum of operator costs.
+    /// True if plan cost is the sum of constant operator costs.
     pub(crate) fn is_sum(&self) -> bool {
         matches!(self.kind, Kind::Sum)
     }
 
-    /// Plan cost as a function of the final state; `None` if the metric depends on more than that
-    /// state.
+    /// Plan cost as a function of the final state; `None` if it depends on more than that state.
     pub(crate) fn of_last(&self, numbers: &Numbers, state: &[u32]) -> Option<f64> {
         match &self.kind {
             Kind::Last(expression, sign) => Some(sign * numbers.value(expression, state)),
@@ -60,7 +59,7 @@ impl ClassicalMeasure {
         }
     }
 
-    /// The cost of a plan from the first state.
+    /// Cost of a plan that starts in the initial state.
     pub(crate) fn of(&self, task: &Compiled, plan: &[u32]) -> f64 {
         let (mut state, mut sum) = (task.initial.clone(), 0.0);
         match &self.kind {
@@ -80,8 +79,8 @@ impl ClassicalMeasure {
     }
 }
 
-/// Measure that depends on the final state. Operator costs are estimated from state-independent
-/// changes if the metric is linear; otherwise each operator costs one.
+/// Measure that depends on the final state only. Operator costs are estimated from constant changes if
+/// the metric is linear; otherwise each operator costs one.
 fn of_last(expression: &GroundExpression, sign: f64, numbers: &Numbers) -> ClassicalMeasure {
     let kind = Kind::Last(expression.clone(), sign);
     let mut linear = Linear::default();

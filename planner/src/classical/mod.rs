@@ -1,4 +1,4 @@
-//! Tasks of instantaneous actions over finite-domain variables and numbers, in flat arrays.
+//! Tasks of instantaneous actions over finite-domain variables and numbers, stored in flat arrays.
 
 #[doc(hidden)]
 pub mod compiled;

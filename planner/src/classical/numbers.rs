@@ -1,8 +1,8 @@
-//! Numeric fluents of a task: their changes, the comparisons that read them, and the metric over
-//! them.
+//! Numeric fluents of a task: their changes, the comparisons that read them, and linear sums of them.
 //!
-//! A state carries its numbers behind its variables, two words each. Every numeric condition is a variable of its own
-//! (value 0 where it holds), looked up after each change, so that all searches treat it like any other fact.
+//! A state vector holds the values of variables first, then two words per number. Every numeric
+//! condition is a variable of its own (value 0 where the condition holds), updated after each change,
+//! so that all searches treat it like a fact.
 
 use crate::ground::{
     Change, Conjunction, GroundComparison, GroundExpression, GroundFact, GroundOutcome, GroundTask, Relation,
@@ -12,21 +12,21 @@ use crate::model::relation::quotient;
 
 use super::compiled::Lists;
 
-/// Numeric effect.
+/// Numeric effect of an operator.
 #[derive(Clone, Debug, Default)]
 pub struct NumberChange {
-    /// Facts (including those of comparisons) that enable the change.
+    /// Facts (including those of comparisons) that must hold for the change to happen.
     pub conditions: Vec<GroundFact>,
-    /// Number that changes.
+    /// Index of the number that changes.
     pub number: u32,
-    /// Kind of change.
+    /// Kind of change; always present, except in the default value.
     pub change: Option<Change>,
-    /// Amount.
+    /// Amount added, subtracted, assigned or scaled by; always present, except in the default value.
     pub amount: Option<GroundExpression>,
 }
 
 impl NumberChange {
-    /// Added amount, if constant.
+    /// Amount added by the change; `None` if it is no addition or depends on the state.
     pub(crate) fn constant_gain(&self) -> Option<f64> {
         match (self.change, &self.amount) {
             (Some(Change::Increase), Some(GroundExpression::Constant(by))) => Some(*by),
@@ -36,25 +36,25 @@ impl NumberChange {
     }
 }
 
-/// A sum of weighted numbers and a constant.
+/// Linear expression: a weighted sum of numbers plus a constant.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
-    /// Numbers with their weights, without duplicates.
+    /// Index and weight of each number; no number twice.
     pub weights: Vec<(u32, f64)>,
-    /// The constant.
+    /// Constant term.
     pub constant: f64,
 }
 
 /// Numeric fluents of a task; empty for a task without numbers.
 #[derive(Clone, Debug, Default)]
 pub struct Numbers {
-    /// Variable of the first comparison.
+    /// Index of the variable that stands for the first comparison.
     pub first: usize,
-    /// Number of words of a state before the numeric fluents.
+    /// Number of words of a state before its numbers.
     base: usize,
-    /// Numeric conditions.
+    /// Numeric conditions, each a comparison of two expressions.
     pub comparisons: Vec<GroundComparison>,
-    /// Left minus right of each comparison as a linear sum; `None` if not linear.
+    /// Left minus right of each comparison as a linear expression; `None` if it is not linear.
     pub linear: Vec<Option<Linear>>,
     /// Numbers that each comparison reads.
     pub reads: Vec<Vec<u32>>,
@@ -62,19 +62,20 @@ pub struct Numbers {
     pub read_by: Lists<u32>,
     /// Initial values; NaN if undefined.
     pub initial: Vec<f64>,
-    /// Changes of numbers by operator.
+    /// Numeric effects of each operator.
     pub changes: Vec<Vec<NumberChange>>,
-    /// Comparisons whose truth each operator may change.
+    /// Comparisons whose truth may change when an operator is applied, by operator.
     turned: Lists<u32>,
-    /// True, by operator, if a number may become undefined or infinite, which forbids the operator.
-    risky: Vec<bool>,
-    /// True, by operator, if its changes of one number may contradict each other, which makes it
+    /// True, by operator, if some number may become undefined or infinite, which makes the operator
     /// inapplicable.
+    risky: Vec<bool>,
+    /// True, by operator, if two of its changes of one number may contradict each other, which makes
+    /// the operator inapplicable.
     contradicting: Vec<bool>,
 }
 
 impl Numbers {
-    /// The numbers of a ground task whose comparisons begin at variable `first`.
+    /// Numbers of a ground task; `first` is the variable of the first comparison.
     pub(crate) fn new(task: &GroundTask, first: usize) -> Numbers {
         let count = task.numerics.len();
         let comparisons = task.comparisons.clone();
@@ -149,7 +150,7 @@ impl Numbers {
         self.initial.len()
     }
 
-    /// A number of a state.
+    /// Value of a number in a state.
     #[inline]
     pub(crate) fn get(&self, state: &[u32], number: u32) -> f64 {
         let at = self.base + 2 * number as usize;
@@ -163,7 +164,8 @@ impl Numbers {
         state[at + 1] = (bits >> 32) as u32;
     }
 
-    /// Completes an initial state that has all variables but derived ones and comparisons.
+    /// Appends the values of comparisons and numbers to an initial state that has those of all other
+    /// variables.
     pub(crate) fn append_initial(&self, state: &mut Vec<u32>) {
         state.resize(self.base + 2 * self.initial.len(), 1);
         for (number, &value) in self.initial.iter().enumerate() {
@@ -172,7 +174,7 @@ impl Numbers {
         self.compare_all(state);
     }
 
-    /// Looks up every comparison.
+    /// Updates the variables of all comparisons.
     pub(crate) fn compare_all(&self, state: &mut [u32]) {
         for comparison in 0..self.comparisons.len() {
             self.compare(comparison, state);
@@ -185,13 +187,14 @@ impl Numbers {
         state[self.first + comparison] = u32::from(!holds);
     }
 
-    /// Left minus right of a comparison.
+    /// Left minus right of a comparison in a state.
     pub(crate) fn gap(&self, comparison: usize, state: &[u32]) -> f64 {
         let GroundComparison { left, right, .. } = &self.comparisons[comparison];
         self.value(left, state) - self.value(right, state)
     }
 
-    /// Change of left minus right of a comparison; NaN if state-dependent.
+    /// Amount by which numeric changes raise left minus right of a comparison; NaN if it depends on
+    /// the state.
     pub(crate) fn gain(&self, comparison: u32, changes: &[NumberChange]) -> f64 {
         let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
         let weight = |n: u32| linear.weights.iter().find(|(number, _)| *number == n).map_or(0.0, |w| w.1);
@@ -199,7 +202,8 @@ impl Numbers {
         gains.filter(|(weight, _)| *weight != 0.0).map(|(weight, gain)| weight * gain).sum()
     }
 
-    /// Change of left minus right of a comparison in a state; NaN if the changes do more than add.
+    /// Amount by which numeric changes raise left minus right of a comparison in a state; NaN if
+    /// some change that counts is no addition.
     pub(crate) fn gain_in(&self, comparison: u32, changes: &[NumberChange], state: &[u32]) -> f64 {
         let Some(linear) = &self.linear[comparison as usize] else { return f64::NAN };
         let added = |c: &NumberChange| {
@@ -215,7 +219,8 @@ impl Numbers {
         changes.iter().map(added).sum()
     }
 
-    /// Minimum value of a number that satisfies a comparison over this number alone.
+    /// Minimum value of a number that satisfies a comparison over this number alone; `None` if the
+    /// comparison reads other numbers or sets no minimum.
     pub(crate) fn least(&self, comparison: usize, number: u32) -> Option<f64> {
         let linear = self.linear[comparison].as_ref()?;
         let [(read, weight)] = linear.weights[..] else { return None };
@@ -227,7 +232,7 @@ impl Numbers {
         (read == number && bounds).then(|| -linear.constant / weight)
     }
 
-    /// Comparisons that an operator may turn.
+    /// Comparisons whose truth an operator may change.
     pub(crate) fn turned(&self, operator: u32) -> &[u32] {
         self.turned.get(operator as usize)
     }
@@ -237,7 +242,8 @@ impl Numbers {
         evaluate(expression, &|number| self.get(state, number))
     }
 
-    /// Applies an operator's numeric changes to `next`, a copy of `state` with the other effects.
+    /// Applies an operator's numeric effects to `next`, which is `state` after the operator's other
+    /// effects.
     pub(crate) fn apply(&self, operator: u32, state: &[u32], next: &mut [u32]) {
         for change in &self.changes[operator as usize] {
             let (Some(how), Some(amount)) = (change.change, &change.amount) else { continue };
@@ -252,7 +258,8 @@ impl Numbers {
         }
     }
 
-    /// True if all numbers changed by an operator stay defined and finite, without contradictions.
+    /// True if the numbers that an operator changes stay defined and finite, and no two of its changes
+    /// contradict each other.
     pub(crate) fn possible(&self, operator: u32, state: &[u32]) -> bool {
         if !self.risky[operator as usize] {
             return true;
@@ -268,7 +275,7 @@ impl Numbers {
         })
     }
 
-    /// True if changes triggered in a state contradict each other.
+    /// True if changes that the operator makes in this state contradict each other.
     fn contradict(&self, operator: u32, state: &[u32]) -> bool {
         let happens = |c: &&NumberChange| c.conditions.iter().all(|f| state[f.variable as usize] == f.value);
         let happening = self.changes[operator as usize].iter().filter(happens);
@@ -282,7 +289,8 @@ impl Numbers {
         self.changes.get(operator as usize).into_iter().flatten().map(|c| c.number)
     }
 
-    /// Variables and numbers that an operator's changes read.
+    /// Variables that the conditions of an operator's numeric effects read, and numbers that their
+    /// amounts read.
     pub(crate) fn change_reads(&self, operator: u32) -> (Vec<u32>, Vec<u32>) {
         let changes = self.changes.get(operator as usize).map_or(&[][..], |c| c);
         let variables = changes.iter().flat_map(|c| c.conditions.iter().map(|f| f.variable)).collect();
@@ -291,13 +299,13 @@ impl Numbers {
     }
 }
 
-/// Maximum number of repetitions that is counted exactly.
+/// Maximum number of repetitions; larger counts are cut to it.
 const MOST_TIMES: f64 = 1.0e6;
-/// Tolerance of repetition counts.
+/// Tolerance in the number of repetitions, against rounding.
 const SLACK: f64 = 1.0e-9;
 
-/// Number of additions until left minus right satisfies the relation to zero; `None` if adding does
-/// not help.
+/// Number of times `gain` must be added to `gap` (left minus right) until the relation holds, at least
+/// 1; `None` if adding does not help.
 pub(crate) fn repetitions(gap: f64, relation: Relation, gain: f64) -> Option<u32> {
     let (missing, gain) = match relation {
         Relation::AtLeast | Relation::Greater => (-gap, gain),
@@ -332,7 +340,7 @@ pub(crate) fn evaluate(expression: &GroundExpression, number: &impl Fn(u32) -> f
     }
 }
 
-/// True if an expression consists of numbers alone.
+/// True if an expression consists of constants, numeric fluents and arithmetic only.
 pub(crate) fn is_plain(expression: &GroundExpression) -> bool {
     match expression {
         GroundExpression::Constant(_) | GroundExpression::Fluent(_) => true,
@@ -348,7 +356,7 @@ pub(crate) fn is_plain(expression: &GroundExpression) -> bool {
     }
 }
 
-/// The numbers that expressions read, each once.
+/// Numbers that expressions read, ascending, each once.
 pub(crate) fn reads(expressions: &[&GroundExpression]) -> Vec<u32> {
     fn collect(expression: &GroundExpression, out: &mut Vec<u32>) {
         match expression {
@@ -371,7 +379,7 @@ pub(crate) fn reads(expressions: &[&GroundExpression]) -> Vec<u32> {
     out
 }
 
-/// Adds a weighted expression to a sum; `false` if it is not linear.
+/// Adds `factor` times an expression to a linear sum; `false` if the expression is not linear.
 pub(crate) fn add_linear(expression: &GroundExpression, factor: f64, sum: &mut Linear) -> bool {
     match expression {
         GroundExpression::Constant(value) => {

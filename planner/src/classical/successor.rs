@@ -1,23 +1,25 @@
-//! Successor generator: a decision tree over variables (Helmert 2006, section 5.3.1) in one flat
-//! array.
+//! Successor generator: a decision tree that finds the applicable operators of a state (Helmert 2006,
+//! section 5.3.1), stored in one flat array.
 
 use super::compiled::Compiled;
 
-/// Node without children.
+/// Index that stands for a missing node.
 const EMPTY: u32 = u32::MAX;
 
-/// The tree. A node is either a list of operators followed by the node to go on with, or a variable to switch over.
+/// Decision tree over variables. A node either lists operators and names the node to continue with, or
+/// branches on the value of a variable.
 pub struct Successors {
-    /// Switch: `[variable, node if any value, child per value…]`. Leaf: `[LEAF, count, operators…]`.
+    /// Nodes one after the other. Branch: `[variable, node for any value, child of each value…]`; list
+    /// of operators: `[LEAF, node to continue with, count, operators…]`.
     nodes: Vec<u32>,
     root: u32,
 }
 
-/// Marks a list of operators.
+/// First word of a node that lists operators.
 const LEAF: u32 = u32::MAX - 1;
 
 impl Successors {
-    /// Builds the tree.
+    /// Builds the tree from the operators' preconditions.
     pub fn new(task: &Compiled) -> Successors {
         let mut operators: Vec<u32> = (0..task.operators() as u32).collect();
         let key = |op: u32| task.preconditions.get(op as usize).iter().map(|f| (f.variable, f.value));
@@ -67,7 +69,7 @@ impl Successors {
         node as u32
     }
 
-    /// Appends the applicable operators.
+    /// Appends the operators that are applicable in a state.
     pub(crate) fn applicable(&self, task: &Compiled, state: &[u32], out: &mut Vec<u32>) {
         self.collect(self.root, state, out);
         if task.some_impossible() {

@@ -1,19 +1,18 @@
-//! Conflict analysis: the clause of the first unique implication point, minimised.
+//! Conflict analysis: derives a minimised clause from a conflict (first unique implication point).
 
 use super::Literal;
 use super::solver::{NONE, PAIR, Solver};
 
-/// Learned clause; after backtracking to `level` (that of the second literal), its first literal
-/// becomes true.
+/// Learned clause. After backtracking to `level`, its first literal must become true.
 pub(super) struct Learned {
     pub clause: Vec<Literal>,
     pub level: u32,
-    /// Number of decision levels among the clause's literals (LBD).
+    /// Number of distinct decision levels among the clause's literals (LBD).
     pub rank: u32,
 }
 
 impl Solver {
-    /// Conflict analysis: learns a clause from a conflicting one.
+    /// Learns a clause from a conflicting one, whose literals are all false.
     pub(super) fn learn(&mut self, mut reason: Vec<Literal>) -> Learned {
         let mut clause = vec![Literal::default()];
         let (mut open, mut index) = (0, self.trail.len());
@@ -58,7 +57,7 @@ impl Solver {
         self.measured(clause)
     }
 
-    /// False literals that propagated a literal.
+    /// Other literals of the clause that propagated a literal; all of them are false.
     fn because(&self, literal: Literal) -> Vec<Literal> {
         let reason = self.reasons[literal.variable() as usize];
         if reason & PAIR != 0 && reason != NONE {
@@ -67,7 +66,7 @@ impl Solver {
         self.literals(reason).filter(|&other| other != literal).collect()
     }
 
-    /// True if a literal is implied by the marked literals.
+    /// True if a literal of the learned clause is redundant: implied by the other marked literals.
     fn follows(&self, literal: Literal) -> bool {
         let reason = self.reasons[literal.variable() as usize];
         let marked = |other: Literal| {

@@ -4,72 +4,75 @@
 
 use super::Literal;
 
-/// Position of a clause in the arena; [`NONE`] for no reason.
+/// Position of a clause in the arena. As the reason of an assignment, [`NONE`] stands for a decision or
+/// a unit clause.
 pub(super) type Place = u32;
 pub(super) const NONE: Place = u32::MAX;
-/// Flag of a reason that is a binary clause with the given other literal.
+/// Flag in a reason: the reason is a binary clause, and the other bits give its other literal.
 pub(super) const PAIR: u32 = 1 << 31;
-/// Words before a clause's literals: length and LBD (0 for an input clause).
+/// Number of words before a clause's literals: its length and its LBD (0 for an input clause).
 pub(super) const HEAD: usize = 2;
 
-/// Conflicts of the shortest run between restarts.
+/// Number of conflicts before the first restart, and unit of the Luby sequence after it.
 const RESTART: u64 = 64;
-/// Initial limit of learned clauses; the next constant is its increase after each reduction.
+/// Number of learned clauses, beyond the length of the trail, at which the first ones are deleted.
 const KEPT: usize = 2_000;
+/// Increase, after each deletion, of the number of learned clauses at which the next one happens.
 const KEPT_MORE: usize = 500;
-/// Maximum LBD of learned clauses that are never deleted.
+/// LBD up to which learned clauses are never deleted.
 const GLUE: u32 = 2;
 
-/// Answer of a search.
+/// Result of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Satisfiability {
-    /// All clauses hold under the values.
+    /// The values satisfy all clauses.
     Satisfied,
-    /// Unsatisfiable.
+    /// No values satisfy all clauses.
     Unsatisfiable,
-    /// Work limit reached or stopped by the caller; the solver can continue.
+    /// The work limit was reached or the caller stopped the search; the search can be continued.
     Interrupted,
 }
 
-/// Decision heuristic.
+/// Decision heuristic of the caller.
 pub trait Decide {
-    /// Appends decision literals, in order of preference; assigned ones are skipped. If none is
-    /// appended, all open variables become false. Returns the work done (see [`Solver::work`]).
+    /// Appends the literals to decide next, in order of preference; assigned ones are skipped. If all
+    /// are assigned or none is appended, every open variable becomes false. Returns the work done, in
+    /// the unit of [`Solver::work`].
     fn next(&mut self, solver: &Solver, out: &mut Vec<Literal>) -> u64;
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Watch {
     clause: Place,
-    /// Blocking literal of the clause: while this literal is true, the clause is satisfied and need
-    /// not be inspected.
+    /// Some other literal of the clause: while it is true, the clause is satisfied and need not be
+    /// inspected.
     blocker: Literal,
 }
 
-/// Clause database and assignment.
+/// CDCL solver: clauses and the current assignment.
 pub struct Solver {
-    /// Clauses of three or more literals, consecutively.
+    /// Clauses of three or more literals, one after the other.
     pub(super) arena: Vec<u32>,
     learned: Vec<Place>,
     kept: usize,
-    /// Binary clauses, by literal: the other literals of the clauses with its negation.
+    /// By literal: the other literals of binary clauses that contain its negation.
     pairs: Vec<Vec<Literal>>,
-    /// Clauses that watch a literal, by literal.
+    /// Clauses to inspect when a literal becomes false, by literal.
     watches: Vec<Vec<Watch>>,
-    /// Value by literal: 1 true, -1 false, 0 open.
+    /// Value of each literal: 1 true, -1 false, 0 open.
     values: Vec<i8>,
-    /// Decision level by variable.
+    /// Decision level at which each variable was assigned.
     pub(super) levels: Vec<u32>,
     pub(super) reasons: Vec<u32>,
-    /// Activity by variable: decayed count of its recent conflicts.
+    /// Activity of each variable: decayed count of recent conflicts that involve it.
     activity: Vec<f64>,
     bump: f64,
     pub(super) trail: Vec<Literal>,
     starts: Vec<usize>,
-    /// Position in the trail up to which propagation is done.
+    /// Number of literals of the trail that have been propagated.
     followed: usize,
     contradiction: bool,
-    /// Stack of planned decisions.
+    /// Decisions to make next, the last one first.
     plan: Vec<Literal>,
     conflicts: u64,
     restart_at: u64,
@@ -81,7 +84,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// A solver without clauses over this many variables.
+    /// Solver over a number of variables, without clauses.
     pub fn new(variables: usize) -> Solver {
         Solver {
             arena: Vec::new(),
@@ -108,7 +111,7 @@ impl Solver {
         }
     }
 
-    /// Approximate memory, bytes.
+    /// Approximate memory of the solver, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.bytes + self.arena.capacity() * 4
     }
@@ -121,7 +124,7 @@ impl Solver {
         }
     }
 
-    /// Activity of a variable: decayed count of its recent conflicts.
+    /// Activity of a variable: decayed count of recent conflicts that involve it.
     pub(crate) fn activity(&self, variable: u32) -> f64 {
         self.activity[variable as usize]
     }
@@ -131,7 +134,7 @@ impl Solver {
         self.conflicts
     }
 
-    /// Adds a clause, before the search begins.
+    /// Adds a clause; only before the search begins.
     pub fn add(&mut self, clause: &[Literal]) {
         let mut open = Vec::with_capacity(clause.len());
         for &literal in clause {
@@ -150,7 +153,7 @@ impl Solver {
         }
     }
 
-    /// Stores a clause of two or more literals; returns its reason reference.
+    /// Stores a clause of two or more literals; returns the reason value that refers to it.
     fn store(&mut self, clause: &[Literal], rank: u32) -> u32 {
         self.bytes += 24;
         if let [one, other] = *clause {
@@ -192,7 +195,7 @@ impl Solver {
         self.plan.clear();
     }
 
-    /// Unit propagation; returns the literals of a conflicting clause, if any.
+    /// Propagates units; returns the literals of a conflicting clause, or `None` without conflict.
     fn propagate(&mut self) -> Option<Vec<Literal>> {
         while self.followed < self.trail.len() {
             let literal = self.trail[self.followed];
@@ -221,8 +224,8 @@ impl Solver {
         None
     }
 
-    /// Inspects the clauses that watch a literal that became false; returns a conflicting clause,
-    /// if any.
+    /// Inspects the clauses that watch a literal that has become false; returns a conflicting clause,
+    /// or `None`.
     fn follow(&mut self, gone: Literal) -> Option<Place> {
         let mut watches = std::mem::take(&mut self.watches[gone.at()]);
         self.work += 2 * watches.len() as u64;
@@ -281,7 +284,7 @@ impl Solver {
         }
     }
 
-    /// Searches until the total work reaches `work`, or `stop` returns true.
+    /// Searches for satisfying values until [`Solver::work`] exceeds `work` or `stop` returns true.
     pub fn run(&mut self, decide: &mut dyn Decide, work: u64, stop: &dyn Fn() -> bool) -> Satisfiability {
         if self.contradiction {
             return Satisfiability::Unsatisfiable;
@@ -312,7 +315,7 @@ impl Solver {
         }
     }
 
-    /// Learns from a conflicting clause and backtracks.
+    /// Learns a clause from a conflicting one, backtracks and assigns the clause's first literal.
     fn resolve(&mut self, broken: Vec<Literal>) {
         self.conflicts += 1;
         let learned = self.learn(broken);
@@ -325,7 +328,7 @@ impl Solver {
         self.bump /= 0.95;
     }
 
-    /// Makes the next decision; `false` if all literals are assigned.
+    /// Makes the next decision; `false` if all variables are assigned.
     fn try_next(&mut self, decide: &mut dyn Decide) -> bool {
         let next = loop {
             match self.plan.pop() {
@@ -351,7 +354,7 @@ impl Solver {
         true
     }
 
-    /// Deletes the worse half of the learned clauses.
+    /// Deletes the worse half of the learned clauses by LBD, except reasons and those with small LBD.
     fn forget(&mut self) {
         let mut learned = std::mem::take(&mut self.learned);
         let rank = |place: Place| self.arena[place as usize + 1];
@@ -375,7 +378,7 @@ impl Solver {
     }
 }
 
-/// 1 1 2 1 1 2 4 … (Luby, Sinclair and Zuckerman 1993), from 1.
+/// Luby sequence 1 1 2 1 1 2 4 … (Luby, Sinclair and Zuckerman 1993), indexed from 1.
 pub fn luby(mut index: u64) -> u64 {
     loop {
         let bits = u64::BITS - index.leading_zeros();

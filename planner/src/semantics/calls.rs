@@ -7,7 +7,7 @@ use crate::attachment::{self, Answer, FactValue, Level, Read, Reading};
 use crate::state::State;
 use crate::task::{CallTerm, FunctionId, ObjectId, Parameter, PredicateId, Task};
 
-/// A predicate or function.
+/// Predicate or function that a module reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ReadSymbol {
     /// A predicate.
@@ -17,7 +17,7 @@ pub enum ReadSymbol {
 }
 
 impl Semantics<'_> {
-    /// Exact answer of a call; `None` if an argument is undefined.
+    /// Answer of a call at the exact level; `None` if an argument is undefined.
     pub(crate) fn ask(
         &self,
         state: &State,
@@ -33,7 +33,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// Parameters that a grounding module proposes.
+    /// Arguments that a grounding module proposes; empty if an argument of the call is undefined.
     pub(crate) fn proposals(
         &self,
         state: &State,
@@ -46,7 +46,8 @@ impl Semantics<'_> {
         })
     }
 
-    /// Call as sent to the attachment: names, and the facts declared in `reads`.
+    /// Call as sent to the attachment: names of its arguments, and values of the facts that its module
+    /// reads.
     fn question(
         &self,
         state: &State,
@@ -90,8 +91,8 @@ impl Semantics<'_> {
     }
 }
 
-/// Ground facts and fluents that a declared read covers for these arguments, ordered by declaration
-/// and by the task's objects; empty for an unknown symbol.
+/// Ground facts and fluents that a module reads in a call with these arguments, ordered by declaration
+/// and by the task's objects; empty for an unknown predicate or function.
 pub(crate) fn instances(
     task: &Task,
     read: &Read,
@@ -136,7 +137,8 @@ fn parameters(task: &Task, symbol: ReadSymbol) -> &[Parameter] {
     }
 }
 
-/// Instances with these arguments; `None`: any object of the parameter's type.
+/// Ground instances of a predicate or function with these arguments; `None` stands for every object of
+/// the parameter's type.
 fn instances_with(
     task: &Task,
     symbol: ReadSymbol,

@@ -1,4 +1,4 @@
-//! Conditions, terms and expressions in a state.
+//! Evaluation of conditions, terms and expressions in a state.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,27 +11,27 @@ use crate::plan::number_text;
 use crate::state::State;
 use crate::task::{Comparison, Condition, Expression, Fluent, ObjectId, Quantified, Term};
 
-/// Unmet part of a condition.
+/// Unmet part of a condition, with the values that decide it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Why {
-    /// Condition part, with objects for its variables.
+    /// Text of the part in PDDL, with objects for its variables.
     pub condition: String,
-    /// Both sides, for a numeric comparison.
+    /// Values of both sides; `None` unless the part is a numeric comparison.
     pub compared: Option<Compared>,
-    /// Values that the part depends on, such as `(fuel r)` and `3`.
+    /// Values that the part depends on: expression and value as text, such as `(fuel r)` and `3`.
     pub values: Vec<(String, String)>,
     /// Span of the part in the task.
     pub span: Span,
 }
 
-/// Two numbers that are compared.
+/// Sides of a numeric comparison and their values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Compared {
     /// Expression on the left, in PDDL.
     pub left: String,
     /// Value of the left side; `None` if undefined.
     pub left_value: Option<f64>,
-    /// The relation that is required between the left and the right side.
+    /// Relation required between the left and the right side.
     pub comparison: Comparison,
     /// Expression on the right, in PDDL.
     pub right: String,
@@ -40,7 +40,7 @@ pub struct Compared {
 }
 
 impl Semantics<'_> {
-    /// True if a condition holds.
+    /// True if a condition holds in a state.
     pub fn holds(
         &self,
         state: &State,
@@ -96,7 +96,8 @@ impl Semantics<'_> {
         })
     }
 
-    /// True if `test` holds for some binding of the variables.
+    /// True if `test` returns true for some binding of the variables; tries no further binding after
+    /// that.
     pub(crate) fn some_binding(
         &self,
         variables: &[Quantified],
@@ -127,7 +128,7 @@ impl Semantics<'_> {
         Ok(left.zip(right))
     }
 
-    /// Object that a term denotes; `None` if undefined.
+    /// Object that a term denotes; `None` if the term is undefined.
     pub fn object(&self, state: &State, term: &Term, binding: &Binding) -> Option<ObjectId> {
         match term {
             Term::Variable(slot) => Some(binding.get(*slot)),
@@ -148,11 +149,11 @@ impl Semantics<'_> {
         state.number(fluent.function, &arguments)
     }
 
-    /// Metric value of a plan, from its final state, end time and violation counts; `None` without
-    /// a metric or if undefined.
+    /// Metric value of a plan, from its final state, its end (seconds, or number of steps) and the
+    /// number of violations of each preference; `None` if there is no metric or its value is undefined.
     ///
     /// # Errors
-    /// [`CallFailure`] where an attachment gives no answer.
+    /// [`CallFailure`] if an attachment gives no answer.
     pub fn measured(&self, state: &State, end: f64, violations: &[f64]) -> Result<Option<f64>, CallFailure> {
         let Some(metric) = &self.task.metric else { return Ok(None) };
         let known = walk::replaced(&metric.value, &|part| match part {
@@ -163,8 +164,8 @@ impl Semantics<'_> {
         self.number(state, &known, &Binding::new(0))
     }
 
-    /// Value of an expression; `None` if undefined. `total-time` and `is-violated` have values in
-    /// metrics alone ([`Semantics::measured`]).
+    /// Value of an expression; `None` if undefined. `total-time` and `is-violated` are undefined here;
+    /// only [`Semantics::measured`] knows them.
     pub fn number(
         &self,
         state: &State,
@@ -196,7 +197,8 @@ impl Semantics<'_> {
         })
     }
 
-    /// Innermost violated part of a condition; `None` if the condition holds.
+    /// First violated part of a condition, without enclosing `and` and `forall`; `None` if the
+    /// condition holds.
     pub fn why_not(
         &self,
         state: &State,
@@ -233,7 +235,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// Both sides of a comparison.
+    /// Both sides of a comparison, with their values; `None` if the condition is no comparison.
     fn compared(
         &self,
         state: &State,
@@ -247,7 +249,8 @@ impl Semantics<'_> {
         Ok(Some(Compared { left, left_value, comparison: *comparison, right, right_value }))
     }
 
-    /// The values that a comparison, equation or call depends on.
+    /// Expressions that decide a comparison or equation, each with its value as text; empty for other
+    /// conditions.
     fn values_in(
         &self,
         state: &State,
@@ -276,7 +279,7 @@ impl Semantics<'_> {
     }
 }
 
-/// Number for people; `undefined` if there is none.
+/// Text of a number for people; `undefined` for `None`.
 pub(crate) fn value_text(value: Option<f64>) -> String {
     value.map_or("undefined".to_string(), number_text)
 }

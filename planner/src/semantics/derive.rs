@@ -1,7 +1,7 @@
 //! Derived facts: the least fixpoint of the rules, stratum by stratum.
 //!
-//! Bodies are evaluated by joining: variables get their objects from true atoms where possible, and by trying all
-//! objects of their type only where nothing else binds them.
+//! Rule bodies are evaluated as joins: variables are bound by matching true atoms where possible; all
+//! objects of a type are tried only for variables that no atom or equation binds.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::state::State;
 use crate::task::{Atom, Condition, Expression, Fluent, ObjectId, Rule, Slot, Term};
 
 impl Semantics<'_> {
-    /// Brings the derived facts of a state up to date.
+    /// Recomputes the derived facts of a state.
     pub fn derive(&self, state: &mut State) -> Result<(), CallFailure> {
         let rules = &self.task.rules;
         for rule in rules {
@@ -38,13 +38,13 @@ impl Semantics<'_> {
     }
 }
 
-/// State of joining one axiom's body.
+/// State of the join over one rule's body.
 struct Join<'j, 'a> {
     semantics: &'j Semantics<'a>,
     state: &'j State,
     rule: &'j Rule,
     binding: Binding,
-    /// Objects that fit each slot.
+    /// Objects that fit each slot; `None` for a slot not yet in scope.
     domains: Vec<Option<Arc<[ObjectId]>>>,
 }
 
@@ -57,7 +57,7 @@ impl<'j, 'a> Join<'j, 'a> {
         Join { semantics, state, rule, binding: Binding::new(rule.slots), domains }
     }
 
-    /// Finds all heads for which everything in `open` holds.
+    /// Appends the arguments of all heads for which every condition in `open` holds.
     fn run(
         &mut self,
         mut open: Vec<&'j Condition>,
@@ -120,7 +120,7 @@ impl<'j, 'a> Join<'j, 'a> {
         Ok(())
     }
 
-    /// Continues with an object bound to a slot, then unbinds it.
+    /// Binds a slot to an object, continues the join, then unbinds the slot.
     fn try_object(
         &mut self,
         slot: Slot,
@@ -142,7 +142,7 @@ impl<'j, 'a> Join<'j, 'a> {
         domain.is_some_and(|domain| domain.binary_search(&object).is_ok())
     }
 
-    /// Binds the variables of an atom to each true instance in turn.
+    /// Matches an atom with each true instance, continuing the join with its variables bound.
     fn join(
         &mut self,
         atom: &'j Atom,
@@ -169,7 +169,8 @@ impl<'j, 'a> Join<'j, 'a> {
         Ok(())
     }
 
-    /// The open atom with the fewest instances whose object functions can be evaluated.
+    /// Index of the open atom whose predicate has the fewest true instances; `None` if no atom can be
+    /// matched yet.
     fn best_atom(&self, open: &[&Condition]) -> Option<usize> {
         let joinable = |condition: &Condition| match condition {
             Condition::Atom(atom) => {
@@ -185,7 +186,8 @@ impl<'j, 'a> Join<'j, 'a> {
         counts.min().map(|(_, at)| at)
     }
 
-    /// An equation between an unbound variable and something with a value.
+    /// Equation between an unbound variable and a term with bound variables: its index, the variable's
+    /// slot and the term's object (`None` if undefined).
     fn equation(&self, open: &[&Condition]) -> Option<(usize, Slot, Option<ObjectId>)> {
         open.iter().enumerate().find_map(|(at, condition)| {
             let Condition::Same(terms, _) = condition else { return None };
@@ -200,7 +202,7 @@ impl<'j, 'a> Join<'j, 'a> {
         })
     }
 
-    /// Unbound variable of an open condition, or of the head.
+    /// First unbound variable in an open condition or the head; `None` if all are bound.
     fn unbound_slot(&self, open: &[&Condition]) -> Option<Slot> {
         let mut found = None;
         for condition in open {
@@ -226,7 +228,8 @@ impl<'j, 'a> Join<'j, 'a> {
         bound
     }
 
-    /// Free variables of a condition.
+    /// Reports the free variables of a condition to `found`; `inner` are variables bound by quantifiers
+    /// around it.
     fn slots_in(&self, condition: &Condition, inner: &mut Vec<Slot>, found: &mut dyn FnMut(Slot)) {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -283,7 +286,7 @@ fn expression_slots(expression: &Expression, found: &mut dyn FnMut(Slot)) {
     }
 }
 
-/// True if an axiom's body uses its head's predicate.
+/// True if a condition uses the predicate of the rule's head.
 fn mentions(condition: &Condition, rule: &Rule) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, rule)),

@@ -75,7 +75,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// PDDL text of a condition, with the names of quantified variables.
+    /// PDDL text of a condition, with objects for bound variables and names for quantified ones.
     pub fn condition_text(&self, condition: &Condition, binding: &Binding) -> String {
         let all = |head: &str, parts: &[Condition]| {
             let parts: String =

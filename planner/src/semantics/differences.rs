@@ -1,4 +1,4 @@
-//! Differences between both sides of each comparison.
+//! Differences between the two sides of numeric comparisons.
 
 use super::{Binding, CallFailure, Semantics};
 use crate::model::walk::{self, Part};
@@ -6,8 +6,8 @@ use crate::state::State;
 use crate::task::{Condition, Quantified, Rule, Slot};
 
 impl Semantics<'_> {
-    /// Adds left minus right of every comparison in a condition, in a state-independent order; NaN
-    /// if undefined. Comparisons in axioms: [`Semantics::rule_differences`].
+    /// Appends left minus right of every comparison in a condition, in the same order for every state;
+    /// NaN if a side is undefined. Comparisons in rules: [`Semantics::rule_differences`].
     pub(crate) fn differences(
         &self,
         state: &State,
@@ -35,7 +35,8 @@ impl Semantics<'_> {
         Ok(())
     }
 
-    /// Differences in all instances of the rules of derived predicates.
+    /// Appends left minus right of every comparison in the rules of derived predicates, for all
+    /// bindings.
     pub(crate) fn rule_differences(&self, state: &State, found: &mut Vec<f64>) -> Result<(), CallFailure> {
         for rule in self.task.rules.iter().filter(|rule| compares(rule)) {
             let slots = (0..).map(Slot).zip(&rule.parameters);

@@ -1,4 +1,4 @@
-//! Effects: their changes, evaluated in the state before any of them happens.
+//! Effects: the changes that they make, evaluated in the state before the happening.
 
 use super::{Binding, CallFailure, Semantics};
 use crate::attachment::{Answer, FactValue};
@@ -9,23 +9,24 @@ use crate::task::{
     ActionId, Assignment, CallTerm, Change, Effect, Fact, Fluent, GroundFluent, ObjectId, Timed, Written,
 };
 
-/// Changes made by a happening.
+/// Changes made by one happening.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Changes {
-    /// Facts that become false, unless also added.
+    /// Facts that become false, unless they are also added.
     pub deleted: Vec<Fact>,
     /// Facts that become true.
     pub added: Vec<Fact>,
-    /// Numbers that change.
+    /// Numbers that change: fluent, kind of change, amount and span of the effect.
     pub numbers: Vec<(GroundFluent, Assignment, f64, Span)>,
     /// Numbers that become undefined.
     pub cleared: Vec<GroundFluent>,
-    /// Object functions that get or lose a value.
+    /// Object functions that get a value, or lose it (`None`), with the span of the effect.
     pub objects: Vec<(GroundFluent, Option<ObjectId>, Span)>,
 }
 
 impl Changes {
-    /// First number or object with contradicting changes, and the span of the second change.
+    /// First number or object function with contradicting changes, and the span of the second change;
+    /// `None` if all changes agree.
     fn contradiction(&self) -> Option<(&GroundFluent, Span)> {
         let numbers = self.numbers.iter();
         let kinds = numbers.clone().map(|(fluent, assignment, number, _)| (fluent, *assignment, *number));
@@ -43,25 +44,26 @@ impl Changes {
     }
 }
 
-/// Inapplicable effect: an undefined number, or two contradicting changes.
+/// Effect that cannot be applied: a value is undefined, or two changes contradict each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clash {
-    /// The contradiction, in a sentence.
+    /// Reason in a sentence.
     pub reason: String,
-    /// The effect.
+    /// Span of the effect.
     pub span: Span,
 }
 
-/// End effects of a durative action with conditions on earlier times that can still hold.
+/// End effects of a running action whose conditions on earlier times have held so far.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pending {
-    /// Effect number and the objects of its quantified variables.
+    /// Index of each effect, with the objects of its quantified variables.
     instances: Vec<(usize, Vec<ObjectId>)>,
 }
 
 impl Semantics<'_> {
-    /// Adds the changes of effects to `changes`. `pending`: effects whose earlier-time conditions
-    /// held; without it, such effects do not happen.
+    /// Adds the changes of effects to `changes`. `pending` is `None` for effects at start; for effects
+    /// at end it holds those whose conditions on earlier times held, and others with such conditions do
+    /// not happen.
     pub fn changes(
         &self,
         state: &State,
@@ -94,7 +96,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// Instances of end effects whose start conditions hold now.
+    /// End effects with conditions on earlier times whose start conditions hold in the state.
     pub fn remember(
         &self,
         state: &State,
@@ -113,7 +115,7 @@ impl Semantics<'_> {
         Ok(pending)
     }
 
-    /// Drops the instances whose over-all conditions do not hold now.
+    /// Drops the pending effects whose over-all conditions do not hold in the state.
     pub fn keep(
         &self,
         state: &State,
@@ -185,7 +187,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// Adds the changes of an effect module.
+    /// Adds the changes that an effect module answers.
     fn written(
         &self,
         state: &State,
@@ -257,7 +259,7 @@ impl Semantics<'_> {
         Some(GroundFluent { function: fluent.function, arguments: arguments.into() })
     }
 
-    /// Applies changes: deletes, adds, then values; then re-derives axioms.
+    /// Applies changes (deletions, additions, then values) and updates the derived facts.
     pub fn apply(&self, state: &mut State, changes: &Changes) -> Result<Result<(), Clash>, CallFailure> {
         if let Some((fluent, span)) = changes.contradiction() {
             let reason = format!("two changes of {} at once contradict each other", self.ground_text(fluent));
@@ -298,7 +300,7 @@ impl Semantics<'_> {
         Ok(Ok(()))
     }
 
-    /// Applies the effects of an instantaneous action without checking its condition.
+    /// Applies the effects of an instantaneous action; its condition is not checked.
     pub fn apply_action(
         &self,
         state: &mut State,
@@ -314,7 +316,7 @@ impl Semantics<'_> {
     }
 }
 
-/// True if an end effect's condition refers to earlier times.
+/// True if an end effect has a condition on the start or the over-all interval of its action.
 fn is_remembered(effect: &Effect) -> bool {
     let Timed { start, over_all, .. } = &effect.when;
     !start.is_true() || !over_all.is_true()

@@ -1,7 +1,7 @@
 //! Semantics of conditions, expressions and effects, shared by all parts that apply actions.
 //!
-//! The validator, the monitor and the executive use it directly. PDDL 2.1 (Fox and Long 2003), section 8, says what the
-//! temporal parts mean.
+//! The validator, the monitor and the executive call it directly. The meaning of times is that of PDDL
+//! 2.1 (Fox and Long 2003, section 8).
 
 pub(crate) mod calls;
 mod conditions;
@@ -25,22 +25,22 @@ pub use conditions::{Compared, Why};
 pub use effects::{Changes, Clash, Pending};
 pub use reads::{Together, Touched};
 
-/// Mark of an unbound slot.
+/// Object that stands for an unbound slot.
 pub(crate) const UNBOUND: ObjectId = ObjectId(u32::MAX);
 
-/// Values for the slots of an action, rule or formula.
+/// Values for the variables of an action, rule or formula.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Binding {
-    /// Objects by slot.
+    /// Object of each slot; a reserved identifier while the slot is unbound.
     pub objects: Vec<ObjectId>,
-    /// `?duration`, in seconds.
+    /// `?duration`, in seconds; `None` if the action has none.
     pub duration_s: Option<f64>,
-    /// Parameters proposed by grounding modules; calls of the action get them as further arguments.
+    /// Arguments proposed by grounding modules; calls of the action get them after their own arguments.
     pub proposals: Vec<Arc<str>>,
 }
 
 impl Binding {
-    /// Binding with all slots unbound.
+    /// Binding of a number of slots, all unbound.
     pub fn new(slots: usize) -> Binding {
         Binding { objects: vec![UNBOUND; slots], duration_s: None, proposals: Vec::new() }
     }
@@ -56,7 +56,7 @@ impl Binding {
     }
 }
 
-/// An attachment failed while something was evaluated.
+/// Failure of an attachment during evaluation.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{error}")]
 pub struct CallFailure {
@@ -67,7 +67,7 @@ pub struct CallFailure {
 }
 
 impl CallFailure {
-    /// The failure drawn under the call.
+    /// Findings to be drawn under the call in the text of the task.
     pub fn findings(&self, task: &Task) -> Findings {
         let finding =
             Diagnostic::error("attachment-failed", self.error.to_string(), self.span, "this call failed");
@@ -75,34 +75,34 @@ impl CallFailure {
     }
 }
 
-/// Step that does not fit the task.
+/// Mismatch between a step of a plan and the task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
     /// The mismatch, in a sentence.
     pub reason: String,
-    /// Span of the violated declaration in the task.
+    /// Span of the declaration that the step violates; `None` if there is no such declaration.
     pub span: Option<Span>,
 }
 
-/// Evaluator of a task with its attachments.
+/// Evaluator of a task's conditions and effects, with the attachments that its modules call.
 pub struct Semantics<'a> {
     /// The task.
     pub task: &'a Task,
-    /// Attachments that implement its modules.
+    /// Attachments that implement the task's modules.
     pub attachments: &'a Attachments,
     /// Name under which each module's attachment is registered.
     bound: Vec<String>,
     object_names: Vec<Arc<str>>,
     module_names: Vec<Arc<str>>,
-    /// True, by predicate, if some effect or rule may change it.
+    /// True, by predicate, if an action, rule, module or timed literal may change it.
     changing: Vec<bool>,
     stop: &'a (dyn Fn() -> bool + Sync),
-    /// Objects that were tried for quantified variables.
+    /// Number of objects tried for quantified variables so far.
     tried: AtomicU32,
     stopped: AtomicBool,
 }
 
-/// Number of objects tried between two checks of the stop signal.
+/// Number of tried objects between two checks of the stop signal.
 const TRIED_AT_ONCE: u32 = 4096;
 
 impl<'a> Semantics<'a> {
@@ -111,7 +111,7 @@ impl<'a> Semantics<'a> {
         Self::until(task, attachments, &|| false)
     }
 
-    /// Evaluator that stops trying objects once `stop` becomes true; answers are meaningless from
+    /// Evaluator that stops trying objects once `stop` returns true; its answers are meaningless from
     /// then on ([`Semantics::is_stopped`]).
     pub(crate) fn until(
         task: &'a Task,
@@ -134,12 +134,12 @@ impl<'a> Semantics<'a> {
         }
     }
 
-    /// True if stopped, so that objects may have been skipped.
+    /// True if evaluation was stopped, so that objects may have been skipped.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// Counts one more tried object; `false` once stopped.
+    /// Counts one more tried object; `false` once evaluation is stopped.
     fn go_on(&self) -> bool {
         let tried = self.tried.fetch_add(1, Ordering::Relaxed);
         if tried % TRIED_AT_ONCE == TRIED_AT_ONCE - 1 && (self.stop)() {
@@ -148,14 +148,14 @@ impl<'a> Semantics<'a> {
         !self.is_stopped()
     }
 
-    /// Initial state with derived facts.
+    /// Initial state, derived facts included.
     pub fn initial(&self) -> Result<State, CallFailure> {
         let mut state = State::initial(self.task);
         self.derive(&mut state)?;
         Ok(state)
     }
 
-    /// Action of a step, with its binding.
+    /// Action that a step names, with the step's arguments and duration as its binding.
     pub fn bind(&self, step: &Step) -> Result<(ActionId, Binding), Misfit> {
         let task = self.task;
         let Some(at) = task.actions.iter().position(|action| action.name.eq_ignore_ascii_case(&step.action))

@@ -1,7 +1,7 @@
-//! Read and write sets of happenings, for detecting interference (mutex).
+//! Read and write sets of the actions in a happening, for detecting interference (mutex).
 //!
-//! PDDL 2.1, section 8.1: two actions may happen at the same time only if neither touches what the other reads, and
-//! neither undoes what the other does ("no moving targets").
+//! PDDL 2.1, section 8.1: two actions may happen at the same time only if neither writes what the other
+//! reads, and neither undoes what the other does ("no moving targets").
 
 use rustc_hash::FxHashSet;
 
@@ -14,20 +14,20 @@ use crate::task::{
     PredicateId, Task, Term, Written,
 };
 
-/// Read and write set of one participant of a happening.
+/// Read and write set of one action or timed literal in a happening.
 #[derive(Debug, Clone, Default)]
 pub struct Touched {
     facts: FxHashSet<Fact>,
     fluents: FxHashSet<GroundFluent>,
-    /// Predicates of which any instance may matter, because a derived fact depends on them.
+    /// Predicates read as a whole, because a derived fact that is read depends on them.
     predicates: FxHashSet<PredicateId>,
-    /// Write set.
+    /// Changes that are made (write set).
     pub changes: Changes,
 }
 
 impl Touched {
-    /// First resource on which the two conflict: written by one, and read or differently written by
-    /// the other.
+    /// First fact or fluent that one side writes and the other reads or writes differently; `None` if
+    /// the two do not interfere.
     pub fn conflict(&self, other: &Touched, semantics: &Semantics<'_>) -> Option<String> {
         self.disturbs(other, semantics).or_else(|| other.disturbs(self, semantics))
     }
@@ -60,8 +60,8 @@ impl Touched {
     }
 }
 
-/// Joint read and write set of several participants of a happening: one lookup finds interference
-/// with any of them.
+/// Joint read and write set of several participants of a happening; one lookup tells if a further
+/// participant may interfere with any of them.
 #[derive(Debug, Default)]
 pub struct Together {
     facts: FxHashSet<Fact>,
@@ -70,13 +70,14 @@ pub struct Together {
     added: FxHashSet<Fact>,
     deleted: FxHashSet<Fact>,
     written: FxHashSet<PredicateId>,
-    /// Numbers with increases or decreases, by whether numbers and objects are also assigned.
+    /// Numbers that are increased or decreased.
     moved: FxHashSet<GroundFluent>,
+    /// Numbers and object functions that are assigned, scaled or made undefined.
     set: FxHashSet<GroundFluent>,
 }
 
 impl Together {
-    /// Adds a participant.
+    /// Adds the read and write set of a participant.
     pub fn extend(&mut self, touched: &Touched) {
         self.facts.extend(touched.facts.iter().cloned());
         self.fluents.extend(touched.fluents.iter().cloned());
@@ -91,8 +92,8 @@ impl Together {
         self.set.extend(cleared.iter().chain(objects.iter().map(|(fluent, ..)| fluent)).cloned());
     }
 
-    /// True if one access set conflicts with any recorded one ([`Touched::conflict`]); may be true
-    /// too often.
+    /// True if a participant may conflict with an added one ([`Touched::conflict`]); may be true
+    /// without a conflict.
     pub fn may_conflict(&self, touched: &Touched) -> bool {
         let Changes { added, deleted, numbers, cleared, objects } = &touched.changes;
         let mut written = added.iter().chain(deleted);
@@ -120,7 +121,7 @@ fn is_additive(kind: Assignment) -> bool {
 }
 
 impl Semantics<'_> {
-    /// Adds the read set of a condition.
+    /// Adds the facts and fluents that a condition reads to `touched`.
     pub fn reads(
         &self,
         state: &State,
@@ -160,7 +161,8 @@ impl Semantics<'_> {
         Ok(())
     }
 
-    /// Truth of a static condition; `None` if it may change.
+    /// Truth of a condition that never changes; `None` if its truth may change or is not known to be
+    /// constant.
     fn constant(&self, state: &State, condition: &Condition, binding: &Binding) -> Option<bool> {
         match condition {
             Condition::And(parts) => {
@@ -188,7 +190,7 @@ impl Semantics<'_> {
         }
     }
 
-    /// Adds the read set of effects: their conditions and values.
+    /// Adds the facts and fluents that effects read in their conditions and values to `touched`.
     pub fn effect_reads(
         &self,
         state: &State,
@@ -280,7 +282,7 @@ impl Semantics<'_> {
     }
 }
 
-/// All predicates on which a derived one depends.
+/// Adds a predicate and all predicates on which its rules depend to `into`.
 pub(crate) fn depends_on(task: &Task, derived: PredicateId, into: &mut FxHashSet<PredicateId>) {
     if !into.insert(derived) {
         return;
@@ -308,7 +310,7 @@ fn predicates_in(task: &Task, condition: &Condition, into: &mut FxHashSet<Predic
     }
 }
 
-/// True, by predicate, if an action, axiom, module or timed literal may change it.
+/// True, by predicate, if it is derived, or an action, module or timed literal may change it.
 pub(super) fn changing(task: &Task) -> Vec<bool> {
     let mut changing: Vec<bool> =
         task.predicates.iter().map(|predicate| predicate.stratum.is_some()).collect();

@@ -1,10 +1,10 @@
-//! Interval relaxation of numeric fluents: reachable intervals only grow.
+//! Relaxation of numeric fluents: the interval of values that a number can reach only grows.
 //!
-//! Two relaxations work together. Where an operator adds the same to a linear condition whenever it is applied, how
-//! often it must be applied is known (subgoaling with repetitions; Scala, Haslum, Thiébaux and Ramirez 2020, sections 4
-//! and 5). Whatever else happens to numbers (assignments, amounts that depend on the state, products) widens an
-//! interval per number, to infinity where an operator can be repeated (the additive interval relaxation; Scala,
-//! Haslum, Thiébaux and Ramirez 2016).
+//! Two relaxations work together. If an operator changes a linear condition by the same amount at every
+//! application, the number of applications needed is known (subgoaling with repetitions; Scala, Haslum,
+//! Thiébaux and Ramirez 2020, sections 4 and 5). Every other numeric effect (assignments,
+//! state-dependent amounts, products) widens the interval of its number, up to infinity if the operator
+//! can be repeated (additive interval relaxation; Scala, Haslum, Thiébaux and Ramirez 2016).
 
 use std::sync::Arc;
 
@@ -14,14 +14,15 @@ use crate::ground::{Change, GroundExpression, Relation};
 
 use super::relaxed::Relevant;
 
-/// Number of widenings of an interval bound after which the bound counts as infinite.
+/// Number of times that an interval bound may widen before it counts as infinite.
 const MOST_WIDENINGS: u8 = 6;
-/// Number of applications assumed for a node whose progress towards a condition cannot be bounded.
+/// Number of applications assumed for an operator whose progress towards a condition has no known
+/// bound.
 const UNLIKELY: u32 = 1000;
-/// No node.
+/// Value that stands for no node.
 const NONE: u32 = u32::MAX;
 
-/// Interval of reachable values of a number; empty if `low` is above `high`.
+/// Interval of the values that a number can reach; empty if `low` is above `high`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     low: f64,
@@ -39,7 +40,7 @@ impl Range {
         self.low > self.high
     }
 
-    /// Range spanned by corner values; an undefined corner (zero times infinity) counts as zero.
+    /// Smallest interval that contains all values; NaN (zero times infinity) counts as zero.
     fn of(corners: &[f64]) -> Range {
         let zeroed = corners.iter().map(|&c| if c.is_nan() { 0.0 } else { c });
         zeroed.fold(EMPTY, |r, c| Range { low: r.low.min(c), high: r.high.max(c) })
@@ -75,12 +76,12 @@ impl Range {
         self.times(Range { low: 1.0 / other.high, high: 1.0 / other.low })
     }
 
-    /// The upper or the lower bound.
+    /// Upper bound of the interval, or its lower bound if `upper` is false.
     fn end(self, upper: bool) -> f64 {
         if upper { self.high } else { self.low }
     }
 
-    /// True if some pair of values satisfies the relation.
+    /// True if some pair of values from the two intervals satisfies the relation.
     fn may(self, relation: Relation, other: Range) -> bool {
         !self.is_empty()
             && !other.is_empty()
@@ -108,14 +109,14 @@ fn range(expression: &GroundExpression, ranges: &impl Fn(u32) -> Range) -> Range
     }
 }
 
-/// Reachable values of a number near a state.
+/// Values that a number can reach by one change of its value in the evaluated state.
 #[derive(Clone, Copy, Debug)]
 struct Near {
     first: Range,
     range: Range,
-    /// Nodes that set the low and the high bound.
+    /// Nodes that last widened the lower and the upper bound; `NONE` for neither.
     by: [u32; 2],
-    /// Number of widenings of the bounds.
+    /// Number of times that a bound has widened.
     moves: u8,
 }
 
@@ -125,7 +126,7 @@ impl Near {
         Near { first: range, range, by: [NONE; 2], moves: 0 }
     }
 
-    /// Adds what a node contributes to a number's interval; true if the interval grew.
+    /// Widens the interval to values that a node reaches; true if the interval grew.
     fn reach(&mut self, node: u32, reached: Range) -> bool {
         let Range { low, high } = self.range;
         let after = Range { low: low.min(reached.low), high: high.max(reached.high) };
@@ -144,7 +145,7 @@ impl Near {
     }
 }
 
-/// True if a gap (left minus right) must grow for the relation to hold.
+/// True if left minus right (the gap) must grow for the relation to hold.
 fn upwards(relation: Relation, gap: f64) -> bool {
     match relation {
         Relation::AtLeast | Relation::Greater => true,
@@ -153,48 +154,51 @@ fn upwards(relation: Relation, gap: f64) -> bool {
     }
 }
 
-/// A condition that a node can bring about.
+/// Constant change of a comparison by a node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Move {
     comparison: u32,
-    /// Change of left minus right by one application; NaN if it depends on the state.
+    /// Change of left minus right by one application of the node; NaN if the change depends on the
+    /// state.
     gain: f64,
 }
 
-/// Reachable intervals of numbers, with the working memory of an evaluation.
+/// Reachable intervals of numbers, with the working memory of one evaluation.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Intervals {
-    /// First comparison fact: fact `first + 2 * c` means that comparison `c` holds.
+    /// Fact of the first comparison: fact `first + 2 * c` says that comparison `c` holds.
     first: u32,
     numbers: Arc<Numbers>,
-    /// Moves by node.
+    /// Comparisons that each node changes.
     moves: Lists<Move>,
     changes: Lists<NumberChange>,
-    /// Nodes whose amounts read a number, by number.
+    /// Nodes whose effects depend on a number, by number.
     amounts_on: Vec<Vec<u32>>,
-    /// True, by comparison, if some condition needs it.
+    /// True, by comparison, if some precondition, condition or goal contains the comparison.
     needed: Vec<bool>,
-    /// Nodes that raise a number, with the least amount, by number.
+    /// Nodes that raise a number with the amount of one application, or that assign a positive constant
+    /// to it with the constant, by number.
     givers: Vec<Vec<(u32, f64)>>,
-    /// True if intervals are needed at all.
+    /// True if intervals are needed: some effect or comparison is beyond subgoaling with repetitions.
     dynamic: bool,
     gaps: Vec<f64>,
     ranges: Vec<Range>,
     widened: Vec<[u8; 2]>,
-    /// Node that moved a number last, by number.
+    /// Node that last widened the interval of a number, by number; `NONE` for none.
     mover: Vec<u32>,
-    /// Values of a number after one application of each node to the initial value, for estimating
-    /// state-dependent amounts (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
+    /// Values of each number after few applications, from which state-dependent amounts are estimated
+    /// (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
     near: Vec<Near>,
     times: Vec<u32>,
-    /// Facts that the last node achieves, with the required number of applications.
+    /// Facts that the last applied node achieves, each with the number of applications needed.
     pub(super) found: Vec<(u32, u32)>,
-    /// Working memory of the caller.
+    /// Working memory of the relaxed heuristic: nodes that it adds to the relaxed plan.
     pub(super) movers: Vec<u32>,
 }
 
 impl Intervals {
-    /// Intervals for the nodes' changes, restricted to the needed facts.
+    /// Intervals for the numeric changes of each node; only comparisons whose facts are needed are
+    /// tracked.
     pub(super) fn new(task: &Compiled, needed: &[bool], changes: Lists<NumberChange>) -> Intervals {
         let numbers = Arc::clone(&task.numbers);
         if numbers.is_empty() {
@@ -267,7 +271,7 @@ impl Intervals {
         self.times.is_empty()
     }
 
-    /// Begins an evaluation.
+    /// Begins the evaluation of a state.
     pub(super) fn start(&mut self, task: &Compiled, state: &[u32]) {
         for comparison in 0..self.gaps.len() {
             if self.needed[comparison] {
@@ -284,8 +288,8 @@ impl Intervals {
         }
     }
 
-    /// Applies a node: writes the achieved facts to `found`, and appends to `again` the fired nodes
-    /// whose amounts changed.
+    /// Applies a node: writes the facts that it achieves to `found`, and appends to `again` the
+    /// triggered nodes (those for which `fired` is true) whose effects depend on a number that changed.
     pub(super) fn fire(&mut self, node: u32, fired: &dyn Fn(u32) -> bool, again: &mut Vec<u32>) {
         self.found.clear();
         if self.changes.get(node as usize).is_empty() {
@@ -324,7 +328,8 @@ impl Intervals {
         range(expression, &|number| self.near[number as usize].range)
     }
 
-    /// Widens the reachable interval of a number by one effect; `None` if the effect adds nothing.
+    /// Widens the interval of a number by one of a node's numeric effects; returns the number, or
+    /// `None` if nothing changed.
     fn widen(&mut self, node: u32, place: usize) -> Option<u32> {
         let NumberChange { number, change: Some(change), amount: Some(amount), .. } =
             &self.changes.get(node as usize)[place]
@@ -366,8 +371,8 @@ impl Intervals {
         (after != before || nearer).then_some(number)
     }
 
-    /// Number of applications of a node for a condition, with present amounts, or with larger ones
-    /// soon reachable if these save more than the extra step.
+    /// Number of applications of a node until a comparison holds, with its present amounts; with larger
+    /// amounts that are soon reachable if this saves more than one application.
     fn times_now(&self, node: u32, comparison: u32) -> u32 {
         let still = self.times_with(node, comparison, &|number| self.near[number as usize].first);
         let soon = self.times_with(node, comparison, &|number| self.near[number as usize].range);
@@ -388,7 +393,8 @@ impl Intervals {
         if gain.is_finite() { repetitions(gap, relation, gain).unwrap_or(UNLIKELY) } else { 1 }
     }
 
-    /// Change of left minus right of a comparison, as an amount and its weight.
+    /// Amount and weight with which a numeric effect changes left minus right of a comparison; `None`
+    /// if it does not.
     fn added<'a>(&self, change: &'a NumberChange, comparison: u32) -> Option<(&'a GroundExpression, f64)> {
         let linear = self.numbers.linear[comparison as usize].as_ref()?;
         let (_, weight) = linear.weights.iter().find(|(n, w)| *n == change.number && *w != 0.0)?;
@@ -396,7 +402,7 @@ impl Intervals {
         Some((change.amount.as_ref()?, sign * weight))
     }
 
-    /// Appends the nodes that increase a node's contribution to the fact's comparison.
+    /// Appends the nodes that raise the contribution of `node` to the comparison of `fact`.
     pub(super) fn collect_levers(&self, fact: u32, node: u32, out: &mut Vec<u32>) {
         if !self.dynamic {
             return;
@@ -427,12 +433,12 @@ impl Intervals {
         }
     }
 
-    /// Records the required number of applications of the fact's supporter.
+    /// Records how often the supporter of a comparison's fact must be applied.
     pub(super) fn support(&mut self, fact: u32, times: u32) {
         self.times[(fact - self.first) as usize / 2] = times;
     }
 
-    /// Number of applications of a comparison's supporter; `None` for other facts.
+    /// Number of applications of the supporter of a comparison's fact; `None` for other facts.
     pub(super) fn repeats(&self, fact: u32) -> Option<u32> {
         if self.is_empty() || fact < self.first {
             return None;
@@ -440,13 +446,13 @@ impl Intervals {
         self.times.get((fact - self.first) as usize / 2).copied()
     }
 
-    /// Nodes that increase a number, with the amounts.
+    /// Nodes that raise a number, each with the amount.
     pub(super) fn givers(&self, number: u32) -> &[(u32, f64)] {
         &self.givers[number as usize]
     }
 
-    /// Numbers that a relaxed plan consumes beyond the available and returned amounts, with the
-    /// shortage; an operator that needs a minimum and consumes must find that minimum.
+    /// Numbers of which a relaxed plan consumes more than the state and the plan supply, each with the
+    /// shortage. A minimum that a consuming operator demands of the number counts too.
     pub(super) fn shortages(&self, task: &Compiled, state: &[u32], plan: &[Relevant]) -> Vec<(u32, f64)> {
         let mut balance: Vec<f64> = vec![0.0; self.numbers.len()];
         let mut floor: Vec<f64> = vec![f64::INFINITY; self.numbers.len()];
@@ -466,14 +472,14 @@ impl Intervals {
         (0..balance.len()).filter(short).map(|n| (n as u32, missing(n))).collect()
     }
 
-    /// The least amount of a number that an operator asks for.
+    /// Largest minimum of a number that an operator's preconditions demand; `None` if they demand none.
     fn asked(&self, task: &Compiled, operator: u32, number: u32) -> Option<f64> {
         let preconditions = task.preconditions.get(operator as usize).iter();
         let compared = preconditions.filter_map(|f| (f.variable as usize).checked_sub(self.numbers.first));
         compared.filter_map(|c| self.numbers.least(c, number)).reduce(f64::max)
     }
 
-    /// Appends the nodes that widened the numbers of a comparison.
+    /// Appends the nodes that last widened the numbers of a fact's comparison.
     pub(super) fn collect_movers(&self, fact: u32, out: &mut Vec<u32>) {
         if !self.dynamic {
             return;

@@ -1,8 +1,9 @@
-//! LM-cut, an admissible heuristic: the costs of action landmarks that are cuts of justification graphs of h_max
-//! (Helmert and Domshlak 2009).
+//! LM-cut, an admissible heuristic: it sums the costs of action landmarks, which are cuts in
+//! justification graphs of h_max (Helmert and Domshlak 2009).
 //!
-//! Conditional effects are operators of their own that share one cost (Röger, Pommerening and Helmert 2014), axioms cost nothing
-//! and derived facts may always be false. A numeric condition that does not hold takes one change of a number that it reads.
+//! Conditional effects become operators of their own that share one cost (Röger, Pommerening and
+//! Helmert 2014), axioms cost nothing, and derived facts may always be false. A numeric condition that
+//! does not hold costs at least one change of a number that it reads.
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::NumberChange;
@@ -10,54 +11,57 @@ use crate::ground::{GroundFact, Relation};
 
 use super::queue::RadixHeap;
 
-/// No fact, operator or cost.
+/// Value that stands for no fact, no operator or infinite cost.
 const NONE: u32 = u32::MAX;
 
-/// Relaxed operator during an evaluation: an operator's unconditional effects, one conditional effect, or an axiom.
+/// Node of the relaxed task: an operator's unconditional effects, one of its conditional effects, or an
+/// axiom.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Number of unreached preconditions.
+    /// Number of preconditions not yet reached.
     open: u32,
-    /// Precondition of the greatest h_max; `NONE` until all are reached.
+    /// Precondition with the greatest h_max; `NONE` until all preconditions are reached.
     supporter: u32,
-    /// h_max of the supporter.
+    /// h_max value of the supporter.
     supported: u32,
-    /// Remaining cost, not used by any landmark.
+    /// Part of the operator's cost that no landmark has used yet.
     left: u32,
 }
 
-/// LM-cut heuristic with its working memory.
+/// LM-cut heuristic with its working memory; nodes are relaxed operators.
 pub struct LandmarkCut {
     preconditions: Lists<u32>,
     effects: Lists<u32>,
     /// Operator of each node; `NONE` for an axiom.
     operators: Vec<u32>,
-    /// Nodes of each operator.
+    /// Nodes that belong to each operator.
     parts: Lists<u32>,
-    /// Nodes with a precondition, by fact.
+    /// Nodes that have a fact as precondition, by fact.
     waiting: Lists<u32>,
-    /// Nodes with an effect, by fact.
+    /// Nodes that have a fact as effect, by fact.
     achievers: Lists<u32>,
-    /// Facts of every relaxed state: absent derived facts, and a dummy precondition.
+    /// Facts that hold in every relaxed state: absent derived facts, and the precondition of nodes that
+    /// have no other.
     always: Vec<u32>,
-    /// The fact that all goals hold.
+    /// Artificial fact that stands for all goals together.
     goal: u32,
-    /// Nodes before an evaluation.
+    /// State of all nodes at the beginning of an evaluation.
     fresh: Vec<Node>,
     nodes: Vec<Node>,
-    /// h_max by fact.
+    /// h_max value of each fact.
     costs: Vec<u32>,
     heap: RadixHeap,
-    /// Zone of each fact in the justification graph, as a stamp of the current cut.
+    /// Zone of each fact in the justification graph of the current cut, as a number that is new for
+    /// every cut.
     zones: Vec<u32>,
     stamp: u32,
     stack: Vec<u32>,
-    /// Operators of the current cut.
+    /// Operators in the current cut.
     cut: Vec<u32>,
 }
 
 impl LandmarkCut {
-    /// The heuristic of a task, by the search's costs.
+    /// Heuristic of a task, in the operator costs of the search.
     pub fn new(task: &Compiled) -> LandmarkCut {
         let mut build = Build::new(task);
         (0..task.operators()).for_each(|operator| build.operator(operator));
@@ -67,8 +71,8 @@ impl LandmarkCut {
         build.finish()
     }
 
-    /// Lower bound on the cost of all plans from a state; `None` if unreachable under delete
-    /// relaxation. Returns the bound so far if `stop` becomes true.
+    /// Lower bound on the cost of every plan from a state; `None` if the goal is unreachable even in
+    /// the relaxation. Once `stop` returns true, the bound reached so far is returned.
     pub fn evaluate(&mut self, task: &Compiled, state: &[u32], stop: &dyn Fn() -> bool) -> Option<u32> {
         let values = task.offsets.iter().zip(state).map(|(&offset, &value)| offset + value);
         let initial: Vec<u32> = values.chain(self.always.iter().copied()).collect();
@@ -92,7 +96,7 @@ impl LandmarkCut {
         Some(total)
     }
 
-    /// Computes h_max of all facts.
+    /// Computes the h_max value of every fact.
     fn explore(&mut self, initial: &[u32]) {
         self.nodes.copy_from_slice(&self.fresh);
         self.costs.fill(NONE);
@@ -115,7 +119,7 @@ impl LandmarkCut {
         }
     }
 
-    /// Updates h_max after the costs of the operators of the cut fell.
+    /// Updates h_max values after the costs of the operators in the cut have fallen.
     fn lower(&mut self) {
         self.heap.clear();
         for place in 0..self.cut.len() {
@@ -152,7 +156,8 @@ impl LandmarkCut {
         }
     }
 
-    /// Finds the operators that enter the zero-cost zone of the goal; returns their minimum cost.
+    /// Collects the operators that lead into the goal's zero-cost zone in `cut`; returns their minimum
+    /// cost.
     fn find_cut(&mut self, initial: &[u32]) -> u32 {
         let (before, beyond) = (self.stamp + 1, self.stamp + 2);
         self.stamp = beyond;
@@ -196,7 +201,7 @@ impl LandmarkCut {
         least
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the heuristic, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let lists = [&self.preconditions, &self.effects, &self.parts, &self.waiting, &self.achievers];
         let items: usize = lists.iter().map(|list| list.all().len() + list.len()).sum();
@@ -204,12 +209,12 @@ impl LandmarkCut {
     }
 }
 
-/// Sum of two costs; a fact whose cost cannot be counted stays reachable.
+/// Sum of two costs, capped below infinity.
 fn sum(one: u32, other: u32) -> u32 {
     one.saturating_add(other).min(NONE - 1)
 }
 
-/// Lowers the cost of a fact.
+/// Lowers the cost of a fact and queues the fact, if `cost` is below its present cost.
 #[inline]
 fn reach(costs: &mut [u32], heap: &mut RadixHeap, fact: u32, cost: u32) {
     if cost < costs[fact as usize] {
@@ -218,8 +223,8 @@ fn reach(costs: &mut [u32], heap: &mut RadixHeap, fact: u32, cost: u32) {
     }
 }
 
-/// Facts of a numeric condition that an operator may achieve; constant changes in the wrong
-/// direction are excluded.
+/// Facts of a comparison (it holds, it does not hold) that an operator may make true; a constant change
+/// excludes the fact that lies the other way.
 fn turned(task: &Compiled, operator: usize, comparison: usize) -> impl Iterator<Item = u32> {
     let (numbers, changes) = (&task.numbers, &task.numbers.changes[operator]);
     // Anything but adding may also give a value to what had none.
@@ -239,10 +244,10 @@ fn turned(task: &Compiled, operator: usize, comparison: usize) -> impl Iterator<
     facts.into_iter().filter(|(_, is_turned)| *is_turned).map(|(fact, _)| fact)
 }
 
-/// Collects the nodes.
+/// Builder that collects the nodes of the heuristic.
 struct Build<'a> {
     task: &'a Compiled,
-    /// Facts that some precondition, condition or goal asks for.
+    /// True, by fact, if some precondition, condition, axiom or goal contains the fact.
     needed: Vec<bool>,
     preconditions: Lists<u32>,
     effects: Lists<u32>,
@@ -259,7 +264,7 @@ impl<'a> Build<'a> {
         Build { task, needed, preconditions: Lists::new(), effects: Lists::new(), operators: Vec::new() }
     }
 
-    /// Adds a relaxed operator if some condition needs one of its effects.
+    /// Adds a node, unless no condition needs any of its effects.
     fn node(&mut self, preconditions: &[GroundFact], mut effects: Vec<u32>, operator: u32) {
         let mut preconditions: Vec<u32> = preconditions.iter().map(|&fact| self.task.id(fact)).collect();
         preconditions.sort_unstable();

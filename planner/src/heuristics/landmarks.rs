@@ -1,8 +1,9 @@
-//! Landmarks (facts that every plan makes true at some time), their orderings, and the number still
-//! open.
+//! Landmarks (facts that every plan makes true at some time), their orderings, and the count of
+//! landmarks still to achieve.
 //!
-//! Found by backchaining from the goal (Hoffmann, Porteous and Sebastia 2004; Richter, Helmert and Westphal 2008):
-//! what all operators need that can bring a landmark about for the first time is a landmark too, ordered right before.
+//! They are found by backchaining from the goal (Hoffmann, Porteous and Sebastia 2004; Richter, Helmert
+//! and Westphal 2008): a precondition shared by all operators that can achieve a landmark first is a
+//! landmark too, ordered right before it.
 
 use rustc_hash::FxHashMap;
 
@@ -14,40 +15,41 @@ use crate::memory::Rows;
 const MOST_ALTERNATIVES: usize = 4;
 /// Maximum number of landmarks.
 const MOST_LANDMARKS: usize = 20_000;
-/// Number of examined operators after which first achievers are no longer distinguished from later
-/// ones.
+/// Number of examined operators after which all achievers of a landmark count as possible first
+/// achievers.
 const EXPLORATION_WORK: usize = 40_000_000;
 
-/// Landmark: one fact, or a disjunction of facts.
+/// Landmark: a fact, or a disjunction of facts, that holds at some time in every plan.
 #[derive(Clone, Debug)]
 pub struct Landmark {
     pub facts: Vec<u32>,
-    /// True if the goal requires it.
+    /// True if the landmark is a goal fact.
     pub goal: bool,
-    /// Landmarks ordered before this one (greedy-necessary and reasonable orders).
+    /// Landmarks that must be achieved before this one (greedy-necessary and reasonable orders).
     before: Vec<u32>,
-    /// Landmarks for whose first achievement this one is needed.
+    /// Landmarks that need this one right before they are first achieved.
     enables: Vec<u32>,
-    /// Facts that become true whenever the landmark first does.
+    /// Facts that become true whenever this landmark is first achieved.
     beside: Vec<u32>,
 }
 
-/// The landmarks of a task.
+/// All landmarks of a task that were found.
 pub struct Landmarks {
     pub all: Vec<Landmark>,
-    /// Landmarks of each fact.
+    /// Landmarks that contain a fact, by fact.
     by_fact: Lists<u32>,
-    /// Landmarks that the goal requires.
+    /// Landmarks that are goal facts.
     goals: Vec<u32>,
     words: usize,
 }
 
-/// The search for landmarks.
+/// Working memory while landmarks are being found.
 struct Find<'a> {
     task: &'a Compiled,
-    /// Achievers by fact: operators, then axioms.
+    /// Operators and axioms that achieve a fact, by fact; axioms are numbered after the operators.
     achievers: Lists<u32>,
-    /// Operators and axioms that need a fact, by fact.
+    /// Operators and axioms that have a fact as precondition, by fact; axioms are numbered after the
+    /// operators.
     needed_by: Lists<u32>,
     all: Vec<Landmark>,
     by_facts: FxHashMap<Vec<u32>, u32>,
@@ -57,7 +59,7 @@ struct Find<'a> {
 }
 
 impl Landmarks {
-    /// Finds the landmarks of a task; returns those found so far if `stop` becomes true.
+    /// Finds landmarks of a task; returns those found so far once `stop` returns true.
     pub fn new(
         task: &Compiled,
         mutex_groups: &[Vec<GroundFact>],
@@ -135,7 +137,8 @@ impl<'a> Find<'a> {
         id
     }
 
-    /// Adds the preconditions shared by all first achievers of a landmark, ordered before it.
+    /// Adds the preconditions shared by all first achievers of a landmark as landmarks ordered before
+    /// it.
     fn backchain(&mut self, id: u32) {
         let task = self.task;
         let facts = self.all[id as usize].facts.clone();
@@ -173,7 +176,7 @@ impl<'a> Find<'a> {
         }
     }
 
-    /// Facts that all of some operators add unconditionally.
+    /// Facts that every one of the operators adds unconditionally.
     fn brought_about(&self, operators: &[u32]) -> Vec<u32> {
         let task = self.task;
         let effects = |op: u32| {
@@ -190,8 +193,8 @@ impl<'a> Find<'a> {
         facts
     }
 
-    /// Facts that all operators need, and small disjunctions over one predicate of which each
-    /// operator needs a fact.
+    /// Preconditions that all operators share, and small disjunctions of facts of one predicate such
+    /// that each operator needs one of the facts.
     fn shared(&self, operators: &[u32]) -> Vec<Vec<u32>> {
         let task = self.task;
         let mut counts: FxHashMap<u32, u32> = FxHashMap::default();
@@ -227,7 +230,7 @@ impl<'a> Find<'a> {
         found
     }
 
-    /// Relaxed reachability by fact when `without` never become true.
+    /// Delete-relaxed reachability of each fact, if the facts `without` never become true.
     fn reach_without(&mut self, without: &[u32]) -> Vec<bool> {
         let task = self.task;
         let operators = task.operators();
@@ -275,12 +278,12 @@ impl<'a> Find<'a> {
     }
 }
 
-/// Maximum number of steps of looking for cycles among orderings.
+/// Maximum number of search steps for cycles among orderings.
 const ORDERING_WORK: usize = 5_000_000;
 
-/// Orders a landmark before others that it would have to delete: goals, and facts needed together
-/// with a later landmark (Hoffmann et al. 2004, reasonable orders; Richter and Westphal 2010,
-/// section 4.3). Orders that close a cycle are dropped.
+/// Adds reasonable orders: a landmark comes before another one that would have to be deleted for its
+/// sake, which is a goal or needed at the same time (Hoffmann et al. 2004; Richter and Westphal 2010,
+/// section 4.3). Orders that would close a cycle are left out.
 fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<GroundFact>], all: &mut [Landmark]) {
     let exclusions = Exclusions::new(task, mutex_groups, all);
     let initial = |l: &Landmark| l.facts.iter().any(|&f| task.holds(f, &task.initial));
@@ -318,13 +321,14 @@ fn order_reasonably(task: &Compiled, mutex_groups: &[Vec<GroundFact>], all: &mut
     }
 }
 
-/// Mutexes between facts.
+/// Mutexes between facts, for ordering landmarks.
 struct Exclusions<'a> {
     mutex_groups: &'a [Vec<GroundFact>],
-    /// Mutex groups by fact.
+    /// Mutex groups that contain a fact, by fact.
     groups_of: Lists<u32>,
-    /// Goal landmark by fact, and by variable; `u32::MAX` for none.
+    /// Goal landmark that is a fact, by fact; `u32::MAX` for none.
     goal_of_fact: Vec<u32>,
+    /// Goal landmark on a variable, by variable; `u32::MAX` for none.
     goal_of_variable: Vec<u32>,
 }
 
@@ -349,7 +353,7 @@ impl<'a> Exclusions<'a> {
         }
     }
 
-    /// Appends the goals' landmarks that exclude a fact.
+    /// Appends the goal landmarks that cannot hold together with a fact.
     fn goals(&self, task: &Compiled, fact: u32, out: &mut Vec<u32>) {
         let same = self.goal_of_variable[task.variables[fact as usize] as usize];
         out.extend((same != u32::MAX && self.goal_of_fact[fact as usize] != same).then_some(same));
@@ -359,7 +363,7 @@ impl<'a> Exclusions<'a> {
         }
     }
 
-    /// True if two facts never hold together.
+    /// True if two facts are known to be mutually exclusive.
     fn exclude(&self, task: &Compiled, one: u32, other: u32) -> bool {
         let groups = self.groups_of.get(other as usize);
         one != other
@@ -368,7 +372,8 @@ impl<'a> Exclusions<'a> {
     }
 }
 
-/// True if `first` is ordered before `second`, directly or transitively.
+/// True if landmark `first` is ordered before landmark `second`, directly or transitively; adds the
+/// work done to `work`.
 fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool {
     let mut seen = vec![false; all.len()];
     let mut stack = vec![second];
@@ -385,19 +390,19 @@ fn precedes(all: &[Landmark], first: u32, second: u32, work: &mut usize) -> bool
     false
 }
 
-/// Landmark status of each state: landmarks accepted on all paths to the state.
+/// Landmark status of each state: the landmarks accepted on all known paths to the state.
 pub(crate) struct Status {
     accepted: Rows<u64>,
     scratch: Vec<u64>,
 }
 
 impl Status {
-    /// Empty.
+    /// Status of no states yet.
     pub(crate) fn new(landmarks: &Landmarks) -> Status {
         Status { accepted: Rows::new(landmarks.words), scratch: vec![0; landmarks.words] }
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the landmark status, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.accepted.bytes()
     }
@@ -410,7 +415,7 @@ impl Status {
         bits[landmark as usize / 64] >> (landmark % 64) & 1 == 1
     }
 
-    /// Sets the status of state 0.
+    /// Records the landmarks that hold in the initial state, as the status of state 0.
     pub(crate) fn initial(&mut self, landmarks: &Landmarks, task: &Compiled, state: &[u32]) {
         self.scratch.fill(0);
         for (&offset, &value) in task.offsets.iter().zip(state) {
@@ -421,8 +426,8 @@ impl Status {
         self.accepted.push_row(&self.scratch);
     }
 
-    /// Updates the status of a successor state; over several paths to a state, the intersection of
-    /// accepted landmarks counts.
+    /// Computes the status of a successor from that of its parent (`step` is parent and successor). A
+    /// state reached on several paths keeps only the landmarks accepted on all of them.
     pub(crate) fn follow(
         &mut self,
         landmarks: &Landmarks,
@@ -456,7 +461,7 @@ impl Status {
         }
     }
 
-    /// Landmark count: landmarks not yet accepted, or accepted and needed again.
+    /// Landmark count of a state: landmarks not yet accepted, or accepted, false and needed again.
     pub(crate) fn left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
         let bits = self.of(id);
         let seen: u32 = bits.iter().map(|w| w.count_ones()).sum();
@@ -476,7 +481,8 @@ impl Status {
         left
     }
 
-    /// Goal count: goals that are false or must become true again because they hold too early.
+    /// Number of goals that are false in a state, or true but not accepted, because other landmarks
+    /// must come before.
     pub(crate) fn goals_left(&self, landmarks: &Landmarks, task: &Compiled, id: u32, state: &[u32]) -> u32 {
         let bits = self.of(id);
         let open = |&&goal: &&u32| {
@@ -485,7 +491,8 @@ impl Status {
         landmarks.goals.iter().filter(open).count() as u32
     }
 
-    /// True if an operator achieves a landmark that is due.
+    /// True if an operator has an effect that achieves a landmark not yet accepted, all of whose
+    /// predecessors are.
     pub(crate) fn advances(&self, landmarks: &Landmarks, task: &Compiled, id: u32, operator: u32) -> bool {
         let bits = self.of(id);
         task.effects.get(operator as usize).iter().any(|effect| {

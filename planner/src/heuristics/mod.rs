@@ -1,4 +1,4 @@
-//! Estimates of the cost to the goal.
+//! Heuristics: estimates of the cost to reach the goal.
 
 #[doc(hidden)]
 pub mod intervals;

@@ -1,6 +1,7 @@
-//! Radix heap: a monotone priority queue (Ahuja et al. 1990).
+//! Radix heap: a priority queue whose popped keys never decrease (Ahuja et al. 1990).
 
-/// Monotone radix heap with 32-bit keys; ties leave in a deterministic order.
+/// Radix heap of items with 32-bit keys; pushed keys must not be below the last key popped. Entries of
+/// equal key leave in a deterministic order.
 #[derive(Clone, Debug)]
 pub(crate) struct RadixHeap {
     buckets: Vec<Vec<(u32, u32)>>,
@@ -9,7 +10,7 @@ pub(crate) struct RadixHeap {
 }
 
 impl RadixHeap {
-    /// Empty.
+    /// Empty heap.
     pub(crate) fn new() -> Self {
         RadixHeap { buckets: vec![Vec::new(); 33], last: 0, len: 0 }
     }
@@ -31,7 +32,7 @@ impl RadixHeap {
         self.len += 1;
     }
 
-    /// Takes an entry with the least key.
+    /// Removes and returns an entry (key, item) with the least key; `None` if the heap is empty.
     #[inline]
     pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         if self.len == 0 {

@@ -1,5 +1,5 @@
-//! Additive heuristic, and the relaxed plan of its best supporters (h_FF with h_add supporters;
-//! Bonet and Geffner 2001, Keyder and Geffner 2008).
+//! Additive heuristic h_add, and the relaxed plan made of its best supporters (FF heuristic with h_add
+//! supporters; Bonet and Geffner 2001, Keyder and Geffner 2008).
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::NumberChange;
@@ -8,28 +8,29 @@ use crate::ground::GroundFact;
 use super::intervals::Intervals;
 use super::queue::RadixHeap;
 
-/// No node, operator or cost.
+/// Value that stands for no node, no operator or infinite cost.
 const NONE: u32 = u32::MAX;
 
-/// Maximum repetitions of an operator that refills a consumed number.
+/// Maximum number of repetitions of an operator that refills a consumed number.
 const MOST_REFILLS: f64 = 1000.0;
 
-/// Number of steps that weigh as one unit of cost in tasks with zero-cost operators.
+/// Number of steps that weigh as much as one unit of cost, in tasks with zero-cost operators.
 const COST_OVER_STEPS: u32 = 64;
 
-/// Operator cost of the heuristic.
+/// Operator costs that a heuristic counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counting {
-    /// Unit costs.
+    /// Every operator costs one.
     Steps,
-    /// Cost plus one, unless all costs are one.
+    /// Cost plus one; one for every operator if all costs are one.
     CostAndSteps,
-    /// Cost first; steps break ties, so that zero-cost operators do not lengthen plans.
+    /// Cost; each step adds a small amount in tasks with zero-cost operators, so that plans do not grow
+    /// longer for free.
     CostThenSteps,
 }
 
 impl Counting {
-    /// Counted cost of an operator.
+    /// Cost of an operator under this counting.
     pub(crate) fn of(self, task: &Compiled, operator: usize) -> u32 {
         match self {
             Counting::Steps => 1,
@@ -43,45 +44,45 @@ impl Counting {
     }
 }
 
-/// An operator in a relaxed plan.
+/// Operator of a relaxed plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Relevant {
-    /// Estimated cost at which the node has fired.
+    /// Estimated cost up to and including the operator.
     pub at: u32,
     /// The operator.
     pub operator: u32,
-    /// Number of applications needed for the node's numeric target.
+    /// Number of times that the operator is applied, for the sake of a numeric condition.
     pub times: u32,
-    /// Fact of the numeric condition that determines the repetitions; `u32::MAX` for none,
-    /// [`REFILL`] for a number that the relaxed plan consumes.
+    /// Numeric condition (as a fact) that determines the repetitions; [`REFILL`] if the operator
+    /// refills a consumed number, `u32::MAX` for neither.
     pub until: u32,
 }
 
-/// Sum of two estimates, capped below "unreachable".
+/// Sum of two costs, capped below infinity.
 fn reached(cost: u32, more: u32) -> u32 {
     cost.saturating_add(more).min(NONE - 1)
 }
 
-/// Stands for a fact: marks an operator that refills a number consumed by the relaxed plan.
+/// Value of [`Relevant::until`] for an operator that refills a number consumed by the relaxed plan.
 pub const REFILL: u32 = u32::MAX - 1;
 
-/// Additive heuristic with its working memory.
+/// Additive heuristic with its working memory. A node is an operator's unconditional effects, one of
+/// its conditional effects, or an axiom.
 #[derive(Clone)]
 pub struct Relaxed {
-    /// Preconditions of each node (an operator's unconditional effects, one conditional effect, or
-    /// an axiom).
+    /// Precondition facts of each node.
     preconditions: Lists<u32>,
     effects: Lists<u32>,
-    /// Index of the node's operator in `names`; `NONE` for an axiom.
+    /// Index into `names` of each node's operator; `NONE` for an axiom.
     operators: Vec<u32>,
     names: Vec<u32>,
     base_costs: Vec<u32>,
     open: Vec<u32>,
-    /// Nodes that need a fact, by fact.
+    /// Nodes that have a fact as precondition, by fact.
     waiting: Lists<u32>,
     /// Nodes without preconditions.
     free: Vec<u32>,
-    /// Facts that hold always in the relaxation: absences of derived facts.
+    /// Facts that always hold in the relaxation: derived facts and numeric conditions being false.
     always: Vec<u32>,
     goal: Vec<u32>,
     is_goal: Vec<bool>,
@@ -93,27 +94,27 @@ pub struct Relaxed {
     marked: Vec<u32>,
     mark: u32,
     stack: Vec<u32>,
-    /// Position in the relaxed plan by index of an operator.
+    /// Position of each operator in the relaxed plan, by index into `names`.
     slots: Vec<u32>,
-    /// Interval relaxation of numbers.
+    /// Reachable intervals of numbers.
     intervals: Intervals,
-    /// Operators of the last relaxed plan, by rising cost.
+    /// Operators of the last relaxed plan, in order of rising cost.
     pub plan: Vec<Relevant>,
-    /// Operators of the relaxed plan that can be applied right away.
+    /// Operators of the last relaxed plan that are applicable in the evaluated state.
     pub preferred: Vec<u32>,
-    /// Number of visited facts and nodes: a deterministic measure of work.
+    /// Number of facts and nodes visited so far: a deterministic measure of work.
     pub work: u64,
 }
 
 impl Relaxed {
-    /// Heuristic towards the task's goal, with the given operator costs.
+    /// Heuristic for the task's goal, with all operators.
     pub fn new(task: &Compiled, counting: Counting) -> Relaxed {
         let all: Vec<u32> = (0..task.operators() as u32).collect();
         let goal = task.goal.iter().map(|&f| task.id(f)).collect();
         Relaxed::with(task, counting, all, goal)
     }
 
-    /// Heuristic restricted to these operators and goal facts.
+    /// Heuristic for other goal facts, with some of the operators.
     pub(crate) fn with(task: &Compiled, counting: Counting, operators: Vec<u32>, goal: Vec<u32>) -> Relaxed {
         let mut needed = vec![false; task.facts];
         goal.iter().for_each(|&f| needed[f as usize] = true);
@@ -146,8 +147,8 @@ impl Relaxed {
         build.finish(operators)
     }
 
-    /// Estimate from a state, or `None` if relaxed-unreachable; leaves the relaxed plan and the
-    /// preferred operators.
+    /// Estimated cost from a state to the goal; `None` if the goal is unreachable even in the
+    /// relaxation. Also sets `plan` and `preferred`.
     pub fn evaluate(&mut self, task: &Compiled, state: &[u32]) -> Option<u32> {
         if !self.explore(task, state) {
             return None;
@@ -218,7 +219,7 @@ impl Relaxed {
         }
     }
 
-    /// Applies a node's numeric changes, and re-applies the nodes whose amounts depend on changed
+    /// Applies a node's numeric changes, then those of triggered nodes whose amounts depend on changed
     /// numbers.
     fn move_numbers(&mut self, node: usize) {
         let now = self.node_costs[node];
@@ -259,7 +260,7 @@ impl Relaxed {
         total
     }
 
-    /// Adds operators that refill the numbers that the relaxed plan consumes.
+    /// Adds operators that refill numbers of which the relaxed plan consumes more than there is.
     fn refill(&mut self, task: &Compiled, state: &[u32], total: &mut u32) {
         for (number, missing) in self.intervals.shortages(task, state, &self.plan) {
             let givers = self.intervals.givers(number).iter();
@@ -275,7 +276,7 @@ impl Relaxed {
         }
     }
 
-    /// Takes the supporters of all facts asked for into the relaxed plan.
+    /// Adds the supporters of all facts on the stack, and of their preconditions, to the relaxed plan.
     fn follow_back(&mut self, total: &mut u32) {
         while let Some(fact) = self.stack.pop() {
             if self.marked[fact as usize] == self.mark || self.supporters[fact as usize] == NONE {
@@ -297,15 +298,15 @@ impl Relaxed {
         }
     }
 
-    /// Entry of a node's operator in the relaxed plan.
+    /// Entry of a node's operator in the relaxed plan; `None` if the plan does not contain it.
     fn known(&self, node: u32) -> Option<&Relevant> {
         let place = self.operators[node as usize] as usize;
         let marked = self.marked.get(self.fact_costs.len() + place)? == &self.mark;
         marked.then(|| &self.plan[self.slots[place] as usize])
     }
 
-    /// Adds a node to the relaxed plan, repeated until a fact holds, and requests its
-    /// preconditions.
+    /// Adds a node's operator to the relaxed plan, to be applied `times` times for the condition
+    /// `until`, and puts the node's preconditions on the stack.
     fn take(&mut self, node: u32, (times, until): (u32, u32), total: &mut u32) {
         let preconditions = self.preconditions.get(node as usize);
         self.stack.extend_from_slice(preconditions);
@@ -333,20 +334,20 @@ impl Relaxed {
         }
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the heuristic, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.base_costs.len() * 40 + self.fact_costs.len() * 24
     }
 }
 
-/// Collects the nodes.
+/// Builder that collects the nodes of the heuristic.
 struct Build<'a> {
     task: &'a Compiled,
     goal: Vec<u32>,
     needed: Vec<bool>,
     preconditions: Lists<u32>,
     effects: Lists<u32>,
-    /// Changes of numbers by the node's operator, by node.
+    /// Numeric effects of each node.
     changes: Lists<NumberChange>,
     operators: Vec<u32>,
     base_costs: Vec<u32>,

@@ -1,4 +1,4 @@
-//! State after the first steps of a plan, by the common semantics.
+//! State after the steps of a plan, by the semantics of the validator.
 
 use std::sync::Arc;
 
@@ -10,12 +10,13 @@ use crate::semantics::Semantics;
 use crate::state::State;
 use crate::task::{Comparison, Task, When};
 
-/// Instances of the named predicates and numeric functions that hold or have a value after the
-/// steps, in the order of the names, instances in object order. The goal is ignored, and steps have
-/// the durations of the task in the current state, whatever the plan states.
+/// Facts that hold and numbers that are defined after a plan's steps, for the named predicates and
+/// functions, in the order of the names and then of the objects. The goal is not checked. A step takes
+/// the duration that its action gives it in the initial state, where defined, and the duration of the
+/// plan otherwise.
 ///
 /// # Errors
-/// The first condition that does not hold, as [`monitor`](super::monitor()) gives it.
+/// The first condition that does not hold, in the form of [`monitor`](super::monitor()).
 pub fn after(
     task: &Task,
     attachments: &Attachments,
@@ -31,7 +32,8 @@ pub fn after(
     Ok(names.iter().flat_map(|name| instances(task, &replayed.state, name)).collect())
 }
 
-/// Steps with the durations given by the initial state, where defined.
+/// Plan whose steps take the duration that their actions demand (`= ?duration`, at start) in the
+/// initial state, where defined.
 fn timed(semantics: &Semantics<'_>, steps: &Plan) -> Plan {
     let Ok(state) = semantics.initial() else { return steps.clone() };
     let asked_s = |step: &Step| -> Option<f64> {

@@ -1,34 +1,34 @@
-//! Causes of an invalid plan, with the deciding values.
+//! Causes for which a plan is invalid, with the values that decide them.
 
 use serde::{Deserialize, Serialize};
 
 use crate::diagnostic::Diagnostic;
 use crate::semantics::{Compared, Why};
 
-/// The cause of a plan's failure.
+/// Cause of a plan's failure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Cause {
     /// The goal does not hold after the last step.
     Goal(Unmet),
-    /// A condition of a step does not hold when required.
+    /// A condition of a step does not hold at the time required.
     Condition {
-        /// Required time.
+        /// Time at which the condition must hold.
         when: Moment,
-        /// The part that does not hold.
+        /// Part of the condition that does not hold.
         #[serde(flatten)]
         unmet: Unmet,
     },
-    /// The duration of a step violates its action's bounds.
+    /// The duration of a step is outside its action's bounds.
     Duration {
-        /// Duration in the plan, seconds.
+        /// Duration in the plan, in seconds.
         planned_s: f64,
-        /// Duration that the action asks for, seconds.
+        /// Value of the violated bound, in seconds.
         asked_s: f64,
     },
-    /// Other cause, in one sentence.
+    /// Any other cause.
     Other {
-        /// The sentence, about the step at fault.
+        /// Cause in one sentence, about the step at fault.
         reason: String,
     },
 }
@@ -37,7 +37,7 @@ pub enum Cause {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moment {
-    /// Before an instantaneous action.
+    /// Before an instantaneous action happens.
     Before,
     /// At the start of a durative action.
     Start,
@@ -50,12 +50,12 @@ pub enum Moment {
 /// Part of a condition that does not hold.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unmet {
-    /// Condition part in PDDL, with objects for its variables.
+    /// Text of the part in PDDL, with objects for its variables.
     pub condition: String,
-    /// Both sides, if the part compares two numbers.
+    /// Values of both sides; `None` unless the part is a numeric comparison.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compared: Option<Compared>,
-    /// Values that the part depends on, by expression.
+    /// Values that the part depends on: expression and value as text.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub values: Vec<(String, String)>,
 }
@@ -67,7 +67,7 @@ impl Unmet {
 }
 
 impl Moment {
-    /// The moment in words, behind "does not hold".
+    /// Words for the moment, to follow "does not hold".
     pub(super) fn words(self) -> &'static str {
         match self {
             Moment::Before => "before it",
@@ -78,7 +78,7 @@ impl Moment {
     }
 }
 
-/// Reason a replay stopped.
+/// Fault at which a replay stopped.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Fault {
     pub reason: String,

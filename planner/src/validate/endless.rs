@@ -1,4 +1,4 @@
-//! Unbounded metrics: a plan may improve its metric without limit.
+//! Unbounded metrics: a step that can be repeated for ever makes a plan better without limit.
 
 use super::verdict::validate;
 use crate::attachment::Attachments;
@@ -6,13 +6,14 @@ use crate::model::walk::{self, Part};
 use crate::plan::{EPSILON_S, Plan, Step};
 use crate::task::{Assignment, Change, Expression, FunctionId, Task};
 
-/// Maximum number of distinct steps that are tried as repeatable.
+/// Maximum number of distinct steps of a plan that are tested.
 const MOST_TRIED: usize = 8;
-/// Number of further repetitions with equal gain after which a step counts as repeatable for ever.
+/// Number of repetitions tested; a step with constant gain over all of them counts as repeatable for
+/// ever.
 const OFTEN: usize = 100;
 
-/// Step that can be repeated at the end of a valid plan, with the metric's improvement per
-/// repetition, tested up to a hundred times.
+/// Step of a valid plan that can be repeated at the plan's end for ever, with the improvement of the
+/// metric per repetition; `None` if none is found. A hundred repetitions are tested.
 pub fn endless(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<(Step, f64)> {
     let metric = task.metric.as_ref()?;
     let sign = if metric.minimise { 1.0 } else { -1.0 };
@@ -36,7 +37,7 @@ pub fn endless(task: &Task, attachments: &Attachments, plan: &Plan) -> Option<(S
     })
 }
 
-/// Functions in the metric, and true if the metric merely sums them.
+/// Functions that the metric reads, and true if the metric contains no subtraction or negation.
 fn counted(task: &Task) -> (Vec<FunctionId>, bool) {
     let (mut counted, mut adds) = (Vec::new(), true);
     if let Some(metric) = &task.metric {
@@ -49,7 +50,7 @@ fn counted(task: &Task) -> (Vec<FunctionId>, bool) {
     (counted, adds)
 }
 
-/// True if a step may improve the metric.
+/// True if an action of the step's name changes a function of the metric, possibly for the better.
 fn may_help(task: &Task, step: &Step, (counted, adds): &(Vec<FunctionId>, bool)) -> bool {
     let worse = match task.metric.as_ref().is_some_and(|metric| metric.minimise) {
         true => Assignment::Increase,
@@ -62,7 +63,7 @@ fn may_help(task: &Task, step: &Step, (counted, adds): &(Vec<FunctionId>, bool))
     })
 }
 
-/// Plan with a step repeated at its end.
+/// Plan with a step repeated `times` times at its end.
 fn with_more(plan: &Plan, step: &Step, times: usize) -> Plan {
     let mut more = plan.clone();
     let mut next_s = plan.makespan_s().map(|end_s| end_s + EPSILON_S);

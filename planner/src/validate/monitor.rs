@@ -1,4 +1,4 @@
-//! Plan monitor: checks if the rest of a plan is still valid from the current state.
+//! Plan monitor: checks that the rest of a plan is still valid from the current state.
 
 use std::fmt;
 
@@ -12,18 +12,18 @@ use crate::plan::Plan;
 use crate::semantics::{CallFailure, Semantics};
 use crate::task::Task;
 
-/// Reason the rest of a plan no longer reaches the goal.
+/// Reason why the rest of a plan no longer reaches the goal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Broken {
-    /// The step at fault, counted from 0 in the rest; `None` if the goal itself is missed.
+    /// Step at fault, counted from 0 in the rest of the plan; `None` if no single step is at fault.
     pub step: Option<usize>,
-    /// The reason, in one sentence.
+    /// Reason in one sentence.
     pub reason: String,
-    /// Cause, with the deciding values.
+    /// Cause, with the values that decide it.
     pub cause: Cause,
-    /// Span in the task's texts.
+    /// Span in the task that the reason refers to.
     pub span: Span,
-    /// Findings about the unmet condition, to be drawn under the text of the task.
+    /// Findings to be drawn under the text of the task.
     #[serde(skip)]
     pub findings: Findings,
 }
@@ -36,12 +36,13 @@ impl fmt::Display for Broken {
 
 impl std::error::Error for Broken {}
 
-/// Checks that the rest of a plan, from the initial state of `task`, still reaches the goal.
+/// Checks that the rest of a plan reaches the goal from the initial state of `task`.
 ///
-/// Give the task the current state with [`Task::with_state`]. Times of the rest count from now.
+/// [`Task::with_state`] makes a task that starts from the current state. Times in the rest of the plan
+/// count from now.
 ///
 /// # Errors
-/// The first thing that no longer works.
+/// The first condition, bound or goal that is not met.
 pub fn monitor(task: &Task, attachments: &Attachments, rest: &Plan) -> Result<(), Box<Broken>> {
     let _span = tracing::debug_span!("monitor", steps = rest.steps.len()).entered();
     let semantics = Semantics::new(task, attachments);

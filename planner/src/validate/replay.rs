@@ -14,18 +14,18 @@ use crate::semantics::{
 use crate::state::State;
 use crate::task::{Action, ActionId, Comparison, GroundChange, Task, Timed, When};
 
-/// The end of a replay.
+/// Result of a complete replay.
 pub(crate) struct Replayed {
     pub state: State,
-    /// States with their start times, for trajectory constraints.
+    /// States with the times at which they begin, in seconds; empty for a task without constraints.
     pub trace: Vec<(f64, State)>,
-    /// Number of violations by action conditions, by preference.
+    /// Number of violated action conditions of each preference.
     pub violations: Vec<f64>,
-    /// End of the plan: a time, or the number of steps.
+    /// End of the plan: a time in seconds, or the number of steps for a plan without times.
     pub end: f64,
 }
 
-/// Durative action in progress.
+/// Durative action that has started and not yet ended.
 struct Running {
     step: usize,
     action: ActionId,
@@ -34,7 +34,7 @@ struct Running {
     since_s: f64,
 }
 
-/// Participant of a happening, with its reads and writes.
+/// Participant of a happening, with its read and write set.
 struct Part {
     step: Option<usize>,
     touched: Touched,
@@ -53,7 +53,7 @@ struct Replay<'r, 'a> {
 
 type Outcome<T> = Result<Result<T, Box<Fault>>, CallFailure>;
 
-/// Takes the value out of a nested result, or returns the fault.
+/// Unwraps a nested result; returns its fault or failure to the caller.
 macro_rules! attempt {
     ($result:expr) => {
         match $result? {
@@ -63,17 +63,16 @@ macro_rules! attempt {
     };
 }
 
-/// Last moment of a replay.
+/// Time up to which a plan is replayed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
     /// The end of the last step.
     LastStep,
-    /// Last timed literal, or the end of the last step if that is later: where PDDL 2.2 judges the
-    /// goal.
+    /// Last timed literal or end of the last step, whichever is later; PDDL 2.2 judges the goal there.
     LastHappening,
 }
 
-/// Replays a plan, without looking at the goal.
+/// Replays a plan without checking the goal; timed literals happen up to `until`.
 pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan, until: Until) -> Outcome<Replayed> {
     let task = semantics.task;
     let mut bound = Vec::with_capacity(plan.steps.len());
@@ -110,7 +109,8 @@ pub(super) fn replay(semantics: &Semantics<'_>, plan: &Plan, until: Until) -> Ou
     Ok(Ok(Replayed { state: replay.state, trace: replay.trace, violations: replay.violations, end }))
 }
 
-/// A plan without times, where something takes time or happens at one.
+/// Fault of a step without a time, if its action is durative or the task has timed literals; `None` if
+/// there is none.
 fn without_times(
     task: &Task,
     plan: &Plan,
@@ -136,7 +136,7 @@ fn without_times(
     Some(Fault { cause: Cause::Other { reason: reason.clone() }, reason, step, finding })
 }
 
-/// Number, text and time of a step, for messages.
+/// Text that names a step in messages: its number (from 1), action, arguments and time.
 fn step_text(plan: &Plan, index: usize) -> String {
     let step = &plan.steps[index];
     let arguments: String = step.arguments.iter().map(|name| format!(" {name}")).collect();
@@ -144,7 +144,8 @@ fn step_text(plan: &Plan, index: usize) -> String {
     format!("step {} ({}{arguments}){time}", index + 1, step.action)
 }
 
-/// Finding about an unmet condition, at its span.
+/// Fault about an unmet condition, with a finding at the condition's span; `action` adds a second
+/// label.
 pub(super) fn fault(
     reason: String,
     step: Option<usize>,
@@ -197,7 +198,9 @@ impl Replay<'_, '_> {
         self.after_happening()
     }
 
-    /// Participant for an event, with the event's changes, if it can happen now.
+    /// Participant for an event, with the changes that the event makes; a fault if the event cannot
+    /// happen in the present state. `alone` leaves out the read set, which only other participants
+    /// need.
     fn part(&mut self, event: Event, alone: bool) -> Outcome<Part> {
         let mut touched = Touched::default();
         let (step, at_end) = match event {
@@ -280,7 +283,8 @@ impl Replay<'_, '_> {
         Fault { reason, step, cause, finding }
     }
 
-    /// Checks a duration against the bounds evaluated now, with a tolerance of ε.
+    /// Checks a step's duration against its bounds at start (or at end, if `at_end`), with a tolerance
+    /// of ε.
     fn duration(&self, step: usize, at_end: bool, binding: &mut Binding) -> Outcome<()> {
         let Some(bounds) = &self.action(step).duration else { return Ok(Ok(())) };
         let duration_s = self.plan.steps[step].duration_s;
@@ -318,7 +322,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Checks that the grounding modules propose the step's parameter.
+    /// Checks that grounding modules propose the further arguments of a step.
     fn proposed(&self, step: usize, binding: &Binding) -> Outcome<()> {
         let action = self.action(step);
         for (call, proposal) in action.grounding.iter().zip(&binding.proposals) {
@@ -337,7 +341,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Counts conditions that were only preferred and do not hold.
+    /// Counts the violations of preferred conditions at the start or end of a step.
     fn preferences(&mut self, step: usize, event: Event, binding: &mut Binding) -> Result<(), CallFailure> {
         let preferences = self.action(step).preferences.clone();
         for (id, Timed { start, end, .. }) in &preferences {
@@ -349,7 +353,7 @@ impl Replay<'_, '_> {
         Ok(())
     }
 
-    /// Checks that no participant of a happening interferes with another's reads or writes.
+    /// Checks that no participant of a happening writes what another one reads or writes differently.
     fn conflicts(&self, parts: &[Part], time_s: f64) -> Outcome<()> {
         let mut together = Together::default();
         for (index, part) in parts.iter().enumerate() {
@@ -379,8 +383,8 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Conditional end effects of a step that starts in the present state, as far as its start
-    /// decides them.
+    /// Conditional end effects of a step that starts now, limited to those whose start conditions hold
+    /// in the present state.
     fn remembered(&self, step: usize) -> Result<Pending, CallFailure> {
         let (action, mut binding) = self.bound[step].clone();
         let effects = &self.semantics.task.action(action).effects.end;
@@ -400,8 +404,9 @@ impl Replay<'_, '_> {
         Ok(())
     }
 
-    /// Checks the invariants of all running actions in the state right after a happening. An action
-    /// that has just begun is checked from here on; continuous changes are checked along the way.
+    /// Checks the over-all conditions of running actions in the state right after a happening. If
+    /// numbers change continuously, those of actions that have just started are skipped here:
+    /// [`Replay::flow`] checks them.
     fn after_happening(&mut self) -> Outcome<()> {
         let flows = self.running.iter().any(|running| self.flows(running));
         let begun_s = if flows { self.now_s } else { f64::INFINITY };
@@ -412,7 +417,7 @@ impl Replay<'_, '_> {
         !self.semantics.task.action(running.action).continuous.is_empty()
     }
 
-    /// Checks the invariants of all actions that began before a time.
+    /// Checks the over-all conditions of all running actions that started before a time, in seconds.
     fn invariants(&mut self, begun_s: f64) -> Outcome<()> {
         let mut broken = None;
         for running in self.running.iter_mut().filter(|running| running.since_s < begun_s) {
@@ -437,7 +442,7 @@ impl Replay<'_, '_> {
         })
     }
 
-    /// Advances continuous changes to the next happening, and checks invariants on the way.
+    /// Advances continuous changes to a time in seconds, and checks over-all conditions on the way.
     fn flow(&mut self, until_s: f64) -> Outcome<()> {
         let elapsed_s = until_s - self.now_s;
         self.now_s = until_s;
@@ -460,7 +465,7 @@ impl Replay<'_, '_> {
         Ok(Ok(()))
     }
 
-    /// Changes of numbers at rates over an elapsed time, seconds.
+    /// Sum of continuous changes over an elapsed time, in seconds, at the present rates.
     fn flowing(&self, elapsed_s: f64) -> Outcome<Changes> {
         let mut changes = Changes::default();
         for running in &self.running {
@@ -478,7 +483,7 @@ impl Replay<'_, '_> {
         Ok(Ok(changes))
     }
 
-    /// State once a part of some changes has come about.
+    /// State after a fraction of numeric changes (0 to 1) has been applied.
     fn moved(&self, changes: &Changes, part: f64) -> Outcome<State> {
         let mut partly = changes.clone();
         partly.numbers.iter_mut().for_each(|(_, _, amount, _)| *amount *= part);
@@ -489,7 +494,7 @@ impl Replay<'_, '_> {
         })
     }
 
-    /// Differences between the sides of all comparisons that matter to the actions in progress.
+    /// Left minus right of all comparisons in rules and in over-all conditions of running actions.
     fn differences(&self, state: &State) -> Result<Vec<f64>, CallFailure> {
         let mut found = Vec::new();
         self.semantics.rule_differences(state, &mut found)?;

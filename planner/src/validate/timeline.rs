@@ -3,34 +3,35 @@
 use crate::plan::{Plan, Step};
 use crate::task::Task;
 
-/// Happenings closer than this are at the same time, in seconds. Plans are printed with few digits, and peers keep
-/// their happenings as little as this apart.
+/// Minimum time between two happenings, in seconds; events closer than this happen at the same time. It
+/// is small because plans are printed with few digits and other planners separate happenings by as
+/// little.
 pub const SEPARATION_S: f64 = 1e-4;
 
-/// An event at one time.
+/// An event of a plan at one point in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Event {
-    /// A timed initial literal or fluent, by number.
+    /// A timed initial literal or change, by its index in the task.
     Timed(usize),
-    /// The end of a step.
+    /// End of a durative step, by the step's index.
     End(usize),
-    /// The start of a durative step.
+    /// Start of a durative step, by the step's index.
     Start(usize),
-    /// An instantaneous step.
+    /// An instantaneous step, by its index.
     Instant(usize),
 }
 
-/// Everything that happens at one time.
+/// All events that happen at the same time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Happening {
     pub time_s: f64,
     pub events: Vec<Event>,
 }
 
-/// Happenings of a plan in time order, including timed literals before `until_s`. `is_durative`:
-/// true, by step, for a durative action.
+/// Happenings of a plan in time order, with the timed literals before `until_s`. `is_durative` says of
+/// each step whether its action is durative.
 ///
-/// In a plan without times every step is a happening of its own, at 1, 2, ….
+/// In a plan without times, every step is a happening of its own, at times 1, 2, ….
 pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool], until_s: f64) -> Vec<Happening> {
     if plan.steps.iter().any(|step| step.start_s.is_none()) {
         let one = |step: usize| Happening { time_s: (step + 1) as f64, events: vec![Event::Instant(step)] };
@@ -65,8 +66,8 @@ pub(super) fn happenings(task: &Task, plan: &Plan, is_durative: &[bool], until_s
     all
 }
 
-/// End of the last step, seconds; an instantaneous step takes no time, whatever the plan says. `None` for a
-/// plan without times.
+/// End of the last step, in seconds; instantaneous steps take no time, whatever duration the plan
+/// states. `None` for a plan without times.
 pub(super) fn makespan_s(plan: &Plan, is_durative: &[bool]) -> Option<f64> {
     let end_s = |(step, is_durative): (&Step, &bool)| {
         Some(step.start_s? + if *is_durative { step.duration_s } else { 0.0 })
@@ -75,8 +76,8 @@ pub(super) fn makespan_s(plan: &Plan, is_durative: &[bool]) -> Option<f64> {
     ends_s.try_fold(0.0, |last: f64, end_s| Some(last.max(end_s?)))
 }
 
-/// True if `event` ends a step that starts among `events`: a step without duration still starts before it
-/// ends.
+/// True if `event` ends a step that starts among `events`: even a step of zero duration starts before
+/// it ends.
 fn starts(events: &[Event], event: Event) -> bool {
     matches!(event, Event::End(step) if events.contains(&Event::Start(step)))
 }

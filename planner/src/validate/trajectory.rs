@@ -1,4 +1,5 @@
-//! Constraints and preferences of PDDL3 (Gerevini and Long 2005) on the states that a plan goes through.
+//! Checks the constraints and preferences of PDDL3 (Gerevini and Long 2005) on the states that a plan
+//! goes through.
 
 use super::cause::{Cause, Fault};
 use super::replay::{self, Replayed};
@@ -6,7 +7,7 @@ use crate::model::automaton::Automaton;
 use crate::semantics::{Binding, CallFailure, Semantics, Why};
 use crate::task::{Modal, Trajectory};
 
-/// First hard constraint that is broken.
+/// First hard constraint that a plan breaks; `None` if all hold.
 pub(super) fn broken_constraint(
     semantics: &Semantics<'_>,
     replayed: &Replayed,
@@ -31,7 +32,7 @@ pub(super) fn broken_constraint(
     Ok(None)
 }
 
-/// Number of violations of each preference.
+/// Number of violations of each preference, from action conditions, the goal and constraints.
 pub(super) fn violations(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Vec<f64>, CallFailure> {
     let mut counts = replayed.violations.clone();
     for (index, preference) in semantics.task.preferences.iter().enumerate() {

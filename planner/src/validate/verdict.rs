@@ -1,4 +1,4 @@
-//! The validator: replay, goal, constraints and metric of a plan.
+//! The validator: judges a plan by replay, goal, constraints and metric.
 
 use serde::Serialize;
 
@@ -13,29 +13,30 @@ use super::replay::{Replayed, Until, fault, replay};
 use super::timeline::makespan_s;
 use super::trajectory::{broken_constraint, violations};
 
-/// The validator's verdict on a plan.
+/// Verdict of the validator on a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// True if the plan reaches the goal.
+    /// True if every step can be executed, and the goal and all hard constraints hold.
     pub valid: bool,
-    /// Reason for being invalid, in one sentence.
+    /// Reason why the plan is invalid, in one sentence; `None` for a valid plan.
     pub reason: Option<String>,
-    /// The step at fault, counted from 0.
+    /// Step at fault, counted from 0; `None` if no single step is at fault.
     pub step: Option<usize>,
-    /// Value of the metric, or the number of steps without one.
+    /// Value of the metric, or the number of steps for a task without metric; `None` for an invalid
+    /// plan.
     pub cost: Option<f64>,
     /// End of the last step, in seconds; `None` for a plan without times.
     pub makespan: Option<f64>,
-    /// Value of the metric.
+    /// Value of the metric; `None` for a task without metric or an invalid plan.
     pub metric: Option<f64>,
-    /// The fault, to be drawn under the text of the task.
+    /// Findings about the fault, to be drawn under the text of the task; empty for a valid plan.
     #[serde(skip)]
     pub findings: Findings,
 }
 
-/// Replays a plan from the initial state to the goal.
+/// Validates a plan by replaying it from the initial state.
 ///
-/// A failing attachment makes the verdict invalid, with the failure as its reason.
+/// If an attachment fails, the verdict is invalid, with the failure as its reason.
 pub fn validate(task: &Task, attachments: &Attachments, plan: &Plan) -> Verdict {
     said(&Semantics::new(task, attachments), plan)
 }
@@ -92,7 +93,7 @@ fn said(semantics: &Semantics<'_>, plan: &Plan) -> Verdict {
     }
 }
 
-/// Replays a plan and looks at the goal and the constraints.
+/// Replays a plan, then checks the goal and the hard constraints.
 pub(super) fn whole(
     semantics: &Semantics<'_>,
     plan: &Plan,
@@ -113,7 +114,7 @@ pub(super) fn whole(
     })
 }
 
-/// The metric's value at the end.
+/// Value of the metric after a replay; `None` without metric.
 fn metric(semantics: &Semantics<'_>, replayed: &Replayed) -> Result<Option<f64>, CallFailure> {
     if semantics.task.metric.is_none() {
         return Ok(None);

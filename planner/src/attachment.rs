@@ -1,4 +1,5 @@
-//! Semantic attachments: words of a domain whose meaning is computed outside the planner.
+//! Semantic attachments: parts of a domain (conditions, effects, costs, parameters) that code
+//! outside the planner computes.
 //!
 //! A `[call]` in PDDL/M names a module; the module is bound to an [`Attachment`] by name. An attachment is a pure
 //! function of the call's arguments and of the facts that it declares to read ([`Attachment::reads`]); the planner
@@ -15,18 +16,18 @@ use serde::{Deserialize, Serialize};
 
 pub use self::registry::{Attachments, CallStatistics};
 
-/// Kind of a module, as written in `:modules`.
+/// Kind of a module (an external function that a domain declares in `:modules`), as written there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CallKind {
     /// A duration or cost; infinite means that the action cannot be applied.
     Cost,
-    /// True or false.
+    /// Truth of a condition.
     #[serde(rename = "conditionchecker")]
     Condition,
     /// New values for the terms that the module lists.
     Effect,
-    /// Further parameters for an action.
+    /// Proposed values for a further parameter of an action.
     Grounding,
 }
 
@@ -41,7 +42,7 @@ impl fmt::Display for CallKind {
     }
 }
 
-/// Value of a fact or fluent.
+/// Value of a predicate or function in a state.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum FactValue {
@@ -51,16 +52,16 @@ pub enum FactValue {
     Number(f64),
     /// Value of an object fluent: the object's name.
     Object(Arc<str>),
-    /// Undefined fluent.
+    /// Undefined value of a numeric or object fluent.
     Undefined,
 }
 
-/// A fact that a call may read, with its value in the state of the call.
+/// Predicate or function instance that a call reads, with its value in the state of the call.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
-    /// Predicate or function, lower case.
+    /// Name of the predicate or function, lower case.
     pub symbol: Arc<str>,
-    /// Names of objects.
+    /// Names of the argument objects.
     pub arguments: Arc<[Arc<str>]>,
     /// Value in the state of the call.
     pub value: FactValue,
@@ -71,14 +72,15 @@ pub struct Reading {
 pub enum Read {
     /// Every ground instance of a predicate or function.
     All(String),
-    /// Instances whose arguments equal the call's arguments at the given positions; `None`: any
-    /// object.
+    /// Instances of a predicate or function. Each argument is an index into the call's arguments,
+    /// whose object it must equal; `None` admits every object.
     At(String, Vec<Option<usize>>),
-    /// Whole state; the cache then helps only for recurring states.
+    /// Whole state; cached answers are then reused only in states that recur.
     Everything,
 }
 
-/// Question to an attachment.
+/// Question to an attachment: a module, argument objects, and the values that the attachment
+/// declared to read.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Call {
     /// The module's PDDL name.
@@ -88,12 +90,14 @@ pub struct Call {
     /// Names of the objects that the call is about; in an action with a `:grounding` call the proposed parameter
     /// comes last.
     pub arguments: Vec<Arc<str>>,
-    /// The declared facts, in the order of the declaration, instances in the order of the task's objects.
+    /// Values of the declared facts: in the order of the declaration, and within one declared read
+    /// in the order of the task's objects.
     pub readings: Vec<Reading>,
 }
 
 impl Call {
-    /// The numeric reading of `symbol` on `arguments`, or a [`CallError::NotRead`].
+    /// Value of the numeric function `symbol` on `arguments`; [`CallError::NotRead`] if it was not
+    /// declared to be read or is no number.
     pub fn number(&self, symbol: &str, arguments: &[&str]) -> Result<f64, CallError> {
         match self.reading(symbol, arguments) {
             Some(FactValue::Number(value)) => Ok(*value),
@@ -101,7 +105,8 @@ impl Call {
         }
     }
 
-    /// The truth of the predicate `symbol` on `arguments`, or a [`CallError::NotRead`].
+    /// Truth of the predicate `symbol` on `arguments`; [`CallError::NotRead`] if it was not
+    /// declared to be read or is no truth value.
     pub fn truth(&self, symbol: &str, arguments: &[&str]) -> Result<bool, CallError> {
         match self.reading(symbol, arguments) {
             Some(FactValue::Truth(value)) => Ok(*value),
@@ -109,7 +114,7 @@ impl Call {
         }
     }
 
-    /// The reading of `symbol` on `arguments`, if it was declared.
+    /// Value of `symbol` on `arguments`; `None` if it was not declared to be read.
     pub fn reading(&self, symbol: &str, arguments: &[&str]) -> Option<&FactValue> {
         self.readings
             .iter()
@@ -138,7 +143,8 @@ impl fmt::Display for Call {
 pub enum Answer {
     /// Answer of a condition module.
     Truth(bool),
-    /// Answer of a cost module; infinite means not applicable.
+    /// Answer of a cost module: a duration or cost; infinite means that the action is not
+    /// applicable.
     Number(f64),
     /// Answer of an effect module: one value for each term that the module lists, in that order.
     Writes(Vec<FactValue>),
@@ -148,8 +154,8 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// Answer of the given kind: from JSON, object names and effect values both come as lists of
-    /// texts.
+    /// Converts an answer read from JSON to the given kind: a list of object names is read as
+    /// effect values, and becomes proposals for a grounding module.
     fn of_kind(self, kind: CallKind) -> Answer {
         let name = |value: &FactValue| match value {
             FactValue::Object(name) => Some(name.clone()),
@@ -176,47 +182,48 @@ impl Answer {
     }
 }
 
-/// Error of an attachment without a usable answer.
+/// Reason why an attachment gave no usable answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CallError {
     /// Failure reported by the attachment.
     #[error("{0}")]
     Failed(String),
-    /// The attachment read a fact that is not declared in `reads`, or has another type.
+    /// The attachment read a fact that its `reads` does not declare, or whose value has another
+    /// type.
     #[error("{term} is not among the facts that the attachment declares to read, or is not {expected}")]
     NotRead {
-        /// The fact looked for.
+        /// The fact that was read, in PDDL.
         term: String,
-        /// The type looked for.
+        /// The type that was expected, in words.
         expected: &'static str,
     },
     /// Answer of the wrong kind, a negative or undefined cost, or a non-finite number.
     #[error("answered {got}, expected {expected}")]
     WrongAnswer {
-        /// Expected answer.
+        /// Expected answer, in words.
         expected: String,
-        /// Given answer.
+        /// Answer that was given, as text.
         got: String,
     },
-    /// No answer within the time limit.
+    /// The attachment did not answer within its time limit.
     #[error("no answer within {limit_s} s")]
     TimedOut {
-        /// Time limit.
+        /// Time limit, seconds.
         limit_s: f64,
     },
-    /// The process behind the attachment ended.
+    /// The process behind the attachment ended; the text says how.
     #[error("the attachment's program ended: {0}")]
     Crashed(String),
 }
 
-/// Failed call, with the call's module and arguments.
+/// Failed call of an attachment: the call, the names involved, and the cause.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("module {call} (attachment `{attachment}`) failed: {cause}")]
 pub struct AttachmentError {
-    /// The call as in PDDL: `[module a b]`.
+    /// The call in PDDL, with its arguments: `[module a b]`.
     pub call: String,
-    /// Name of the module.
+    /// PDDL name of the module.
     pub module: String,
     /// Name of the attachment.
     pub attachment: String,
@@ -233,27 +240,30 @@ pub enum Level {
     Relaxed,
 }
 
-/// The meaning of a module: a pure function of the arguments and the declared facts.
+/// Implementation of a module: a pure function of the call's arguments and of the facts that
+/// [`Attachment::reads`] declares.
 ///
 /// Any `Fn(&Call) -> Result<Answer, CallError>` that may be shared between threads is an attachment that reads nothing.
 pub trait Attachment: Send + Sync {
-    /// Read set besides the arguments: the cache key, and the readings that a call carries.
+    /// Facts that the answers depend on besides the arguments. Their values come with every call
+    /// and are part of the cache key.
     fn reads(&self) -> Vec<Read> {
         Vec::new()
     }
 
-    /// The exact answer.
+    /// Answers a call exactly.
     fn evaluate(&self, call: &Call) -> Result<Answer, CallError>;
 
-    /// Cheap answer for heuristics; `None` (the default) if the exact one is as good.
+    /// Answers a call cheaply, for heuristics; `None` (the default) if [`Attachment::evaluate`] is
+    /// to be used there too.
     ///
-    /// It should be optimistic (a cost not above the exact one, false only where the exact answer is false), or
-    /// plans may be missed and *unsolvable* may be wrong.
+    /// The answer should be optimistic (a cost not above the exact one, false only where the exact
+    /// answer is false); otherwise plans may be missed and *unsolvable* may be wrong.
     fn relaxed(&self, _call: &Call) -> Option<Result<Answer, CallError>> {
         None
     }
 
-    /// Several calls at once, all exact; answers in the order of the calls.
+    /// Answers several calls exactly, in the order of the calls.
     fn evaluate_all(&self, calls: &[Call]) -> Vec<Result<Answer, CallError>> {
         calls.iter().map(|call| self.evaluate(call)).collect()
     }

@@ -1,5 +1,5 @@
-//! Ground calls bound to attachments: questions of the searches, and the state variables on which
-//! each answer depends.
+//! Calls of a ground task, bound to their attachments: asks the attachments, caches their answers,
+//! and names the state variables on which each answer depends.
 
 mod terms;
 
@@ -21,26 +21,28 @@ use crate::task::{Module, ModuleId, Task};
 
 use self::terms::{Origin, Sources, Terms};
 
-/// Failed call, returned up to [`crate::plan()`].
+/// Error of a failed call, passed up to [`crate::plan()`].
 pub type Failure = Box<AttachmentError>;
 
 /// Data that all calls of a module share.
 struct Asked<'a> {
-    /// Name of the attachment; empty for a module that is never called.
+    /// Name of the attachment; empty if none is registered (allowed only for modules without
+    /// calls).
     attachment: String,
     module: Arc<str>,
     kind: CallKind,
     /// Number of terms that the call writes.
     writes: usize,
-    /// Counts answers that were known already, for the statistics of the attachment.
+    /// Counter of answers found in the caches here, for the statistics of the attachment; `None`
+    /// without an attachment.
     hits: Option<&'a AtomicU64>,
-    /// Argument positions that select the facts a call reads.
+    /// Argument positions on which the set of facts that a call reads depends.
     positions: Vec<usize>,
-    /// Sources of the call's readings, if these are the same for all arguments.
+    /// Readings of every call, if they do not depend on the arguments; else `None`.
     sources: Option<Arc<Sources>>,
 }
 
-/// Ground call: attachment, arguments, and sources of the readings.
+/// Ground call with the data of its module: argument object ids, and the places of its readings.
 #[derive(Clone, Copy)]
 struct Bound<'b> {
     asked: &'b Asked<'b>,
@@ -48,10 +50,11 @@ struct Bound<'b> {
     sources: &'b Sources,
 }
 
-/// Cached answers, by the values of the variables that a call reads.
+/// Cached answers of one call, by the packed values of the variables and numbers that it reads.
 type Known = FxHashMap<Box<[u64]>, Answer>;
 
-/// Refused call: its id, the truth that was needed, and the proposed parameter.
+/// Refused call: its id, the truth value that was needed, and the proposed parameter if there is
+/// one.
 type Refusal = (CallId, bool, Option<Arc<str>>);
 
 /// Every call of a ground task, bound to its attachment.
@@ -60,24 +63,25 @@ pub struct Calls<'a> {
     ground: &'a GroundTask,
     attachments: &'a Attachments,
     names: Vec<Arc<str>>,
-    /// Shared data by module.
+    /// Data shared by the calls of a module, by module index.
     asked: Vec<Asked<'a>>,
-    /// Sources of the readings by call.
+    /// Readings of each call, by call id.
     sources: Vec<Arc<Sources>>,
-    /// Exact and relaxed answers of calls with no readings and no proposed parameter.
+    /// Cached answers, exact (index 0) and relaxed (index 1), of calls that read nothing and have no
+    /// proposed parameter, by call id.
     settled: RefCell<Vec<[Option<Answer>; 2]>>,
-    /// Answers of calls that read something, without a proposed parameter, by call, exact and relaxed.
+    /// Cached answers, exact (index 0) and relaxed (index 1), of calls that read something and have no
+    /// proposed parameter, by call id.
     known: RefCell<Vec<[Known; 2]>>,
-    /// Buffer for the readings of the last question.
+    /// Scratch buffer for cache keys.
     read: RefCell<Vec<u64>>,
     terms: Terms,
-    /// Calls whose answer differed from the truth needed, with that truth and the proposed
-    /// parameter.
+    /// Calls whose answer differed from the truth value needed.
     refused: RefCell<FxHashSet<Refusal>>,
 }
 
 impl<'a> Calls<'a> {
-    /// Binds the calls of `ground`.
+    /// Binds the calls of `ground` to their attachments.
     ///
     /// # Errors
     ///
@@ -185,7 +189,7 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// True if a condition module gives the needed answer; refusals are recorded.
+    /// True if the condition module of `call` answers `wanted`; otherwise records the refusal.
     pub fn agrees(
         &self,
         (call, wanted): (CallId, bool),
@@ -200,7 +204,7 @@ impl<'a> Calls<'a> {
         Ok(agrees)
     }
 
-    /// The cost that a cost module answers.
+    /// Duration or cost that the cost module of `call` answers.
     pub fn cost(
         &self,
         call: CallId,
@@ -219,7 +223,8 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// Evaluates an effect module in one state and writes the result into another.
+    /// Calls an effect module in one state and writes the values that it answers into another
+    /// state.
     pub fn write(
         &self,
         call: CallId,
@@ -260,7 +265,8 @@ impl<'a> Calls<'a> {
         Ok(())
     }
 
-    /// Value of an object fluent's variable for the object of this name; `None`: undefined.
+    /// Value of an object fluent's variable that stands for the object `name` (`None`: for
+    /// undefined); `None` if the variable has no such value.
     fn object_value(&self, variable: VariableId, name: Option<&Arc<str>>) -> Option<u32> {
         let means = |meaning: &Meaning| match meaning {
             Meaning::Object { value: Some(object), .. } => name == Some(&self.names[*object as usize]),
@@ -271,7 +277,7 @@ impl<'a> Calls<'a> {
         values.iter().position(means).map(|value| value as u32)
     }
 
-    /// The parameters that a grounding module of the lifted task proposes.
+    /// Names that a grounding module of the lifted task proposes for the parameter of an action.
     pub fn proposals(
         &self,
         module: usize,
@@ -286,19 +292,20 @@ impl<'a> Calls<'a> {
         }
     }
 
-    /// Read set of the answer: variables, then numbers.
+    /// State variables and numbers that the call reads.
     pub fn reads(&self, call: CallId) -> (&[VariableId], &[NumericId]) {
         let sources = &self.sources[call as usize];
         (&sources.variables, &sources.numbers)
     }
 
-    /// True if the answer, without a proposed parameter, is independent of the state.
+    /// True if the call reads nothing, so its answer (without a proposed parameter) is the same in
+    /// all states.
     pub fn settles(&self, call: CallId) -> bool {
         let (variables, numbers) = self.reads(call);
         variables.is_empty() && numbers.is_empty()
     }
 
-    /// Recorded answers that differed from the needed ones.
+    /// Refusals recorded so far, by module and needed answer.
     pub fn refusals(&self) -> Refusals {
         let mut refusals = Refusals::default();
         let refused = self.refused.borrow();
@@ -356,8 +363,8 @@ impl<'a> Calls<'a> {
         Ok(answer)
     }
 
-    /// Cache key of a state: values of the variables read, packed into words, then those of the
-    /// numbers read.
+    /// Writes the cache key of a state to `words`: values of the variables read, packed into words
+    /// of 64 bits, then the numbers read.
     fn what_is_read(&self, sources: &Sources, state: &Values, words: &mut Vec<u64>) {
         words.clear();
         let (mut word, mut room) = (0, 1_u64);
@@ -394,7 +401,7 @@ impl<'a> Calls<'a> {
         Ok(self.attachments.call(&bound.asked.attachment, &question, level)?)
     }
 
-    /// Question of a call, without its readings.
+    /// Question of a call with its arguments and an empty list of readings.
     fn unread(&self, bound: Bound, proposal: Option<&Arc<str>>) -> Question {
         let arguments = bound.arguments.iter().map(|&object| &self.names[object as usize]);
         Question {
@@ -440,7 +447,7 @@ impl<'a> Calls<'a> {
         })
     }
 
-    /// A failure as an error of the whole planning call, drawn under the domain.
+    /// Planning error for a failed call, with a finding that points at the call in the domain.
     pub fn report(&self, failure: Failure) -> PlanError {
         report(self.task, failure)
     }

@@ -1,4 +1,4 @@
-//! Diagnostics: faults of a text with place and remedy.
+//! Diagnostics: faults found in a text, each with its place and, where known, a remedy.
 
 mod excerpt;
 
@@ -14,7 +14,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Source with a name and a text. A lone carriage return counts as a line end.
+    /// Creates a source. A lone carriage return in the text counts as a line end.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
         Self { name: name.into(), text: with_line_feeds(text.into()) }
     }
@@ -34,15 +34,14 @@ fn with_line_feeds(text: String) -> String {
     mended
 }
 
-/// A place in one of the sources of a task: byte offsets `start..end` of source number `source`
-/// (0 is the domain, 1 the problem).
+/// Byte range `start..end` in source number `source` of a task (0 is the domain, 1 the problem).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize)]
 pub struct Span {
-    /// Number of the source.
+    /// Index of the source in the list of sources.
     pub source: u32,
-    /// First byte.
+    /// Byte offset of the first byte.
     pub start: u32,
-    /// Byte after the span's last one.
+    /// Byte offset after the last byte.
     pub end: u32,
 }
 
@@ -53,7 +52,7 @@ impl Span {
     }
 }
 
-/// Severity: stops the work, or only deserves a look.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -75,20 +74,20 @@ pub struct Label {
 /// Finding: message, spans that show the fault, and a remedy if one is known.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Diagnostic {
-    /// Fault or warning.
+    /// Error or warning.
     pub severity: Severity,
     /// Stable code of the finding's kind, such as `undeclared-predicate`.
     pub code: &'static str,
     /// The fault in one sentence, without the place.
     pub message: String,
-    /// Labels; the finding is reported at the first.
+    /// Places with messages; the finding is reported at the first.
     pub labels: Vec<Label>,
-    /// Mend.
+    /// Suggested remedy, if one is known.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
-    /// Error at a span.
+    /// Creates an error with one labelled span.
     pub fn error(
         code: &'static str,
         message: impl Into<String>,
@@ -98,7 +97,7 @@ impl Diagnostic {
         Self::new(Severity::Error, code, message, span, label)
     }
 
-    /// Warning at a span.
+    /// Creates a warning with one labelled span.
     pub fn warning(
         code: &'static str,
         message: impl Into<String>,
@@ -119,23 +118,24 @@ impl Diagnostic {
         Self { severity, code, message: message.into(), labels, help: None }
     }
 
-    /// Adds a labelled span.
+    /// Adds a span with a message.
     pub fn with_label(mut self, span: Span, text: impl Into<String>) -> Self {
         self.labels.push(Label { span, text: text.into() });
         self
     }
 
-    /// Adds a remedy.
+    /// Adds a suggested remedy.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 }
 
-/// All findings of one reading in text order, with the sources that they point into.
+/// All findings of one reading of a task, in text order, with the sources that the spans point
+/// into.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Findings {
-    /// The texts, by the numbers that spans use.
+    /// Source texts; a span's `source` is the index here.
     pub sources: Vec<Source>,
     /// The findings.
     pub list: Vec<Diagnostic>,
@@ -182,7 +182,8 @@ impl Findings {
         text.lines().map(|line| format!("{}\n", line.trim_end())).collect()
     }
 
-    /// File, line and column of a span's start, from 1.
+    /// File name, line and column (both from 1) of a span's start; `("", 1, 1)` if the source is
+    /// unknown.
     pub fn place(&self, span: Span) -> (&str, usize, usize) {
         let Some(source) = self.sources.get(span.source as usize) else { return ("", 1, 1) };
         let (line, column) = excerpt::line_and_column(&source.text, span.start as usize);

@@ -28,40 +28,42 @@ use self::relaxed::could_be_had;
 pub(crate) use self::sites::sites;
 pub(crate) use self::within::too_slow;
 
-/// Explanation why a task has no plan: findings that point at the goal, at atoms without achievers,
-/// and at attachments that refused.
+/// Explanation why a task has no plan: findings that point at the goal, at atoms that nothing
+/// achieves, and at attachments that refused.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Explanation {
-    /// The reasons, the goal's first.
+    /// Findings, with those about the goal first.
     pub findings: Findings,
-    /// Actions that may help if they overlap themselves, which no search tries exhaustively. If
-    /// any, the proof excludes plans in which an action overlaps itself; the last finding says so.
+    /// Names of actions for which plans that overlap two runs of one instance were not tried
+    /// exhaustively. If there are any, the proof covers only plans without such overlaps, and the
+    /// last finding says so.
     pub overlapping: BTreeSet<String>,
     /// True if the goal is reachable under delete relaxation.
     #[serde(skip)]
     pub(crate) only_lost: bool,
-    /// True if the only reason is exhaustion: no reachable state fulfils the whole goal.
+    /// True if exhaustion is the only reason: all reachable states were seen, and none fulfils the
+    /// whole goal.
     #[serde(skip)]
     pub(crate) exhausted: bool,
-    /// Refusing attachments, in the order of their findings.
+    /// Refusals by attachments as values, in the order of their findings.
     #[serde(skip)]
     refused: Vec<NoPlan>,
 }
 
-/// Structured reason why no plan exists.
+/// Reason why no plan exists, as a value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum NoPlan {
-    /// An attachment refused.
+    /// An attachment gave an answer that rules the plan out.
     Refused {
-        /// Name of the attachment.
+        /// PDDL name of the module.
         module: String,
-        /// The answer of the attachment.
+        /// Answer that ruled the plan out.
         answer: Refusal,
         /// Refused calls, in PDDL.
         calls: Vec<String>,
     },
-    /// No reachable state fulfils the goal.
+    /// All reachable states were seen, and none fulfils the goal.
     Exhausted,
     /// Other reason, in one sentence.
     Finding {
@@ -72,15 +74,15 @@ pub enum NoPlan {
     },
 }
 
-/// Refusal by an attachment.
+/// Answer by which an attachment ruled a plan out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refusal {
-    /// "No" where "yes" is needed.
+    /// A condition module answered false where true is needed.
     No,
-    /// "Yes" where "no" is needed.
+    /// A condition module answered true where false is needed.
     Yes,
-    /// An infinite cost.
+    /// A cost module answered an infinite cost.
     Impossible,
 }
 
@@ -90,7 +92,7 @@ impl Explanation {
         Explanation { findings, ..Explanation::default() }
     }
 
-    /// The reasons as values, in the order of the findings.
+    /// Reasons as values, one for each finding.
     pub fn reasons(&self) -> Vec<NoPlan> {
         let mut refused = self.refused.iter();
         let reason = |finding: &Diagnostic| {
@@ -104,7 +106,8 @@ impl Explanation {
         self.findings.list.iter().map(reason).collect()
     }
 
-    /// Explanation limited to plans in which these actions do not overlap themselves.
+    /// Limits the explanation to plans in which the actions named in `overlapping` do not overlap
+    /// themselves, and adds a finding that says so.
     pub(crate) fn but_for(mut self, task: &Task, overlapping: &BTreeSet<String>) -> Explanation {
         let mut actions = task.actions.iter().filter(|action| overlapping.contains(&action.name));
         if let Some(first) = actions.next() {
@@ -123,11 +126,11 @@ impl Explanation {
     }
 }
 
-/// Code of findings about the goal or a part of the goal.
+/// Code of findings that the goal, or a part of it, is unreachable.
 const UNSOLVABLE: &str = "unsolvable";
 /// Code of findings about refusing attachments.
 const REFUSED: &str = "attachment-refused";
-/// Code of findings about actions that could overlap themselves.
+/// Code of the finding that overlaps of an action with itself were not all tried.
 const OVERLAP: &str = "overlap-untried";
 
 impl fmt::Display for Explanation {
@@ -145,10 +148,11 @@ impl fmt::Display for Explanation {
     }
 }
 
-/// Refused calls by module and needed answer (of a cost: finite).
+/// Refused calls as text, by module index and the answer needed (for a cost module: true, for
+/// finite).
 pub(crate) type Refusals = BTreeMap<(u32, bool), Vec<String>>;
 
-/// The maximum number of refused calls shown for one module.
+/// Maximum number of calls, actions or spans that one finding lists.
 const SHOWN: usize = 8;
 
 /// Explains why a task has no plan: contradictions in the goal, obstacles found by grounding,
@@ -199,10 +203,10 @@ pub(crate) fn explain(task: &Task, ground: &GroundTask, refusals: &Refusals) -> 
     Explanation { only_lost, exhausted, refused: told_refused, ..Explanation::new(task, list) }
 }
 
-/// Message when no relaxation gives a better reason.
+/// Message where no more specific reason is known: the goal as a whole is unreachable.
 const UNREACHED: &str = "every state that can be reached was seen, and none fulfils the whole goal";
 
-/// Explanation that no plan satisfies the constraints; `reachable`: plans exist that violate them.
+/// Explanation that no plan keeps all constraints. `reachable`: the goal is reachable without them.
 pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     let hard = task.constraints.iter().filter(|constraint| constraint.preference.is_none());
     let mut spans = hard.map(|constraint| constraint.span);
@@ -221,8 +225,8 @@ pub(crate) fn constrained(task: &Task, reachable: bool) -> Explanation {
     Explanation::new(task, vec![finding])
 }
 
-/// Finding about goal parts that are jointly unreachable. `narrowed`: the subset is minimal;
-/// `only_lost`: reachable under delete relaxation.
+/// Finding that the given goal parts cannot be reached together. `narrowed`: `parts` is a minimal
+/// such subset; `only_lost`: the goal is reachable under delete relaxation.
 fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) -> Diagnostic {
     let message = match (narrowed, parts.len()) {
         (false, _) => UNREACHED.to_string(),
@@ -275,7 +279,8 @@ fn together(task: &Task, parts: &[&Condition], narrowed: bool, only_lost: bool) 
 
 const LASTS: &str = "what an action gives only while it runs does not last long enough";
 
-/// Action that adds an atom of the predicate at its start and deletes that atom at its end.
+/// First atom that an action adds at its start and deletes at its end: the action, the atom's span
+/// and its predicate.
 fn given_while_running(action: &Action) -> Option<(&Action, Span, PredicateId)> {
     action.effects.start.iter().find_map(|effect| {
         let Change::Add(atom) = &effect.change else { return None };
@@ -292,7 +297,8 @@ fn conjuncts<'t>(condition: &'t Condition, parts: &mut Vec<&'t Condition>) {
     }
 }
 
-/// Finding about one module's refused calls, pointing at the calls in the domain.
+/// Finding about the refused calls of one module, pointing at its calls in the domain, with the
+/// reason as a value; `None` if the task never calls the module.
 fn refused(task: &Task, module: ModuleId, wanted: bool, calls: &[String]) -> Option<(Diagnostic, NoPlan)> {
     let mut sites = sites(task, module).into_iter();
     let (who, span) = sites.next()?;

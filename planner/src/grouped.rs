@@ -1,17 +1,17 @@
-//! Values side by side in memory, grouped by a small number.
+//! Lists of values by a small integer key, stored in one array.
 
 use std::ops::Range;
 
-/// Values grouped by key, in their order.
+/// Values grouped by key; within a group in the order in which they were given.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Grouped<T> {
-    /// Start of each key's values, plus the total.
+    /// Index of the first value of each key, and the number of all values last.
     from: Vec<u32>,
     pub(crate) values: Vec<T>,
 }
 
 impl<T: Copy + Default> Grouped<T> {
-    /// Groups pairs of a key below `keys` and a value.
+    /// Groups `pairs` of a key (less than `keys`) and a value.
     pub(crate) fn new(keys: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Grouped<T> {
         let mut from = vec![0; keys + 2];
         pairs.clone().for_each(|(key, _)| from[key as usize + 2] += 1);
@@ -28,12 +28,12 @@ impl<T: Copy + Default> Grouped<T> {
         Grouped { from, values }
     }
 
-    /// Range of the values of a key.
+    /// Index range of the values of a key.
     pub(crate) fn range(&self, key: u32) -> Range<usize> {
         self.from[key as usize] as usize..self.from[key as usize + 1] as usize
     }
 
-    /// The values of a key.
+    /// Values of a key.
     pub(crate) fn of(&self, key: u32) -> &[T] {
         &self.values[self.range(key)]
     }

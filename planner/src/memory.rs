@@ -1,4 +1,4 @@
-//! Memory limits, and lists that grow without being copied.
+//! Memory limits of planning, and tables and heaps that grow without copying their content.
 
 use std::ops::{Index, IndexMut};
 
@@ -6,26 +6,29 @@ use std::ops::{Index, IndexMut};
 #[derive(Clone, Copy, Debug)]
 pub struct MemoryLimit {
     bytes: usize,
-    /// Memory in use by the process; `None` if the caller cannot measure it.
+    /// Measures the memory of the whole process, bytes; `None` if the caller cannot measure it.
     used: Option<fn() -> u64>,
 }
 
-/// Share of the limit reserved for allocations between two checks, as a divisor.
+/// The limit divided by this is reserved for allocations between two checks.
 const RESERVE: usize = 32;
 
 impl MemoryLimit {
-    /// Limit in bytes (`None`: unlimited); `used` measures the memory of the whole process.
+    /// Creates a limit of `bytes` (`None`: unlimited); `used` measures the memory of the whole
+    /// process, bytes.
     pub fn new(bytes: Option<u64>, used: Option<fn() -> u64>) -> MemoryLimit {
         let bytes = bytes.map_or(usize::MAX, |bytes| usize::try_from(bytes).unwrap_or(usize::MAX));
         MemoryLimit { bytes: bytes - bytes / RESERVE, used: used.filter(|_| bytes != usize::MAX) }
     }
 
-    /// Limit on counted memory; `None` if process memory is measured.
+    /// Limit in bytes on the memory that the search itself counts; `None` if unlimited or if the
+    /// process's memory is measured instead.
     pub(crate) fn counted(&self) -> Option<usize> {
         (self.used.is_none() && self.bytes != usize::MAX).then_some(self.bytes)
     }
 
-    /// Limit that remains besides `others` bytes used elsewhere.
+    /// Limit that remains when `others` bytes are in use elsewhere. Unchanged if the process's
+    /// memory is measured.
     pub fn beside(self, others: usize) -> MemoryLimit {
         match self.used {
             Some(_) => self,
@@ -33,7 +36,8 @@ impl MemoryLimit {
         }
     }
 
-    /// True if `more` bytes fit besides `counted`.
+    /// True if `more` further bytes fit. Memory in use is the measured memory of the process, or
+    /// `counted` bytes where that is not measured.
     pub fn has_room(&self, counted: impl FnOnce() -> usize, more: usize) -> bool {
         let used = match self.used {
             Some(used) => usize::try_from(used()).unwrap_or(usize::MAX),
@@ -43,27 +47,27 @@ impl MemoryLimit {
     }
 }
 
-/// True if a list of this length and capacity grows soon.
+/// True if a list of this length is about to exceed its capacity (8/9 full).
 pub(crate) fn soon(length: usize, capacity: usize) -> bool {
     length + length / 8 >= capacity
 }
 
-/// Bytes of a piece of a list.
+/// Maximum size of one chunk of a table, bytes.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// Rows of equal length, stored in chunks: growing copies nothing and allocates one chunk at a
-/// time.
+/// Table of rows of equal length, stored in chunks: growth copies nothing (except in the first
+/// chunk) and allocates one chunk at a time.
 #[derive(Debug)]
 pub struct Rows<T> {
     pieces: Vec<Vec<T>>,
     width: usize,
-    /// Binary logarithm of the rows in a piece.
+    /// Binary logarithm of the number of rows in a chunk.
     shift: u32,
     len: usize,
 }
 
 impl<T> Rows<T> {
-    /// An empty table whose rows have `width` items.
+    /// Creates an empty table whose rows have `width` items.
     pub fn new(width: usize) -> Rows<T> {
         let fitting = PIECE_BYTES / (width * size_of::<T>()).max(1);
         Rows { pieces: Vec::new(), width, shift: fitting.max(1).ilog2(), len: 0 }
@@ -74,24 +78,25 @@ impl<T> Rows<T> {
         self.len
     }
 
-    /// Items of a row.
+    /// Number of items in a row.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
 
-    /// Forgets all rows.
+    /// Removes all rows; the memory of the first chunk is kept.
     pub(crate) fn clear(&mut self) {
         self.pieces.truncate(1);
         self.pieces.iter_mut().for_each(Vec::clear);
         self.len = 0;
     }
 
-    /// Memory, bytes.
+    /// Allocated memory, bytes.
     pub fn bytes(&self) -> usize {
         self.pieces.iter().map(|piece| piece.capacity() * size_of::<T>()).sum()
     }
 
-    /// Chunk for the next row. The first grows like a vector, because most are never filled.
+    /// Chunk to which the next row is appended. The first chunk grows like a vector, because most
+    /// tables stay small.
     fn last(&mut self) -> &mut Vec<T> {
         let at = self.len >> self.shift;
         if at == self.pieces.len() {
@@ -122,7 +127,7 @@ impl<T> Rows<T> {
         self.last().push(item);
     }
 
-    /// Removes and returns the last single-item row.
+    /// Removes and returns the last single-item row; `None` if the table is empty.
     pub(crate) fn pop(&mut self) -> Option<T> {
         debug_assert_eq!(self.width, 1);
         self.len = self.len.checked_sub(1)?;
@@ -159,7 +164,7 @@ impl<T> IndexMut<usize> for Rows<T> {
     }
 }
 
-/// Min-heap.
+/// Min-heap stored in chunks.
 #[derive(Debug)]
 pub struct Heap<T> {
     items: Rows<T>,
@@ -177,7 +182,7 @@ impl<T: Ord + Copy> Heap<T> {
         self.items.len() == 0
     }
 
-    /// Memory, bytes.
+    /// Allocated memory, bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.items.bytes()
     }
@@ -197,7 +202,7 @@ impl<T: Ord + Copy> Heap<T> {
         self.items[at] = item;
     }
 
-    /// Takes the least item.
+    /// Removes and returns the smallest item; `None` if the heap is empty.
     pub fn pop(&mut self) -> Option<T> {
         let last = self.items.pop()?;
         let len = self.items.len();

@@ -13,79 +13,83 @@ use crate::plan::Plan;
 /// Options of planning.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Keep improving until stopped, or until the best plan is proven best. Otherwise stop after the first plan and a
-    /// short improvement whose length is fixed by the task alone.
+    /// Keep improving the plan until stopped or until it is proven optimal. Otherwise planning
+    /// stops after the first plan and a short improvement whose length depends on the task alone.
     pub anytime: bool,
     /// Return the first plan, without improvement.
     pub first: bool,
-    /// Accept only plans whose metric (makespan or cost where there is none) is below this.
+    /// Accept only plans whose metric value is below this; without a metric, the makespan (temporal
+    /// tasks) or the cost.
     pub bound: Option<f64>,
     /// Seed of random choices; the classical search makes none.
     pub seed: u64,
-    /// Memory limit for grounded task and search, bytes; with `memory_used`, for the whole process.
+    /// Memory limit, bytes: for the grounded task and the search, or for the whole process if
+    /// `memory_used` is given.
     pub memory_limit_bytes: Option<u64>,
-    /// Measures the memory of the whole process, bytes; polled now and then. `None`: only the
-    /// searches' own memory is counted.
+    /// Function that measures the memory of the whole process, bytes; called now and then. `None`:
+    /// only the memory of the grounded task and of the searches is counted.
     pub memory_used: Option<fn() -> u64>,
-    /// Maximum number of evaluated states.
+    /// Maximum number of states that a heuristic evaluates.
     pub evaluation_limit: Option<u64>,
-    /// Number of parallel searches for plans without durations; default 1. The plan is the same for
-    /// any number unless limits run out. If states or search memory are limited, 1 is used.
+    /// Number of searches in parallel, for plans without durations; default 1. The plan is the same
+    /// for any number unless a limit is reached. One is used if states or the searches' memory are
+    /// limited.
     pub threads: Option<NonZeroUsize>,
 }
 
-/// Statistics of planning.
+/// Statistics of one planning call.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Statistics {
-    /// States evaluated by a heuristic.
+    /// Number of states evaluated by a heuristic.
     pub evaluated: u64,
-    /// States whose successors were made.
+    /// Number of states whose successors were generated.
     pub expanded: u64,
     /// Number of plans found, each better than the one before.
     pub plans: u64,
-    /// Ground actions.
+    /// Number of ground actions.
     pub actions: u64,
     /// True if the plan is proven optimal among all plans, including those in which an action
     /// overlaps itself.
     pub optimal: bool,
-    /// Proven lower bound on the metric (on the number of steps without one), if requested.
+    /// Proven lower bound on the metric value (without a metric: on the number of steps); `None` if
+    /// not computed.
     pub lower_bound: Option<f64>,
-    /// True if some preferences were not optimised, only scored: those outside the metric, or with
+    /// True if some preferences were only scored, not optimised: those outside the metric, or with
     /// times or attachments.
     pub scored_only: bool,
-    /// Statistics by attachment, for this call alone.
+    /// Statistics of each attachment for this planning call alone, by name.
     pub attachments: BTreeMap<String, CallStatistics>,
 }
 
 /// Outcome of planning.
 #[derive(Debug, Clone)]
 pub enum Outcome {
-    /// A plan, validated.
+    /// A validated plan.
     Solved {
         /// Best plan found.
         plan: Plan,
         /// Statistics.
         statistics: Statistics,
     },
-    /// Proven to have no plan; if `why` names self-overlapping actions, only plans without
-    /// self-overlap are excluded.
+    /// Proof that no plan exists. If `why` names actions that may overlap themselves, the proof
+    /// covers only plans in which they do not.
     Unsolvable {
-        /// Explanation.
+        /// Explanation why there is no plan.
         why: Explanation,
         /// Statistics.
         statistics: Statistics,
     },
-    /// Stopped before a plan was found, or (anytime) before optimality was proven, then with a
-    /// plan.
+    /// Planning was stopped before a plan was found, or (with `anytime`) before the plan was proven
+    /// optimal.
     OutOfTime {
-        /// Best plan so far.
+        /// Best plan found; `None` if there is none yet.
         best: Option<Plan>,
         /// Statistics.
         statistics: Statistics,
     },
     /// The memory limit was reached.
     OutOfMemory {
-        /// Best plan so far.
+        /// Best plan found; `None` if there is none yet.
         best: Option<Plan>,
         /// Statistics.
         statistics: Statistics,
@@ -122,38 +126,38 @@ impl Outcome {
     }
 }
 
-/// Error without any planning result.
+/// Error because of which planning gives neither a plan nor a proof that there is none.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The task uses an unsupported feature or a module without an attachment. Each finding points
-    /// at its place.
+    /// The task uses an unsupported feature, or a module without an attachment. Each finding points
+    /// at its place in the text.
     #[error("{}", first_message(.0))]
     Refused(Findings),
-    /// All plans found violate constraints of kinds that no search supports, so solvability is
-    /// unknown. Each finding points at a constraint.
+    /// All plans found violate constraints of a kind that no search supports, so it is unknown
+    /// whether a plan exists. Each finding points at a constraint.
     #[error("{}", first_message(.0))]
     Untried(Findings),
-    /// An attachment failed; the finding points at the call in the domain.
+    /// An attachment failed. The finding points at the call in the domain.
     #[error("{error}")]
     Attachment {
         /// The failed call.
         error: Box<AttachmentError>,
-        /// Findings, to be drawn under the text.
+        /// Findings with the domain's text.
         findings: Findings,
     },
-    /// A plan of the search failed validation: an internal error.
+    /// A plan that the search found failed validation: an error in the planner.
     #[error("internal error: a plan that was found is not valid: {reason}\n{plan}")]
     Internal {
         /// Message of the validator.
         reason: String,
-        /// The plan.
+        /// Plan that failed validation.
         plan: Plan,
     },
 }
 
 impl PlanError {
-    /// Findings to draw under the text of the domain, if the domain is at fault.
+    /// Findings that point into the task's text; `None` for an internal error.
     pub fn findings(&self) -> Option<&Findings> {
         match self {
             PlanError::Refused(findings)

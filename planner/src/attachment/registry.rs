@@ -1,4 +1,4 @@
-//! Registry of attachments: function, cached answers, and number of calls of each.
+//! Registry of attachments: each attachment's function, cached answers and call counts.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{Answer, Attachment, AttachmentError, Call, CallError, CallKind, FactValue, Level, Read};
 
-/// Number of questions to an attachment.
+/// Counts of the questions to one attachment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct CallStatistics {
-    /// Exact calls that reached the attachment.
+    /// Exact calls that the attachment itself answered (not the cache).
     pub calls: u64,
-    /// Relaxed calls that reached the attachment.
+    /// Relaxed calls that the attachment itself answered (not the cache).
     pub relaxed: u64,
     /// Questions that the cache answered.
     pub hits: u64,
@@ -24,7 +24,7 @@ pub struct CallStatistics {
     pub time_s: f64,
 }
 
-/// Attachments by name, with their caches and counts.
+/// Attachments by name, each with its cache of answers and its call counts.
 #[derive(Default)]
 pub struct Attachments {
     registered: BTreeMap<String, Registered>,
@@ -46,10 +46,10 @@ struct CacheKey {
     level: Level,
     module: Arc<str>,
     arguments: Vec<Arc<str>>,
-    /// Truth values of the readings, two bits each: false, true, or "in `others`". A call may have
-    /// hundreds of readings.
+    /// Truth values of the readings, two bits each: 0 false, 1 true, 2 "not a truth value: see
+    /// `others`". Packed because a call may have hundreds of readings.
     truths: Vec<u64>,
-    /// Other readings, in order.
+    /// Values of the readings that are no truth values, in the order of the call.
     others: Vec<KeyValue>,
 }
 
@@ -91,24 +91,25 @@ impl fmt::Debug for Attachments {
 }
 
 impl Attachments {
-    /// Empty registry.
+    /// Creates an empty registry.
     pub fn new() -> Attachments {
         Attachments::default()
     }
 
-    /// Registry that also times calls with `clock_s` (seconds from an arbitrary origin, monotonic).
+    /// Makes the registry time each call with `clock_s`: seconds from an arbitrary origin,
+    /// monotonic.
     pub fn with_clock(self, clock_s: impl Fn() -> f64 + Send + Sync + 'static) -> Attachments {
         Attachments { clock_s: Some(Box::new(clock_s)), ..self }
     }
 
-    /// Registers `attachment` under `name`, replacing an earlier one.
+    /// Registers `attachment` under `name`, replacing one registered earlier under that name.
     ///
     /// The name is what stands before the `@` in the domain (`fn` of `fn@lib.so`), or the module's PDDL name.
     pub fn insert(&mut self, name: impl Into<String>, attachment: impl Attachment + 'static) {
         self.insert_shared(name, Arc::new(attachment));
     }
 
-    /// [`Attachments::insert`] for a shared attachment.
+    /// Like [`Attachments::insert`], for an attachment that the caller shares.
     pub fn insert_shared(&mut self, name: impl Into<String>, attachment: Arc<dyn Attachment>) {
         let registered = Registered {
             reads: attachment.reads(),
@@ -122,7 +123,8 @@ impl Attachments {
         self.registered.insert(name.into(), registered);
     }
 
-    /// Registered name for a module, from its binding (`fn@lib.so` or `fn`) and its PDDL name.
+    /// Name of the registered attachment that a module's binding (`fn@lib.so` or `fn`) or PDDL name
+    /// selects; `None` if there is none.
     ///
     /// The exact spelling of the binding is preferred, then its part before the `@`, then the PDDL name, then either
     /// without regard to case.
@@ -138,23 +140,23 @@ impl Attachments {
         found.map(|(name, _)| name.as_str())
     }
 
-    /// Registered names in order.
+    /// Names of all registered attachments, in alphabetical order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.registered.keys().map(String::as_str)
     }
 
-    /// The declared read-set of a registered attachment (empty for an unknown name).
+    /// Declared read set of the attachment `name` (empty for an unknown name).
     pub fn reads(&self, name: &str) -> &[Read] {
         self.registered.get(name).map_or(&[], |registered| &registered.reads)
     }
 
-    /// Counter for answers cached by the caller itself.
+    /// Counter of cached answers of the attachment `name`, for a caller with a cache of its own.
     pub(crate) fn hits(&self, name: &str) -> Option<&AtomicU64> {
         self.registered.get(name).map(|registered| &registered.hits)
     }
 
-    /// Passes one entry of `:moduleoptions` to the attachment `name`; `Ok(false)` if none has that
-    /// name.
+    /// Passes one entry of `:moduleoptions` to the attachment `name`; `Ok(false)` if no attachment
+    /// has that name.
     pub fn configure(&self, name: &str, options: &[String]) -> Result<bool, AttachmentError> {
         let Some(found) = self.resolve(name, name) else { return Ok(false) };
         let Some(registered) = self.registered.get(found) else { return Ok(false) };
@@ -166,7 +168,7 @@ impl Attachments {
         })
     }
 
-    /// Answers a call from the cache, or by the attachment `name`.
+    /// Answers a call from the cache, or else by asking the attachment `name`.
     ///
     /// Errors are not cached. An answer that does not fit the module's kind is a [`CallError::WrongAnswer`].
     pub fn call(&self, name: &str, call: &Call, level: Level) -> Result<Answer, AttachmentError> {
@@ -240,7 +242,7 @@ impl Attachments {
             .collect()
     }
 
-    /// Counts since registration, by attachment.
+    /// Call counts of each attachment since its registration, by name.
     pub fn statistics(&self) -> BTreeMap<String, CallStatistics> {
         let counts = self.registered.iter().map(|(name, registered)| (name.clone(), registered.statistics()));
         counts.collect()

@@ -1,4 +1,4 @@
-//! Sources of the facts that a call reads.
+//! State variables, numbers and constants from which the values of a call's readings are taken.
 
 use std::sync::Arc;
 
@@ -9,30 +9,31 @@ use crate::ground::{GroundTask, Meaning, NumericId, VariableId};
 use crate::semantics::calls::{ReadSymbol, instances};
 use crate::task::{ObjectId, Task};
 
-/// Source of a reading.
+/// Place from which the value of a reading is taken.
 #[derive(Debug, Clone)]
 pub(super) enum Origin {
-    /// Truth of a variable having a value.
+    /// A predicate: true if the variable has this value.
     Fact(VariableId, u32),
-    /// The number.
+    /// A numeric fluent: the number with this id.
     Number(NumericId),
-    /// Object that the variable's value means.
+    /// An object fluent: the object that the variable's value stands for.
     Object(VariableId),
     /// Constant, equal in every state.
     Constant(FactValue),
 }
 
-/// Declared reading without its value: symbol, arguments, and origin of the value in a state.
+/// Declared reading without its value: symbol name, argument names, and the place of the value in a
+/// state.
 pub(super) type Source = (Arc<str>, Arc<[Arc<str>]>, Origin);
 
-/// Everything that a call reads.
+/// Readings of one call, with the state variables and numbers behind them.
 #[derive(Debug, Default)]
 pub(super) struct Sources {
-    /// Sources in the order of the declaration.
+    /// Readings in the order of the declaration.
     pub list: Vec<Source>,
-    /// State variables of the sources, sorted, without duplicates.
+    /// Ids of all state variables in `list`, sorted, without duplicates.
     pub variables: Vec<VariableId>,
-    /// Numeric fluents of the sources, sorted, without duplicates.
+    /// Ids of all numeric fluents in `list`, sorted, without duplicates.
     pub numbers: Vec<NumericId>,
 }
 
@@ -54,7 +55,7 @@ impl Sources {
     }
 }
 
-/// Ground terms by name, with the origin of each value.
+/// State variables and numbers of a ground task, by symbol id and argument object ids.
 #[derive(Default)]
 pub(super) struct Terms {
     facts: FxHashMap<(u32, Vec<u32>), (VariableId, u32)>,
@@ -84,7 +85,8 @@ impl Terms {
         terms
     }
 
-    /// Ground readings of one declared read, in the task's object order.
+    /// Readings that one declared read means for a call with these arguments, in the order of the
+    /// task's objects.
     pub(super) fn readings(
         &self,
         task: &Task,

@@ -1,4 +1,4 @@
-//! Findings on very long lines are drawn with an excerpt around the span.
+//! Drawing of findings on very long lines: only an excerpt around the span is shown.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -7,12 +7,13 @@ use super::{Diagnostic, Severity, Source, Span};
 
 /// Length above which a line is shortened, bytes.
 const LONG_LINE_BYTES: usize = 400;
-/// Number of characters shown around a span.
+/// Number of characters shown on each side of a span.
 const AROUND: usize = 40;
-/// Maximum number of characters shown of a span.
+/// Maximum number of characters of the span itself that are shown.
 const MOST_SHOWN: usize = 60;
 
-/// Line and column of a byte, both from 1.
+/// Line and column (in characters) of a byte offset, both from 1; (1, 1) for an offset outside the
+/// text.
 pub(super) fn line_and_column(text: &str, byte: usize) -> (usize, usize) {
     let Some(before) = text.get(..byte) else { return (1, 1) };
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
@@ -27,7 +28,8 @@ pub(super) fn is_needed(sources: &[Source], finding: &Diagnostic) -> bool {
     })
 }
 
-/// Line in which a span begins; a span of several lines extends to its end.
+/// Byte range of the line in which a span begins; a span over several lines extends the range to
+/// the line in which it ends.
 fn line_of(text: &str, span: Span) -> Range<usize> {
     let at = (span.start as usize).min(text.len());
     let (before, after) = (text.as_bytes()[..at].iter(), text.as_bytes()[at..].iter());
@@ -59,7 +61,8 @@ pub(super) fn draw(sources: &[Source], finding: &Diagnostic) -> String {
     drawn
 }
 
-/// Single-line excerpt around a span, with the span's column and width in the excerpt.
+/// Excerpt of one line around a span, with the span's column and width in the excerpt, in
+/// characters (column from 0).
 fn excerpt(text: &str, span: Span) -> (String, usize, usize) {
     let line = line_of(text, span);
     let start = (span.start as usize).clamp(line.start, line.end);

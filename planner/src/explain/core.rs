@@ -1,15 +1,18 @@
-//! Minimal unsolvable subset of a goal.
+//! Search for a minimal unsolvable subset of a goal's parts.
 
 use crate::task::{Condition, Task};
 
 use super::{Explanation, together};
 
-/// Maximum number of goal parts for the subset search.
+/// Maximum number of goal parts for which the search is tried.
 const MOST_PARTS: usize = 24;
 
-/// Drops goal parts while `unsolvable` still proves the remainder unreachable; returns the
-/// remainder. The subset is minimal if every query is decided. `only_lost`: all parts are reachable
-/// under delete relaxation.
+/// Drops goal parts one after the other while `unsolvable` still proves that the rest cannot be
+/// reached, and explains with the remaining parts; `None` if the goal is no conjunction or has too
+/// many parts.
+///
+/// The remaining subset is minimal if every call of `unsolvable` comes to a decision. `only_lost`:
+/// the goal is reachable under delete relaxation.
 pub(crate) fn narrowed(
     task: &Task,
     only_lost: bool,

@@ -5,7 +5,8 @@ use crate::ground::{GroundDurationBound, GroundExpression, GroundTask, Relation}
 use crate::plan::number_text;
 use crate::task::Task;
 
-/// Contradicting minimum and maximum duration, seconds, from state-independent bounds.
+/// Minimum and maximum duration, seconds, from the constant bounds of an action, if they contradict
+/// each other; else `None`.
 fn contradiction(bounds: &[GroundDurationBound]) -> Option<(f64, f64)> {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {
@@ -20,7 +21,7 @@ fn contradiction(bounds: &[GroundDurationBound]) -> Option<(f64, f64)> {
     (least_s > most_s).then_some((least_s, most_s))
 }
 
-/// Findings about actions without an instance that has a duration.
+/// Findings about actions all of whose ground instances have contradictory duration bounds.
 pub(super) fn without_duration(task: &Task, ground: &GroundTask) -> Vec<Diagnostic> {
     let mut findings = Vec::new();
     for (schema, action) in (0..).zip(&task.actions) {

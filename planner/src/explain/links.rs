@@ -1,5 +1,5 @@
-//! Causal chain of obstacles to a goal part: its achievers, their unreachable preconditions, down
-//! to predicates without achievers.
+//! Causal chain that explains an unreachable goal part: actions that could achieve it, the
+//! preconditions that these lack, and so on down to a predicate that nothing achieves.
 
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::walk::{self, Part};
@@ -10,8 +10,7 @@ use crate::task::{
 
 use super::UNSOLVABLE;
 
-/// Predicates reachable under delete relaxation with arguments ignored, and the obstacle of each
-/// unreachable action.
+/// Predicates reachable under delete relaxation when their arguments are ignored.
 pub(super) struct Reach<'t> {
     task: &'t Task,
     predicates: Vec<bool>,
@@ -48,8 +47,8 @@ impl<'t> Reach<'t> {
         grown
     }
 
-    /// First unreachable atom of an action's conditions; conditions over all may use the action's
-    /// own start effects.
+    /// First atom in the conditions of an action that is unreachable, `None` if there is none.
+    /// Conditions over all and at end may use what the action adds at its start.
     fn lacks(&self, action: &'t Action) -> Option<&'t Atom> {
         let own: Vec<PredicateId> = action
             .effects
@@ -86,7 +85,8 @@ impl<'t> Reach<'t> {
     }
 }
 
-/// Predicates that an action can add, including those written by effect modules.
+/// Predicates that an action can add, including those that effect modules write, each with its
+/// place in the text.
 fn added<'t>(task: &'t Task, action: &'t Action) -> impl Iterator<Item = (PredicateId, Span)> + 't {
     let effects = action.effects.start.iter().chain(&action.effects.end);
     effects.flat_map(|effect| match &effect.change {
@@ -104,7 +104,8 @@ fn added<'t>(task: &'t Task, action: &'t Action) -> impl Iterator<Item = (Predic
     })
 }
 
-/// Finding about a goal part without achievers; `None` if some action might achieve it.
+/// Finding about a goal part that nothing can achieve; `None` if some action might achieve it.
+/// Predicates that the finding explains are added to `told`.
 pub(super) fn goal_part(
     task: &Task,
     reach: &Reach,
@@ -154,15 +155,16 @@ pub(super) fn goal_part(
     }
 }
 
-/// Finding about an unreachable goal atom, with the chain of obstacles down to predicates without
-/// achievers.
+/// Finding about an unreachable goal atom, with the chain of obstacles down to a predicate that
+/// nothing achieves.
 fn nobody(task: &Task, reach: &Reach, goal: &Atom, told: &mut Vec<PredicateId>) -> Diagnostic {
     let message = format!("the goal {} can never be reached", atom_text(task, goal));
     let finding = Diagnostic::error(UNSOLVABLE, message, goal.span, "asked for here");
     trace(task, reach, finding, goal.predicate, told)
 }
 
-/// Follows the obstacles of a predicate down to predicates without achievers.
+/// Adds labels to a finding: the chain of obstacles from the predicate `first` down to one that
+/// nothing achieves. All predicates of the chain are added to `told`.
 fn trace(
     task: &Task,
     reach: &Reach,
@@ -210,7 +212,7 @@ fn trace(
     ))
 }
 
-/// The functions that an expression reads.
+/// Appends the functions that an expression reads.
 fn fluents(expression: &Expression, functions: &mut Vec<FunctionId>) {
     walk::expression(expression, &mut |part| {
         if let Part::Expression(Expression::Fluent(fluent)) = part {

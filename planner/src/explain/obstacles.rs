@@ -1,11 +1,11 @@
-//! Findings about atoms that grounding never reached.
+//! Findings about atoms that grounding found unreachable.
 
 use crate::diagnostic::{Diagnostic, Span};
 use crate::ground::{MissingAtom, Obstacle};
 use crate::model::walk::{self, Part};
 use crate::task::{Action, Condition, Task, Term};
 
-/// Span at which a condition asks for an atom.
+/// Span at which a condition mentions an atom with these arguments (`None`: any object).
 fn asked(condition: &Condition, (predicate, arguments): (u32, &[Option<u32>])) -> Option<Span> {
     let same = |term: &Term, object: &Option<u32>| match term {
         Term::Object(own) => object.is_none_or(|object| own.0 == object),
@@ -22,7 +22,7 @@ fn asked(condition: &Condition, (predicate, arguments): (u32, &[Option<u32>])) -
     found
 }
 
-/// Span at which an action asks for the first of some atoms.
+/// Span at which an action's conditions mention one of some atoms: the first that they do mention.
 fn needed(action: &Action, missing: &[MissingAtom]) -> Option<Span> {
     let condition = &action.condition;
     let asks = |(predicate, arguments): &MissingAtom| {
@@ -33,8 +33,8 @@ fn needed(action: &Action, missing: &[MissingAtom]) -> Option<Span> {
     missing.iter().find_map(asks)
 }
 
-/// Finding about an atom that never holds: the conditions that need it, its achievers, and the
-/// atoms they lack.
+/// Finding about an atom that never holds: where it is needed, which actions and rules could
+/// achieve it, and which atoms these lack.
 pub(super) fn obstacle_finding(
     task: &Task,
     obstacle: &Obstacle,

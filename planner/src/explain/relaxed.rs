@@ -1,5 +1,5 @@
-//! Delete-relaxed reachability of the goal, counting certain effects only. Numeric and attachment
-//! conditions are not evaluated; goals that need them count as unreachable.
+//! Delete-relaxed reachability of the goal, counting only effects that are certain. Numeric
+//! conditions and attachments are not evaluated: conditions that need them count as unreachable.
 
 use crate::ground::{
     Change, Conjunction, DurativeAction, GroundAction, GroundDurationBound, GroundEffect, GroundExpression,
@@ -8,7 +8,7 @@ use crate::ground::{
 use crate::model::agreement::contradictions;
 use crate::model::relation::Relation;
 
-/// True if the goal is reachable under delete relaxation; false if unknown.
+/// True if the goal is reachable under delete relaxation; false if unreachable or unknown.
 pub(super) fn could_be_had(ground: &GroundTask) -> bool {
     let mut had = Had::new(ground);
     while had.grow() {}
@@ -18,9 +18,9 @@ pub(super) fn could_be_had(ground: &GroundTask) -> bool {
 /// Facts and actions reached so far.
 struct Had<'g> {
     ground: &'g GroundTask,
-    /// Reached facts, by variable and value.
+    /// True for reached facts, by variable and value.
     facts: Vec<Vec<bool>>,
-    /// Applied actions: instantaneous and durative ones.
+    /// True for actions applied so far: `[0]` instantaneous, `[1]` durative, by index.
     taken: [Vec<bool>; 2],
 }
 
@@ -36,7 +36,7 @@ impl<'g> Had<'g> {
         had
     }
 
-    /// Applies every action once more; true if this reached anything new.
+    /// Applies every applicable action and axiom once; true if a fact or action was newly reached.
     fn grow(&mut self) -> bool {
         let ground = self.ground;
         let before = self.count();
@@ -70,7 +70,7 @@ impl<'g> Had<'g> {
         self.holds_after(&[], condition)
     }
 
-    /// True if a condition holds after these effects.
+    /// True if a condition holds with the facts reached and those that `effects` set.
     fn holds_after(&self, effects: &[GroundEffect], condition: &Conjunction) -> bool {
         let given = |fact: &GroundFact| {
             let mut outcomes = self.happening(effects);
@@ -94,8 +94,8 @@ impl<'g> Had<'g> {
             && lasts(&action.duration)
     }
 
-    /// True if effects certainly have a result: known amounts are added to known numbers, and each
-    /// object gets one value.
+    /// True if effects certainly have a result: constant amounts are added to defined numbers, and
+    /// each object fluent gets one value.
     fn can_happen(&self, effects: &[GroundEffect]) -> bool {
         let kinds = effects.iter().filter_map(|effect| match effect.outcome {
             GroundOutcome::Change { fluent, change, amount: GroundExpression::Constant(amount) } => {
@@ -124,7 +124,7 @@ impl<'g> Had<'g> {
         }
     }
 
-    /// Outcomes of the effects whose conditions hold.
+    /// Outcomes of the effects whose conditions are reached.
     fn happening<'e>(&self, effects: &'e [GroundEffect]) -> impl Iterator<Item = &'e GroundOutcome> {
         let holds = |when: &GroundWhen| {
             [&when.here, &when.at_start, &when.over_all].into_iter().all(|part| self.holds(part))
@@ -145,7 +145,7 @@ impl<'g> Had<'g> {
     }
 }
 
-/// True if constant duration bounds exclude every duration.
+/// True if all duration bounds are constants and allow some positive duration.
 fn lasts(bounds: &[GroundDurationBound]) -> bool {
     let (mut least_s, mut most_s) = (0.0_f64, f64::INFINITY);
     for bound in bounds {

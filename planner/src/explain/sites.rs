@@ -1,10 +1,11 @@
-//! Calls of a module in a task's text.
+//! Places in a task's text that call a module.
 
 use crate::diagnostic::Span;
 use crate::model::walk::{self, Part};
 use crate::task::{ModuleId, Task};
 
-/// All calls of a module in text order, with the caller and the span.
+/// All calls of a module in text order, each with the caller in words (such as "the goal") and the
+/// span.
 pub(crate) fn sites(task: &Task, module: ModuleId) -> Vec<(String, Span)> {
     let mut found = Vec::new();
     for action in &task.actions {

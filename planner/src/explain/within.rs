@@ -1,4 +1,4 @@
-//! Explanation of deadlines in constraints that no plan can meet.
+//! Explanation of `within` constraints whose deadline no plan can meet.
 
 use crate::diagnostic::Diagnostic;
 use crate::ground::{Earliest, GroundTask, Keep, WITNESS, compile, ground_with};
@@ -7,8 +7,8 @@ use crate::task::{Modal, Task, Trajectory};
 
 use super::Explanation;
 
-/// Explanation that a condition cannot become true within a constraint's deadline; `None` if
-/// unknown. `free`: task without preferences and constraints.
+/// Explanation that the condition of a `within` constraint cannot become true by the constraint's
+/// deadline; `None` if that is not proven. `free`: the task without preferences and constraints.
 pub(crate) fn too_slow(
     task: &Task,
     free: Task,
@@ -42,14 +42,15 @@ fn is_within(constraint: &&Trajectory) -> bool {
     constraint.operator == Modal::Within && constraint.preference.is_none()
 }
 
-/// Witness actions of a constraint in the compiled task; one instance must observe the condition in
-/// time.
+/// Indices of the witness actions that the compilation made for a constraint; one of these must be
+/// applied while the condition holds, in time.
 fn witnesses(compiled: &Task, constraint: &Trajectory) -> impl Iterator<Item = u32> {
     let own = |action: &crate::task::Action| action.name == WITNESS && action.span == constraint.span;
     (0..).zip(&compiled.actions).filter(move |(_, action)| own(action)).map(|(schema, _)| schema)
 }
 
-/// Earliest time at which an action can observe its condition, seconds.
+/// Lower bound on the time at which some instance of an action is applicable, seconds from the
+/// plan's start; 0 without instances.
 fn seen_s(grounded: &GroundTask, earliest: &Earliest, schema: u32) -> f64 {
     let own = grounded.actions.iter().filter(|action| action.origin.schema == schema);
     own.map(|action| earliest.of(&action.condition)).reduce(f64::min).unwrap_or_default()

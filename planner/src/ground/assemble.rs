@@ -17,7 +17,7 @@ use super::task::{
 };
 use super::variables::{Choice, Encoding, drop_none, encode, mark_none, used_none};
 
-/// New numbers for the numeric fluents that are still used.
+/// New indices of the numeric fluents that are still used, by old index.
 #[derive(Default)]
 struct Renumber {
     numerics: FxHashMap<u32, u32>,
@@ -104,8 +104,8 @@ pub(super) fn assemble(
     ground
 }
 
-/// Mutex groups that may share one variable; an atom deleted by a timed literal gets its own
-/// variable, because it may already be false.
+/// Mutex groups whose atoms may share one variable. Atoms that a timed literal deletes are left
+/// out: they may be false already when it comes, and then it must change nothing.
 fn shared(raw: &RawTask, groups: &Groups) -> Vec<Vec<u32>> {
     let lost = raw.timed.iter().flat_map(|(_, deeds)| deeds).filter_map(|deed| match deed {
         Deed::Delete(atom) => Some(*atom),
@@ -116,7 +116,7 @@ fn shared(raw: &RawTask, groups: &Groups) -> Vec<Vec<u32>> {
     groups.found.iter().map(kept).collect()
 }
 
-/// Drops actions that always give an object fluent several values at once.
+/// Drops actions that always give one object function several values at once.
 fn drop_contested(
     variables: &[Variable],
     actions: &mut Vec<GroundAction>,
@@ -247,7 +247,7 @@ fn timed(encoding: &Encoding, time_s: f64, deeds: &[Deed]) -> TimedEffect {
     TimedEffect { time_s, outcomes: outcomes.collect() }
 }
 
-/// Initial numbers; NaN if undefined.
+/// Initial values of the numeric fluents; NaN if undefined.
 pub(super) fn initial_numbers(make: &Instantiate<'_>) -> Vec<f64> {
     let number = |f: &NumericFluent| {
         make.statics.numbers.get(&(f.function, f.arguments[..].into())).copied().unwrap_or(f64::NAN)
@@ -255,7 +255,7 @@ pub(super) fn initial_numbers(make: &Instantiate<'_>) -> Vec<f64> {
     make.numerics.iter().map(number).collect()
 }
 
-/// Drops unreferenced numeric fluents and calls; keeps all of them if attachments may read them.
+/// Drops comparisons and numeric fluents that nothing refers to. With `keep` nothing is dropped.
 fn compact(ground: &mut GroundTask, keep: bool) {
     if keep {
         return;
@@ -371,7 +371,8 @@ fn for_expressions(ground: &mut GroundTask, body: &mut dyn FnMut(&mut GroundExpr
     }
 }
 
-/// Sets the derived variables of the initial state, calls counted as false.
+/// Evaluates the derived variables of the initial state; conditions with attachment calls count as
+/// false.
 pub(super) fn derive_initial(ground: &mut GroundTask) {
     let mut from = 0;
     while from < ground.axioms.len() {
@@ -408,8 +409,9 @@ fn holds_without_calls(ground: &GroundTask, condition: &Conjunction) -> bool {
 }
 
 impl GroundExpression {
-    /// Value over these numbers; NaN if a fluent is undefined or the expression needs more than
-    /// numbers.
+    /// Value of the expression given the values of the numeric fluents; NaN if a fluent is
+    /// undefined or if the expression contains a call, a duration, the total time or a violation
+    /// count.
     pub fn number(&self, numbers: &[f64]) -> f64 {
         match self {
             GroundExpression::Constant(value) => *value,
@@ -428,15 +430,15 @@ impl GroundExpression {
 }
 
 impl Instantiate<'_> {
-    /// True if effects, rules or timed literals change the atom's predicate.
+    /// True if effects, rules or timed literals change atoms of this atom's predicate.
     fn changes(&self, atom: u32) -> bool {
         let predicate = self.atoms.predicate(atom) as usize;
         predicate < self.statics.task.predicates.len() + self.statics.task.functions.len()
             && self.statics.fluent[predicate]
     }
 
-    /// True if the atom belongs to a plain predicate; an object function's atom may be replaced by
-    /// another value.
+    /// True if the atom belongs to a predicate. An atom of an object function may cease to hold
+    /// without a delete: another value replaces it.
     fn atoms_hold(&self, atom: usize) -> bool {
         atom < self.atoms.len()
             && (self.atoms.predicate(atom as u32) as usize) < self.statics.task.predicates.len()

@@ -1,11 +1,13 @@
-//! Ground atoms by number, with an index for every combination of bound arguments that a join asks for.
+//! Ground atoms, numbered, with one hash index for every combination of bound arguments that a join
+//! asks for.
 
 use rustc_hash::FxHashMap;
 
-/// No object: an unbound slot.
+/// Marks an argument or slot that is bound to no object, and the end of a list of rows.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Atoms of one predicate that agree on some arguments, ascending.
+/// Rows of one predicate that agree on the arguments of an index, as a linked list in ascending
+/// order.
 #[derive(Clone, Copy)]
 struct Chain {
     first: u32,
@@ -14,18 +16,18 @@ struct Chain {
 }
 
 struct Index {
-    /// Bit `i`: argument `i` is part of the key.
+    /// Arguments that form the key: bit `i` for argument `i`.
     mask: u32,
     chains: FxHashMap<u64, Chain>,
-    /// Next row with the same key, by row, or `NONE`.
+    /// Next row with the same key, by row; `NONE` after the last.
     next: Vec<u32>,
 }
 
-/// Atoms of one predicate; a row is an atom's index in the table.
+/// Atoms of one predicate, one per row, in the order of their discovery.
 struct Table {
     arity: usize,
     arguments: Vec<u32>,
-    /// Number of the atom by row.
+    /// Atom number, by row.
     atoms: Vec<u32>,
     indexes: Vec<Index>,
 }
@@ -33,9 +35,9 @@ struct Table {
 /// All reachable atoms, numbered in order of discovery.
 pub(super) struct Atoms {
     tables: Vec<Table>,
-    /// Predicate and row, by atom.
+    /// Predicate and row, by atom number.
     places: Vec<(u32, u32)>,
-    /// Bits per object in a key of arguments.
+    /// Number of bits by which a key is rotated for each argument.
     bits: u32,
 }
 
@@ -44,7 +46,7 @@ fn key_of(bits: u32, arguments: impl Iterator<Item = u32>) -> u64 {
 }
 
 impl Atoms {
-    /// Empty set of atoms, for this many predicates and objects.
+    /// Creates an empty set of atoms over this many predicates and objects.
     pub(super) fn new(predicates: usize, objects: usize) -> Self {
         let table = || Table {
             arity: 0,
@@ -61,12 +63,12 @@ impl Atoms {
         self.places.len()
     }
 
-    /// The predicate of an atom.
+    /// Predicate of an atom.
     pub(super) fn predicate(&self, atom: u32) -> u32 {
         self.places[atom as usize].0
     }
 
-    /// The arguments of an atom.
+    /// Arguments of an atom.
     pub(super) fn arguments(&self, atom: u32) -> &[u32] {
         let (predicate, row) = self.places[atom as usize];
         self.tables[predicate as usize].row(row)
@@ -88,7 +90,7 @@ impl Atoms {
         &self.tables[predicate as usize].atoms
     }
 
-    /// Number of the atom, if reachable.
+    /// Number of the atom; `None` if the set does not contain it.
     pub(super) fn find(&self, predicate: u32, arguments: &[u32]) -> Option<u32> {
         let table = &self.tables[predicate as usize];
         let index = &table.indexes[0];
@@ -102,7 +104,7 @@ impl Atoms {
         None
     }
 
-    /// Inserts the atom; returns its number and true if the atom is new.
+    /// Inserts an atom; returns its number, and true if it is new.
     pub(super) fn insert(&mut self, predicate: u32, arguments: &[u32]) -> (u32, bool) {
         if let Some(atom) = self.find(predicate, arguments) {
             return (atom, false);
@@ -120,8 +122,9 @@ impl Atoms {
         (atom, true)
     }
 
-    /// Upper bound on the number of the predicate's atoms that match the bound arguments (others
-    /// `NONE`); keys may collide when the arguments exceed one word.
+    /// Upper bound on the number of atoms of the predicate that match the bound arguments of
+    /// `pattern` (the others are `NONE`). Not exact, because keys of different arguments may
+    /// collide.
     pub(super) fn count(&mut self, predicate: u32, pattern: &[u32]) -> u32 {
         let mask = mask_of(pattern);
         if mask == 0 {
@@ -132,7 +135,8 @@ impl Atoms {
         self.tables[predicate as usize].indexes[index].chains.get(&key).map_or(0, |c| c.length)
     }
 
-    /// First row that matches the bound arguments, and the index for continuing.
+    /// Index for these bound arguments and its first row that may match them (keys may collide);
+    /// the row is `NONE` if there is none.
     pub(super) fn first(&mut self, predicate: u32, pattern: &[u32]) -> (usize, u32) {
         let mask = mask_of(pattern);
         if mask == 0 {
@@ -144,7 +148,7 @@ impl Atoms {
         (index, self.tables[predicate as usize].indexes[index].chains.get(&key).map_or(NONE, |c| c.first))
     }
 
-    /// Next row in the index.
+    /// Row after `row` in an index that [`Atoms::first`] returned; `NONE` at the end.
     pub(super) fn next(&self, predicate: u32, index: usize, row: u32) -> u32 {
         let table = &self.tables[predicate as usize];
         if index == usize::MAX {
@@ -153,7 +157,7 @@ impl Atoms {
         table.indexes[index].next[row as usize]
     }
 
-    /// Number and arguments of a row.
+    /// Atom number and arguments of a row.
     pub(super) fn row(&self, predicate: u32, row: u32) -> (u32, &[u32]) {
         let table = &self.tables[predicate as usize];
         (table.atoms[row as usize], table.row(row))

@@ -1,4 +1,4 @@
-//! Grounding of a lifted task, step by step.
+//! Steps of grounding, from the lifted to the grounded task.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use tracing::debug_span;
@@ -24,18 +24,19 @@ use super::task::{GroundDurationBound, GroundExpression, GroundTask, NumericFlue
 /// Reason why a task was not grounded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GroundError {
-    /// The caller's stop signal.
+    /// The caller's stop signal came.
     #[error("stopped while grounding")]
     Stopped,
-    /// More atoms and actions than memory allows.
+    /// The memory limit was exceeded: by more than this number of ground atoms and actions.
     #[error("grounding needs more than the memory allowed: over {0} ground atoms and actions")]
     TooLarge(usize),
-    /// A limit of the implementation.
+    /// The named predicate, function or action has more arguments than the implementation can
+    /// handle.
     #[error("`{0}` has more than 31 arguments, values of functions included; split it")]
     TooManyArguments(String),
 }
 
-/// Approximate memory per ground action until the search compiles the task, bytes.
+/// Approximate memory per ground atom or action until the search compiles the task, bytes.
 const BYTES_AN_INSTANCE: usize = 600;
 
 /// Grounds a task: relaxed reachability, evaluation of static parts, removal of unreachable and
@@ -51,18 +52,19 @@ pub fn ground(
     ground_with(task, memory_limit_bytes, Keep::Relevant, stop)
 }
 
-/// Parts of a grounded task that are kept.
+/// Parts of a grounded task that are kept; others are removed as irrelevant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Keep {
-    /// Parts that matter to the goal.
+    /// Parts on which the goal or the metric depends.
     Relevant,
-    /// Those, and the fluents of the metric in the state.
+    /// The same parts, with the numeric fluents of the metric as part of the state instead of as
+    /// action costs.
     Metric,
-    /// Parts that matter to any goal.
+    /// All parts on which any goal may depend.
     All,
 }
 
-/// Grounds a task; `kept` says what is left out.
+/// Grounds a task and keeps the parts that `kept` selects.
 pub(crate) fn ground_with(
     task: &Task,
     memory_limit_bytes: Option<usize>,
@@ -141,7 +143,8 @@ pub(crate) fn ground_with(
     Ok(ground)
 }
 
-/// Object function and its arguments, by atom of an object function.
+/// Number of the object function instance (function with its arguments) to which each of its atoms
+/// belongs, by atom.
 fn valued(task: &Task, atoms: &Atoms) -> FxHashMap<u32, u32> {
     let functions = task.predicates.len()..task.predicates.len() + task.functions.len();
     let mut objects: FxHashMap<(u32, &[u32]), u32> = FxHashMap::default();
@@ -208,7 +211,8 @@ fn statics<'a>(
     Statics { task, fluent, written, numbers, tries: Tries::new(stop) }
 }
 
-/// Predicate and arguments of an object function with a value.
+/// Atom that states that an object function has a value: its predicate, and its arguments with the
+/// value last.
 fn object_atom(task: &Task, fluent: &crate::task::GroundFluent, value: u32) -> (u32, Vec<u32>) {
     let mut arguments: Vec<u32> = fluent.arguments.iter().map(|o| o.0).collect();
     arguments.push(value);
@@ -232,7 +236,8 @@ fn insert_initial(task: &Task, atoms: &mut Atoms) {
     }
 }
 
-/// Marks atoms that hold initially and that no instance deletes: they always hold.
+/// Marks the atoms that hold initially and that nothing deletes, and which therefore hold in every
+/// state.
 fn mark_always(
     task: &Task,
     normal: &Normal,
@@ -285,7 +290,7 @@ fn mark_always(
     Ok(())
 }
 
-/// Effect without its condition.
+/// Copy of an effect without its condition.
 fn unconditional(effect: &Effect_) -> Effect_ {
     let nothing = || Formula::And(Vec::new());
     Effect_ {
@@ -488,7 +493,7 @@ fn later(
     Some(Later { over_all, end, end_effects, flows, duration })
 }
 
-/// True if effects need a number that never has a value.
+/// True if an unconditional effect has an amount that is constant and not finite (undefined).
 fn never(effects: &[RawEffect]) -> bool {
     let undefined =
         |amount: &GroundExpression| matches!(amount, GroundExpression::Constant(value) if !value.is_finite());
@@ -541,7 +546,7 @@ fn timed(task: &Task, make: &mut Instantiate<'_>) -> Vec<(f64, Vec<Deed>)> {
     timed
 }
 
-/// Atoms whose absence some condition asks for.
+/// Marks the atoms that some condition requires to be false.
 fn absences(raw: &RawTask) -> Vec<bool> {
     let mut unwanted = vec![false; raw.init.len()];
     let mut mark = |clauses: &Clauses| {

@@ -1,7 +1,8 @@
-//! Earliest times of facts in the delete relaxation, in which only facts of timed literals end.
+//! Earliest times at which facts can hold, under a delete relaxation in which only facts of timed
+//! literals ever end.
 //!
-//! Labels are times and spread from what holds at first (Dijkstra 1959): what an operator gives comes no earlier than all that
-//! it needs, and never where something that it needs is over by then.
+//! Times spread from the initial facts (Dijkstra 1959): an operator's effects come no earlier than
+//! all its preconditions, and never if one of the preconditions has ended by then.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,30 +14,30 @@ use super::task::{
     Place, Relation,
 };
 
-/// Times that differ by less than this are equal, seconds.
+/// Times that differ by less than this count as equal, seconds.
 const ROUNDING_S: f64 = 1e-6;
 
 /// An operator of the relaxed task.
 struct Operator {
     missing: u32,
-    /// Latest label among the operator's preconditions, so far.
+    /// Latest earliest time among the preconditions that are known so far, seconds.
     base_s: f64,
-    /// Time after which one of the operator's preconditions is false for good, seconds.
+    /// Earliest end among the operator's preconditions, seconds; infinite if none ever ends.
     until_s: f64,
     gives: Vec<u32>,
 }
 
-/// Earliest times, in seconds from the start of the plan.
+/// Earliest times of all facts, seconds from the start of the plan.
 pub(crate) struct Earliest<'g> {
     ground: &'g GroundTask,
-    /// Proposition of each variable's value 0; propositions of started actions follow after all
-    /// facts.
+    /// Index of the proposition for value 0 of each variable; its other values follow. Propositions
+    /// "this durative action has started" come after all facts.
     offsets: Vec<u32>,
-    /// Time from which each proposition is false for good, seconds; infinite for never.
+    /// Time from which each fact is false for good, seconds; infinite if it never ends.
     until_s: Vec<f64>,
     operators: Vec<Operator>,
-    /// Preconditions: proposition, the operator that needs it, and delay to the operator's effects,
-    /// seconds.
+    /// Each precondition of an operator: its proposition, the operator's index, and the delay from
+    /// the precondition to the operator's effects, seconds.
     waits: Vec<(u32, (u32, f64))>,
     labels_s: Vec<f64>,
 }
@@ -64,14 +65,14 @@ impl<'g> Earliest<'g> {
         earliest
     }
 
-    /// Earliest time at which all facts of a condition can hold, each taken alone, seconds;
-    /// infinite for never.
+    /// Lower bound on the time at which a condition can hold, seconds: the latest of its facts'
+    /// earliest times. Infinite if one of them never holds.
     pub(crate) fn of(&self, condition: &Conjunction) -> f64 {
         let labels = condition.facts.iter().map(|&fact| self.labels_s[self.place(fact) as usize]);
         labels.fold(0.0, f64::max)
     }
 
-    /// True if no needed fact is false for good before the last timed literal.
+    /// True if no fact of the condition is ended for good by a timed literal.
     pub(crate) fn lasts(&self, condition: &Conjunction) -> bool {
         condition.facts.iter().all(|&fact| self.until_s[self.place(fact) as usize].is_infinite())
     }
@@ -129,7 +130,8 @@ impl<'g> Earliest<'g> {
         }
     }
 
-    /// Adds operators for conditional effects, a given time after an action's start.
+    /// Adds operators for the effects of an action. `started`: the proposition that a durative
+    /// action has started and the least time from there to the effects, seconds.
     fn effects(&mut self, needs: &[&[GroundFact]], started: Option<(u32, f64)>, effects: &[GroundEffect]) {
         let plain = effects.iter().filter(|effect| effect.when.is_none());
         let gives: Vec<u32> = plain.flat_map(|effect| self.given(&effect.outcome)).collect();
@@ -172,7 +174,8 @@ impl<'g> Earliest<'g> {
         }
     }
 
-    /// Records the end times of facts that only timed literals add.
+    /// Determines the times at which facts end that no operator achieves, only the initial state
+    /// and timed literals, and from these the end of each operator.
     fn endings(&mut self) {
         let mut made = vec![false; self.until_s.len()];
         let facts = made.len();

@@ -1,4 +1,5 @@
-//! Groups of atoms that share a variable: synthesised mutex groups and object functions.
+//! Groups of atoms that may share a variable: mutex groups found by invariant synthesis, and the
+//! values of object functions.
 
 use rustc_hash::FxHashMap;
 use tracing::debug_span;
@@ -13,10 +14,11 @@ use super::raw::RawTask;
 use super::relaxed;
 use super::rules::Rules;
 
-/// Names of atoms, and of tokens that mark a running durative action.
+/// Predicates and arguments of atoms, and of the tokens that stand for "this durative action is
+/// running".
 struct Names<'a> {
     atoms: &'a Atoms,
-    /// First atom number that is a token.
+    /// Number of the first token; smaller numbers are atoms.
     first: u32,
     first_token: u32,
     tokens: Vec<(u32, &'a [u32])>,
@@ -38,7 +40,8 @@ impl AtomNames for Names<'_> {
     }
 }
 
-/// Synthesised mutex groups, and those of object functions, which must share a variable.
+/// Mutex groups found by synthesis, and the groups (values of an object function) that must share a
+/// variable.
 pub(super) struct Groups {
     pub found: Vec<Vec<u32>>,
     pub fixed: Vec<Vec<u32>>,
@@ -100,7 +103,8 @@ pub(super) fn groups(
     Groups { found, fixed: fixed_groups }
 }
 
-/// Every action, start, end and timed effect as a transition; tokens are numbered from `token`.
+/// Transitions of all instantaneous actions, action starts, action ends and timed effects. Tokens
+/// of durative actions are numbered from `token`.
 fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
     let mut all = Transitions::default();
     for action in &raw.actions {
@@ -126,7 +130,8 @@ fn transitions(raw: &RawTask, mut token: u32) -> Transitions {
     all
 }
 
-/// Snap action as a transition; deletions under conditions that are not atoms are unreliable.
+/// Adds an action's start or end to the open transition. Deletes whose conditions are not plain
+/// atoms are left out, since they may not happen.
 fn transition(before: &[&Clauses], effects: &[RawEffect], inner: u32, into: &mut Transitions) {
     let positive = |c: &Clauses| {
         let literals = c.literals.iter().filter(|&&l| l & 1 == 0);

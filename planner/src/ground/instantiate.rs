@@ -1,4 +1,5 @@
-//! Lifted conditions, effects and expressions under a binding: static parts are evaluated away.
+//! Instantiation of lifted conditions, effects and expressions with objects; static parts are
+//! evaluated and removed.
 
 use std::sync::Arc;
 
@@ -11,7 +12,8 @@ use super::normal::{Change_, Effect_, Formula, Named, Number, Pattern, Target, T
 use super::statics::{Statics, each, found};
 use super::task::{Change, GroundComparison, GroundExpression, NumericFluent, Origin, Relation};
 
-/// Ground condition with disjunctions; a literal is `atom << 1 | negated`.
+/// Conjunction of ground literals (`atom << 1 | negated`), comparisons, calls with the wanted
+/// answer, and disjunctions of further conditions.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct Clauses {
     pub literals: Vec<u32>,
@@ -54,7 +56,7 @@ impl Clauses {
     }
 }
 
-/// Ground effect in atoms.
+/// Effect of a ground action, on an atom or a numeric fluent.
 #[derive(Clone, Debug)]
 pub(super) enum Deed {
     Add(u32),
@@ -63,14 +65,15 @@ pub(super) enum Deed {
     Call(u32),
 }
 
-/// Ground call with the places it writes.
+/// Ground call of an attachment, with the terms that it writes.
 #[derive(Clone, Debug)]
 pub(super) struct RawCall {
     pub origin: Origin,
     pub writes: Vec<RawPlace>,
 }
 
-/// Target of a call's write: a number, an atom, or one of the values of an object function.
+/// Term that a call writes: a numeric fluent, an atom (`None`: never reached), or an object
+/// function with the atoms of its values.
 #[derive(Clone, Debug)]
 pub(super) enum RawPlace {
     Number(u32),
@@ -79,7 +82,7 @@ pub(super) enum RawPlace {
 }
 
 impl RawCall {
-    /// Atoms that the effect may make true or false.
+    /// Atoms that the call may make true or false.
     pub(super) fn atoms(&self) -> impl Iterator<Item = u32> {
         self.writes
             .iter()
@@ -92,29 +95,30 @@ impl RawCall {
     }
 }
 
-/// A ground effect.
+/// Ground effect with its condition.
 #[derive(Clone, Debug)]
 pub(super) struct RawEffect {
-    /// Conditions at start, over all and at end; `None`: unconditional.
+    /// Conditions at the effect's own time, at the action's start, and over all; `None`:
+    /// unconditional.
     pub when: Option<Box<[Clauses; 3]>>,
     pub deed: Deed,
 }
 
-/// A condition that cannot hold.
+/// Error: the condition can never hold.
 struct Never;
 
-/// Instantiates lifted structures, and numbers numeric fluents, comparisons and calls.
+/// Instantiates lifted structures, and assigns numbers to numeric fluents, comparisons and calls.
 pub(super) struct Instantiate<'a> {
     pub statics: &'a Statics<'a>,
     pub atoms: Atoms,
-    /// True, by atom, if it holds in every reachable state.
+    /// True, by atom, if the atom holds in every reachable state.
     pub always: Vec<bool>,
     pub numerics: Vec<NumericFluent>,
     pub comparisons: Vec<GroundComparison>,
     pub calls: Vec<RawCall>,
     numeric_ids: FxHashMap<NumericFluent, u32>,
     comparison_ids: FxHashMap<Vec<u64>, u32>,
-    /// Call numbers, as atoms of the calls' modules.
+    /// Ids of calls, stored as atoms whose predicate is the module.
     call_ids: Atoms,
 }
 
@@ -134,7 +138,7 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// Conjoins a formula to a condition; `false` if the result can never hold.
+    /// Adds a formula under a binding to a conjunction; `false` if the result can never hold.
     pub(super) fn conjoin(
         &mut self,
         formula: &Formula,
@@ -179,7 +183,8 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// `false` once a branch that always holds was met.
+    /// Adds one alternative of a disjunction to `branches`, unless it can never hold; `false` if
+    /// the alternative always holds.
     fn branch(
         &mut self,
         part: &Formula,
@@ -249,7 +254,7 @@ impl<'a> Instantiate<'a> {
         true
     }
 
-    /// The expression under the binding, constants folded.
+    /// Ground expression under a binding, with constants folded.
     pub(super) fn expression(&mut self, number: &Number, binding: &[u32]) -> GroundExpression {
         if let Some(value) = self.statics.constant(number, binding) {
             return GroundExpression::Constant(value);
@@ -282,13 +287,13 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// Number of a written numeric fluent.
+    /// Id of the numeric fluent that an effect changes.
     pub(super) fn numeric(&mut self, named: &Named, binding: &[u32]) -> u32 {
         let arguments = named.terms.iter().map(|t| t.bound(binding)).collect();
         self.numeric_id(NumericFluent { function: named.index, arguments })
     }
 
-    /// Number of a numeric fluent by name.
+    /// Id of a numeric fluent; a new fluent gets the next id.
     pub(super) fn numeric_id(&mut self, fluent: NumericFluent) -> u32 {
         let next = self.numerics.len() as u32;
         let id = *self.numeric_ids.entry(fluent.clone()).or_insert(next);
@@ -324,7 +329,7 @@ impl<'a> Instantiate<'a> {
         id
     }
 
-    /// Ground effects of a lifted one.
+    /// Appends the ground effects of a lifted effect.
     pub(super) fn effect(
         &mut self,
         effect: &Effect_,
@@ -379,7 +384,7 @@ impl<'a> Instantiate<'a> {
         }
     }
 
-    /// Condition of an effect; `None`: unconditional; `Err`: never holds.
+    /// Ground condition of an effect; `None`: unconditional; `Err`: can never hold.
     fn when(
         &mut self,
         effect: &Effect_,
@@ -404,7 +409,7 @@ impl<'a> Instantiate<'a> {
         Ok(if always { None } else { Some(Box::new([here, at_start, over_all])) })
     }
 
-    /// Reached atoms of an object function's instance, one per value.
+    /// Reached atoms of an object function with the arguments `prefix`, one per value.
     pub(super) fn values_of(&mut self, predicate: u32, prefix: &[u32]) -> Vec<u32> {
         let mut pattern = prefix.to_vec();
         pattern.push(NONE);
@@ -420,7 +425,8 @@ impl<'a> Instantiate<'a> {
         found
     }
 
-    /// Calls `body` for every binding of the slots under which all guards are reached atoms.
+    /// Calls `body` for every binding of the slots under which all guards (positive literals) are
+    /// reached atoms.
     fn for_matches(
         &mut self,
         slots: &[u32],
@@ -512,7 +518,7 @@ impl<'a> Instantiate<'a> {
     }
 }
 
-/// Positive literals that the formula needs.
+/// Positive literals that must hold for the formula to hold.
 fn guards_of(formula: &Formula) -> Vec<&Pattern> {
     match formula {
         Formula::And(parts) => parts.iter().flat_map(guards_of).collect(),
@@ -521,7 +527,7 @@ fn guards_of(formula: &Formula) -> Vec<&Pattern> {
     }
 }
 
-/// Key that is equal only for equal expressions.
+/// Appends an encoding of an expression to a key; different expressions have different keys.
 fn encode(expression: &GroundExpression, key: &mut Vec<u64>) {
     let mut list = |tag: u64, parts: &[&GroundExpression]| {
         key.push(tag << 32 | parts.len() as u64);

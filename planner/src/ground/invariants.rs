@@ -1,35 +1,37 @@
 //! Mutex groups: sets of atoms of which at most one holds in every reachable state.
 //!
-//! Candidates are those of Helmert (2009), "Concise finite-domain representations for PDDL planning tasks", section 5:
-//! a set of predicates, each with a key (the arguments that name an instance) and the rest counted. They are tested
-//! against the ground actions instead of the lifted ones, which is exact about equal objects. A durative action is two
-//! transitions joined by a token that says it runs, so that what its start takes away and its end gives back stays counted.
+//! Candidates follow Helmert (2009), "Concise finite-domain representations for PDDL planning
+//! tasks", section 5: a set of predicates, each with key arguments, which name a group, and at most
+//! one counted argument. A candidate is tested against the ground actions instead of the lifted
+//! ones, which is exact where several parameters are the same object. A durative action is two
+//! transitions, joined by a token that says that the action is running; so what its start deletes
+//! and its end adds again stays counted.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Atom of an add or delete effect, with the atoms of the effect's condition.
+/// Atom that a transition adds or deletes, with the atoms in the condition of that effect.
 pub(crate) type Changed = (u32, Vec<u32>);
 
-/// A transition of the task, in atoms.
+/// Change of the state by an action's start, its end or a timed effect, in atoms.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Transition<'t> {
     /// Atoms of the transition's precondition, sorted.
     pub before: &'t [u32],
-    /// Atoms that the transition adds, with further atoms that held before (of conditional
-    /// effects).
+    /// Atoms that the transition adds, each with the further atoms that hold before it (condition
+    /// of a conditional effect).
     pub adds: &'t [Changed],
-    /// Atoms that the transition deletes, with all conditions of the deletion; deletions with other
-    /// conditions must be left out.
+    /// Atoms that the transition deletes, each with the complete condition of the deletion.
+    /// Deletions whose condition is more than atoms are left out.
     pub deletes: &'t [Changed],
 }
 
-/// Every transition of a task, side by side in memory.
+/// Transitions of a task, stored in common arrays.
 #[derive(Debug, Default)]
 pub(crate) struct Transitions {
     before: Vec<u32>,
     adds: Vec<Changed>,
     deletes: Vec<Changed>,
-    /// End positions of each transition's parts.
+    /// End of each transition's part in `before`, `adds` and `deletes`.
     ends: Vec<[u32; 3]>,
 }
 
@@ -50,22 +52,22 @@ impl Transitions {
         }
     }
 
-    /// Another atom that holds before the transition at hand.
+    /// Adds a precondition to the open transition.
     pub fn before(&mut self, atom: u32) {
         self.before.push(atom);
     }
 
-    /// Another atom that the transition at hand adds.
+    /// Adds an add effect with the condition `after` to the open transition.
     pub fn adds(&mut self, atom: u32, after: Vec<u32>) {
         self.adds.push((atom, after));
     }
 
-    /// Another atom that the transition at hand takes away.
+    /// Adds a delete effect with the condition `after` to the open transition.
     pub fn deletes(&mut self, atom: u32, after: Vec<u32>) {
         self.deletes.push((atom, after));
     }
 
-    /// The transition at hand is complete.
+    /// Closes the open transition; the next additions begin a new one.
     pub fn close(&mut self) {
         let from = self.ends.last().map_or(0, |ends| ends[0] as usize);
         self.before[from..].sort_unstable();
@@ -73,46 +75,50 @@ impl Transitions {
     }
 }
 
-/// The atoms whose groups are asked for.
+/// Predicates and arguments of the atoms among which groups are sought.
 pub(crate) trait AtomNames {
     /// Predicate of an atom.
     fn predicate(&self, atom: u32) -> u32;
-    /// Objects of an atom.
+    /// Argument objects of an atom.
     fn arguments(&self, atom: u32) -> &[u32];
 }
 
-/// Predicate of a candidate, with the argument positions of the key, in key order.
+/// One predicate of a candidate invariant, with the argument positions that form the key, in key
+/// order.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Part {
     predicate: u32,
     key: Vec<u8>,
 }
 
-/// Maximum number of candidates.
+/// Maximum number of candidates tested.
 const MOST_CANDIDATES: usize = 400;
-/// Transitions looked at in all.
+/// Maximum number of transitions examined over all candidates.
 const MOST_WORK: usize = 30_000_000;
 
 struct Synthesis<'a, N: AtomNames> {
     names: &'a N,
     transitions: &'a Transitions,
-    /// Transitions that add an atom of a predicate, by predicate.
+    /// Transitions that add an atom of a predicate (indices), by predicate.
     adders: FxHashMap<u32, Vec<u32>>,
-    /// First predicate number that is a token; a token may have any number of counted arguments.
+    /// Least predicate number of a token. Any number of a token's arguments may be outside the key.
     first_token: u32,
     work: usize,
 }
 
-/// Counterexample to a candidate: a transition that adds to a key without deleting.
+/// Counterexample to a candidate: a transition whose add effect `add` makes an atom of `key` true
+/// without making another one false.
 struct Unbalanced {
     transition: u32,
     add: usize,
     key: Vec<u32>,
 }
 
-/// Finds mutex groups among `atoms`; returns the groups found so far if `stop` becomes true.
-/// `predicates`: predicates to start from, with arity. `initial`: atoms that hold initially. The
-/// order of the output follows the order of the input.
+/// Finds mutex groups among `atoms`, in an order that follows from the order of the input; the
+/// groups found so far if `stop` becomes true.
+///
+/// `initial`: atoms that hold initially. `predicates`: predicates to start from, each with its
+/// arity.
 pub(crate) fn mutex_groups<N: AtomNames>(
     names: &N,
     atoms: &[u32],
@@ -178,7 +184,8 @@ impl<N: AtomNames> Synthesis<'_, N> {
         valid
     }
 
-    /// `None` if the candidate is an invariant; otherwise the reason, if refinement may help.
+    /// Tests a candidate: `None` if it is an invariant, `Some(Some(_))` with a counterexample that
+    /// a refinement may repair, `Some(None)` if none can.
     fn test(&mut self, candidate: &[Part]) -> Option<Option<Unbalanced>> {
         for part in candidate {
             let list = self.adders.get(&part.predicate).map_or(&[][..], |l| l);
@@ -233,8 +240,8 @@ impl<N: AtomNames> Synthesis<'_, N> {
         left.key.iter().zip(&right.key).all(|(&l, &r)| a[l as usize] == b[r as usize])
     }
 
-    /// Candidates extended by a predicate that the unbalanced transition deletes, with its key at
-    /// every position where the objects fit.
+    /// Candidates extended by one more predicate, whose atom the unbalanced transition deletes; its
+    /// key arguments are tried at every position where the objects fit.
     fn refine(&self, candidate: &[Part], unbalanced: &Unbalanced) -> Vec<Vec<Part>> {
         let transition = self.transitions.get(unbalanced.transition as usize);
         let extra = &transition.adds[unbalanced.add].1;
@@ -275,7 +282,7 @@ fn placements(key: &[u32], arguments: &[u32], chosen: &mut Vec<u8>, found: &mut 
     }
 }
 
-/// Atoms of each key with exactly one initially true atom.
+/// Groups of an invariant: for each key with exactly one initially true atom, all its atoms.
 fn instances<N: AtomNames>(names: &N, atoms: &[u32], initial: &[u32], invariant: &[Part]) -> Vec<Vec<u32>> {
     let key_of = |atom: u32| {
         let predicate = names.predicate(atom);

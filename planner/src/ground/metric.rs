@@ -1,27 +1,29 @@
-//! The metric, and the numeric fluents that only add up costs.
+//! Analysis of the metric, and of numeric fluents that do nothing but accumulate costs.
 
 use super::instantiate::{Deed, RawEffect};
 use super::raw::{RawAction, RawTask};
 use super::relevant::{is_risky, reads};
 use super::task::{Change, Earns, GroundComparison, GroundExpression, GroundMetric};
 
-/// Composition of the metric.
+/// Metric, split into costs of actions and numeric fluents that stay in the state.
 pub(super) struct Costs {
-    /// Weight in the metric by numeric fluent, if the fluent only adds up costs.
+    /// Weight in the metric of each numeric fluent that only accumulates costs and is therefore
+    /// removed from the state; `None` for the others.
     pub weights: Vec<Option<f64>>,
     pub metric: Option<GroundMetric>,
-    /// Numeric fluents that the metric reads otherwise.
+    /// Numeric fluents of a metric that is not additive: these stay in the state.
     pub read: Vec<u32>,
 }
 
-/// Coefficients of the numeric fluents (`count` of them) and of the total time; `None` if not
-/// linear.
+/// Weights of the numeric fluents (`count` of them) and of the total time in an expression; `None`
+/// if the expression is not linear.
 pub(crate) fn weights(expression: &GroundExpression, count: usize) -> Option<(Vec<f64>, f64)> {
     let (mut weights, mut time) = (vec![0.0; count], 0.0);
     linear(expression, 1.0, &mut weights, &mut time).then_some((weights, time))
 }
 
-/// Splits a linear expression into weights; `false` if it is not linear.
+/// Adds the weights of a linear expression, times `factor`, to `weights` and `time`; `false` if the
+/// expression is not linear.
 fn linear(expression: &GroundExpression, factor: f64, weights: &mut [f64], time: &mut f64) -> bool {
     match expression {
         GroundExpression::Constant(_) => true,
@@ -54,8 +56,8 @@ fn linear(expression: &GroundExpression, factor: f64, weights: &mut [f64], time:
     }
 }
 
-/// Numeric fluents that are not pure costs: read outside the metric, or changed by more than
-/// unconditional increases of defined amounts.
+/// Marks the numeric fluents that are not pure costs: read outside the metric, or changed other
+/// than by unconditional increases and decreases by defined amounts.
 fn not_just_costs(task: &RawTask, comparisons: &[GroundComparison], undefined: &[bool]) -> Vec<bool> {
     let mut read = vec![false; undefined.len()];
     let mark = |expression: &GroundExpression, read: &mut Vec<bool>| {
@@ -93,7 +95,8 @@ fn not_just_costs(task: &RawTask, comparisons: &[GroundComparison], undefined: &
     read
 }
 
-/// Possible improvement of an additive metric by actions.
+/// Possibility that actions improve an additive metric. `sign`: 1 for minimisation, -1 for
+/// maximisation.
 fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     let earns = |effect: &RawEffect| match &effect.deed {
         Deed::Change(id, change, amount) => added(*change, amount, sign * weights[*id as usize]),
@@ -106,7 +109,7 @@ fn earning(task: &RawTask, weights: &[f64], sign: f64) -> Earns {
     effects.map(earns).max().unwrap_or(Earns::Never)
 }
 
-/// Possible improvement by one change of a number with this weight in the metric.
+/// Possibility that one change of a number with this weight improves a metric that is minimised.
 pub(crate) fn added(change: Change, amount: &GroundExpression, weight: f64) -> Earns {
     let weight = match change {
         _ if weight == 0.0 => return Earns::Never,
@@ -121,8 +124,8 @@ pub(crate) fn added(change: Change, amount: &GroundExpression, weight: f64) -> E
     }
 }
 
-/// Analyses the metric. `keep` keeps all numeric fluents in the state, `keep_metric` those of the
-/// metric.
+/// Splits the metric into costs and numbers. `keep` keeps all numeric fluents in the state,
+/// `keep_metric` those of the metric.
 pub(super) fn costs(
     task: &RawTask,
     comparisons: &[GroundComparison],
@@ -160,8 +163,8 @@ pub(super) fn costs(
 }
 
 impl Costs {
-    /// Contribution of the action to the metric through pure cost fluents; their effects are
-    /// removed.
+    /// Contribution of an action to the metric through fluents that only accumulate costs; removes
+    /// the effects on these fluents. Constant 1 for an instantaneous action without a metric.
     pub(super) fn of(&self, action: &mut RawAction) -> GroundExpression {
         if self.metric.is_none() && action.later.is_none() {
             strip(&self.weights, &mut action.effects, &mut Vec::new());

@@ -1,5 +1,5 @@
-//! Normalised lifted task for grounding: object functions become predicates with one more argument,
-//! so every term is a variable or an object.
+//! Normal form of the lifted task for grounding. An object function becomes a predicate with the
+//! value as one more argument, so every term is a variable or an object.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::task::{
     ObjectId, Quantified, Task, Term as LiftedTerm, Timed, Written,
 };
 
-/// A variable slot or an object.
+/// Term: a variable (slot of a binding) or an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Term {
     Slot(u32),
@@ -18,7 +18,7 @@ pub(super) enum Term {
 }
 
 impl Term {
-    /// Object under a complete binding.
+    /// Object of the term under a binding; `NONE` for an unbound slot.
     pub(super) fn bound(self, binding: &[u32]) -> u32 {
         match self {
             Term::Slot(slot) => binding[slot as usize],
@@ -27,21 +27,23 @@ impl Term {
     }
 }
 
-/// A predicate (or object function, numbered after the predicates) with its arguments, an object function's value last.
+/// Predicate with its terms. An object function counts as a predicate, numbered after the
+/// predicates, with its value as last term.
 #[derive(Clone, Debug)]
 pub(super) struct Pattern {
     pub predicate: u32,
     pub terms: Vec<Term>,
 }
 
-/// A numeric function or module with its arguments.
+/// Numeric function or module with its terms.
 #[derive(Clone, Debug)]
 pub(super) struct Named {
     pub index: u32,
     pub terms: Vec<Term>,
 }
 
-/// A condition in negation normal form without function terms.
+/// Condition in negation normal form, without function terms; `bool` is false for a negated
+/// literal.
 #[derive(Clone, Debug)]
 pub(super) enum Formula {
     And(Vec<Formula>),
@@ -54,7 +56,7 @@ pub(super) enum Formula {
     Exists(Vec<u32>, Box<Formula>),
 }
 
-/// A numeric expression without function terms.
+/// Numeric expression without function terms.
 #[derive(Clone, Debug)]
 pub(super) enum Number {
     Constant(f64),
@@ -70,18 +72,18 @@ pub(super) enum Number {
     Violated(u32),
 }
 
-/// Change by an effect.
+/// Change that an effect makes.
 #[derive(Clone, Debug)]
 pub(super) enum Change_ {
     Add(Pattern),
     Delete(Pattern),
     Number(Assignment, Named, Number),
-    /// Effect that makes an object function undefined: function and arguments.
+    /// Makes an object function undefined: function and arguments, without a value.
     Unset(Pattern),
     Call(Named),
 }
 
-/// An effect for all objects of `forall`.
+/// Effect, for all objects of the `forall` slots.
 #[derive(Clone, Debug)]
 pub(super) struct Effect_ {
     pub forall: Vec<u32>,
@@ -89,7 +91,7 @@ pub(super) struct Effect_ {
     pub change: Change_,
 }
 
-/// Values for start, over all and end.
+/// Values for the start, the whole duration and the end of an action.
 #[derive(Clone, Debug)]
 pub(super) struct Timed3<T> {
     pub start: T,
@@ -97,11 +99,12 @@ pub(super) struct Timed3<T> {
     pub end: T,
 }
 
-/// An action.
+/// Action in normal form.
 #[derive(Clone, Debug)]
 pub(super) struct Action_ {
     pub schema: u32,
-    /// Slots `0..arity` are the parameters; `extra` slots hold values of functions that durations or rates use.
+    /// Number of parameters, which are slots `0..arity`. The slots `extra` hold values of object
+    /// functions that durations or rates mention.
     pub arity: usize,
     pub extra: Vec<u32>,
     pub domains: Vec<Arc<[ObjectId]>>,
@@ -113,14 +116,14 @@ pub(super) struct Action_ {
 }
 
 impl Timed3<Formula> {
-    /// Formulas of all three times.
+    /// Formulas for start, over all and end.
     pub fn all(&self) -> [&Formula; 3] {
         [&self.start, &self.over_all, &self.end]
     }
 }
 
 impl Formula {
-    /// Visits every term.
+    /// Visits every term of the formula.
     pub fn terms(&self, visit: &mut dyn FnMut(&Term)) {
         match self {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| part.terms(visit)),
@@ -134,7 +137,7 @@ impl Formula {
 }
 
 impl Number {
-    /// Visits every term.
+    /// Visits every term of the expression.
     pub fn terms(&self, visit: &mut dyn FnMut(&Term)) {
         match self {
             Number::Fluent(named) | Number::Call(named) => named.terms.iter().for_each(visit),
@@ -148,7 +151,7 @@ impl Number {
     }
 }
 
-/// A rule of a derived predicate.
+/// Rule of a derived predicate in normal form.
 #[derive(Clone, Debug)]
 pub(super) struct Rule_ {
     pub head: Pattern,
@@ -157,24 +160,25 @@ pub(super) struct Rule_ {
     pub stratum: u32,
 }
 
-/// A task in this form.
+/// Lifted task in normal form.
 pub(super) struct Normal {
     pub actions: Vec<Action_>,
     pub rules: Vec<Rule_>,
     pub goal: Formula,
     pub goal_domains: Vec<Arc<[ObjectId]>>,
     pub metric: Option<Number>,
-    /// Predicates and object functions together.
+    /// Number of predicates and functions together.
     pub predicate_count: usize,
 }
 
-/// Collects extra atoms that define fresh variables while terms are flattened.
+/// Slots of one action, rule or goal, with the objects of each slot; object functions in terms get
+/// new slots.
 struct Scope<'a> {
     task: &'a Task,
     domains: Vec<Arc<[ObjectId]>>,
 }
 
-/// Fresh variables and the atoms that define them.
+/// New slots for the values of object functions, with the atoms that define these values.
 #[derive(Default)]
 struct Fresh {
     slots: Vec<u32>,
@@ -291,7 +295,7 @@ impl<'a> Scope<'a> {
         if wanted { fresh.positive(formula) } else { fresh.negative(formula) }
     }
 
-    /// Equation with an object function on one side as an atom of that function.
+    /// Equation of two terms; if one side is an object function, an atom of that function.
     fn same(&mut self, left: &LiftedTerm, right: &LiftedTerm, wanted: bool, fresh: &mut Fresh) -> Formula {
         let (function, value) = match (left, right) {
             (LiftedTerm::Function(f), value) => (f, value),
@@ -332,8 +336,8 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// Normalised effect. If an object that the effect names may be undefined, `needs` gets the
-    /// condition for a defined result.
+    /// Effect in normal form. If an object function in it may be undefined, `needs` gets a
+    /// condition under which the effect has a result.
     fn effect(&mut self, effect: &Effect, at_end: bool, needs: &mut Needs) -> Effect_ {
         let mut forall = self.quantify(&effect.forall);
         let mut when = self.timed(&effect.when);
@@ -377,13 +381,14 @@ impl<'a> Scope<'a> {
         Effect_ { forall, when, change }
     }
 
-    /// True for an atom of an object function that may be undefined.
+    /// True if the atom belongs to an object function that may be undefined.
     fn unsure(&self, atom: &Pattern) -> bool {
         let function = atom.predicate.checked_sub(self.task.predicates.len() as u32);
         function.is_some_and(|function| may_be_undefined(self.task, FunctionId(function)))
     }
 
-    /// Condition that the objects named by an effect are defined at the effect's time.
+    /// Condition of an action: where an effect happens, the object functions that it mentions are
+    /// defined.
     fn defined(&mut self, effect: &Effect, at_end: bool, fresh: &Fresh) -> Formula {
         let atoms = fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), true)).collect();
         let defined = Formula::Exists(fresh.slots.clone(), Box::new(Formula::And(atoms)));
@@ -398,17 +403,18 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Conditions under which effects have a result.
+/// Conditions under which all effects of an action have a result.
 #[derive(Default)]
 struct Needs {
-    /// Conditions of the action.
+    /// Further conditions of the action.
     conditions: Vec<Formula>,
-    /// Effects that must not happen, besides end effects with conditions on earlier times.
+    /// Additional effects that make the action inapplicable where they happen; used for end effects
+    /// with conditions on earlier times.
     forbidden: Vec<Effect_>,
 }
 
-/// Effect that marks an inapplicable end effect, which names an undefined object: the object
-/// function gets a number, which is no object.
+/// Effect that makes an action inapplicable where one of its end effects mentions an undefined
+/// object function: it assigns an undefined number to that function.
 fn without_result(function: u32, forall: &[u32], when: &Timed3<Formula>, fresh: &Fresh) -> Effect_ {
     let mut absent: Vec<Formula> =
         fresh.atoms.iter().map(|atom| Formula::Literal(atom.clone(), false)).collect();
@@ -489,7 +495,7 @@ fn action(task: &Task, schema: usize) -> Action_ {
     }
 }
 
-/// Brings a lifted task into the form for grounding.
+/// Converts a lifted task to normal form.
 pub(super) fn normalise(task: &Task) -> Normal {
     let rules = task.rules.iter().map(|rule| {
         let mut scope = Scope::new(task, rule.slots);
@@ -519,16 +525,16 @@ pub(super) fn normalise(task: &Task) -> Normal {
     }
 }
 
-/// Term that an effect module writes, over the module's parameters.
+/// Term that an effect module writes; its slots are the module's parameters.
 pub(super) enum Target {
     Number(Named),
     /// Truth of an atom.
     Truth(Pattern),
-    /// An object function: the pattern lacks the value.
+    /// Object function: the pattern has no value.
     Object(Pattern),
 }
 
-/// Targets that an effect module writes.
+/// Terms that an effect module writes.
 pub(super) fn module_writes(task: &Task, module: u32) -> Vec<Target> {
     let module = &task.modules[module as usize];
     let mut scope = Scope::new(task, module.parameters.len());

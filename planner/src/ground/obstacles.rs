@@ -1,29 +1,32 @@
-//! Explains goals that are unreachable even under delete relaxation: atoms without achievers.
+//! Explains why a goal is unreachable even under delete relaxation: atoms that nothing can achieve.
 
 use super::atoms::{Atoms, NONE};
 use super::normal::{Action_, Change_, Formula, Normal, Pattern, Term};
 
-/// Maximum number of atoms in the reported chain of causes.
+/// Maximum number of atoms whose obstacles are reported.
 const MOST_OBSTACLES: usize = 24;
-/// Maximum number of candidate atoms for a condition whose missing preconditions are reported.
+/// Maximum number of atoms that match one condition for which the missing preconditions are still
+/// reported.
 const MOST_MATCHES: usize = 4;
 
-/// Atom that holds in no reachable state, with the obstacles of all its achievers.
+/// Atom that holds in no reachable state, with the reasons why none of its achievers can be
+/// applied.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Obstacle {
-    /// Predicate of the lifted task, or (from its number of predicates on) function.
+    /// Index of a predicate of the lifted task; indices beyond the predicates continue with the
+    /// functions.
     pub predicate: u32,
-    /// Objects; `None` for any. Of a function, the value comes last.
+    /// Argument objects; `None` stands for any object. For a function, the value comes last.
     pub arguments: Vec<Option<u32>>,
-    /// Actions that add the atom, by index, each with its unreachable conditions; empty without
-    /// achievers. An empty list of conditions: each is reachable, but not all together, or they are
-    /// not atoms.
+    /// Actions that add the atom (by index), each with its unreachable conditions; empty if no
+    /// action adds it. Without unreachable conditions, an action's conditions are reachable only
+    /// one by one, or are not atoms.
     pub achievers: Vec<(u32, Vec<MissingAtom>)>,
-    /// Rules that derive the atom, by index, in the same form.
+    /// Rules that derive the atom (by index), each with its unreachable conditions.
     pub rules: Vec<(u32, Vec<MissingAtom>)>,
 }
 
-/// A predicate with arguments, `None` for any.
+/// Predicate and arguments of an unreachable atom; `None` stands for any object.
 pub type MissingAtom = (u32, Vec<Option<u32>>);
 
 struct Find<'a> {
@@ -34,7 +37,8 @@ struct Find<'a> {
     queue: Vec<MissingAtom>,
 }
 
-/// Chain of obstacles from the goal on; empty if the goal's atoms are all reachable.
+/// Obstacles from the goal's atoms down to atoms that nothing achieves; empty if all atoms of the
+/// goal are reachable.
 pub(super) fn obstacles(normal: &Normal, atoms: &Atoms, reached: &[bool]) -> Vec<Obstacle> {
     let mut find = Find { normal, atoms, reached, found: Vec::new(), queue: Vec::new() };
     let binding = vec![NONE; normal.goal_domains.len()];
@@ -58,7 +62,7 @@ impl Find<'_> {
         }
     }
 
-    /// Positive atoms of a conjunction without a matching reached atom.
+    /// Positive atoms of a conjunction that no reached atom matches.
     fn missing(&self, formula: &Formula, binding: &[u32]) -> Vec<MissingAtom> {
         match formula {
             Formula::And(parts) => parts.iter().flat_map(|p| self.missing(p, binding)).collect(),
@@ -122,9 +126,9 @@ impl Find<'_> {
 }
 
 impl Find<'_> {
-    /// Missing atoms of an action whose conditions are reachable one by one but not together: for
-    /// one condition, the atoms that are missing under every reached atom that fulfils it. Initial
-    /// facts and conditions that lead to new atoms come first.
+    /// Unreachable atoms that explain an action whose conditions are reachable one by one but not
+    /// together: for one condition, the atoms that are missing whichever reached atom fulfils it.
+    /// Conditions that no action changes are tried first, and those that lead to new atoms.
     fn missing_together(&self, action: &Action_, binding: &[u32]) -> Vec<MissingAtom> {
         let mut literals: Vec<&Pattern> = Vec::new();
         let condition = &action.condition;
@@ -137,8 +141,8 @@ impl Find<'_> {
         explaining.find(|missing| missing.iter().any(|atom| !self.queue.contains(atom))).unwrap_or_default()
     }
 
-    /// Atoms that an action lacks under every reached atom that fulfils one of its conditions;
-    /// `None` if nothing is lacking for one of them, or if there are many.
+    /// Atoms that an action lacks for each reached atom that matches the condition `pattern`;
+    /// `None` if nothing is lacking for one of these, or if more than [`MOST_MATCHES`] match.
     fn lacking(&self, action: &Action_, pattern: &Pattern, binding: &[u32]) -> Option<Vec<MissingAtom>> {
         let mut lacking: Vec<MissingAtom> = Vec::new();
         let mut matches = 0;
@@ -170,7 +174,7 @@ impl Find<'_> {
     }
 }
 
-/// The positive literals of a conjunction.
+/// Appends the positive literals of a conjunction.
 fn literals_of<'f>(formula: &'f Formula, into: &mut Vec<&'f Pattern>) {
     match formula {
         Formula::And(parts) => parts.iter().for_each(|part| literals_of(part, into)),
@@ -179,7 +183,7 @@ fn literals_of<'f>(formula: &'f Formula, into: &mut Vec<&'f Pattern>) {
     }
 }
 
-/// Binding extended by matching a pattern with an atom.
+/// Binding extended so that a pattern becomes an atom; `None` if they do not unify.
 fn extended(pattern: &Pattern, arguments: &[u32], binding: &[u32]) -> Option<Vec<u32>> {
     let mut binding = binding.to_vec();
     for (term, &argument) in pattern.terms.iter().zip(arguments) {
@@ -198,7 +202,8 @@ fn extended(pattern: &Pattern, arguments: &[u32], binding: &[u32]) -> Option<Vec
     Some(binding)
 }
 
-/// The binding under which the pattern is the atom, as far as the atom is known.
+/// Binding under which a pattern becomes an atom (`None` arguments stay free); `None` if they do
+/// not unify.
 fn unify(pattern: &Pattern, arguments: &[Option<u32>], slots: usize) -> Option<Vec<u32>> {
     let mut binding = vec![NONE; slots];
     for (term, argument) in pattern.terms.iter().zip(arguments) {

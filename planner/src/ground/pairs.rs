@@ -1,16 +1,18 @@
-//! Mutex groups from h² (Haslum and Geffner 2000): pairs of facts that are reachable together.
-//! Finds more than invariant synthesis where actions no longer correspond to lifted ones.
+//! Mutex groups from h² (Haslum and Geffner 2000), which finds the pairs of facts that are
+//! reachable together. It finds more than invariant synthesis where ground actions no longer
+//! correspond to lifted ones.
 
 use super::task::{GroundAction, GroundFact, GroundOutcome, GroundTask};
 
-/// Maximum number of facts, above which h² is skipped; the next constant limits the work.
+/// Maximum number of facts; h² is skipped for larger tasks.
 const MOST_FACTS: usize = 4_000;
+/// Maximum number of machine words examined in search of pairs; beyond, no group is found.
 const MOST_WORK: usize = 50_000_000;
-/// Members of all groups at most.
+/// Maximum total number of members of all groups.
 const MOST_MEMBERS: usize = 50_000;
 
-/// Mutex groups that cover every pair of different variables found mutually exclusive; none for
-/// tasks with axioms, conditional effects or too many facts.
+/// Mutex groups that together cover the pairs of facts found mutually exclusive; none for tasks
+/// with axioms, conditional effects or too many facts.
 pub fn exclusive(task: &GroundTask) -> Vec<Vec<GroundFact>> {
     let conditional = task.actions.iter().flat_map(|action| &action.effects).any(|e| e.when.is_some());
     let facts: Vec<GroundFact> = (0..task.variables.len() as u32)
@@ -25,7 +27,8 @@ pub fn exclusive(task: &GroundTask) -> Vec<Vec<GroundFact>> {
     Pairs::reached(task, &facts).map_or_else(Vec::new, |pairs| pairs.groups(&facts))
 }
 
-/// Facts that may hold together with a fact (h2), by fact; itself among them if reachable.
+/// Bit matrix over facts: two facts that may hold together (h²). The bit of a fact with itself says
+/// that it is reachable.
 struct Pairs {
     words: usize,
     rows: Vec<u64>,
@@ -75,7 +78,7 @@ impl Pairs {
         self.row(one)[other / 64] >> (other % 64) & 1 == 1
     }
 
-    /// Applies an action wherever possible; true if this reaches new pairs.
+    /// Adds the pairs that an action makes reachable; true if there are new ones.
     fn apply(&mut self, action: &GroundAction, offsets: &[usize]) -> bool {
         let id = |fact: GroundFact| offsets[fact.variable as usize] + fact.value as usize;
         let needs: Vec<usize> = action.condition.facts.iter().map(|&fact| id(fact)).collect();
@@ -122,7 +125,8 @@ impl Pairs {
         changed
     }
 
-    /// Greedy maximal mutex groups that cover every unreached pair of different variables.
+    /// Mutex groups, grown greedily, that cover the mutually exclusive pairs of reachable facts of
+    /// different variables.
     fn groups(&self, facts: &[GroundFact]) -> Vec<Vec<GroundFact>> {
         let reached: Vec<usize> = (0..facts.len()).filter(|&fact| self.may(fact, fact)).collect();
         let mut all = vec![0; self.words];
@@ -147,7 +151,8 @@ impl Pairs {
         groups
     }
 
-    /// Extends a set of facts by further mutex facts of `all`, first come first served.
+    /// Extends a set of facts by facts of `all` that are mutex with all its members, in index
+    /// order.
     fn enlarged(&self, facts: &[usize], all: &[u64]) -> Vec<usize> {
         let mut open = all.to_vec();
         let without = |open: &mut Vec<u64>, fact: usize| {

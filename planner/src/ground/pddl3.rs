@@ -1,12 +1,17 @@
-//! Preferences and constraints of PDDL3 compiled away, for searches that know only a goal and costs.
+//! Compiles preferences and constraints of PDDL3 away, for searches that know only a goal and
+//! costs.
 //!
-//! - A constraint becomes the flags of its automaton ([`Automaton`]): an action that may change its conditions looks at them
-//!   right before, where they have been the same since the last such action, and the goal looks at the last state.
-//! - Of what must come about within a time, an action of ours is witness that comes early enough.
-//! - A preference becomes two actions, one free where it is kept and one that pays where it is not (Keyder and Geffner 2009,
-//!   "Soft goals can be compiled away"). They follow the last action of the plan one preference after the other, so that
-//!   their order leaves nothing to search.
-//! - An action with preferences of its own becomes several of its name: each preference is a condition, or is paid for.
+//! - A constraint becomes an automaton ([`Automaton`]) with flag facts as its state. An action that
+//!   may change the constraint's conditions updates the flags from the state right before its
+//!   effects; the goal checks the last state.
+//! - A `within` constraint becomes a witness action, which must be applied while the condition
+//!   holds and before the deadline.
+//! - A preference becomes two actions: a free one for a satisfied preference, and one that pays for
+//!   a violated one (Keyder and Geffner 2009, "Soft goals can be compiled away"). They follow the
+//!   last action of the plan, preference by preference in a fixed order, so that their order needs
+//!   no search.
+//! - An action with preferences of its own becomes several copies: in a copy, each preference is
+//!   either a condition or paid for.
 
 pub(super) mod conditions;
 mod touch;
@@ -26,22 +31,23 @@ use crate::task::{
 use conditions::{Fixed, all, any, each_binding, is_false, negated, words};
 use touch::Mentioned;
 
-/// Name of the action that observes a condition before its deadline; its span is the constraint's.
+/// Name of the action that observes the condition of a `within` constraint before the deadline; its
+/// span is the constraint's.
 pub(crate) const WITNESS: &str = "see it";
 /// Maximum number of preferences of one action that are compiled into copies of the action.
 const MOST_OF_AN_ACTION: usize = 3;
 
-/// A task without preferences and constraints.
+/// Task whose preferences and constraints are compiled away.
 pub(crate) struct Compiled {
-    /// Compiled task; actions with a blank in their names are no plan steps.
+    /// Compiled task. Actions with a blank in their names are bookkeeping, no steps of a plan.
     pub task: Task,
-    /// True if a preference that the metric counts was dropped.
+    /// True if a preference that the metric counts could not be compiled and was left out.
     pub forgets: bool,
-    /// True if the metric counts no preference.
+    /// True if there are preferences and the metric counts none of them.
     pub uncounted: bool,
 }
 
-/// Task without preferences and constraints; `None` if the task has neither.
+/// Compiles the preferences and constraints of a task away; `None` if the task has neither.
 pub(crate) fn compile(task: &Task) -> Option<Compiled> {
     if task.constraints.is_empty() && task.preferences.is_empty() {
         return None;
@@ -78,16 +84,16 @@ pub(crate) fn compile(task: &Task) -> Option<Compiled> {
     Some(compiler.finish())
 }
 
-/// Demand of a constraint.
+/// Demand of a constraint on the states of a plan.
 #[derive(Debug, Clone, Copy)]
 enum Asked {
-    /// Acceptance by an automaton.
+    /// The sequence of states is accepted by an automaton.
     States(&'static Automaton),
-    /// First condition true at some time up to this one, seconds.
+    /// The condition is true at some time up to this one, seconds.
     Within(f64),
 }
 
-/// Constraint or preference with its variables bound to objects.
+/// Constraint or preference whose quantified variables are bound to objects.
 struct Stated {
     asked: Asked,
     span: Span,
@@ -95,12 +101,14 @@ struct Stated {
     preference: Option<PreferenceId>,
 }
 
-/// Bound constraint or preference with its automaton and flags.
+/// Bound constraint or preference that is compiled into an automaton with flag facts.
 struct Instance {
     automaton: &'static Automaton,
-    /// Both conditions, reduced to literals where numbers are compared.
+    /// The two conditions that the automaton reads. Where numbers are compared, each is replaced by
+    /// a derived fact.
     conditions: [Condition; 2],
-    /// Flag facts of the automaton, and one for a violation if allowed.
+    /// Facts that hold the automaton's state, then one that records a violation if violations are
+    /// allowed.
     flags: Vec<Condition>,
     preference: Option<PreferenceId>,
 }
@@ -123,12 +131,13 @@ impl Instance {
         any(cases.iter().map(|case| self.case(case)))
     }
 
-    /// Fact that the instance has been violated.
+    /// Fact that records a violation of the instance; `None` if violations are forbidden or
+    /// impossible before the last state.
     fn was_broken(&self) -> Option<&Condition> {
         self.flags.get(self.automaton.flags)
     }
 
-    /// Condition on the last state.
+    /// Condition on the last state under which the instance is satisfied.
     fn kept(&self) -> Condition {
         let broken = any([self.cases(self.automaton.broken), self.cases(self.automaton.open)]);
         all(self.was_broken().map(negated).into_iter().chain([negated(&broken)]))
@@ -139,14 +148,16 @@ struct Compiler<'t> {
     task: &'t Task,
     made: Task,
     fixed: Fixed,
-    /// Violation counter of each preference, if the metric uses it.
+    /// Function that counts the violations of each preference; `None` if the metric does not
+    /// mention it.
     counters: Vec<Option<FunctionId>>,
-    /// Number of occurrences of each distinct instance, by its text.
+    /// Index of each distinct instance in `instances`, by its canonical text and preference.
     said: FxHashMap<(String, Option<PreferenceId>), usize>,
     instances: Vec<(Stated, f64)>,
-    /// Condition and weight of each undecided preference in the last state.
+    /// Preferences to be decided in the last state: the weight of a violation, and the condition
+    /// under which there is none.
     kept: Vec<(PreferenceId, f64, Condition)>,
-    /// Unavoidable violations by preference.
+    /// Number of unavoidable violations, by preference.
     lost: FxHashMap<PreferenceId, f64>,
     goal: Vec<Condition>,
     forgets: bool,
@@ -176,7 +187,8 @@ impl<'t> Compiler<'t> {
         compiler
     }
 
-    /// Adds a violation counter for each preference in the metric and substitutes it there.
+    /// Adds a counter function for each preference in the metric, and replaces the violation counts
+    /// in the metric by these.
     fn count_violations(&mut self) {
         let Some(metric) = &self.task.metric else { return };
         walk::expression(&metric.value, &mut |part| {
@@ -199,7 +211,7 @@ impl<'t> Compiler<'t> {
         }
     }
 
-    /// Something stays to be looked at after the search.
+    /// Records that a preference of the metric was left out.
     fn forget(&mut self, preference: Option<PreferenceId>) {
         self.forgets |= preference.is_some_and(|id| self.counters[id.index()].is_some());
     }
@@ -215,7 +227,7 @@ impl<'t> Compiler<'t> {
         Condition::Atom(atom(self.predicate(name, Vec::new()), &[]))
     }
 
-    /// All instances of constraints and preferences; equal ones are merged.
+    /// Adds all instances of a constraint or preference; equal ones are merged and counted.
     fn instances(
         &mut self,
         asked: Asked,
@@ -275,7 +287,8 @@ impl<'t> Compiler<'t> {
         self.ask(instance.kept(), preference, times);
     }
 
-    /// Asks something of the last state.
+    /// Requires the condition `kept` of the last state: as a goal, or as a preference that counts
+    /// `times`.
     fn ask(&mut self, kept: Condition, preference: Option<PreferenceId>, times: f64) {
         match preference {
             None => self.goal.push(kept),
@@ -285,7 +298,8 @@ impl<'t> Compiler<'t> {
         }
     }
 
-    /// Fact that an action observed the condition before the deadline.
+    /// Fact that a witness action has observed the condition by the time `time_s`, seconds; adds
+    /// that action.
     fn witnessed(&mut self, time_s: f64, span: Span, condition: Condition) -> Condition {
         let (seen, early) = (self.fact("seen in time"), self.fact("early"));
         let (Condition::Atom(own), Condition::Atom(early_atom)) = (&seen, &early) else { return seen };
@@ -302,7 +316,7 @@ impl<'t> Compiler<'t> {
         seen
     }
 
-    /// Derived fact that replaces a condition whose negation cannot be expressed.
+    /// Derived fact that stands for a condition, whose negation cannot be expressed directly.
     fn derived(&mut self, condition: Condition) -> Condition {
         if condition.is_true() {
             return condition;
@@ -315,7 +329,7 @@ impl<'t> Compiler<'t> {
         Condition::Atom(atom(predicate, &[]))
     }
 
-    /// Adds automaton transitions to an action, evaluated just before its effects.
+    /// Adds the automaton's transitions to an action, evaluated right before the action's effects.
     fn watch(&mut self, instance: &Instance, mentioned: &Mentioned, index: usize) {
         let own = &self.task.actions[index];
         let start = mentioned.touched(own, &own.effects.start);
@@ -329,7 +343,8 @@ impl<'t> Compiler<'t> {
     }
 }
 
-/// Conditions and effects that an instance adds to an action that affects it.
+/// Adds to an action's start or end the conditions and effects that an instance needs where the
+/// action affects it.
 fn look(
     instance: &Instance,
     touched: &Condition,
@@ -362,7 +377,8 @@ fn look(
 }
 
 impl Compiler<'_> {
-    /// Copies of an action, one for each subset of its preferences that may be violated.
+    /// Replaces an action with preferences by copies, one for each choice of preferences that it
+    /// violates.
     fn action_preferences(&mut self, index: usize, own: &Action) {
         let mut parts: Vec<(FunctionId, bool, &Condition)> = Vec::new();
         for (id, Timed { start, over_all, end }) in &own.preferences {
@@ -414,7 +430,7 @@ impl Compiler<'_> {
         Compiled { task: self.made, forgets: self.forgets, uncounted }
     }
 
-    /// Adds the bookkeeping actions after the plan's last action.
+    /// Adds the bookkeeping actions that follow the last action of a plan.
     fn last_stage(&mut self) {
         let at_work = self.fact("at work");
         for action in &mut self.made.actions {
@@ -452,7 +468,8 @@ impl Compiler<'_> {
         self.goal.extend(turns.last().cloned());
     }
 
-    /// Phase facts, exactly one of which holds: one before each preference, and one after the last.
+    /// Facts that mark the stages of bookkeeping: one before each preference and one after the
+    /// last. Exactly one holds at a time.
     fn turns(&mut self) -> Vec<Condition> {
         let (types, objects, span) = (vec![TypeId(0)], Vec::new().into(), Span::default());
         let parameter = Parameter { name: "?stage".to_string(), types: types.clone(), objects, span };
@@ -465,8 +482,8 @@ impl Compiler<'_> {
         (0..=self.kept.len()).map(stage).collect()
     }
 
-    /// Replaces total time in the metric by the number of steps, for tasks without durations;
-    /// bookkeeping actions count zero.
+    /// Replaces the total time in the metric by the number of steps, for tasks without durations;
+    /// bookkeeping actions do not count.
     fn steps_for_time(&mut self) {
         let mut timed = false;
         let metric = self.made.metric.iter();
@@ -489,7 +506,7 @@ impl Compiler<'_> {
     }
 }
 
-/// Adds a numeric function with initial value 0.
+/// Adds a numeric function without parameters and with initial value 0.
 fn function(task: &mut Task, name: String) -> FunctionId {
     let function = FunctionId(task.functions.len() as u32);
     task.functions.push(Function { name, parameters: Vec::new(), result: None, span: Span::default() });

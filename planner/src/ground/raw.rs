@@ -1,4 +1,4 @@
-//! The ground task over single atoms, before atoms are grouped into variables.
+//! Ground task in terms of single atoms, before atoms are grouped into variables.
 
 use rustc_hash::FxHashMap;
 
@@ -6,10 +6,11 @@ use super::instantiate::{Clauses, Deed, RawEffect};
 use super::statics::Tries;
 use super::task::{GroundDurationBound, GroundExpression};
 
-/// Maximum number of action copies for a disjunctive condition; more become a derived variable.
+/// Maximum number of copies of an action with a disjunctive condition; beyond, the disjunction
+/// becomes a derived atom.
 const MOST_COPIES: usize = 4;
 
-/// Durative part of an action.
+/// Parts of a durative action other than its start.
 #[derive(Clone, Debug)]
 pub(super) struct Later {
     pub over_all: Clauses,
@@ -19,7 +20,7 @@ pub(super) struct Later {
     pub duration: Vec<GroundDurationBound>,
 }
 
-/// A ground action; no disjunctions are left in its conditions.
+/// Ground action; its conditions contain no disjunctions.
 #[derive(Clone, Debug)]
 pub(super) struct RawAction {
     pub schema: u32,
@@ -27,11 +28,11 @@ pub(super) struct RawAction {
     pub start: Clauses,
     pub effects: Vec<RawEffect>,
     pub later: Option<Box<Later>>,
-    /// Contribution to the metric.
+    /// Contribution of the action to the metric.
     pub cost: GroundExpression,
 }
 
-/// A ground axiom.
+/// Ground axiom.
 #[derive(Clone, Debug)]
 pub(super) struct RawAxiom {
     pub head: u32,
@@ -39,19 +40,19 @@ pub(super) struct RawAxiom {
     pub stratum: u32,
 }
 
-/// The ground task. Atoms from `inner` on stand for disjunctions.
+/// Ground task over atoms; atoms from number `inner` on stand for disjunctions.
 pub(super) struct RawTask {
     pub actions: Vec<RawAction>,
     pub axioms: Vec<RawAxiom>,
     pub goal: Clauses,
-    /// True, by atom, if initially true (derived atoms are false).
+    /// True, by atom, if the atom holds initially (derived atoms are false).
     pub init: Vec<bool>,
     /// Number of the first atom that stands for a disjunction.
     pub inner: u32,
     pub timed: Vec<(f64, Vec<Deed>)>,
 }
 
-/// Replaces disjunctions by derived atoms.
+/// Replaces disjunctions by derived atoms, and collects the axioms that define these.
 pub(super) struct Resolve<'a> {
     next: u32,
     tries: &'a Tries<'a>,
@@ -60,17 +61,18 @@ pub(super) struct Resolve<'a> {
 }
 
 impl<'a> Resolve<'a> {
-    /// Numbers new atoms from `next` on. Once `tries` are used up, the result is incomplete.
+    /// Creates the replacement, with new atoms numbered from `next`. Once `tries` is stopped,
+    /// results are incomplete.
     pub(super) fn new(next: u32, tries: &'a Tries<'a>) -> Self {
         Resolve { next, tries, known: FxHashMap::default(), axioms: Vec::new() }
     }
 
-    /// Present number of atoms.
+    /// Number of atoms, new ones included.
     pub(super) fn atoms(&self) -> u32 {
         self.next
     }
 
-    /// Condition with every disjunction replaced by a derived atom.
+    /// Replaces every disjunction of a condition by a derived atom.
     pub(super) fn flat(&mut self, mut clauses: Clauses, stratum: u32) -> Clauses {
         for or in std::mem::take(&mut clauses.ors) {
             if !self.tries.go_on() {
@@ -100,7 +102,8 @@ impl<'a> Resolve<'a> {
         head
     }
 
-    /// The condition as few alternatives without disjunctions.
+    /// Splits a condition into at most [`MOST_COPIES`] alternatives without disjunctions; further
+    /// disjunctions become derived atoms.
     pub(super) fn split(&mut self, mut clauses: Clauses, stratum: u32) -> Vec<Clauses> {
         if clauses.ors.is_empty() {
             clauses.tidy();

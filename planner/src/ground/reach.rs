@@ -1,7 +1,8 @@
-//! Delete-relaxed reachability over the lifted task: a semi-naive join for every new atom.
+//! Delete-relaxed reachability over the lifted task: rule bodies are joined once for every new atom
+//! (semi-naive evaluation).
 //!
-//! Each rule's body is matched by taking the atom with the fewest candidates next, given what is bound so far; a body
-//! atom with no candidate ends the branch at once.
+//! A join continues with the body atom that has the fewest candidates under the present binding; a
+//! body atom without candidates ends the branch at once.
 
 use std::sync::Arc;
 
@@ -10,33 +11,34 @@ use crate::task::ObjectId;
 use super::atoms::{Atoms, NONE};
 use super::normal::{Formula, Pattern, Term};
 
-/// A rule of the relaxed task.
+/// Rule of the relaxed task: where the body holds, the head atoms are reachable.
 pub(super) struct Rule {
     /// Objects of each slot.
     pub domains: Vec<Arc<[ObjectId]>>,
     pub body: Vec<Pattern>,
-    /// Conditions beyond the body, tested when everything is bound.
+    /// Conditions that are no body atoms; tested once all slots are bound.
     pub filters: Vec<Formula>,
-    /// Pairs of terms that must differ, tested early.
+    /// Pairs of terms that must differ; tested as soon as both are bound.
     pub unequal: Vec<(Term, Term)>,
-    /// Pairs of terms that must be equal.
+    /// Pairs of terms that must be equal; tested as soon as both are bound.
     pub equal: Vec<(Term, Term)>,
-    /// Slots that must be bound, even if not in the body.
+    /// Slots that must be bound, whether or not the body mentions them.
     pub slots: Vec<u32>,
     pub heads: Vec<Head>,
-    /// Action of the rule's instances, and the number of leading `slots` that identify an instance.
+    /// Index of the list in [`Reach::instances`] that records the bindings of this rule, and the
+    /// number of leading `slots` recorded.
     pub instance: Option<(u32, usize)>,
 }
 
-/// An atom that a rule brings about, for all objects of `forall`.
+/// Atom that a rule makes reachable, for all objects of the `forall` slots.
 pub(super) struct Head {
     pub forall: Vec<u32>,
     pub atom: Pattern,
 }
 
-/// Filter under a complete binding by static facts; true unless known to be false.
+/// Test of formulas by static facts.
 pub(super) trait Possible {
-    /// True if the formula may hold in some reachable state.
+    /// True unless static facts show that the formula is false under a complete binding.
     fn possible(
         &self,
         atoms: &Atoms,
@@ -45,38 +47,38 @@ pub(super) trait Possible {
         domains: &[Arc<[ObjectId]>],
     ) -> bool;
 
-    /// True after a request to stop: results since then are void.
+    /// True once stopped; results after that are invalid.
     fn is_stopped(&self) -> bool;
 }
 
-/// Marker of work that was interrupted.
+/// Error: the computation was stopped or exceeded its limit.
 pub(super) struct Stopped;
 
-/// The work in progress.
+/// Computation of the reachable atoms and action instances.
 pub(super) struct Reach<'a, P: Possible> {
     pub atoms: Atoms,
     pub rules: &'a [Rule],
-    /// True, by predicate, if effects or rules add its atoms.
+    /// True, by predicate, if effects or rules change its atoms.
     pub fluent: &'a [bool],
     pub possible: P,
-    /// Instances by action, flat.
+    /// Bindings of each action's (then axiom alternative's) instances, in one flat list each.
     pub instances: Vec<Vec<u32>>,
-    /// Upper bound on atoms and instances together.
+    /// Maximum number of atoms and instances together.
     pub limit: usize,
     pub count: usize,
-    /// Number of objects tried for slots restricted by type alone.
+    /// Number of objects tried so far for slots that no body atom binds.
     pub tried: usize,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Number of tried objects between two queries of the stop signal.
+/// Number of tried objects between two checks of the stop signal and the limit.
 const TRIED_AT_ONCE: usize = 1 << 14;
 
-/// Working memory of one join.
+/// State of one join.
 struct Join<'r> {
     rule: &'r Rule,
     domains: &'r [Arc<[ObjectId]>],
-    /// Objects that fit each slot, as a bit set; `None`: all objects.
+    /// Objects that fit each slot, as a bit set; `None`: every object fits.
     fits: &'r [Option<Vec<u64>>],
     binding: Vec<u32>,
     trigger: u32,
@@ -84,7 +86,7 @@ struct Join<'r> {
 }
 
 impl<P: Possible> Reach<'_, P> {
-    /// Runs to the fixpoint.
+    /// Applies the rules until nothing new is reachable.
     pub(super) fn run(&mut self, objects: usize) -> Result<(), Stopped> {
         let rules = self.rules;
         let fits: Vec<Vec<Option<Vec<u64>>>> =
@@ -116,7 +118,8 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// Rules and positions in them that the atoms of a predicate may match, by predicate.
+    /// Rules with an atom of a predicate in the body, each with the position of that atom, by
+    /// predicate.
     fn triggers(&self) -> Vec<Vec<(usize, usize)>> {
         let mut triggers: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.fluent.len()];
         for (r, rule) in self.rules.iter().enumerate() {
@@ -204,7 +207,8 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// True at the first position of the body that matches the instance's newest atom, so that each
+    /// True if an atom may be matched at this position of the body. Atoms newer than the one that
+    /// triggered the join are excluded, as is the trigger itself at earlier positions, so that each
     /// instance is found once.
     fn visible(&self, join: &Join<'_>, position: usize, atom: u32) -> bool {
         if !self.fluent[join.rule.body[position].predicate as usize] {
@@ -273,7 +277,7 @@ impl<P: Possible> Reach<'_, P> {
         Ok(())
     }
 
-    /// Counts one more tried object; an error once `tries` are used up.
+    /// Counts one more tried object; an error when stopped or beyond the limit.
     fn go_on(&mut self) -> Result<(), Stopped> {
         self.tried += 1;
         let asked = self.tried.is_multiple_of(TRIED_AT_ONCE);
@@ -285,7 +289,8 @@ impl<P: Possible> Reach<'_, P> {
 }
 
 impl Join<'_> {
-    /// Writes the bound arguments (`NONE` for unbound ones) and returns their number.
+    /// Writes the objects of the terms (`NONE` for unbound slots) to `out`; returns the number of
+    /// bound ones.
     fn pattern(&self, terms: &[Term], out: &mut [u32; 32]) -> usize {
         let mut bound = 0;
         for (i, term) in terms.iter().enumerate() {

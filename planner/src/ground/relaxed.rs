@@ -1,19 +1,19 @@
-//! Delete-relaxed reachability of the ground task; unreachable parts are removed.
+//! Delete-relaxed reachability of the ground task, and removal of its unreachable parts.
 
 use crate::grouped::Grouped;
 
 use super::instantiate::{Clauses, Deed, RawCall, RawEffect};
 use super::raw::{RawAction, RawTask};
 
-/// Result of the fixpoint.
+/// Atoms that are reachable, and atoms that may be false.
 pub(super) struct Reached {
-    /// True, by atom, if reachable.
+    /// True, by atom, if the atom is reachable.
     pub atoms: Vec<bool>,
-    /// True, by atom, if it may be deleted or is initially false.
+    /// True, by atom, if the atom is false initially or some effect may delete it.
     pub absent: Vec<bool>,
 }
 
-/// Relaxed operator: reaches its atom (or only counts) once its conditions are reached.
+/// Relaxed operator with one effect: the atom `reaches` is reached once no condition is missing.
 struct Unary {
     missing: u32,
     reaches: u32,
@@ -21,10 +21,10 @@ struct Unary {
 
 struct Fixpoint {
     unary: Vec<Unary>,
-    /// Atoms (those beyond the task's mean "the action was started") with the operators that need
-    /// them.
+    /// Pairs of an atom and an operator that needs it. Atom numbers beyond the task's mean "this
+    /// action was started".
     waits: Vec<(u32, u32)>,
-    /// Open conditions of the operator at hand.
+    /// Buffer for the conditions of the operator that is being added.
     wanted: Vec<u32>,
 }
 
@@ -83,8 +83,8 @@ impl Fixpoint {
     }
 }
 
-/// Removes actions, effects and axioms with unreachable conditions, and conditions that always
-/// hold. Returns the reachable part.
+/// Removes actions, effects and axioms with unreachable conditions, and conditions that an
+/// unreachable atom is false. Returns which atoms are reachable and which may be false.
 pub(super) fn prune(task: &mut RawTask, calls: &[RawCall]) -> Reached {
     let count = task.init.len();
     let mut fixpoint = Fixpoint { unary: Vec::new(), waits: Vec::new(), wanted: Vec::new() };

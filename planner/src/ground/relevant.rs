@@ -7,13 +7,13 @@ use super::raw::{RawAction, RawTask};
 use super::task::{Change, GroundComparison, GroundExpression};
 use crate::model::agreement::contradictions;
 
-/// Relevant atoms and numbers.
+/// Atoms and numeric fluents that are relevant.
 pub(super) struct Relevant {
-    /// True, by atom, if some condition or goal needs it true.
+    /// True, by atom, if some relevant condition needs the atom true.
     pub wanted: Vec<bool>,
-    /// True, by atom, if some condition or goal needs it false.
+    /// True, by atom, if some relevant condition needs the atom false.
     pub unwanted: Vec<bool>,
-    /// True, by numeric fluent, if relevant.
+    /// True, by numeric fluent, if the fluent is relevant.
     pub numerics: Vec<bool>,
 }
 
@@ -21,14 +21,14 @@ struct Work<'a> {
     relevant: Relevant,
     comparisons: &'a [GroundComparison],
     calls: &'a [RawCall],
-    /// True, by numeric fluent, if initially undefined.
+    /// True, by numeric fluent, if the fluent has no initial value.
     undefined: &'a [bool],
-    /// Function with its arguments, by atom of an object function.
+    /// Number of the object function instance to which an atom belongs.
     valued: &'a FxHashMap<u32, u32>,
     changed: bool,
 }
 
-/// Every numeric fluent and call in the expression.
+/// Calls `fluent` and `call` for every numeric fluent and every call in an expression.
 pub(super) fn reads(expression: &GroundExpression, fluent: &mut dyn FnMut(u32), call: &mut dyn FnMut(u32)) {
     match expression {
         GroundExpression::Fluent(id) => fluent(*id),
@@ -48,20 +48,21 @@ pub(super) fn reads(expression: &GroundExpression, fluent: &mut dyn FnMut(u32), 
     }
 }
 
-/// True if a change may read something undefined: the action is then inapplicable, whoever needs
-/// the number. `undefined` marks the numeric fluents without an initial value.
+/// True if a change of a number may have an undefined result, which makes the action inapplicable
+/// whether or not the number is relevant. `undefined` marks the numeric fluents without an initial
+/// value.
 pub(super) fn is_risky(change: Change, fluent: u32, amount: &GroundExpression, undefined: &[bool]) -> bool {
     let mut risky = change == Change::ScaleDown || change != Change::Assign && undefined[fluent as usize];
     reads(amount, &mut |id| risky |= undefined[id as usize], &mut |_| {});
     risky || may_fail(amount)
 }
 
-/// Value of a state-independent expression; NaN for others.
+/// Value of a constant; NaN for other expressions.
 fn known(expression: &GroundExpression) -> f64 {
     if let GroundExpression::Constant(value) = expression { *value } else { f64::NAN }
 }
 
-/// True if an expression may be undefined although all its inputs are defined.
+/// True if an expression may be undefined even where all fluents in it are defined.
 fn may_fail(expression: &GroundExpression) -> bool {
     match expression {
         GroundExpression::Constant(value) => !value.is_finite(),
@@ -87,8 +88,8 @@ impl Work<'_> {
         self.numbers(clauses);
     }
 
-    /// Marks the body of a relevant axiom: literals that make its head true, and their negations if
-    /// the head must be false.
+    /// Marks the body of an axiom as relevant: as is if its head is needed true, negated if the
+    /// head is needed false.
     fn body(&mut self, body: &Clauses, head: u32) {
         if self.relevant.wanted[head as usize] {
             self.literals(body, 0);
@@ -101,7 +102,7 @@ impl Work<'_> {
         }
     }
 
-    /// Marks literals, or (`flipped` 1) their negations.
+    /// Marks the literals of a condition as needed, or with `flipped` 1 their negations.
     fn literals(&mut self, clauses: &Clauses, flipped: u32) {
         for literal in clauses.literals.iter().map(|literal| literal ^ flipped) {
             let list = if literal & 1 == 0 { &mut self.relevant.wanted } else { &mut self.relevant.unwanted };
@@ -131,7 +132,7 @@ impl Work<'_> {
         }
     }
 
-    /// True if the absence of this effect may matter.
+    /// True if it may matter that this effect does not happen.
     fn harms(&self, deed: &Deed) -> bool {
         match deed {
             Deed::Add(a) => self.relevant.unwanted[*a as usize],
@@ -140,7 +141,7 @@ impl Work<'_> {
         }
     }
 
-    /// True if the effect must be kept; harmful effects of a kept action are relevant too.
+    /// True if the effect changes something relevant or may make the action inapplicable.
     fn keeps(&self, deed: &Deed) -> bool {
         match deed {
             Deed::Add(a) | Deed::Delete(a) => {
@@ -153,7 +154,7 @@ impl Work<'_> {
         }
     }
 
-    /// Marks a number that one action may change in contradicting ways as relevant: the
+    /// Marks numbers that one action may change in contradicting ways as relevant, because the
     /// contradiction makes the action inapplicable.
     fn contradictions(&mut self, effects: &[RawEffect]) {
         let change = |effect: &RawEffect| match &effect.deed {
@@ -169,8 +170,8 @@ impl Work<'_> {
         }
     }
 
-    /// Marks an object fluent that one action may give two values as relevant: the contradiction
-    /// makes the action inapplicable.
+    /// Marks the negated conditions of effects that may give one object function two values at
+    /// once, because that makes the action inapplicable.
     fn contests(&mut self, effects: &[RawEffect]) {
         // The object, its value (none where it loses that), and how it gets it.
         let valued = self.valued;
@@ -195,7 +196,8 @@ impl Work<'_> {
         }
     }
 
-    /// True if both effects give one object different values.
+    /// True if the conditions of two effects require different values of one object function, so
+    /// that not both can happen.
     fn exclude(&self, one: &RawEffect, other: &RawEffect) -> bool {
         let (Some(one), Some(other)) = (&one.when, &other.when) else { return false };
         let has = |literal: u32| if literal & 1 == 0 { self.valued.get(&(literal >> 1)) } else { None };
@@ -259,9 +261,10 @@ impl Work<'_> {
     }
 }
 
-/// Removes irrelevant actions and effects. `undefined`: numeric fluents without initial value;
-/// `metric`: fluents that the metric depends on beyond action costs; `valued`: function and
-/// arguments by atom of an object function.
+/// Removes irrelevant actions, effects and axioms; returns what is relevant.
+///
+/// `undefined`: numeric fluents without initial value. `metric`: numeric fluents in the state that
+/// the metric reads. `valued`: number of the object function instance of each of its atoms.
 pub(super) fn prune(
     task: &mut RawTask,
     comparisons: &[GroundComparison],

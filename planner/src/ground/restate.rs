@@ -1,7 +1,4 @@
-//! A grounded task in another state or with another goal.
-//!
-//! Relaxed reachability only grows with what holds at first: where all that holds now was reachable then, no action is missing. So
-//! a grounded task fits every state that differs in the values of its variables and numbers alone.
+//! Reuse of a grounded task for another initial state or another goal.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -12,45 +9,51 @@ use crate::task::{FunctionId, PredicateId, TimedInitial};
 use super::assemble::derive_initial;
 use super::task::{Conjunction, GroundComparison, GroundExpression, GroundFact, GroundTask, Meaning, Values};
 
-/// Reason for which a changed problem was grounded anew.
+/// Reason why a changed problem had to be grounded again.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Regrounded {
-    /// The first time.
+    /// There was no grounded task yet.
     #[error("it was not grounded before")]
     First,
-    /// A fact that is no part of the grounded task has changed: no action changes it, or it was out of reach.
+    /// This fact is not part of the grounded task (no action changes it, or it was unreachable) and
+    /// has changed.
     #[error("{0} was taken for granted or was out of reach")]
     Fact(String),
-    /// A number that is no part of the grounded task has changed, or has a value only now or only before.
+    /// This number is not part of the grounded task and has changed, or has become defined or
+    /// undefined.
     #[error("the value of {0} was taken for granted")]
     Number(String),
-    /// The value of an object function has changed to one that was out of reach.
+    /// The object function has changed to a value that was unreachable, or is not part of the
+    /// grounded task.
     #[error("the value of {0} was taken for granted or was out of reach")]
     Object(String),
-    /// Facts hold together that exclude each other in the grounded task, or none of those of which one always held.
+    /// The present facts contradict a mutex group of the grounded task, or a variable without a
+    /// "none" value has none of its values.
     #[error("facts hold together, or are all false, that never were")]
     Exclusive,
     /// Timed literals have changed.
     #[error("other things happen by themselves at a time")]
     Timed,
-    /// The goal asks for more than facts and comparisons of numbers that are part of the grounded task.
+    /// The new goal asks for more than a conjunction of facts and numeric comparisons of the
+    /// grounded task.
     #[error("the goal asks for more than facts and numbers that are part of the grounded task")]
     Goal,
-    /// Constraints and preferences are part of the grounded actions.
+    /// The task has constraints or preferences, which are compiled into the grounded actions.
     #[error("it has constraints or preferences")]
     Soft,
-    /// No plan was found: reasons are given by what is grounded for the present state alone.
+    /// No plan was found; explanations need a task grounded for the present state.
     #[error("there was no plan, and the reason is sought anew")]
     NoPlan,
 }
 
-/// A grounded task that can be put in other states of the lifted one.
+/// Grounded task that can be moved to other states of the lifted task.
 pub(crate) struct Restated {
     pub ground: GroundTask,
     facts: FxHashMap<Fact, GroundFact>,
     objects: FxHashMap<GroundFluent, FxHashMap<ObjectId, GroundFact>>,
     numbers: FxHashMap<GroundFluent, u32>,
-    /// Facts and values outside the grounded task.
+    /// Initial facts that are not part of the grounded task and must stay as they are; likewise the
+    /// numbers and values of object functions below.
     granted_facts: FxHashSet<Fact>,
     granted_numbers: FxHashMap<GroundFluent, f64>,
     granted_objects: FxHashMap<GroundFluent, ObjectId>,
@@ -63,7 +66,7 @@ fn ids(arguments: &[u32]) -> Box<[ObjectId]> {
 }
 
 impl Restated {
-    /// Takes a task grounded with all that any goal may ask for.
+    /// Takes a task that was grounded with [`super::Keep::All`].
     pub fn new(task: &Task, ground: GroundTask) -> Restated {
         let (mut facts, mut objects) = (FxHashMap::default(), FxHashMap::default());
         for (variable, own) in (0..).zip(&ground.variables) {
@@ -107,10 +110,7 @@ impl Restated {
         }
     }
 
-    /// Puts the grounded task in the present state of the lifted one, and gives it its goal.
-    ///
-    /// # Errors
-    /// Reason for grounding another task; this one is then of no more use.
+    /// Gives the grounded task the present initial state and goal of the lifted task.
     pub fn restate(&mut self, task: &Task) -> Result<(), Regrounded> {
         let same = |(one, other): (&TimedInitial, &TimedInitial)| {
             one.time_s == other.time_s && one.change == other.change
@@ -201,7 +201,8 @@ impl Restated {
         }
     }
 
-    /// A goal of facts and comparisons; `None` where it asks for something else.
+    /// Ground goal; `None` if the goal is more than a conjunction of known facts and comparisons,
+    /// or contradicts itself.
     fn conjunction(&mut self, goal: &Condition) -> Option<Conjunction> {
         let mut made = Conjunction::default();
         self.conjoin(goal, &mut made)?;

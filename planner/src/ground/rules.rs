@@ -1,5 +1,5 @@
-//! Rules of relaxed reachability: one per action or axiom, plus those of conditional and end
-//! effects.
+//! Rules of relaxed reachability: one for each action or axiom, and further ones for conditional
+//! effects and end effects.
 
 use std::sync::Arc;
 
@@ -14,34 +14,36 @@ use super::normal::{
 };
 use super::reach::{Head, Rule};
 
-/// Maximum number of body atoms that a join matches; further ones are tested against static facts
-/// only.
+/// Maximum number of body atoms of a rule that a join matches; further ones are tested only if they
+/// are static.
 const LONGEST_BODY: usize = 60;
-/// Maximum number of alternatives up to which disjunctions are distributed over a condition.
+/// Maximum number of alternatives into which a condition's disjunctions are split.
 const MOST_ALTERNATIVES: usize = 16;
 
-/// Alternative body of a derived predicate: a conjunction over the rule's variables and witnesses.
+/// Alternative body of a derived predicate: a conjunction over the rule's parameters and
+/// existential variables.
 pub(super) struct Alternative {
-    /// Index of the rule in the normal form.
+    /// Index of the rule in the normal form of the task.
     pub rule: usize,
-    /// Parameters, then witnesses.
+    /// Slots of the parameters, then of the existential variables.
     pub slots: Vec<u32>,
     pub parts: Vec<Formula>,
 }
 
-/// All rules and the alternatives of axioms; axiom instances are numbered after action instances.
+/// Rules of actions and axioms. Instance lists of axiom alternatives follow those of actions.
 pub(super) struct Rules {
     pub rules: Vec<Rule>,
     pub alternatives: Vec<Alternative>,
-    /// True, by action, if an instance may be found more than once.
+    /// True, by action, if the same instance may be found more than once.
     pub repeats: Vec<bool>,
-    /// True, by predicate, if it changes; includes predicates "the action was applied".
+    /// True, by predicate, if its atoms change. Includes the new predicates "this action was
+    /// applied".
     pub fluent: Vec<bool>,
-    /// True, by predicate, if it is derived.
+    /// True, by predicate, if the predicate is derived.
     derived: Vec<bool>,
 }
 
-/// Predicates that change, before any "applied" predicate is added.
+/// True, by predicate, if its atoms change.
 pub(super) fn fluent_predicates(task: &Task, normal: &Normal) -> Vec<bool> {
     let mut fluent = vec![false; normal.predicate_count];
     for action in &normal.actions {
@@ -67,14 +69,15 @@ pub(super) fn fluent_predicates(task: &Task, normal: &Normal) -> Vec<bool> {
     fluent
 }
 
-/// Conjunctive parts of a condition, sorted by their use in a join.
+/// One alternative of a condition: existential variables and a conjunction.
 #[derive(Clone, Default)]
 struct Parts {
     slots: Vec<u32>,
     leaves: Vec<Formula>,
 }
 
-/// Distributes disjunctions at the top and lifts existential variables out.
+/// Splits a condition into alternatives: distributes disjunctions and lifts existential variables
+/// out.
 fn alternatives(formula: &Formula) -> Vec<Parts> {
     match formula {
         Formula::And(parts) => parts.iter().fold(vec![Parts::default()], |done, part| {
@@ -135,7 +138,7 @@ fn rule(domains: &[Arc<[ObjectId]>], slots: Vec<u32>, leaves: &[Formula], fluent
     rule
 }
 
-/// The atoms that an effect adds.
+/// Atoms that an effect adds.
 fn heads(task: &Task, effect: &Effect_, domains: &mut Vec<Arc<[ObjectId]>>) -> Vec<Head> {
     match &effect.change {
         Change_::Add(atom) => vec![Head { forall: effect.forall.clone(), atom: atom.clone() }],
@@ -147,8 +150,8 @@ fn heads(task: &Task, effect: &Effect_, domains: &mut Vec<Arc<[ObjectId]>>) -> V
     }
 }
 
-/// Adds rules for an effect module: its atoms may become true and its object functions take any
-/// value.
+/// Atom that an effect module may make true by writing `target`: a predicate's atom, or one for
+/// every value of an object function. `None` for a number.
 fn written(
     task: &Task,
     effect: &Effect_,
@@ -178,7 +181,7 @@ fn is_true(formula: &Formula) -> bool {
     matches!(formula, Formula::And(parts) if parts.iter().all(is_true))
 }
 
-/// Makes the rules; `fresh` creates predicates "the action was applied".
+/// Makes the rules of a task; `fresh` creates a new predicate, "this action was applied".
 pub(super) fn make(task: &Task, normal: &Normal, fresh: &mut dyn FnMut() -> u32) -> Rules {
     let mut all = Rules {
         rules: Vec::new(),
@@ -290,9 +293,9 @@ impl Rules {
         }
     }
 
-    /// Splits a durative action's conditions into those needed at the start and those that may be
-    /// achieved while the action runs. A condition over all must hold at the start unless the start
-    /// itself, or a simultaneous one, achieves it.
+    /// Splits a durative action's conditions into those needed at its start and those that may
+    /// become true while it runs. A condition over all is needed at the start unless the action's
+    /// own start or a simultaneous start may add it.
     fn split(&self, action: &Action_, given: &Given) -> (Vec<Formula>, Vec<Formula>) {
         let mut start = vec![action.condition.start.clone()];
         let mut later = Vec::new();
@@ -308,11 +311,11 @@ impl Rules {
     }
 }
 
-/// Effects of action starts.
+/// Predicates to which some action starts add atoms.
 #[derive(Default)]
 struct Given {
     predicates: FxHashSet<u32>,
-    /// A module may bring about anything.
+    /// True if one of the starts calls an effect module, which counts as adding anything.
     anything: bool,
 }
 
@@ -334,8 +337,9 @@ impl Given {
     }
 }
 
-/// Cycles of actions that may have to start together: each holds over all an atom that the next one
-/// adds at its start. Returns the cycle of each action, and the start effects of each cycle.
+/// Groups of actions that may have to start at the same time, because each needs over all what
+/// another adds at its start, in a cycle. Returns the group of each action and the start effects of
+/// each group.
 fn circles(actions: &[Action_]) -> (Vec<usize>, Vec<Given>) {
     let mut givers: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
     let mut of_anything: Vec<u32> = Vec::new();
@@ -371,7 +375,7 @@ fn leaves(formula: &Formula) -> Vec<&Formula> {
     }
 }
 
-/// The predicates that a formula mentions.
+/// Predicates that a formula mentions.
 fn predicates(formula: &Formula) -> Vec<u32> {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().flat_map(predicates).collect(),

@@ -1,4 +1,4 @@
-//! Static predicates and functions: evaluated away while grounding.
+//! Static predicates and functions, which nothing changes; they are evaluated during grounding.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -12,20 +12,20 @@ use super::atoms::{Atoms, NONE};
 use super::normal::{Formula, Named, Number, Pattern};
 use super::reach::Possible;
 
-/// Static predicates and functions.
+/// Static predicates and functions of a task.
 pub(super) struct Statics<'a> {
     pub task: &'a Task,
-    /// True, by predicate (object functions follow), if its atoms change.
+    /// True, by predicate (then by function), if its atoms change.
     pub fluent: Vec<bool>,
-    /// True, by function, if some effect writes it.
+    /// True, by function, if some effect or timed literal changes the number.
     pub written: Vec<bool>,
-    /// The initial numbers.
+    /// Initial numbers, by function and arguments.
     pub numbers: FxHashMap<(u32, Box<[u32]>), f64>,
-    /// Who is asked now and then whether to stop.
+    /// Counter of work and stop signal.
     pub tries: Tries<'a>,
 }
 
-/// Counter of objects tried for quantified variables, with a stop signal.
+/// Counter of objects tried for quantified variables, which checks the stop signal now and then.
 pub(super) struct Tries<'a> {
     stop: &'a dyn Fn() -> bool,
     tried: Cell<u32>,
@@ -40,7 +40,7 @@ impl<'a> Tries<'a> {
         Tries { stop, tried: Cell::new(0), stopped: Cell::new(false) }
     }
 
-    /// Counts one more tried object; `false` once stopped.
+    /// Counts one more tried object; `false` if stopped.
     pub(super) fn go_on(&self) -> bool {
         self.tried.set(self.tried.get().wrapping_add(1));
         if self.tried.get().is_multiple_of(TRIED_AT_ONCE) && (self.stop)() {
@@ -49,20 +49,20 @@ impl<'a> Tries<'a> {
         !self.stopped.get()
     }
 
-    /// True after a request to stop: results since then are incomplete.
+    /// True once stopped; results after that are incomplete.
     pub(super) fn are_stopped(&self) -> bool {
         self.stopped.get()
     }
 }
 
 impl Statics<'_> {
-    /// Value of a numeric function that no effect changes; NaN if undefined.
+    /// Initial value of a numeric function under a binding; NaN if undefined.
     pub(super) fn number(&self, named: &Named, binding: &[u32]) -> f64 {
         let arguments: Box<[u32]> = named.terms.iter().map(|t| t.bound(binding)).collect();
         self.numbers.get(&(named.index, arguments)).copied().unwrap_or(f64::NAN)
     }
 
-    /// Value if everything is static.
+    /// Value of an expression if it depends on static functions only; else `None`.
     pub(super) fn constant(&self, number: &Number, binding: &[u32]) -> Option<f64> {
         Some(match number {
             Number::Constant(value) => *value,
@@ -121,7 +121,7 @@ impl Possible for &Statics<'_> {
     }
 }
 
-/// True if the test holds for every combination of objects of the slots.
+/// True if the test holds for every assignment of objects to the slots.
 pub(super) fn each(
     slots: &[u32],
     binding: &mut Vec<u32>,

@@ -14,7 +14,7 @@ pub type CallId = u32;
 /// Index of a numeric comparison in [`GroundTask::comparisons`].
 pub type ComparisonId = u32;
 
-/// Variable with one of its values.
+/// Fact: a variable has a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GroundFact {
     /// The variable.
@@ -26,25 +26,25 @@ pub struct GroundFact {
 /// Meaning of a value of a finite-domain variable in the lifted task.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Meaning {
-    /// The atom holds, and no other atom of the variable does.
+    /// This atom holds, and no other atom of the variable.
     Atom {
         /// Predicate of the lifted task.
         predicate: u32,
-        /// Objects of the lifted task.
+        /// Objects of the lifted task, in the order of the arguments.
         arguments: Vec<u32>,
     },
-    /// The object fluent has this value.
+    /// The object function has this value.
     Object {
-        /// Object fluent of the lifted task.
+        /// Function of the lifted task.
         fluent: u32,
-        /// Objects of the lifted task.
+        /// Argument objects of the lifted task.
         arguments: Vec<u32>,
-        /// The value, or `None` for an undefined fluent.
+        /// Value object; `None`: the function is undefined.
         value: Option<u32>,
     },
-    /// Derived variable of a nested condition: a disjunction inside a condition.
+    /// A disjunction inside a condition, which became a derived variable.
     Inner,
-    /// None of the other values' atoms holds.
+    /// None of the variable's other atoms holds.
     NoneOfThose,
 }
 
@@ -54,8 +54,8 @@ pub struct Variable {
     /// Meaning of each value. In a two-valued variable over one atom, value 0 is the atom, value 1
     /// its absence.
     pub values: Vec<Meaning>,
-    /// Axiom stratum of a derived variable, which no effect writes; its default is value 1
-    /// (absent). `None`: not derived.
+    /// Axiom stratum of a derived variable, which axioms make true (value 0) and no effect writes.
+    /// `None`: not derived.
     pub stratum: Option<u32>,
 }
 
@@ -65,51 +65,52 @@ impl Variable {
         self.values.len() as u32
     }
 
-    /// True for object fluents: two values given at once contradict each other.
+    /// True if the variable is an object function; two different values given at once then
+    /// contradict each other.
     pub fn is_object(&self) -> bool {
         matches!(self.values[0], Meaning::Object { .. })
     }
 }
 
-/// Numeric fluent written by some effect, timed literal or attachment; others are folded into
+/// Numeric fluent that some effect, timed literal or attachment writes; all others are folded into
 /// constants.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct NumericFluent {
     /// Numeric function of the lifted task.
     pub function: u32,
-    /// Objects of the lifted task.
+    /// Argument objects of the lifted task.
     pub arguments: Vec<u32>,
 }
 
-/// Arithmetic expression over the state; NaN if an input fluent is undefined (its number is NaN).
+/// Arithmetic expression over a state; NaN if a fluent in it is undefined.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroundExpression {
-    /// A number.
+    /// Constant.
     Constant(f64),
     /// Value of a numeric fluent.
     Fluent(NumericId),
-    /// The answer of an attachment.
+    /// Answer of an attachment.
     Call(CallId),
-    /// `?duration` of the action at hand, in seconds.
+    /// `?duration` of the action that the expression belongs to, seconds.
     Duration,
-    /// `total-time`: the makespan, only in metrics.
+    /// `total-time`: the makespan, seconds; only in metrics.
     TotalTime,
-    /// Number of a preference's violations; only in metrics.
+    /// Number of violations of a preference; only in metrics.
     Violated(u32),
-    /// Sum of all.
+    /// Sum of all parts.
     Sum(Vec<GroundExpression>),
-    /// The product of all.
+    /// Product of all parts.
     Product(Vec<GroundExpression>),
-    /// First minus second.
+    /// First operand minus the second.
     Difference(Box<GroundExpression>, Box<GroundExpression>),
-    /// First over second.
+    /// First operand divided by the second.
     Quotient(Box<GroundExpression>, Box<GroundExpression>),
-    /// Minus the expression.
+    /// Negated operand.
     Negative(Box<GroundExpression>),
 }
 
 impl GroundExpression {
-    /// True if the value is a weighted sum of numbers.
+    /// True if the expression is a linear function of numeric fluents.
     pub fn is_linear(&self) -> bool {
         match self {
             GroundExpression::Constant(_) | GroundExpression::Fluent(_) => true,
@@ -132,8 +133,8 @@ impl GroundExpression {
 }
 
 impl GroundExpression {
-    /// True if the value times `factor` is at least 0 in every state, judged by constants,
-    /// durations and attachment answers (never negative).
+    /// True if the expression times `factor` is certainly at least 0 in every state. Durations and
+    /// answers of attachments count as never negative; fluents are undecided.
     pub fn is_never_negative(&self, factor: f64) -> bool {
         match self {
             GroundExpression::Constant(value) => factor * value >= 0.0,
@@ -153,7 +154,7 @@ impl GroundExpression {
         }
     }
 
-    /// Coefficient of a number in a sum ([`Expression::is_linear`]).
+    /// Coefficient of a numeric fluent in a linear expression ([`GroundExpression::is_linear`]).
     pub fn weight_of(&self, fluent: NumericId) -> f64 {
         match self {
             GroundExpression::Fluent(own) => f64::from(u8::from(*own == fluent)),
@@ -179,7 +180,7 @@ impl GroundExpression {
     }
 }
 
-/// Numeric comparison; false if a side is NaN.
+/// Numeric comparison; false if a side is undefined (NaN).
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundComparison {
     /// Left side.
@@ -190,14 +191,15 @@ pub struct GroundComparison {
     pub right: GroundExpression,
 }
 
-/// A conjunction of conditions; empty is true. Disjunctions have been split off into actions or derived variables.
+/// Conjunction of conditions; true if empty. Disjunctions have become separate actions or derived
+/// variables.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Conjunction {
     /// Facts, sorted, at most one per variable.
     pub facts: Vec<GroundFact>,
-    /// Numeric conditions, sorted.
+    /// Numeric comparisons, sorted.
     pub comparisons: Vec<ComparisonId>,
-    /// Attachment calls and the answer wanted, sorted.
+    /// Attachment calls with the answer that each must give, sorted.
     pub calls: Vec<(CallId, bool)>,
 }
 
@@ -208,32 +210,32 @@ impl Conjunction {
     }
 }
 
-/// Outcome of an effect.
+/// Change that an effect makes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum GroundOutcome {
-    /// The variable takes the value.
+    /// Sets a variable to a value.
     Set(GroundFact),
-    /// The number changes.
+    /// Changes a number at once.
     Change {
-        /// Number that changes.
+        /// Number that is changed.
         fluent: NumericId,
-        /// Kind of change.
+        /// Kind of change: assignment, increase, decrease or scaling.
         change: Change,
-        /// Amount, evaluated in the state before the effects.
+        /// Amount, evaluated in the state before all simultaneous effects.
         amount: GroundExpression,
     },
-    /// The number changes continuously while the action runs: by `rate` a second.
+    /// Changes a number continuously while the action runs.
     Flow {
-        /// Number that changes.
+        /// Number that is changed.
         fluent: NumericId,
-        /// Change a second.
+        /// Change per second.
         rate: GroundExpression,
     },
-    /// An effect module writes the numbers that [`GroundCall::writes`] lists.
+    /// Calls an effect module, which writes the terms that [`GroundCall::writes`] lists.
     Call(CallId),
 }
 
-/// Condition of a conditional effect.
+/// Condition of a conditional effect, by the time at which each part must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GroundWhen {
     /// Condition at the time of the effect.
@@ -250,12 +252,12 @@ pub struct GroundWhen {
 pub struct GroundEffect {
     /// Condition of the effect; `None`: unconditional.
     pub when: Option<Box<GroundWhen>>,
-    /// Outcome.
+    /// Change that the effect makes.
     pub outcome: GroundOutcome,
 }
 
 impl GroundEffect {
-    /// True if both effects may happen together and give one object fluent different values.
+    /// True if both effects may happen together and give one object function different values.
     pub(crate) fn contests(&self, other: &GroundEffect, variables: &[Variable]) -> bool {
         let (GroundOutcome::Set(one), GroundOutcome::Set(another)) = (&self.outcome, &other.outcome) else {
             return false;
@@ -266,7 +268,7 @@ impl GroundEffect {
             && !self.excludes(other)
     }
 
-    /// True if the conditions of both cannot hold at once.
+    /// True if the conditions of the two effects contradict each other.
     fn excludes(&self, other: &GroundEffect) -> bool {
         let (Some(one), Some(other)) = (&self.when, &other.when) else { return false };
         let differs = |fact: &GroundFact| {
@@ -275,14 +277,15 @@ impl GroundEffect {
         one.here.facts.iter().any(differs)
     }
 
-    /// True if some of these effects may give an object fluent several values at once.
+    /// True if two of these effects may give one object function different values at once.
     pub(crate) fn some_contest(effects: &[GroundEffect], variables: &[Variable]) -> bool {
         let mut later = effects.iter().enumerate();
         later.any(|(place, one)| effects[..place].iter().any(|other| one.contests(other, variables)))
     }
 }
 
-/// Origin of a ground action, axiom or call: its lifted counterpart with the arguments.
+/// Lifted action, rule or module from which a ground action, axiom or call was made, with its
+/// arguments.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Origin {
     /// Index in the lifted task's list (actions: instantaneous and durative share one).
@@ -291,7 +294,7 @@ pub struct Origin {
     pub arguments: Vec<u32>,
 }
 
-/// Instantaneous action; a disjunctive condition gives several ground actions per lifted instance.
+/// Ground instantaneous action. A lifted instance with a disjunctive condition gives several.
 #[derive(Clone, Debug)]
 pub struct GroundAction {
     /// Lifted action and its arguments.
@@ -300,22 +303,22 @@ pub struct GroundAction {
     pub condition: Conjunction,
     /// Effects.
     pub effects: Vec<GroundEffect>,
-    /// Contribution to the metric; see [`GroundMetric::additive`].
+    /// Contribution to the metric, if that is additive ([`GroundMetric::additive`]).
     pub cost: GroundExpression,
 }
 
-/// A durative action.
+/// Ground durative action.
 #[derive(Clone, Debug)]
 pub struct DurativeAction {
     /// Lifted action and its arguments.
     pub origin: Origin,
-    /// Bounds on the duration, seconds, evaluated at the start (`true`) or at the end (`false`).
+    /// Bounds on the duration.
     pub duration: Vec<GroundDurationBound>,
     /// Condition right before the start.
     pub at_start: Conjunction,
     /// Condition strictly between start and end (invariant).
     pub over_all: Conjunction,
-    /// Condition just before the end.
+    /// Condition right before the end.
     pub at_end: Conjunction,
     /// Effects at the start.
     pub start_effects: Vec<GroundEffect>,
@@ -323,18 +326,19 @@ pub struct DurativeAction {
     pub flow_effects: Vec<GroundEffect>,
     /// Effects at the end.
     pub end_effects: Vec<GroundEffect>,
-    /// Contribution to the metric besides time; see [`GroundMetric::additive`].
+    /// Contribution to the metric besides its share of time, if the metric is additive
+    /// ([`GroundMetric::additive`]).
     pub cost: GroundExpression,
 }
 
-/// A bound on a duration.
+/// Bound on the duration of an action.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundDurationBound {
-    /// True if evaluated at the end of the action instead of its start.
+    /// True if the expression is evaluated at the end of the action, false if at its start.
     pub at_end: bool,
     /// Relation of `?duration` to the expression.
     pub relation: Relation,
-    /// Seconds.
+    /// Expression for the bound, seconds.
     pub seconds: GroundExpression,
 }
 
@@ -343,113 +347,113 @@ pub struct GroundDurationBound {
 pub struct Axiom {
     /// Derived fact, always value 0 of its variable.
     pub head: GroundFact,
-    /// Condition.
+    /// Condition under which the derived fact holds.
     pub body: Conjunction,
 }
 
 /// Effects that happen by themselves at a time (timed initial literals and fluents).
 #[derive(Clone, Debug)]
 pub struct TimedEffect {
-    /// When, in seconds from the start of the plan.
+    /// Time, seconds from the start of the plan.
     pub time_s: f64,
-    /// Outcomes, in the order of the problem file.
+    /// Changes, in the order of the problem file.
     pub outcomes: Vec<GroundOutcome>,
 }
 
-/// A ground call of an attachment.
+/// Ground call of an attachment.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct GroundCall {
-    /// The module of the lifted task and the arguments.
+    /// Module of the lifted task, and its arguments.
     pub origin: Origin,
-    /// Terms written by an effect module, in module order; empty for other kinds.
+    /// Terms that an effect module writes, in the order of the module's declaration; empty for
+    /// other kinds.
     pub writes: Vec<Place>,
 }
 
-/// Term written by an effect module.
+/// Term that an effect module writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Place {
-    /// A number.
+    /// Numeric fluent.
     Number(NumericId),
-    /// The truth of an atom: value 0 of this two-valued variable is true, 1 false.
+    /// Truth of an atom: the two-valued variable whose value 0 means true and 1 false.
     Truth(VariableId),
-    /// An object fluent: the variable whose values' meanings are [`Meaning::Object`].
+    /// Object function: the variable whose values are [`Meaning::Object`].
     Object(VariableId),
-    /// Irrelevant term.
+    /// Term that the grounded task does not contain, because it is irrelevant or unreachable.
     Nowhere,
 }
 
-/// Metric.
+/// Metric of the task.
 #[derive(Clone, Debug)]
 pub struct GroundMetric {
-    /// True for minimisation.
+    /// True if the metric is minimised, false if maximised.
     pub minimise: bool,
-    /// The whole expression.
+    /// Expression for the metric value of a plan.
     pub expression: GroundExpression,
     /// True if the metric is a constant plus action costs plus `time_weight` × makespan.
     pub additive: bool,
-    /// Possible improvement by actions beyond the value without them; if any, a best value may not
-    /// exist.
+    /// Possibility that actions improve the metric without limit; if they may, a best value need
+    /// not exist.
     pub earns: Earns,
-    /// The weight of `total-time` in an additive metric.
+    /// Weight of `total-time` in an additive metric, per second.
     pub time_weight: f64,
 }
 
-/// Possibility that actions improve a metric beyond its value without them.
+/// Possibility that actions make a metric better than it is without them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Earns {
-    /// Impossible.
+    /// No action can improve the metric.
     Never,
     /// Unknown before the search.
     Perhaps,
-    /// Certain: some action improves the metric.
+    /// Some action certainly improves the metric.
     Surely,
 }
 
-/// State: value of each variable (derived ones up to date), and each numeric fluent (NaN if
-/// undefined).
+/// State: a value for each variable (derived ones included) and each numeric fluent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {
-    /// Values by variable.
+    /// Value of each variable.
     pub values: Vec<u32>,
-    /// Values by numeric fluent.
+    /// Value of each numeric fluent; NaN if undefined.
     pub numbers: Vec<f64>,
 }
 
-/// The grounded task.
+/// Grounded task.
 #[derive(Clone, Debug)]
 pub struct GroundTask {
     /// Finite-domain variables, derived ones last.
     pub variables: Vec<Variable>,
     /// Numeric fluents.
     pub numerics: Vec<NumericFluent>,
-    /// Numeric conditions, each once.
+    /// Numeric comparisons that conditions refer to, each once.
     pub comparisons: Vec<GroundComparison>,
-    /// Attachment calls, each once.
+    /// Calls of attachments, each once.
     pub calls: Vec<GroundCall>,
     /// Instantaneous actions.
     pub actions: Vec<GroundAction>,
     /// Durative actions.
     pub durative: Vec<DurativeAction>,
-    /// Axioms, by stratum.
+    /// Axioms, sorted by stratum.
     pub axioms: Vec<Axiom>,
-    /// Timed effects, by time.
+    /// Timed effects, sorted by time.
     pub timed: Vec<TimedEffect>,
-    /// Initial state, with derived variables evaluated unless calls are involved.
+    /// Initial state; axioms whose bodies contain calls are not applied in it.
     pub initial: Values,
     /// Goal.
     pub goal: Conjunction,
-    /// Metric; `None` counts steps (classical) or time (temporal).
+    /// Metric; `None`: the number of steps counts, or in temporal tasks the makespan.
     pub metric: Option<GroundMetric>,
-    /// Mutex groups beyond those that share a variable.
+    /// Further mutex groups: at most one fact of each group holds in a reachable state.
     pub mutex_groups: Vec<Vec<GroundFact>>,
     /// False if the goal is unreachable even under delete relaxation.
     pub goal_reachable: bool,
-    /// Obstacles of an unreachable task: atoms without achievers, the goal's first.
+    /// Obstacles that explain an unreachable goal: atoms that nothing achieves, the goal's first.
     pub obstacles: Vec<super::obstacles::Obstacle>,
 }
 
 impl GroundTask {
-    /// Approximate memory of the ground task, bytes; actions dominate.
+    /// Approximate memory of the ground task, bytes; mainly that of the actions.
     pub(crate) fn bytes(&self) -> usize {
         let condition = |condition: &Conjunction| {
             condition.facts.len() * size_of::<GroundFact>()

@@ -1,10 +1,10 @@
-//! Unused parameters of an action: one object is enough for each.
+//! Parameters that an action does not use: one object is enough for each.
 
 use super::normal::{Action_, Change_, Effect_, Formula, Pattern, Term};
 use crate::task::{Action, GroundChange, Task};
 
-/// Replaces unused action parameters by their first object, unless a durative action may need to
-/// overlap itself under two names.
+/// Reduces each unused parameter of an action to its first object, unless a durative action may
+/// have to overlap itself under different objects.
 pub(super) fn leave_out_what_nothing_uses(task: &Task, actions: &mut [Action_]) {
     let bare = |lifted: &Action| lifted.grounding.is_empty() && lifted.preferences.is_empty();
     let once: Vec<bool> = actions
@@ -25,7 +25,7 @@ pub(super) fn leave_out_what_nothing_uses(task: &Task, actions: &mut [Action_]) 
     }
 }
 
-/// True, by slot, if the action uses the parameter.
+/// True, by slot, if the action mentions the slot.
 fn used(action: &Action_) -> Vec<bool> {
     let mut used = vec![false; action.domains.len()];
     let mut note = |term: &Term| {
@@ -59,8 +59,8 @@ fn used(action: &Action_) -> Vec<bool> {
     used
 }
 
-/// True if the earliest end among overlapping instances suffices: the action only adds atoms at its
-/// end, and no effect deletes them.
+/// True if overlapping instances bring no more than the one that ends first: the action has no
+/// effects but atoms added at its end, which nothing deletes.
 fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let lasts = |effect: &Effect_| match &effect.change {
         Change_::Add(added) => {
@@ -83,8 +83,8 @@ fn ends_first(task: &Task, actions: &[Action_], action: &Action_) -> bool {
         && action.end_effects.iter().all(|effect| always(effect) && lasts(effect))
 }
 
-/// True if instances of an action are mutex: the action needs and deletes an atom at its start, and
-/// only actions of the same kind restore it, at their end.
+/// True if no two instances of an action can overlap: its start needs and deletes an atom that only
+/// ends of actions of the same kind restore.
 fn alone(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     let mut taken = action.start_effects.iter().filter_map(|effect| match &effect.change {
         Change_::Delete(pattern) => Some(pattern),
@@ -112,7 +112,7 @@ fn alone(task: &Task, actions: &[Action_], action: &Action_) -> bool {
     })
 }
 
-/// True if an action needs an atom at its start and deletes it unconditionally.
+/// True if an action needs an atom at its start and deletes it there unconditionally.
 fn takes(action: &Action_, pattern: &Pattern) -> bool {
     let same = |other: &Pattern| other.predicate == pattern.predicate && other.terms == pattern.terms;
     let bound = |term: &Term| !matches!(term, Term::Slot(slot) if *slot as usize >= action.arity);

@@ -1,48 +1,52 @@
-//! Atoms grouped into finite-domain variables, and conditions and effects translated to them.
+//! Grouping of atoms into finite-domain variables, and translation of conditions and effects to
+//! these.
 
 use super::instantiate::{Clauses, Deed, RawEffect};
 use super::task::{Conjunction, GroundEffect, GroundFact, GroundOutcome, GroundWhen, Variable};
 
-/// Mark of an atom without a variable.
+/// Marks an atom that is no value of a variable.
 const NOWHERE: GroundFact = GroundFact { variable: u32::MAX, value: 0 };
 
-/// Encoding of atoms in variables.
+/// Encoding of atoms as values of variables.
 pub(super) struct Encoding {
-    /// Fact of each atom; `NOWHERE` for static and irrelevant atoms.
+    /// Variable and value of each atom; `NOWHERE` for static and irrelevant atoms.
     facts: Vec<GroundFact>,
-    /// Fact that states an atom's absence, by atom, if a single fact does.
+    /// Fact that is equivalent to the atom being false, by atom; `None` if no single fact is.
     absent: Vec<Option<GroundFact>>,
-    /// Extra two-valued variable of an atom besides the shared one, by atom.
+    /// Extra two-valued variable of an atom (value 0 true, 1 false), which makes its absence a
+    /// single fact; `None` if it has none.
     doubles: Vec<Option<u32>>,
-    /// True, by variable, if one of its atoms has an extra variable.
+    /// True, by variable, if one of its atoms also has an extra variable.
     doubled: Vec<bool>,
-    /// Value "none of these atoms", by variable.
+    /// Value that means "none of these atoms", by variable.
     none: Vec<Option<u32>>,
     /// True, by atom, if it holds in every reachable state.
     always: Vec<bool>,
-    /// Atoms of a variable by value, by variable.
+    /// Atoms of each variable, by value.
     pub atoms: Vec<Vec<u32>>,
-    /// Number of object functions, which are the first variables.
+    /// Number of variables for object functions; these come first.
     objects: usize,
 }
 
-/// Inputs of the choice of groups.
+/// Input of the choice of variables.
 pub(super) struct Choice<'a> {
-    /// Atoms that get a variable.
+    /// True, by atom, if the atom needs a variable.
     pub carried: &'a [bool],
-    /// Atoms that hold in every reachable state.
+    /// True, by atom, if the atom holds in every reachable state.
     pub always: Vec<bool>,
     /// Mutex groups of atoms.
     pub groups: &'a [Vec<u32>],
-    /// Groups that must share a variable (object functions).
+    /// Groups that must become one variable each (object functions).
     pub fixed: &'a [Vec<u32>],
-    /// Atoms whose absence is asked for.
+    /// True, by atom, if some condition requires the atom to be false.
     pub unwanted: &'a [bool],
-    /// Derived atoms: alone, last.
+    /// Axiom stratum of derived atoms, each of which gets a variable of its own after all others;
+    /// `None` for other atoms.
     pub derived: &'a [Option<u32>],
 }
 
-/// Chooses the variables: fixed groups, then greedily the group with most uncovered atoms.
+/// Chooses the variables: first the fixed groups, then repeatedly the mutex group with the most
+/// atoms that have no variable yet.
 pub(super) fn encode(choice: Choice<'_>) -> Encoding {
     let count = choice.carried.len();
     let mut covered: Vec<bool> = choice.carried.iter().map(|c| !c).collect();
@@ -139,13 +143,13 @@ impl Encoding {
         self.atoms.push(group);
     }
 
-    /// Fact of an atom.
+    /// Variable and value of an atom; `None` if the atom has no variable.
     pub(super) fn fact(&self, atom: u32) -> Option<GroundFact> {
         let fact = self.facts[atom as usize];
         (fact != NOWHERE).then_some(fact)
     }
 
-    /// Condition over variables; `None` if it can never hold. Expects no disjunctions.
+    /// Translates a condition without disjunctions to facts; `None` if it can never hold.
     pub(super) fn conjunction(&self, clauses: &Clauses) -> Option<Conjunction> {
         let mut facts = Vec::with_capacity(clauses.literals.len());
         for &literal in &clauses.literals {
@@ -168,7 +172,8 @@ impl Encoding {
         Some(Conjunction { facts, comparisons: clauses.comparisons.clone(), calls: clauses.calls.clone() })
     }
 
-    /// Effects over variables, given the conditions before them; deletes come first.
+    /// Translates effects to variables, deletes first. `before`: conditions that hold before the
+    /// effects.
     pub(super) fn effects(&self, effects: &[RawEffect], before: &[&Conjunction]) -> Vec<GroundEffect> {
         let mut all = Vec::with_capacity(effects.len());
         for effect in effects {
@@ -199,8 +204,8 @@ impl Encoding {
         all
     }
 
-    /// Adds the effects of one value on the atoms it replaces: an assignment has no explicit
-    /// delete, but the extra variables need one.
+    /// Adds the deletes that an added atom implies for extra variables: the atom replaces the other
+    /// values of its variable, whose extra variables become false.
     fn replace(&self, atom: u32, effect: &RawEffect, out: &mut Vec<GroundEffect>) {
         let variable = self.fact(atom).map(|fact| fact.variable as usize);
         let Some(variable) = variable.filter(|&variable| self.doubled[variable]) else { return };
@@ -252,8 +257,8 @@ impl Encoding {
         );
     }
 
-    /// Adds the effects of an object function becoming undefined for this value, which contradict
-    /// an assignment of another value.
+    /// Adds the effects of an object function losing this value: it becomes undefined, which
+    /// contradicts a simultaneous assignment of a value.
     fn unset(&self, atom: u32, fact: GroundFact, effect: &RawEffect, out: &mut Vec<GroundEffect>) {
         if let Some(variable) = self.doubles[atom as usize] {
             self.push(effect, None, GroundOutcome::Set(GroundFact { variable, value: 1 }), out);
@@ -290,19 +295,20 @@ impl Encoding {
         out.push(GroundEffect { when: if always { None } else { Some(Box::new(when)) }, outcome });
     }
 
-    /// The initial value of a variable.
+    /// Initial value of a variable.
     pub(super) fn initial(&self, variable: usize, init: &[bool]) -> u32 {
         let atoms = &self.atoms[variable];
         atoms.iter().position(|&a| init[a as usize]).unwrap_or(atoms.len()) as u32
     }
 }
 
-/// True, by variable, if it starts with the value "none of these atoms", or has one atom only.
+/// True, by variable, if its value "none of these atoms" must be kept: the variable begins with it,
+/// or has one atom only.
 pub(super) fn used_none(variables: &[Variable], initial: &[u32]) -> Vec<bool> {
     variables.iter().zip(initial).map(|(v, &i)| v.values.len() <= 2 || i + 1 == v.domain_size()).collect()
 }
 
-/// Marks variables that an effect may set to "none of these atoms".
+/// Marks the variable of an effect that sets it to "none of these atoms".
 pub(super) fn mark_none(variables: &[Variable], effect: &GroundEffect, used: &mut [bool]) {
     if let GroundOutcome::Set(fact) = effect.outcome {
         let variable = fact.variable as usize;

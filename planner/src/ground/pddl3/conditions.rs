@@ -1,4 +1,5 @@
-//! Conditions with variables bound to objects, quantifiers expanded and static parts evaluated.
+//! Conditions whose variables are replaced by objects, with quantifiers expanded and static parts
+//! evaluated.
 
 use rustc_hash::FxHashSet;
 
@@ -8,7 +9,7 @@ use crate::task::{
     Slot, Task, Term,
 };
 
-/// Conjunction, with constants folded.
+/// Conjunction of conditions; true and false parts are simplified.
 pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
     let mut list = Vec::new();
     for part in parts {
@@ -21,7 +22,7 @@ pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
     single(list, Condition::And)
 }
 
-/// Disjunction, with constants folded.
+/// Disjunction of conditions; true and false parts are simplified.
 pub(super) fn any(parts: impl IntoIterator<Item = Condition>) -> Condition {
     let mut list = Vec::new();
     for part in parts {
@@ -45,7 +46,7 @@ fn single(mut list: Vec<Condition>, many: fn(Vec<Condition>) -> Condition) -> Co
     }
 }
 
-/// True for the empty disjunction.
+/// True if the condition is the empty disjunction.
 pub(super) fn is_false(condition: &Condition) -> bool {
     matches!(condition, Condition::Or(parts) if parts.is_empty())
 }
@@ -63,7 +64,7 @@ pub(crate) fn negated(condition: &Condition) -> Condition {
     }
 }
 
-/// Calls `visit` with every binding of the variables.
+/// Calls `visit` with every binding of the variables to objects.
 pub(super) fn each_binding(
     variables: &[Quantified],
     binding: &mut Vec<Option<ObjectId>>,
@@ -76,9 +77,9 @@ pub(super) fn each_binding(
     }
 }
 
-/// Constant predicates and functions.
+/// Predicates that nothing changes, and the initial facts.
 pub(super) struct Fixed {
-    /// True, by predicate, if no effect changes it.
+    /// True, by predicate, if nothing changes its atoms.
     predicates: Vec<bool>,
     facts: FxHashSet<Fact>,
 }
@@ -108,7 +109,8 @@ impl Fixed {
         Fixed { predicates, facts: task.init.facts.iter().cloned().collect() }
     }
 
-    /// The condition under a binding of its free variables.
+    /// Replaces the variables of a condition by their objects in `binding`, expands quantifiers and
+    /// evaluates static atoms.
     pub(super) fn ground(&self, condition: &Condition, binding: &mut Vec<Option<ObjectId>>) -> Condition {
         match condition {
             Condition::And(parts) => all(parts.iter().map(|part| self.ground(part, binding))),

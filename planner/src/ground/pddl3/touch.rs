@@ -1,4 +1,4 @@
-//! Finds the actions that may change the truth of a condition.
+//! Determines the actions that may change the truth of a condition.
 
 use rustc_hash::FxHashSet;
 
@@ -11,17 +11,16 @@ use crate::task::{
 
 use super::conditions::{all, any};
 
-/// Read set of conditions without variables.
+/// Atoms, predicates and functions that conditions without variables depend on.
 #[derive(Debug, Default)]
 pub(super) struct Mentioned {
     atoms: Vec<Atom>,
-    /// Predicates of which any atom may be relevant, because derived predicates depend on them.
+    /// Predicates all of whose atoms count, because they are derived or occur in rules.
     predicates: FxHashSet<PredicateId>,
     functions: FxHashSet<FunctionId>,
-    /// True if the condition depends on attachments or `?duration`, whose changes no effect
-    /// announces.
+    /// True if the conditions depend on attachments or `?duration`, which change without an effect.
     pub opaque: bool,
-    /// Numbers are compared.
+    /// True if the conditions themselves compare numbers.
     pub compares: bool,
 }
 
@@ -59,8 +58,7 @@ impl Mentioned {
         }
     }
 
-    /// True if the condition may change without an action's start or end: by rates or timed
-    /// literals.
+    /// True if rates or timed literals may change the conditions between action starts and ends.
     pub(super) fn drifts(&self, task: &Task) -> bool {
         let mut rates = task.actions.iter().flat_map(|action| &action.continuous);
         let timed = |change: &GroundChange| match change {
@@ -75,7 +73,7 @@ impl Mentioned {
             || task.init.timed.iter().any(|entry| timed(&entry.change))
     }
 
-    /// Condition on an action's parameters under which these effects may change the conditions.
+    /// Condition on an action's parameters under which the given effects may change the conditions.
     pub(super) fn touched(&self, action: &Action, effects: &[Effect]) -> Condition {
         any(effects.iter().map(|effect| match &effect.change {
             Change::Add(atom) | Change::Delete(atom) if self.predicates.contains(&atom.predicate) => {
@@ -94,8 +92,7 @@ impl Mentioned {
     }
 }
 
-/// Condition that unifies the arguments of an effect with the given ones; `None` if they do not
-/// unify.
+/// Condition under which an effect's arguments are the given objects; `None` if they can never be.
 fn unified(action: &Action, effect: &Effect, written: &[Term], own: &[Term]) -> Option<Condition> {
     let mut parts = Vec::new();
     for (written, own) in written.iter().zip(own) {

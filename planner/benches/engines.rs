@@ -1,7 +1,8 @@
-//! Benchmark of the states each engine evaluates per second, translating and grounding included: `cargo bench
-//! -p descry-planner`.
+//! Benchmark of the number of states that each search engine evaluates per second, translation and
+//! grounding included: `cargo bench -p descry-planner`.
 //!
-//! Tasks are made by a rule, large enough that the limit on evaluations or the improvement of plans ends the search.
+//! The tasks are generated, and so large that the limit on evaluations, or the improvement of
+//! plans, ends the search.
 
 use descry_planner::{Attachments, Options, Source, Task, plan};
 use divan::Bencher;
@@ -11,7 +12,7 @@ fn main() {
     divan::main();
 }
 
-/// A classical task: a sliding puzzle of four by four, its tiles in the order of powers of three.
+/// Classical task: a sliding-tile puzzle of 4 × 4, with the tiles in the order of powers of three.
 fn puzzle() -> (String, String) {
     let domain = "(define (domain sliding) (:requirements :typing) (:types tile place)
       (:predicates (on ?t - tile ?p - place) (free ?p - place) (beside ?a ?b - place))
@@ -47,7 +48,7 @@ fn puzzle() -> (String, String) {
     (domain.into(), problem)
 }
 
-/// A task with times: vans that carry parcels along a ring of towns, each way of its own length.
+/// Temporal task: vans carry parcels along a ring of towns, with roads of different lengths.
 fn parcels() -> (String, String) {
     let domain = "(define (domain parcels) (:requirements :typing :durative-actions :numeric-fluents)
       (:types town van parcel)
@@ -81,7 +82,8 @@ fn parcels() -> (String, String) {
     (domain.into(), problem)
 }
 
-/// A numeric task: counters that are to rise from left to right, and begin falling.
+/// Numeric task: counters that must get increasing values from left to right, and begin with
+/// decreasing ones.
 fn counters() -> (String, String) {
     let domain = "(define (domain counters) (:requirements :typing :numeric-fluents) (:types counter)
       (:functions (value ?c - counter) (most))

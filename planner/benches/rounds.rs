@@ -1,7 +1,7 @@
-//! Benchmark of the rounds of two runs, planned for anew from their texts and again by one [`Problem`]: `cargo bench -p
-//! descry-planner --bench rounds`.
+//! Benchmark of planning in the rounds of two recorded runs, from their PDDL texts and again with
+//! one [`Problem`]: `cargo bench -p descry-planner --bench rounds`.
 //!
-//! Geometry answers at once and the same in every round: what is measured is the planner.
+//! Modules answer at once, with the same answers in every round, so only the planner is measured.
 
 use descry_planner::{
     Answer, Attachment, Attachments, Call, CallError, Options, Outcome, Problem, Source, State, Task, plan,
@@ -27,7 +27,7 @@ fn main() {
     divan::main();
 }
 
-/// Answers of a module that are the same in every state.
+/// Module whose answers are the same in every state.
 struct Geometry(fn(&[&str]) -> Answer);
 
 impl Attachment for Geometry {
@@ -37,7 +37,8 @@ impl Attachment for Geometry {
     }
 }
 
-/// True if a pose was made for a surface.
+/// True if the pose (first argument) was sampled for the surface (last argument): its name begins
+/// with the surface's.
 fn belongs(arguments: &[&str]) -> bool {
     arguments[0].starts_with(arguments[arguments.len() - 1])
 }

@@ -1,4 +1,4 @@
-//! Plans: steps with start times and durations, in the format of the planning competitions.
+//! Plans: steps with start times and durations, in the text format of the planning competitions.
 
 #[doc(hidden)]
 pub mod format;
@@ -7,37 +7,37 @@ use std::fmt;
 
 use crate::diagnostic::{Diagnostic, Findings, Source, Span};
 
-/// Minimum time between two interfering happenings (epsilon), seconds.
+/// Minimum time between two happenings that interfere with each other (epsilon), seconds.
 pub const EPSILON_S: f64 = 0.001;
 
 /// Step of a plan.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Step {
-    /// Start time from the beginning of the plan, seconds; `None` in a classical plan.
+    /// Start time, seconds from the beginning of the plan; `None` in a plan without times.
     pub start_s: Option<f64>,
     /// Name of the action.
     pub action: String,
-    /// Names of the objects, then parameters proposed by grounding modules.
+    /// Names of the argument objects, then the parameters proposed by grounding modules.
     pub arguments: Vec<String>,
-    /// Duration; 0 for an instantaneous action.
+    /// Duration, seconds; 0 for an instantaneous action.
     pub duration_s: f64,
 }
 
-/// A plan, in order of time.
+/// Plan.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Plan {
-    /// Steps.
+    /// Steps in order of time.
     pub steps: Vec<Step>,
-    /// Cost, if known.
+    /// Metric value of the plan; `None` if not known.
     pub cost: Option<f64>,
 }
 
 impl Plan {
-    /// Parses `0.000: (move a b) [3.200]` and `(move a b)`, one or more per line; sorts the steps
-    /// by time.
+    /// Parses steps such as `0.000: (move a b) [3.200]` or `(move a b)`, one or more per line, and
+    /// sorts them by time.
     ///
     /// # Errors
-    /// Every line that is no step.
+    /// Findings about lines that are not steps, and about steps with and without times in one plan.
     pub fn read(source: &Source) -> Result<Plan, Findings> {
         let at = source.text.len() - source.text.trim_start_matches('\u{feff}').len();
         let mut reader = Reader { text: &source.text, at, findings: Vec::new() };
@@ -61,7 +61,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Plan with rounding noise removed from times; a third of a second stays unchanged.
+    /// Plan whose times are rounded to microseconds where that changes them by less than a
+    /// nanosecond (rounding noise).
     pub fn tidy(&self) -> Plan {
         let rounded = |seconds: f64| {
             let short = (seconds * 1e6).round() / 1e6;
@@ -75,7 +76,7 @@ impl Plan {
         plan
     }
 
-    /// End of the last step, seconds; 0 for an empty plan, `None` for a classical one.
+    /// End time of the last step, seconds; 0 for an empty plan, `None` for a plan without times.
     pub fn makespan_s(&self) -> Option<f64> {
         self.steps.iter().try_fold(0.0, |last: f64, step| Some(last.max(step.start_s? + step.duration_s)))
     }
@@ -104,14 +105,14 @@ impl fmt::Display for Plan {
     }
 }
 
-/// Seconds with three decimals, six if three are inexact, or as many as needed.
+/// Seconds as text, with three decimals; six if three are inexact, or as many as needed.
 pub fn seconds(value: f64) -> String {
     let short = [3, 6].map(|digits| format!("{value:.digits$}"));
     let exact = |text: &&String| text.parse() == Ok(value);
     short.iter().find(exact).cloned().unwrap_or_else(|| format!("{value}"))
 }
 
-/// Number for people, without rounding noise in the last digits.
+/// Number as text, rounded to six decimals; very small and very large numbers with an exponent.
 pub fn number_text(value: f64) -> String {
     const DIGITS: f64 = 1e6;
     let size = value.abs();
@@ -152,7 +153,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Next readable step; unreadable lines are reported.
+    /// Next step of the text; `None` at the end. Reports text that is not a step, and skips its
+    /// line.
     fn step(&mut self) -> Option<(Step, Span)> {
         loop {
             self.skip_blanks();

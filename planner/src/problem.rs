@@ -1,4 +1,4 @@
-//! A problem that is planned for again and again while its state and its goal change.
+//! Problem that is planned for repeatedly while its state and goal change.
 
 use crate::attachment::Attachments;
 use crate::ground::{Keep, Regrounded, Restated, ground_with};
@@ -11,16 +11,18 @@ use crate::solve::{plan, search_on};
 use crate::state::State;
 use crate::task::{Atom, Condition, Fact, GroundFluent, ObjectId, Parameter, Scoped, Task, Term};
 
-/// A name that the task does not have, or arguments that do not fit; says what was expected.
+/// Error: the task has no such name, or the arguments do not fit it; the text says what was
+/// expected.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Misnamed(String);
 
-/// A task that is grounded once, and planned for from every state and goal that it is given.
+/// Task that is grounded once and planned for from changing states and goals.
 ///
-/// Objects, actions and what no action changes stay. Where a change is one of what was taken for granted, the next call of
-/// [`Problem::plan`] grounds anew, and [`Problem::regrounded`] says why. Every answer is that of [`plan`] for the present task,
-/// but for the choice among plans that are equally good to the search.
+/// Objects, actions and facts that no action changes are expected to stay. If something changes
+/// that grounding relied on, the next call of [`Problem::plan`] grounds again, and
+/// [`Problem::regrounded`] says why. An answer is the one that [`plan`](crate::plan()) would give
+/// for the present task, except that it may be another among equally good plans.
 pub struct Problem {
     task: Task,
     grounded: Option<Restated>,
@@ -28,27 +30,27 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem in the initial state of a task, with its goal.
+    /// Problem with the initial state and goal of a task.
     pub fn new(mut task: Task) -> Problem {
         let mut seen = rustc_hash::FxHashSet::default();
         task.init.facts.retain(|fact| seen.insert(fact.clone()));
         Problem { task, grounded: None, regrounded: None }
     }
 
-    /// The task with its present state and goal.
+    /// Task with the present state and goal.
     pub fn task(&self) -> &Task {
         &self.task
     }
 
-    /// Reason for which the last call of [`Problem::plan`] grounded anew; `None` where it did not.
+    /// Reason why the last call of [`Problem::plan`] grounded again; `None` if it did not.
     pub fn regrounded(&self) -> Option<&Regrounded> {
         self.regrounded.as_ref()
     }
 
-    /// Makes a fact true or false.
+    /// Makes a fact true or false in the present state.
     ///
     /// # Errors
-    /// [`Misnamed`] where the task has no such predicate or objects.
+    /// [`Misnamed`] if the task has no such predicate or objects.
     pub fn set_fact(&mut self, predicate: &str, arguments: &[&str], holds: bool) -> Result<(), Misnamed> {
         let fact = self.named_fact(predicate, arguments)?;
         let facts = &mut self.task.init.facts;
@@ -62,10 +64,10 @@ impl Problem {
         Ok(())
     }
 
-    /// Gives a number another value.
+    /// Sets the value of a numeric function in the present state.
     ///
     /// # Errors
-    /// [`Misnamed`] where the task has no such function or objects.
+    /// [`Misnamed`] if the task has no such function or objects.
     pub fn set_number(&mut self, function: &str, arguments: &[&str], value: f64) -> Result<(), Misnamed> {
         let id = self.task.find_function(function).filter(|&id| self.task.function(id).result.is_none());
         let known = self.task.functions.iter().map(|own| own.name.as_str());
@@ -80,17 +82,17 @@ impl Problem {
         Ok(())
     }
 
-    /// A fact as a condition, for [`Problem::set_goal`].
+    /// Fact as a condition, to be used in [`Problem::set_goal`].
     ///
     /// # Errors
-    /// [`Misnamed`] where the task has no such predicate or objects.
+    /// [`Misnamed`] if the task has no such predicate or objects.
     pub fn fact(&self, predicate: &str, arguments: &[&str]) -> Result<Condition, Misnamed> {
         let Fact { predicate, arguments } = self.named_fact(predicate, arguments)?;
         let arguments = arguments.iter().map(|&object| Term::Object(object)).collect();
         Ok(Condition::Atom(Atom { predicate, arguments, span: self.task.goal_span }))
     }
 
-    /// Sets another goal, without variables but those that it quantifies.
+    /// Sets the goal, which must have no free variables.
     pub fn set_goal(&mut self, goal: Condition) {
         let mut slots = 0;
         walk::condition(&goal, &mut |part| {
@@ -101,15 +103,15 @@ impl Problem {
         self.task.goal = Scoped { slots, body: goal };
     }
 
-    /// Sets all facts and values, those of a state of this task.
+    /// Sets the present state; timed literals are dropped.
     pub fn set_state(&mut self, state: &State) {
         self.task.init = state.to_init(&self.task);
     }
 
-    /// Plans from the present state to the present goal, as [`plan`] does.
+    /// Plans from the present state to the present goal, as [`plan`](crate::plan()) does.
     ///
     /// # Errors
-    /// Those of [`plan`].
+    /// Those of [`plan`](crate::plan()).
     pub fn plan(
         &mut self,
         attachments: &Attachments,

@@ -1,4 +1,4 @@
-//! Entry point: [`plan`] turns a task into a timed plan, or explains why there is none.
+//! Entry point: [`plan`] finds a timed plan for a task, or explains why there is none.
 
 pub(crate) mod optimal;
 
@@ -20,15 +20,16 @@ use crate::task::Task;
 use crate::temporal::{Counts, Limits, Measure, Progress, Reason, Timed, World, search_plans, to_plan};
 use crate::validate::validate_until;
 
-/// Plans.
+/// Plans for a task.
 ///
-/// `stop` is asked often; once it says true, planning ends within some milliseconds with what it has. `on_plan` hears
-/// of every plan that is better than the one before. Every plan has been validated. Deterministic for a seed, up to
-/// when `stop` says true.
+/// `stop` is polled often; within some milliseconds after it returns true, planning ends with what was
+/// found so far. `on_plan` is called with every plan that is better than the one before. All plans are
+/// validated. The result is deterministic for a seed, as far as `stop` does not intervene.
 ///
 /// # Errors
 ///
-/// [`PlanError`]: a missing or failing attachment, a part of the language that no search handles, or a fault of ours.
+/// [`PlanError`]: a missing or failing attachment, a part of the language that no search supports, or
+/// an internal error.
 pub fn plan(
     task: &Task,
     attachments: &Attachments,
@@ -45,7 +46,7 @@ pub fn plan(
     Ok(with_culprits(task, attachments, options, stop, outcome))
 }
 
-/// Narrows the explanation of an unsolvable task to the conflicting parts of its goal.
+/// Narrows the explanation of an unsolvable task to the parts of the goal that conflict.
 fn with_culprits(
     task: &Task,
     attachments: &Attachments,
@@ -77,18 +78,19 @@ fn with_culprits(
     outcome
 }
 
-/// Maximum number of ground actions up to which an unsolvable goal is split to find the conflicting
-/// parts.
+/// Maximum number of ground actions for which conflicting parts of an unsolvable goal are sought.
 const MOST_ACTIONS_TAKEN_APART: u64 = 5_000;
-/// Spacing of `f64` at the end of a plan, as a fraction of epsilon, above which planning fails as `too-long`.
+/// Maximum spacing of `f64` at the end of a plan, as a fraction of epsilon; beyond, planning fails
+/// as `too-long`.
 /// From: a few times, each rounded by half of that spacing, are added up between two happenings.
 const LEAST_SPACING: f64 = 0.1;
-/// Bytes that a search's own form of the task takes, as a multiple of the grounded task's.
+/// Memory of a search's own form of the task, as a multiple of the grounded task's.
 const FORMS: usize = 2;
-/// Minimum evaluation limit for a part of a goal.
+/// Minimum limit on evaluated states for the searches that explain why there is no plan.
 const LEAST_EVALUATIONS: u64 = 1_000;
 
-/// Distinguishes an unreachable goal from unsatisfiable constraints, after a search without a plan.
+/// After a search without a plan, determines whether the goal itself is unreachable or only the
+/// constraints cannot be kept.
 fn on_the_way(
     task: &Task,
     attachments: &Attachments,
@@ -114,7 +116,7 @@ fn on_the_way(
     }
 }
 
-/// Task without constraints and preferences; the metric goes too if there were preferences.
+/// Task without constraints and preferences; also without metric if there were preferences.
 fn freed(task: &Task) -> Task {
     let mut free = task.clone();
     free.constraints.clear();
@@ -126,7 +128,7 @@ fn freed(task: &Task) -> Task {
     free
 }
 
-/// Plans a task with its preferences and constraints compiled away.
+/// Plans for a task after compiling its preferences and constraints away.
 fn search(
     task: &Task,
     attachments: &Attachments,
@@ -145,12 +147,12 @@ fn search(
     Ok(outcome)
 }
 
-/// Plans `task`, a compilation of `original`; its plans are valid for `original` without the
-/// bookkeeping actions.
+/// Plans for `task`, a compilation of `original`. Without bookkeeping actions, the plans are valid
+/// for `original`.
 ///
-/// Where actions earn something, states in which more has been earned are better ones, and there are ever more of them: the
-/// first search looks away from that, for a plan or the proof that there is none, and a second one goes after what is to be earned.
-/// `grounded` is the task grounded before, if it was.
+/// If actions certainly improve the metric, there may be ever more and better states. Then a first
+/// search ignores this and finds a plan, or proves that there is none; with `anytime`, a second
+/// search improves the metric. `grounded`: `task` grounded already, if it was.
 pub(crate) fn search_on(
     original: &Task,
     task: &Task,
@@ -191,8 +193,8 @@ pub(crate) fn search_on(
     })
 }
 
-/// Runs one search on a task that is grounded already, or grounds what matters to the goal. Returns also
-/// whether actions may improve the metric.
+/// Runs one search on the given grounded task, or grounds the parts of the task that are relevant
+/// to the goal. Also returns whether actions may improve the metric.
 fn search_for(
     original: &Task,
     task: &Task,
@@ -209,7 +211,7 @@ fn search_for(
     }
 }
 
-/// Grounds a task and runs one search on it.
+/// Grounds a task, keeping the parts that `keep` selects, and runs one search on it.
 fn search_keeping(
     original: &Task,
     task: &Task,
@@ -236,7 +238,7 @@ fn search_keeping(
     search_in(original, task, &grounded, attachments, options, memory, stop, on_plan)
 }
 
-/// One search on a grounded task.
+/// Runs one search on a grounded task.
 #[allow(clippy::too_many_arguments)]
 fn search_in(
     original: &Task,
@@ -284,7 +286,7 @@ fn search_in(
     Ok((found_at_least(outcome, unchecked.get()), earns))
 }
 
-/// Outcome with its proof withdrawn if some plan was found but not validated for lack of time.
+/// Outcome without its proof if some plan was found but its validation was stopped (`unchecked`).
 fn found_at_least(outcome: Outcome, unchecked: bool) -> Outcome {
     match outcome {
         Outcome::Unsolvable { statistics, .. } if unchecked => Outcome::OutOfTime { best: None, statistics },
@@ -296,7 +298,7 @@ fn found_at_least(outcome: Outcome, unchecked: bool) -> Outcome {
     }
 }
 
-/// Plans for a grounded task with times, calls or costs that depend on states.
+/// Plans for a grounded task with times, attachments or costs that depend on the state.
 fn plan_in_time(
     (task, grounded): (&Task, &GroundTask),
     attachments: &Attachments,
@@ -361,7 +363,7 @@ fn plan_in_time(
     Ok(ended(best, reason, why, statistics))
 }
 
-/// Outcome of a temporal search.
+/// Outcome of planning after a temporal search ended for `reason`.
 fn ended(
     best: Option<Plan>,
     reason: Reason,
@@ -403,7 +405,7 @@ fn grounding_ended(task: &Task, error: GroundError) -> Result<Outcome, PlanError
     }
 }
 
-/// Passes `:moduleoptions` to the attachments of the same names; other entries are for other
+/// Passes `:moduleoptions` to the attachments of the same names; other entries are meant for other
 /// planners.
 fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
     for option in &task.module_options {
@@ -413,7 +415,7 @@ fn configure(task: &Task, attachments: &Attachments) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// Measure of the plans of a task.
+/// Measure by which the temporal search compares plans of a task.
 fn measure(grounded: &GroundTask) -> Measure {
     match &grounded.metric {
         None => Measure::Makespan,
@@ -429,8 +431,12 @@ fn measure(grounded: &GroundTask) -> Measure {
     }
 }
 
-/// Validates every plan before it leaves this crate; no plan if the validator is stopped. Plans
-/// that violate only constraints on times or attachments, which no search supports, are refused.
+/// Validates a plan, with noise removed from its times where possible; `None` if validation was
+/// stopped.
+///
+/// # Errors
+/// [`PlanError::Untried`] if only constraints are violated; [`PlanError::Refused`] if the plan is
+/// too long for `f64`; else [`PlanError::Internal`].
 fn checked(
     task: &Task,
     attachments: &Attachments,
@@ -475,7 +481,8 @@ fn checked(
     Err(PlanError::Internal { reason: verdict.reason.unwrap_or_default(), plan })
 }
 
-/// Finding about the longest action of a plan whose end times exceed the resolution of `f64`.
+/// Error about the longest action of a plan that is too long for times of `f64` to be exact enough;
+/// `None` for shorter plans.
 fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
     let spacing_s = plan.makespan_s()? * f64::EPSILON;
     let longest = plan.steps.iter().max_by(|one, other| one.duration_s.total_cmp(&other.duration_s))?;
@@ -488,7 +495,8 @@ fn too_long(task: &Task, plan: &Plan) -> Option<Diagnostic> {
         .then(|| finding.with_help("give durations and times in a larger unit, such as hours"))
 }
 
-/// Assigns consecutive start times, apart from all timed literals, to a plan without times.
+/// Assigns start times one epsilon apart to a plan without times, leaving out the times of timed
+/// literals.
 fn give_times(task: &Task, plan: &mut Plan) {
     let is_taken =
         |at_s: f64| task.init.timed.iter().any(|timed| (timed.time_s - at_s).abs() < EPSILON_S / 2.0);

@@ -1,12 +1,13 @@
-//! State of the lifted task: true facts and values.
+//! State of the lifted task: facts that hold, and values of functions.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::task::{Fact, FunctionId, GroundChange, GroundFluent, Init, ObjectId, PredicateId, Task};
 
-/// True facts, numbers and object values; absent ones are false or undefined.
+/// Facts that hold, and values of numeric and object functions. Other facts are false, other
+/// functions undefined.
 ///
-/// Derived facts are held too; [`Semantics`](crate::Semantics) keeps them up to date.
+/// Derived facts are included; [`Semantics`](crate::Semantics) keeps them up to date.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct State {
     facts: Vec<FxHashSet<Box<[ObjectId]>>>,
@@ -15,7 +16,7 @@ pub struct State {
 }
 
 impl State {
-    /// State without true facts and values.
+    /// State without facts and values.
     pub fn empty(task: &Task) -> State {
         State {
             facts: vec![FxHashSet::default(); task.predicates.len()],
@@ -24,7 +25,7 @@ impl State {
         }
     }
 
-    /// The initial state of a task, without derived facts and timed changes.
+    /// Initial state of a task, without derived facts and timed changes.
     pub fn initial(task: &Task) -> State {
         let mut state = State::empty(task);
         for fact in &task.init.facts {
@@ -44,12 +45,12 @@ impl State {
         self.facts[predicate.index()].contains(arguments)
     }
 
-    /// Value of a numeric function.
+    /// Value of a numeric function; `None` if undefined.
     pub fn number(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<f64> {
         self.numbers[function.index()].get(arguments).copied()
     }
 
-    /// Value of an object function.
+    /// Value of an object function; `None` if undefined.
     pub fn object(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<ObjectId> {
         self.objects[function.index()].get(arguments).copied()
     }
@@ -64,7 +65,7 @@ impl State {
         }
     }
 
-    /// Sets a numeric function, or makes it undefined.
+    /// Sets a numeric function; `None` makes it undefined.
     pub fn set_number(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<f64>) {
         let numbers = &mut self.numbers[function.index()];
         match (value, numbers.get_mut(arguments)) {
@@ -78,7 +79,7 @@ impl State {
         }
     }
 
-    /// Sets an object function, or makes it undefined.
+    /// Sets an object function; `None` makes it undefined.
     pub fn set_object(&mut self, function: FunctionId, arguments: &[ObjectId], value: Option<ObjectId>) {
         let objects = &mut self.objects[function.index()];
         match value {
@@ -91,7 +92,7 @@ impl State {
         }
     }
 
-    /// Makes a change.
+    /// Applies a change to the state.
     pub fn apply(&mut self, change: &GroundChange) {
         match change {
             GroundChange::Add(fact) => self.set_fact(fact.predicate, &fact.arguments, true),
@@ -105,17 +106,17 @@ impl State {
         }
     }
 
-    /// Argument tuples of the true instances of a predicate, unordered.
+    /// Arguments for which a predicate is true, unordered.
     pub fn instances(&self, predicate: PredicateId) -> impl Iterator<Item = &[ObjectId]> {
         self.facts[predicate.index()].iter().map(|arguments| &**arguments)
     }
 
-    /// Arguments for which a numeric function is defined, with the values, unordered.
+    /// Arguments for which a numeric function is defined, each with its value, unordered.
     pub fn values(&self, function: FunctionId) -> impl Iterator<Item = (&[ObjectId], f64)> {
         self.numbers[function.index()].iter().map(|(arguments, value)| (&**arguments, *value))
     }
 
-    /// Number of argument tuples for which a predicate is true.
+    /// Number of facts of a predicate that hold.
     pub fn count(&self, predicate: PredicateId) -> usize {
         self.facts[predicate.index()].len()
     }
@@ -124,7 +125,8 @@ impl State {
         self.facts[predicate.index()].clear();
     }
 
-    /// Everything that is true of basic predicates, and every value, sorted: an initial state without timed changes.
+    /// Initial state with all facts of basic (not derived) predicates and all values, sorted;
+    /// without timed changes.
     pub fn to_init(&self, task: &Task) -> Init {
         let mut init = Init::default();
         for (index, facts) in self.facts.iter().enumerate() {
@@ -152,25 +154,25 @@ impl State {
 }
 
 impl Task {
-    /// Task with another initial state. Timed initial literals are dropped, because their times
-    /// refer to the former start.
+    /// Copy of the task with another initial state. Timed initial literals are dropped, because
+    /// their times refer to the former start.
     pub fn with_state(&self, state: &State) -> Task {
         Task { init: state.to_init(self), ..self.clone() }
     }
 
-    /// Object by name, case-insensitive.
+    /// Object of a name in any case; `None` if there is none.
     pub fn find_object(&self, name: &str) -> Option<ObjectId> {
         let by_name = &self.objects_by_name;
         by_name.get(name).or_else(|| by_name.get(&name.to_ascii_lowercase())).copied()
     }
 
-    /// Predicate by name, case-insensitive.
+    /// Predicate of a name in any case; `None` if there is none.
     pub fn find_predicate(&self, name: &str) -> Option<PredicateId> {
         let at = self.predicates.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
         Some(PredicateId(at as u32))
     }
 
-    /// Function by name, case-insensitive.
+    /// Function of a name in any case; `None` if there is none.
     pub fn find_function(&self, name: &str) -> Option<FunctionId> {
         let at = self.functions.iter().position(|own| own.name.eq_ignore_ascii_case(name))?;
         Some(FunctionId(at as u32))

@@ -1,6 +1,6 @@
-//! Simultaneous changes of one number or object. PDDL 2.1 (section 8.1) defines a result only if
-//! the order does not matter: all increase, all scale, or all assign the same value. Actions with
-//! contradicting changes are inapplicable.
+//! Agreement of simultaneous changes of one number or one object function. PDDL 2.1 (section 8.1)
+//! defines a result only if the order does not matter: all changes increase or decrease, all scale,
+//! or all assign the same value. Otherwise the action is inapplicable.
 
 use std::hash::Hash;
 
@@ -10,7 +10,7 @@ use super::relation::Relation;
 use crate::task::Assignment;
 
 impl Assignment {
-    /// Changes a number.
+    /// Applies a change by `amount` to a number.
     pub(crate) fn apply(self, number: &mut f64, amount: f64) {
         match self {
             Assignment::Assign => *number = amount,
@@ -22,8 +22,8 @@ impl Assignment {
     }
 }
 
-/// True if two changes of one number, each with its amount, commute; false for unknown amounts
-/// (NaN).
+/// True if two changes of one number, each with its amount, give the same result in either order.
+/// Assignments of unknown amounts (NaN) do not agree.
 fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f64)) -> bool {
     let adds = |change: Assignment| matches!(change, Assignment::Increase | Assignment::Decrease);
     let scales = |change: Assignment| matches!(change, Assignment::ScaleUp | Assignment::ScaleDown);
@@ -33,7 +33,9 @@ fn agree((one, amount): (Assignment, f64), (other, other_amount): (Assignment, f
     }
 }
 
-/// Pairs of indices of contradicting changes of one number.
+/// Contradicting changes of one number, as pairs of indices into `changes`: the first change of the
+/// number and a later one. A change is a number's id, the kind of change and the amount (NaN if
+/// unknown).
 pub fn contradictions<N: Hash + Eq>(
     changes: impl Iterator<Item = (N, Assignment, f64)>,
 ) -> Vec<(usize, usize)> {
@@ -48,7 +50,7 @@ pub fn contradictions<N: Hash + Eq>(
     found
 }
 
-/// First pair of indices that give one name different values at once.
+/// First two entries (indices) that give one name different values; `None` if all agree.
 pub fn reset<N: Hash + Eq, V: PartialEq + Copy>(
     values: impl Iterator<Item = (N, V)>,
 ) -> Option<(usize, usize)> {

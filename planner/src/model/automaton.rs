@@ -1,41 +1,44 @@
-//! The modal operators of PDDL3 (Gerevini and Long 2005) without times, as automata over the states of a plan.
+//! Automata over the states of a plan for the modal operators of PDDL3 without times (Gerevini and
+//! Long 2005).
 //!
-//! Each sees the states one after the other, the first and the last included, and remembers at most two flags of what it saw.
-//! None changes its mind where a state is seen twice: whoever runs one may leave out states in which neither condition
-//! has changed.
+//! An automaton reads the states in order, from the initial to the final one, and remembers at most
+//! two flags. A repeated state changes nothing, so states in which neither condition has changed
+//! since the state before may be left out.
 
 use crate::task::Modal;
 
-/// Literal over a condition or flag in a state.
+/// Literal over a condition or flag in a state; the literal holds if the condition or flag has the
+/// given truth value.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Literal {
-    /// The operator's first condition.
+    /// First condition of the constraint.
     First(bool),
     /// Second condition of the constraint.
     Second(bool),
-    /// A flag that earlier states have left.
+    /// Flag, by index, as set by earlier states.
     Flag(usize, bool),
 }
 
 use Literal::{First, Flag, Second};
 
-/// Disjunction of conjunctions of literals.
+/// Disjunction of conjunctions of literals; false if empty.
 pub(crate) type Cases = &'static [&'static [Literal]];
 
 /// Automaton of a trajectory constraint (PDDL3).
 #[derive(Debug)]
 pub(crate) struct Automaton {
-    /// Number of flags, all initially false.
+    /// Number of flags, all false in the initial state.
     pub flags: usize,
-    /// States that violate the constraint for good.
+    /// Condition on a state that violates the constraint whatever follows.
     pub broken: Cases,
-    /// Transitions: states that set or clear a flag for the following states.
+    /// Transitions: a flag's index, its new value for the following states, and the condition on
+    /// the present state.
     pub changes: &'static [(usize, bool, &'static [Literal])],
-    /// Final states that leave the constraint unsatisfied.
+    /// Condition on the final state under which the constraint is violated.
     pub open: Cases,
 }
 
-/// `at end`.
+/// `(at end f)`.
 pub(crate) static AT_END: Automaton =
     Automaton { flags: 0, broken: &[], changes: &[], open: &[&[First(false)]] };
 static ALWAYS: Automaton = Automaton { flags: 0, broken: &[&[First(false)]], changes: &[], open: &[] };
@@ -45,21 +48,21 @@ static SOMETIME: Automaton = Automaton {
     changes: &[(0, true, &[First(true)])],
     open: &[&[First(false), Flag(0, false)]],
 };
-/// Flags: has been true; has been true and became false.
+/// Flag 0: the condition has been true. Flag 1: it became false after that.
 static AT_MOST_ONCE: Automaton = Automaton {
     flags: 2,
     broken: &[&[First(true), Flag(1, true)]],
     changes: &[(0, true, &[First(true)]), (1, true, &[First(false), Flag(0, true)])],
     open: &[],
 };
-/// The second condition is owed.
+/// Flag 0: the first condition has been true, and since then the second has not.
 static SOMETIME_AFTER: Automaton = Automaton {
     flags: 1,
     broken: &[],
     changes: &[(0, true, &[First(true), Second(false)]), (0, false, &[Second(true)])],
     open: &[&[First(true), Second(false)], &[Second(false), Flag(0, true)]],
 };
-/// The second condition was true.
+/// Flag 0: the second condition has been true.
 static SOMETIME_BEFORE: Automaton = Automaton {
     flags: 1,
     broken: &[&[First(true), Flag(0, false)]],
@@ -68,7 +71,7 @@ static SOMETIME_BEFORE: Automaton = Automaton {
 };
 
 impl Automaton {
-    /// Automaton of a modal operator; `None` for one with times.
+    /// Automaton of a modal operator; `None` for operators with times.
     pub(crate) fn of(operator: Modal) -> Option<&'static Automaton> {
         match operator {
             Modal::AtEnd => Some(&AT_END),
@@ -81,7 +84,8 @@ impl Automaton {
         }
     }
 
-    /// True if the automaton accepts a plan, given the truth of both conditions in each state.
+    /// True if a plan satisfies the constraint, given the truth of the two conditions in each
+    /// state, in order.
     pub(crate) fn accepts(&self, truths: impl IntoIterator<Item = (bool, bool)>) -> bool {
         let mut flags = [false; 2];
         let mut open = true;

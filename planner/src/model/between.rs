@@ -1,16 +1,18 @@
-//! Conditions over open intervals with linearly changing numbers: PDDL 2.1 (Fox and Long 2003),
-//! section 8.3; truth at both ends does not imply truth in between.
+//! Numeric conditions that must hold throughout an interval while numbers change continuously (PDDL
+//! 2.1, Fox and Long 2003, section 8.3). Truth at both ends does not imply truth in between.
 
 use super::relation::Relation;
 
-/// Minimum length of a sub-interval; shorter ones are rounding errors.
+/// Minimum distance of a test point from the ends of the interval (0, 1); closer ones are due to
+/// rounding.
 const EDGE: f64 = 1e-9;
 
 /// Test points in the open interval (0, 1): a numeric condition holds throughout if it holds at
-/// each of them. They are the roots of the comparisons, and one point between neighbours.
+/// each of these. They are the zeros and turning points of the comparisons, and a point between
+/// each two neighbours.
 ///
-/// `differences` are those of the sides of each comparison: at the beginning, in the middle and at the end. They are taken to
-/// change at a rate, or as products of two such numbers do.
+/// `differences`: for each comparison, left minus right side at the beginning, in the middle and at
+/// the end of the interval; each is taken to be a polynomial of degree at most two.
 pub fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64> {
     let mut turns: Vec<f64> = differences.into_iter().flat_map(turns).collect();
     turns.sort_by(f64::total_cmp);
@@ -25,7 +27,7 @@ pub fn telling_parts(differences: impl IntoIterator<Item = [f64; 3]>) -> Vec<f64
     parts
 }
 
-/// Zeros and turning points of a difference inside the interval.
+/// Zeros and the turning point of a difference inside the interval (0, 1).
 fn turns([first, middle, last]: [f64; 3]) -> Vec<f64> {
     // The parabola through three points: a·x² + b·x + first.
     let a = 2.0 * (first - 2.0 * middle + last);

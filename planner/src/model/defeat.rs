@@ -1,10 +1,10 @@
-//! Durative actions that are never applicable: their own start deletes an invariant.
+//! Durative actions that are never applicable because their own start deletes an invariant.
 
 use crate::diagnostic::Span;
 use crate::task::{Action, Atom, Change, Condition};
 
-/// Invariant (over-all atom) that a durative action deletes at its own start, with the span of that
-/// effect.
+/// Over-all atom of a durative action that the action's own start deletes, with the span of that
+/// effect; `None` if there is none.
 pub fn self_defeating(action: &Action) -> Option<(&Atom, Span)> {
     let effects = &action.effects.start;
     let adds = |atom: &Atom| {
@@ -28,7 +28,7 @@ fn is_same(one: &Atom, other: &Atom) -> bool {
     one.predicate == other.predicate && one.arguments == other.arguments
 }
 
-/// Atoms that hold wherever a condition holds.
+/// Appends the atoms that must hold for the condition to hold.
 fn certain<'c>(condition: &'c Condition, into: &mut Vec<&'c Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| certain(part, into)),

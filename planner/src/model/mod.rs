@@ -1,5 +1,5 @@
-//! Definitions that planner, validator and monitor share: comparisons of numbers, walks over
-//! expressions, trajectory constraints.
+//! Definitions that planner, validator and monitor share: comparisons of numbers, traversal of
+//! conditions and expressions, trajectory constraints.
 
 #[doc(hidden)]
 pub mod agreement;

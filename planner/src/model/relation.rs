@@ -1,10 +1,10 @@
-//! Numeric comparison, with a common tolerance for rounding.
+//! Comparison of numbers with a common tolerance for rounding.
 
 use crate::task::Comparison;
 
-/// Numbers that differ by less than this are equal.
+/// Maximum difference of numbers that count as equal.
 const TOLERANCE: f64 = 1e-7;
-/// Relative difference below which large numbers are equal, too.
+/// Maximum difference of large numbers that count as equal, relative to the larger number.
 const RELATIVE_TOLERANCE: f64 = 1e-12;
 
 /// Relation of two numbers.
@@ -20,12 +20,12 @@ pub enum Relation {
     AtLeast,
     /// `>`
     Greater,
-    /// Not equal; only from negated conditions.
+    /// Not equal; results only from negating an equation.
     Unequal,
 }
 
 impl Relation {
-    /// Relation required by a comparison or by its negation.
+    /// Relation that a comparison requires, or its negation if `wanted` is false.
     pub(crate) fn of(comparison: Comparison, wanted: bool) -> Relation {
         match (comparison, wanted) {
             (Comparison::Less, true) | (Comparison::GreaterOrEqual, false) => Relation::Less,
@@ -37,14 +37,14 @@ impl Relation {
         }
     }
 
-    /// True if all numbers on one side of a bound satisfy the relation.
+    /// True for `<`, `<=`, `>=` and `>`.
     pub fn is_bound(self) -> bool {
         !matches!(self, Relation::Equal | Relation::Unequal)
     }
 
-    /// True if two numbers satisfy the relation; false for NaN.
+    /// True if two numbers satisfy the relation within the tolerance; false if one is NaN.
     ///
-    /// Of `<`, `=` and `>` exactly one holds of any two numbers.
+    /// Of any two numbers exactly one of `<`, `=` and `>` holds.
     pub fn holds(self, left: f64, right: f64) -> bool {
         match self {
             Relation::Less => left < right && !equal(left, right),
@@ -56,8 +56,8 @@ impl Relation {
         }
     }
 
-    /// True if a number of the first range stands in this relation to some number of the second; ranges go
-    /// from the lower to the higher number.
+    /// True if some number of the range `left` may stand in this relation to some number of the
+    /// range `right`; a range is (lowest, highest).
     pub fn may_hold(self, left: (f64, f64), right: (f64, f64)) -> bool {
         match self {
             // The farther apart two numbers are, the less rounding explains it.
@@ -81,7 +81,7 @@ fn equal(left: f64, right: f64) -> bool {
         || apart.is_finite() && apart <= RELATIVE_TOLERANCE * left.abs().max(right.abs())
 }
 
-/// Quotient; NaN if not finite.
+/// Quotient of two numbers; NaN if not finite.
 pub fn quotient(left: f64, right: f64) -> f64 {
     let value = left / right;
     if value.is_finite() { value } else { f64::NAN }

@@ -1,20 +1,20 @@
-//! Pre-order traversal of a task's conditions, expressions, calls and terms.
+//! Pre-order traversal of the conditions, expressions, calls and terms of a task.
 
 use crate::task::{Action, CallTerm, Change, Condition, Effect, Expression, Fluent, Task, Term, Timed};
 
-/// Visited node.
+/// Node that a traversal visits.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Part<'t> {
     Condition(&'t Condition),
     Expression(&'t Expression),
     Call(&'t CallTerm),
-    /// Value of a function, read or changed.
+    /// Function with arguments, whose value is read or changed.
     Fluent(&'t Fluent),
     /// Change by an effect.
     Change(&'t Change),
 }
 
-/// Visits a condition.
+/// Visits a condition and all its parts.
 pub(crate) fn condition<'t>(own: &'t Condition, visit: &mut dyn FnMut(Part<'t>)) {
     visit(Part::Condition(own));
     match own {
@@ -31,7 +31,7 @@ pub(crate) fn condition<'t>(own: &'t Condition, visit: &mut dyn FnMut(Part<'t>))
     }
 }
 
-/// Visits an expression.
+/// Visits an expression and all its parts.
 pub(crate) fn expression<'t>(own: &'t Expression, visit: &mut dyn FnMut(Part<'t>)) {
     visit(Part::Expression(own));
     match own {
@@ -100,7 +100,7 @@ pub(crate) fn action<'t>(own: &'t Action, visit: &mut dyn FnMut(Part<'t>)) {
     own.preferences.iter().for_each(|(_, preferred)| timed(preferred, visit));
 }
 
-/// The calls among the parts that a walk visits.
+/// Calls among the nodes that a traversal visits.
 fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t CallTerm> {
     let mut calls = Vec::new();
     walk(&mut |part| {
@@ -112,7 +112,7 @@ fn calls<'t>(walk: impl FnOnce(&mut dyn FnMut(Part<'t>))) -> Vec<&'t CallTerm> {
 }
 
 impl Action {
-    /// All module calls of an action: grounding, duration, conditions, effects, rates and
+    /// All module calls of the action: grounding, duration, conditions, effects, rates and
     /// preferences.
     pub fn calls(&self) -> Vec<&CallTerm> {
         calls(|visit| action(self, visit))
@@ -120,13 +120,13 @@ impl Action {
 }
 
 impl Expression {
-    /// All module calls of a rule.
+    /// All module calls of the expression.
     pub fn calls(&self) -> Vec<&CallTerm> {
         calls(|visit| expression(self, visit))
     }
 }
 
-/// Visits goal, constraints, preferences and metric of a task.
+/// Visits the goal, constraints, preferences and metric of a task.
 pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     condition(&task.goal.body, visit);
     let constraints = task.constraints.iter().flat_map(|constraint| &constraint.conditions);
@@ -136,7 +136,7 @@ pub(crate) fn aims<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     task.metric.iter().for_each(|metric| expression(&metric.value, visit));
 }
 
-/// Expression with some subexpressions replaced.
+/// Copy of an expression in which each subexpression is replaced for which `with` gives another.
 pub(crate) fn replaced(own: &Expression, with: &dyn Fn(&Expression) -> Option<Expression>) -> Expression {
     let list = |parts: &[Expression]| parts.iter().map(|part| replaced(part, with)).collect();
     let both = |sides: &[Expression; 2]| Box::new(sides.each_ref().map(|side| replaced(side, with)));

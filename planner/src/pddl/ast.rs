@@ -1,126 +1,127 @@
-//! Syntax tree of a domain or problem file: names unresolved, every node with its span.
+//! Syntax tree of a domain or problem file. Names are not resolved yet; every node has its span in
+//! the text.
 
 use crate::attachment::CallKind;
 use crate::diagnostic::Span;
 
-/// Case-folded name or token (names of modules and their functions keep their case in `text`).
+/// Interned, case-folded name or token; an index into [`Symbols`](super::lex::Symbols).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Symbol(pub u32);
 
 /// Name with its span.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Name {
-    /// The case-folded name.
+    /// Case-folded name.
     pub symbol: Symbol,
-    /// Span in the source.
+    /// Span of the name in the source text.
     pub span: Span,
 }
 
 /// Entry of a typed list, such as `?x - (either car truck)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Typed {
-    /// Name that is declared.
+    /// Name that is declared, such as `?x`.
     pub name: Name,
-    /// Types, the alternatives of an `either`; empty if untyped.
+    /// Declared types: one, or the alternatives of an `either`; empty if untyped.
     pub types: Vec<Name>,
 }
 
-/// Declared predicate, or head of a derived one.
+/// Head of a declaration: a predicate, function or module with its parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signature {
-    /// Name.
+    /// Name of the predicate, function or module.
     pub name: Name,
     /// Parameters.
     pub parameters: Vec<Typed>,
 }
 
-/// Declared function; `result` is empty or `number` for numeric ones.
+/// Declared function.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FunctionDeclaration {
     /// Name and parameters.
     pub signature: Signature,
-    /// Types of the function's value.
+    /// Types of the function's value; empty or `number` for a numeric function.
     pub result: Vec<Name>,
 }
 
-/// A declared module: `(can-see ?p - pose conditionchecker fn@lib.so)`.
+/// Declaration of a module, such as `(can-see ?p - pose conditionchecker fn@lib.so)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModuleDeclaration {
     /// Name and parameters.
     pub signature: Signature,
-    /// The fluents that an effect module writes.
+    /// Functions or predicates that an effect module writes, with arguments; empty for other kinds.
     pub writes: Vec<TermAst>,
     /// Kind of the module.
     pub kind: CallKind,
-    /// The token `fn@lib.so`.
+    /// Token that names the module's implementation: `fn@lib.so`.
     pub function: Name,
 }
 
-/// An option line `(init@lib arg …)`.
+/// Option of a module, such as `(init@lib arg …)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModuleOptionAst {
-    /// The token `init@lib`.
+    /// Token that names the option's function: `init@lib`.
     pub function: Name,
-    /// Arguments.
+    /// Arguments of the option.
     pub arguments: Vec<Name>,
 }
 
-/// A call of a module, `[name arg …]`.
+/// Call of a module, `[name arg …]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CallAst {
-    /// The module's name.
+    /// Name of the module.
     pub name: Name,
-    /// Arguments.
+    /// Arguments of the call.
     pub arguments: Vec<TermAst>,
-    /// The whole call.
+    /// Span of the whole call.
     pub span: Span,
 }
 
-/// Something with a value: an object or a number.
+/// Term whose value is an object or a number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum TermAst {
-    /// A plain name: an object, or a function without parameters written without parentheses.
+    /// Name without parentheses: an object, or a function without parameters.
     Name(Name),
-    /// `?x`
+    /// Variable `?x`.
     Variable(Name),
-    /// `3.5`, and the word, which may be an object's name
+    /// Number, such as `3.5`, with the token itself, which may be the name of an object.
     Number(f64, Name),
-    /// `(f a b)`
+    /// Function with arguments, `(f a b)`.
     Apply {
-        /// The function.
+        /// Name of the function.
         name: Name,
-        /// Arguments.
+        /// Arguments of the function.
         arguments: Vec<TermAst>,
-        /// The whole term.
+        /// Span of the whole term.
         span: Span,
     },
-    /// `(+ a b …)`
+    /// Arithmetic, such as `(+ a b …)`.
     Arithmetic {
-        /// The operation.
+        /// Operation.
         operator: Arithmetic,
         /// Operands, at least one.
         operands: Vec<TermAst>,
-        /// The whole term.
+        /// Span of the whole term.
         span: Span,
     },
-    /// `[cost a b]`
+    /// Call of a cost module, such as `[cost a b]`.
     Call(CallAst),
-    /// `?duration`
+    /// `?duration` of the action.
     Duration(Span),
-    /// `#t`
+    /// `#t`, the time in a continuous effect.
     ContinuousTime(Span),
-    /// `total-time`
+    /// `total-time`, in a metric.
     TotalTime(Span),
-    /// `(is-violated name)`
+    /// `(is-violated name)`: number of violations of a preference, in a metric.
     Violated(Name),
 }
 
-/// Operations on numbers.
+/// Arithmetic operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Arithmetic {
     /// `+`
     Add,
-    /// `-`, with one operand the negative
+    /// `-`; negation with one operand
     Subtract,
     /// `*`
     Multiply,
@@ -128,7 +129,7 @@ pub enum Arithmetic {
     Divide,
 }
 
-/// Comparisons.
+/// Comparison of two terms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Comparison {
     /// `<`
@@ -154,10 +155,10 @@ pub enum When {
     End,
 }
 
-/// A condition, goal or constraint.
+/// Condition, goal or constraint.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Formula {
-    /// `(and …)`, also `()`
+    /// `(and …)` or `()`
     And(Vec<Formula>),
     /// `(or …)`
     Or(Vec<Formula>),
@@ -169,48 +170,49 @@ pub enum Formula {
     Exists(Vec<Typed>, Box<Formula>),
     /// `(forall (…) f)`
     Forall(Vec<Typed>, Box<Formula>),
-    /// `(p a b)`
+    /// Predicate with arguments, `(p a b)`.
     Atom {
-        /// The predicate.
+        /// Name of the predicate.
         name: Name,
-        /// Arguments.
+        /// Arguments of the predicate.
         arguments: Vec<TermAst>,
-        /// The whole atom.
+        /// Span of the whole atom.
         span: Span,
     },
-    /// `(= a b)`, `(< a b)`, …
+    /// Comparison, such as `(= a b)` or `(< a b)`.
     Compare {
-        /// The comparison.
+        /// Kind of comparison.
         comparison: Comparison,
-        /// Both sides.
+        /// Left and right side.
         sides: Box<[TermAst; 2]>,
-        /// The whole comparison.
+        /// Span of the whole comparison.
         span: Span,
     },
-    /// `[can-see a b]`
+    /// Call of a condition module, such as `[can-see a b]`.
     Call(CallAst),
-    /// `(at start f)`, …
+    /// Condition with a time specifier, such as `(at start f)`; with the span of the whole.
     Timed(When, Box<Formula>, Span),
-    /// `(preference name f)`
+    /// `(preference name f)`, the name being optional; with the span of the whole.
     Preference(Option<Name>, Box<Formula>, Span),
-    /// `(sometime f)` and the other modal operators of PDDL3
+    /// `(sometime f)` or another modal operator of PDDL3.
     Modal {
-        /// The operator.
+        /// Modal operator.
         operator: Modal,
-        /// Numbers (times).
+        /// Times of the operator, seconds, in the order of the text; empty for operators without
+        /// times.
         times_s: Vec<f64>,
-        /// Formulas.
+        /// Conditions of the operator, one or two.
         formulas: Vec<Formula>,
-        /// The whole constraint.
+        /// Span of the whole constraint.
         span: Span,
     },
 }
 
-/// Modal operators of PDDL3.
+/// Modal operator of PDDL3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Modal {
-    /// `(at end f)`: in the last state
+    /// `(at end f)`: in the final state
     AtEnd,
     /// `(always f)`
     Always,
@@ -232,7 +234,7 @@ pub enum Modal {
     HoldAfter,
 }
 
-/// Five operators that change a fluent.
+/// Operator that changes a numeric function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Assignment {
     /// `assign`
@@ -247,7 +249,7 @@ pub enum Assignment {
     ScaleDown,
 }
 
-/// An effect.
+/// Effect of an action.
 #[derive(Debug, Clone, PartialEq)]
 pub enum EffectAst {
     /// `(and …)`
@@ -256,93 +258,93 @@ pub enum EffectAst {
     Forall(Vec<Typed>, Box<EffectAst>),
     /// `(when f e)`
     When(Formula, Box<EffectAst>),
-    /// `(p a b)` or `(not (p a b))`
+    /// Add or delete effect, `(p a b)` or `(not (p a b))`.
     Literal {
-        /// True if the atom becomes false.
+        /// True for a delete effect.
         negated: bool,
-        /// The predicate.
+        /// Name of the predicate.
         name: Name,
-        /// Arguments.
+        /// Arguments of the predicate.
         arguments: Vec<TermAst>,
-        /// The whole literal.
+        /// Span of the whole literal.
         span: Span,
     },
-    /// `(increase (f a) e)`, …
+    /// Change of a function's value, such as `(increase (f a) e)`.
     Assign {
         /// Kind of change.
         assignment: Assignment,
-        /// The fluent that changes.
+        /// Function that changes, with arguments.
         fluent: TermAst,
-        /// The new value, or the amount of the change.
+        /// New value, or amount of the change.
         value: TermAst,
-        /// The whole effect.
+        /// Span of the whole effect.
         span: Span,
     },
-    /// `[update a b]`
+    /// Call of an effect module, such as `[update a b]`.
     Call(CallAst),
-    /// `(at end e)`, …
+    /// Effect with a time specifier, such as `(at end e)`; with the span of the whole.
     Timed(When, Box<EffectAst>, Span),
 }
 
-/// Bound on a duration, `(<= ?duration e)`, at start or end.
+/// Bound on the duration of an action, such as `(<= ?duration e)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DurationBoundAst {
-    /// Time at which the bound is evaluated.
+    /// Time at which the bound is evaluated: start or end of the action.
     pub when: When,
-    /// Comparison with `?duration` on the left-hand side.
+    /// Comparison; its left side is `?duration`.
     pub comparison: Comparison,
-    /// The bound.
+    /// Right side of the comparison, seconds.
     pub value: TermAst,
-    /// The whole bound.
+    /// Span of the whole bound.
     pub span: Span,
 }
 
-/// An action, instantaneous or durative.
+/// Declaration of an action, instantaneous or durative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActionAst {
-    /// Name.
+    /// Name of the action.
     pub name: Name,
     /// True for a `:durative-action`.
     pub durative: bool,
-    /// Parameters.
+    /// Parameters of the action.
     pub parameters: Vec<Typed>,
-    /// Calls of grounding modules.
+    /// Calls of grounding modules, which propose values of further parameters.
     pub grounding: Vec<CallAst>,
     /// Bounds on the duration.
     pub duration: Vec<DurationBoundAst>,
-    /// Precondition.
+    /// Precondition, or condition of a durative action; `None` if there is none.
     pub condition: Option<Formula>,
-    /// Effect.
+    /// Effect; `None` if there is none.
     pub effect: Option<EffectAst>,
-    /// The whole declaration.
+    /// Span of the whole declaration.
     pub span: Span,
 }
 
-/// A derived predicate's rule.
+/// Rule of a derived predicate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derived {
-    /// Head.
+    /// Derived predicate with its parameters.
     pub head: Signature,
-    /// The condition under which the head is true.
+    /// Condition under which the derived predicate is true.
     pub body: Formula,
-    /// The whole rule.
+    /// Span of the whole rule.
     pub span: Span,
 }
 
-/// A domain file.
+/// Contents of a domain file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Domain {
-    /// True if a part of the domain could not be parsed.
+    /// True if part of the file could not be parsed.
     pub unread: bool,
-    /// Name.
+    /// Name of the domain; `None` if missing.
     pub name: Option<Name>,
     /// Declared requirements.
     pub requirements: Vec<Name>,
     /// Declared types.
     pub types: Vec<Typed>,
-    /// `:oplinit`: options of the modules, independent of the problem.
+    /// `:oplinit`: options of modules that hold for all problems.
     pub module_options: Vec<ModuleOptionAst>,
-    /// Declared semantic modules.
+    /// Declared modules.
     pub modules: Vec<ModuleDeclaration>,
     /// Declared constants.
     pub constants: Vec<Typed>,
@@ -354,84 +356,84 @@ pub struct Domain {
     pub constraints: Vec<Formula>,
     /// Rules of derived predicates.
     pub derived: Vec<Derived>,
-    /// Actions of both kinds.
+    /// Instantaneous and durative actions.
     pub actions: Vec<ActionAst>,
 }
 
-/// An element of the initial state.
+/// Element of the initial state.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
-    /// `(p a b)`, or `(not (p a b))`
+    /// Fact `(p a b)`, or `(not (p a b))`.
     Literal {
-        /// True for a negative literal.
+        /// True if the fact is declared false.
         negated: bool,
-        /// The predicate.
+        /// Name of the predicate.
         name: Name,
-        /// Arguments.
+        /// Arguments of the predicate.
         arguments: Vec<Name>,
-        /// The whole literal.
+        /// Span of the whole literal.
         span: Span,
     },
-    /// `(= (f a b) v)`
+    /// Value of a function, `(= (f a b) v)`.
     Value {
-        /// The function.
+        /// Name of the function.
         name: Name,
-        /// Arguments.
+        /// Arguments of the function.
         arguments: Vec<Name>,
-        /// Value.
+        /// Value of the function.
         value: InitialValue,
-        /// The whole equation.
+        /// Span of the whole equation.
         span: Span,
     },
-    /// `(at 3.5 (p a b))`
+    /// Timed initial literal, such as `(at 3.5 (p a b))`, with its time in seconds.
     At(f64, Box<Initial>),
 }
 
 /// Value of a function in the initial state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InitialValue {
-    /// A number, and the word, which may be an object's name.
+    /// Number, with the token itself, which may be the name of an object.
     Number(f64, Name),
-    /// An object.
+    /// Object, by name.
     Object(Name),
 }
 
-/// The metric of a problem.
+/// Metric of a problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetricAst {
-    /// True to minimise, false to maximise.
+    /// True if the metric is minimised, false if maximised.
     pub minimise: bool,
-    /// The expression that is optimised.
+    /// Expression that is optimised.
     pub value: TermAst,
-    /// The whole section.
+    /// Span of the whole section.
     pub span: Span,
 }
 
-/// A problem file.
+/// Contents of a problem file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProblemAst {
-    /// True if a part of the problem could not be parsed.
+    /// True if part of the file could not be parsed.
     pub unread: bool,
-    /// Name.
+    /// Name of the problem; `None` if missing.
     pub name: Option<Name>,
-    /// Name of the domain that the problem refers to.
+    /// Name of the domain that the problem is for; `None` if missing.
     pub domain: Option<Name>,
     /// Requirements repeated in the problem.
     pub requirements: Vec<Name>,
-    /// `:moduleoptions`
+    /// `:moduleoptions`: options passed to modules before planning.
     pub module_options: Vec<ModuleOptionAst>,
-    /// `:moduleexitoptions`
+    /// `:moduleexitoptions`: options passed to modules after planning.
     pub module_exit_options: Vec<ModuleOptionAst>,
-    /// Objects.
+    /// Objects of the problem.
     pub objects: Vec<Typed>,
-    /// The initial state, timed literals included.
+    /// Elements of the initial state, timed literals included.
     pub initial: Vec<Initial>,
-    /// The goal.
+    /// Goal; `None` if missing.
     pub goal: Option<Formula>,
-    /// Span of the whole goal section.
+    /// Span of the whole `:goal` section.
     pub goal_span: Span,
     /// Trajectory constraints.
     pub constraints: Vec<Formula>,
-    /// The metric.
+    /// Metric; `None` if there is none.
     pub metric: Option<MetricAst>,
 }

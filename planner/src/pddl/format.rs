@@ -1,7 +1,8 @@
-//! PDDL formatter: keeps the author's line breaks between parts; normalises indentation, blanks and
-//! closing parentheses.
+//! PDDL formatter. It keeps the author's line breaks between parts, and normalises indentation,
+//! blanks and closing parentheses.
 //!
-//! Comments are kept where they stand. What is read is the same before and after, and laying out twice changes nothing.
+//! Comments stay in place. Formatting does not change what the text means, and formatting twice
+//! gives the same text as formatting once.
 
 #[doc(hidden)]
 pub mod layout;
@@ -10,13 +11,13 @@ mod tree;
 use super::lex::{self, Symbols};
 use crate::diagnostic::{Findings, Source};
 
-/// Maximum number of layout passes until a fixed point.
+/// Maximum number of layout passes in search of a text that a further pass leaves unchanged.
 const MOST_PASSES: usize = 6;
 
-/// Lays out a domain, a problem, or any text of lists.
+/// Formats a domain, a problem, or any text of parenthesised lists.
 ///
 /// # Errors
-/// What is wrong with its parentheses: such a text is not touched.
+/// Findings about unbalanced parentheses or unknown characters; such a text is not formatted.
 pub fn format(source: &Source) -> Result<String, Findings> {
     let mut list = Vec::new();
     lex::read(&source.text, 0, &mut Symbols::default(), &mut list);

@@ -1,18 +1,18 @@
-//! Lexer: turns characters into a tree of lists and words, with mended parentheses.
+//! Lexer: turns a text into a tree of lists and words, and repairs unbalanced parentheses.
 //!
-//! The tree is flat: nodes in the order of the text, each with the index just after its last descendant. Unbalanced
-//! parentheses are found here, where the layout of the text still shows which one is meant, and mended so that the rest
-//! of the file is read as its author intended.
+//! The tree is flat: nodes in the order of the text, each with the index just after its last
+//! descendant. Unbalanced parentheses are found here, where the indentation still shows which one
+//! is meant, and repaired so that the rest of the file is read as its author intended.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::Symbol;
 use crate::diagnostic::{Diagnostic, Span};
 
-/// Maximum nesting depth; bounds the stack of all later recursion.
+/// Maximum nesting depth of lists. It bounds the stack of all recursion over the tree.
 pub const MAX_DEPTH: usize = 200;
 
-/// Interner of case-folded names, shared by the files of a task.
+/// Table of case-folded names (interner), shared by the files of a task.
 #[derive(Debug, Default)]
 pub struct Symbols {
     names: Vec<Box<str>>,
@@ -22,7 +22,7 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// The symbol of a name in any case.
+    /// Symbol of a name in any case; adds new names.
     pub fn intern(&mut self, name: &str) -> Symbol {
         let name = if name.bytes().any(|byte| byte.is_ascii_uppercase()) {
             self.folded.clear();
@@ -40,17 +40,17 @@ impl Symbols {
         symbol
     }
 
-    /// The symbol of a case-folded name that occurs somewhere already.
+    /// Symbol of a case-folded name; `None` if the name has not occurred yet.
     pub fn find(&self, name: &str) -> Option<Symbol> {
         self.index.get(name).copied()
     }
 
-    /// The case-folded name of a symbol.
+    /// Case-folded name of a symbol.
     pub fn name(&self, symbol: Symbol) -> &str {
         &self.names[symbol.0 as usize]
     }
 
-    /// Records predicate names declared by the domain, so that they are not taken for misspelt
+    /// Records the predicate names that a domain declares, so that these are not taken for misspelt
     /// connectives.
     pub fn declare_predicates(&mut self, tree: &Tree) {
         let head = |list: usize| match tree.children(list).next().map(|first| tree.nodes[first].kind) {
@@ -64,68 +64,68 @@ impl Symbols {
         self.predicates.extend(declared);
     }
 
-    /// True if the domain declares a predicate of this name.
+    /// True if the domain declares a predicate of this case-folded name.
     pub fn is_predicate(&self, name: &str) -> bool {
         self.find(name).is_some_and(|symbol| self.predicates.contains(&symbol))
     }
 
-    /// Number of symbols.
+    /// Number of distinct names.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// True if there are no symbols.
+    /// True if there are no names yet.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 }
 
-/// Kind of a node.
+/// Kind of a node of the tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// `( … )`
     List,
     /// `[ … ]`
     Bracket,
-    /// Anything between delimiters.
+    /// Word: text between delimiters.
     Word(Symbol),
 }
 
-/// A list or word.
+/// List or word.
 #[derive(Debug, Clone, Copy)]
 pub struct Node {
     /// Kind of the node.
     pub kind: Kind,
-    /// First byte.
+    /// Byte offset of the first byte.
     pub start: u32,
-    /// One past the last byte.
+    /// Byte offset after the last byte.
     pub end: u32,
-    /// Index of the node after this one's subtree.
+    /// Index of the first node after this node's descendants.
     pub next: u32,
 }
 
-/// The nodes of a file in the order of the text.
+/// Nodes of a file.
 #[derive(Debug, Default)]
 pub struct Tree {
-    /// Nodes; top-level ones are linked by `next`.
+    /// Nodes in the order of the text; each is followed by its descendants.
     pub nodes: Vec<Node>,
 }
 
 impl Tree {
-    /// The nodes directly inside a list.
+    /// Indices of the nodes directly inside a list; none for a word.
     pub fn children(&self, list: usize) -> Children<'_> {
         let end = self.nodes[list].next as usize;
         let first = if matches!(self.nodes[list].kind, Kind::Word(_)) { end } else { list + 1 };
         Children { nodes: &self.nodes, at: first, end }
     }
 
-    /// Top-level nodes.
+    /// Indices of the top-level nodes.
     pub fn roots(&self) -> Children<'_> {
         Children { nodes: &self.nodes, at: 0, end: self.nodes.len() }
     }
 }
 
-/// Indices of sibling nodes.
+/// Iterator over the indices of sibling nodes.
 #[derive(Debug, Clone)]
 pub struct Children<'t> {
     nodes: &'t [Node],
@@ -145,7 +145,7 @@ impl Iterator for Children<'_> {
     }
 }
 
-/// Keywords of sections: lists directly inside `(define …)` only.
+/// Keywords of sections, which stand only directly inside `(define …)`.
 const SECTIONS: &[&str] = &[
     ":requirements",
     ":types",
@@ -168,14 +168,14 @@ const SECTIONS: &[&str] = &[
     ":metric",
 ];
 
-/// Keywords of sections whose body is `:keyword` parts.
+/// Keywords of sections that consist of parts with keywords.
 const ACTIONS: &[&str] = &[":action", ":durative-action", ":process", ":event"];
 
-/// Keywords that stand directly in an action.
+/// Keywords of the parts of an action.
 const ACTION_PARTS: &[&str] =
     &[":parameters", ":precondition", ":condition", ":duration", ":effect", ":grounding"];
 
-/// Parses a text of source number `source` into a tree; parenthesis errors go to `findings`.
+/// Parses a text of source number `source` into a tree; errors are appended to `findings`.
 pub fn read(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Tree {
     let mut builder = Builder {
         text,
@@ -203,33 +203,35 @@ struct Builder<'a> {
     bytes: &'a [u8],
     source: u32,
     tree: Tree,
-    /// Open nodes, outermost first.
+    /// Indices of the open lists, outermost first.
     open: Vec<usize>,
-    /// Last parenthesis that closed an action or the whole definition.
+    /// Byte offset of the last parenthesis that closed a section or the whole definition.
     last_close: Option<u32>,
-    /// The action closed last, directly in the definition.
+    /// Section closed last, by node index.
     last_action: Option<usize>,
-    /// Open list that is probably unclosed: a later line starts left of it. With the first byte of
-    /// that line.
+    /// Innermost open list when a later line began no further right than the list's content should:
+    /// probably a closing bracket is missing. Node index, and byte offset of that line's first
+    /// word.
     suspect: Option<(usize, u32)>,
-    /// Suspect of the previous section.
+    /// Value of `suspect` when the previous section ended.
     suspect_before: Option<(usize, u32)>,
     line_start: usize,
     fresh_line: bool,
     too_deep: bool,
-    /// True for each kind of non-PDDL character, such as a special blank or hyphen, that was
-    /// already reported.
+    /// True for each kind of non-PDDL character that was reported already: 0 blanks, 1 hyphens, 2
+    /// commas and quotes.
     odd: [bool; 3],
     findings: &'a mut Vec<Diagnostic>,
 }
 
-/// True for non-PDDL blanks, as in copied texts: no-break, thin, ideographic and zero-width ones.
+/// True for blanks that PDDL does not know and copied texts contain: no-break, thin, ideographic
+/// and zero-width ones.
 fn is_odd_blank(sign: char) -> bool {
     !sign.is_ascii() && sign.is_whitespace()
         || matches!(sign, '\u{200b}'..='\u{200d}' | '\u{2060}' | '\u{feff}')
 }
 
-/// True if a word is a dash or a minus sign, into which word processors turn a hyphen.
+/// True if a word is a dash or minus sign, into which word processors turn a hyphen.
 fn is_odd_hyphen(word: &str) -> bool {
     matches!(word, "\u{2010}" | "\u{2011}" | "\u{2012}" | "\u{2013}" | "\u{2014}" | "\u{2212}")
 }
@@ -270,7 +272,7 @@ impl Builder<'_> {
         self.finish();
     }
 
-    /// Reads a word, or skips a character that counts as a blank; returns the end.
+    /// Reads a word, or skips a character that counts as a blank; returns the byte offset after it.
     fn word_or_blank(&mut self, at: usize, symbols: &mut Symbols) -> usize {
         let end = self.word_end(at);
         let word = &self.text[at..end];
@@ -289,7 +291,7 @@ impl Builder<'_> {
         blank.map_or(end, |(before, _)| at + before)
     }
 
-    /// Reports a non-PDDL character once per kind, with the character it is read as.
+    /// Reports a non-PDDL character, once for each kind; `help` says how the character is read.
     fn odd(&mut self, kind: usize, message: String, span: Span, help: &str) {
         if !std::mem::replace(&mut self.odd[kind], true) {
             let finding = Diagnostic::warning("odd-sign", message, span, "other planners do not read this");
@@ -297,7 +299,8 @@ impl Builder<'_> {
         }
     }
 
-    /// End of a word: a delimiter, or a question mark, so that `at?x` is two words.
+    /// Byte offset of the end of a word: the next delimiter, or a question mark, so that `at?x` is
+    /// two words.
     fn word_end(&self, start: usize) -> usize {
         let rest = &self.bytes[start + 1..];
         let delimiter = |byte: &u8| byte.is_ascii_whitespace() || b"\x0b()[];?,\"".contains(byte);
@@ -349,7 +352,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Reports a mismatched closing bracket; true if it closes the list anyway.
+    /// Reports a closing bracket of the wrong kind; true if the bracket closes the list
+    /// nevertheless.
     fn mend_mixed(&mut self, at: usize, list: usize) -> bool {
         let node = self.tree.nodes[list];
         let (open, wanted, got) = if node.kind == Kind::List { ('(', ')', ']') } else { ('[', ']', ')') };
@@ -412,7 +416,8 @@ impl Builder<'_> {
         self.tree.nodes.push(Node { kind, start: start as u32, end: end as u32, next });
     }
 
-    /// Remembers the first open list that a new line stands left of.
+    /// Remembers the innermost open list as suspect if a new line begins left of the list's
+    /// content.
     fn note_layout(&mut self, at: usize) {
         if !std::mem::take(&mut self.fresh_line) || self.suspect.is_some() || self.open.len() < 3 {
             return;
@@ -428,8 +433,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Column right of which the list's contents should stand: the bracket's, or the line's if only
-    /// its first word stands there.
+    /// Column right of which the content of a list should stand: that of the opening bracket, or of
+    /// the line's first word if the bracket's line holds at most one word after the bracket.
     fn edge(&self, start: usize) -> usize {
         let line = self.text[..start].rfind('\n').map_or(0, |newline| newline + 1);
         let rest = self.text[start + 1..].lines().next().unwrap_or_default();
@@ -438,7 +443,7 @@ impl Builder<'_> {
         self.column(if hangs { line + blanks } else { start })
     }
 
-    /// Column of a byte, tabs to the next multiple of eight.
+    /// Column of a byte, from 0; a tab extends to the next multiple of eight.
     fn column(&self, at: usize) -> usize {
         let line = self.bytes[..at].iter().rposition(|&byte| byte == b'\n').map_or(0, |newline| newline + 1);
         self.bytes[line..at]
@@ -446,7 +451,7 @@ impl Builder<'_> {
             .fold(0, |column, &byte| if byte == b'\t' { column / 8 * 8 + 8 } else { column + 1 })
     }
 
-    /// True if the list at `at` begins with one of these words.
+    /// True if the list at byte `at` begins with one of these keywords.
     fn begins(&self, at: usize, words: &[&str]) -> bool {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
@@ -458,7 +463,7 @@ impl Builder<'_> {
         words.iter().any(|section| section.eq_ignore_ascii_case(word))
     }
 
-    /// Handles the start of a section: all lists before it except `(define` should be closed.
+    /// Handles the start of a section: all lists except `(define` should have been closed.
     fn expect_section(&mut self, at: usize) {
         if self.open.len() > 1 {
             self.unclosed(1, at, "a new section begins here");
@@ -484,7 +489,7 @@ impl Builder<'_> {
         self.open.push(define);
     }
 
-    /// Handles the start of an action part, which should stand directly inside the action.
+    /// Handles the start of an action's part, which should stand directly inside the action.
     fn expect_action_part(&mut self, start: usize, end: usize) {
         let in_action =
             self.open.get(1).is_some_and(|&list| self.begins(self.tree.nodes[list].start as usize, ACTIONS));
@@ -527,8 +532,8 @@ impl Builder<'_> {
         self.open.push(action);
     }
 
-    /// Reports the list that lacks its closing bracket, of those open beyond `depth`; `there`:
-    /// description of the text at `at`.
+    /// Reports which of the lists open beyond `depth` lacks its closing bracket. `there` describes
+    /// the text at `at`.
     fn unclosed(&mut self, depth: usize, at: usize, there: &str) {
         let outer = depth.checked_sub(1).map(|parent| self.open[parent]);
         let (list, before, there) = match self.suspect.take().filter(|&(list, _)| Some(list) > outer) {

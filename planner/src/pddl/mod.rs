@@ -1,4 +1,4 @@
-//! PDDL text: parsing to a syntax tree, and the checks that make a [`Task`](crate::Task) from it.
+//! PDDL text: parsing to a syntax tree, and checks that turn the tree into a [`Task`](crate::Task).
 
 pub mod ast;
 mod check;
@@ -11,7 +11,8 @@ pub use check::check;
 pub(crate) use check::{defeated, without_value};
 pub use format::format;
 
-/// Known name most similar to `name`, if at most a third of the letters differ.
+/// Known name that is most similar to `name`; `None` if in all of them more than a third of the
+/// letters differ.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.chars().count() / 3).max(1);
     known
@@ -22,8 +23,8 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
         .map(|(_, candidate)| candidate)
 }
 
-/// Edit distance (insertion, deletion, replacement, transposition of neighbours); above `limit`,
-/// some larger number.
+/// Edit distance of two names (insertion, deletion, replacement, transposition of neighbours).
+/// Distances above `limit` are returned as some number above `limit`.
 fn distance(from: &str, to: &str, limit: usize) -> usize {
     let (from, to): (Vec<char>, Vec<char>) = (from.chars().collect(), to.chars().collect());
     if from.len().abs_diff(to.len()) > limit {

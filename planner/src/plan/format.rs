@@ -1,14 +1,14 @@
-//! Plan formatter: one step per line, times and durations with three decimals if exact, comments
-//! kept in place.
+//! Plan formatter: each step on its own line, times and durations with three decimals where these
+//! are exact. Comments stay in place.
 
 use super::{Plan, Reader, seconds};
 use crate::diagnostic::{Findings, Source};
 
 impl Plan {
-    /// Formats a plan; steps keep their order, and reading the result gives the same plan.
+    /// Formats a plan; the order of the steps is kept, and reading the result gives the same plan.
     ///
     /// # Errors
-    /// Every line that is no step: such a text is not touched.
+    /// Findings about lines that are not steps; such a text is not formatted.
     pub fn format(source: &Source) -> Result<String, Findings> {
         Plan::read(source)?;
         let mut reader = Reader { text: &source.text, at: 0, findings: Vec::new() };
@@ -48,7 +48,7 @@ impl Plan {
     }
 }
 
-/// Step text with runs of blanks reduced to one.
+/// Text of a step in normal form: single blanks, and times as [`seconds`] writes them.
 fn step(text: &str) -> String {
     let (before, rest) = text.split_once('(').unwrap_or(("", text));
     let (inside, after) = rest.split_once(')').unwrap_or((rest, ""));
@@ -60,7 +60,7 @@ fn step(text: &str) -> String {
     format!("{time}({call}){duration}")
 }
 
-/// Number with the decimals of plans if exact; otherwise unchanged.
+/// Number as [`seconds`] writes it, if that is exact; otherwise the text as it is.
 fn exact(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(value) if seconds(value).parse() == Ok(value) => seconds(value),

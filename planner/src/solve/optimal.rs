@@ -1,4 +1,5 @@
-//! Optimal planning for instantaneous actions: a plan with a proof of optimality, or no plan.
+//! Optimal planning for instantaneous actions: a plan that is proven optimal, or a proof that there
+//! is none.
 
 use crate::attachment::Attachments;
 use crate::classical::compiled::{Compiled, is_classical};
@@ -16,15 +17,16 @@ use crate::task::{Action, Task};
 
 use super::{checked, freed, grounding_ended, on_the_way, with_culprits};
 
-/// Plans optimally, by A* with LM-cut: [`Outcome::Solved`] is proven optimal.
+/// Plans optimally, by A* with the LM-cut heuristic: a plan in [`Outcome::Solved`] is proven
+/// optimal.
 ///
-/// `on_bound` hears every better bound on the metric (on the number of steps, without a metric): no plan has a better value. Of
-/// the options, the limits count.
+/// `on_bound` is called with every better lower bound on the metric value (without a metric, on the
+/// number of steps). Of the options, only the limits are used.
 ///
 /// # Errors
 ///
-/// [`PlanError::Refused`] for what the proof does not cover: durations, timed literals, attachments, and metrics other than a sum of
-/// constant costs of at least 0.
+/// [`PlanError::Refused`] for what the proof does not cover: durations, timed literals,
+/// attachments, and metrics other than a sum of constant costs of at least 0.
 pub fn plan_optimally(
     task: &Task,
     attachments: &Attachments,
@@ -70,7 +72,7 @@ pub fn plan_optimally(
     Ok(with_culprits(task, attachments, options, stop, outcome))
 }
 
-/// Compiled task, or the reason why summed costs do not decide optimality, with a remedy.
+/// Compiled task; or, if optimality cannot be decided by summed costs, the reason and a remedy.
 fn prepared(task: &Task, grounded: &GroundTask) -> Result<Compiled, (&'static str, &'static str)> {
     let improve = "improve plans instead (`--anytime`), which says when a plan is proven best";
     if !is_classical(grounded) {
@@ -94,7 +96,8 @@ fn prepared(task: &Task, grounded: &GroundTask) -> Result<Compiled, (&'static st
     }
 }
 
-/// Finding on the first part of a task with durations or attachments.
+/// Finding about the first durative action, timed literal or module, which the proof does not
+/// cover; `None` if there is none.
 fn beyond_the_proof(task: &Task) -> Option<Diagnostic> {
     let finding = |what: String, span: Span, label: &str| {
         let message = format!("optimal plans are proven for actions that take no time: {what}");
@@ -121,10 +124,10 @@ fn of_the_metric(task: &Task, fault: &str, help: &str) -> Diagnostic {
     Diagnostic::error("not-proven-optimal", message, span, "this metric").with_help(help)
 }
 
-/// Search of a grounded task.
+/// Optimal search on a grounded task.
 struct Search<'a> {
     task: &'a Task,
-    /// Task without preferences and constraints.
+    /// Task that is searched: `task` with preferences and constraints compiled away.
     searched: &'a Task,
     grounded: &'a GroundTask,
     flat: &'a Compiled,
@@ -176,7 +179,7 @@ impl Search<'_> {
         })
     }
 
-    /// Value of the metric by a cost of the search's.
+    /// Converts a cost of the search to a metric value.
     fn value_of_bounds(&self) -> impl Fn(u32) -> f64 + '_ {
         let semantics = Semantics::new(self.searched, self.attachments);
         let nothing_done = semantics.measured(&State::initial(self.searched), 0.0, &[]);

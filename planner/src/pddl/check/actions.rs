@@ -1,4 +1,4 @@
-//! Actions: parameters, durations, conditions, effects.
+//! Checks of actions: parameters, durations, conditions and effects.
 
 use super::conditions::{all_of, constant};
 use super::expressions::{Place, Value, span_of};
@@ -12,14 +12,14 @@ use crate::task::{
     Term, Timed,
 };
 
-/// Quantifiers and conditions around an effect.
+/// Quantified variables and conditions around an effect.
 #[derive(Clone, Default)]
 struct Around {
     forall: Vec<Quantified>,
     when: Timed<Condition>,
 }
 
-/// Effects collected so far.
+/// Effects and rates of an action found so far.
 #[derive(Default)]
 struct Found {
     effects: Timed<Vec<Effect>>,
@@ -67,8 +67,7 @@ impl Checker<'_> {
         });
     }
 
-    /// Reports simultaneous unconditional changes of one number or object that contradict each
-    /// other.
+    /// Reports simultaneous changes of one number or object function that contradict each other.
     fn agree(&mut self, effects: &[Effect]) {
         let is_always = |effect: &Effect| effect.when == Timed::default();
         let together = |one: &Effect, other: &Effect| {
@@ -104,7 +103,7 @@ impl Checker<'_> {
         bounds
     }
 
-    /// Constant bounds must leave a duration.
+    /// Reports constant bounds that allow no duration.
     fn possible_duration(&mut self, bounds: &[DurationBound]) {
         let constants: Vec<(&DurationBound, f64)> =
             bounds.iter().filter_map(|bound| Some((bound, constant(&bound.value)?))).collect();
@@ -174,7 +173,8 @@ impl Checker<'_> {
         Some(Timed { start, ..Timed::default() })
     }
 
-    /// Separates the preferences of a condition; the remaining parts go to `hard`.
+    /// Separates preferences from a condition: these are added to `preferences`, the other parts to
+    /// `hard`.
     fn split_preferences<'f>(
         &mut self,
         formula: &'f Formula,
@@ -211,7 +211,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Preference by name; an unnamed one becomes a preference of its own.
+    /// Preference of this name, created at its first use; `None` always creates a new, unnamed one.
     pub(super) fn preference(&mut self, name: Option<Name>) -> PreferenceId {
         let id = self.task.preferences.len() as u32;
         if let Some(name) = name {
@@ -345,7 +345,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Reports an effect on a derived predicate.
+    /// Reports an effect that changes a derived predicate.
     fn changeable(&mut self, atom: &crate::task::Atom, name: Name) {
         if self.task.predicate(atom.predicate).stratum.is_none() {
             return;
@@ -424,7 +424,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Fluent changed by an assignment, with the types of its values (`None` for a number).
+    /// Function that an assignment changes, with the types of its value (`None` for a number).
     fn changed_fluent(
         &mut self,
         fluent: &ast::TermAst,
@@ -449,7 +449,7 @@ impl Checker<'_> {
         Some((fluent, result))
     }
 
-    /// `(increase (f) (* #t e))`
+    /// Adds a continuous effect, such as `(increase (f) (* #t e))`, to `found`.
     #[expect(clippy::too_many_arguments, reason = "the context of an effect and the three parts of a change")]
     fn rate(
         &mut self,
@@ -497,7 +497,8 @@ impl Checker<'_> {
     }
 }
 
-/// Kind of contradiction between two effects: number or object.
+/// Kind of value that two effects change in contradicting ways: "number" or "object"; `None`
+/// without contradiction.
 fn contradict(one: &Effect, other: &Effect) -> Option<&'static str> {
     if let (Change::Object(fluent, value), Change::Object(other_fluent, other_value)) =
         (&one.change, &other.change)

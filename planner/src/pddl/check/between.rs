@@ -1,5 +1,5 @@
-//! Checks conditions on continuously changing numbers between happenings; only exactly decidable
-//! ones are accepted.
+//! Checks of conditions on numbers that change continuously: only those that can be decided exactly
+//! between happenings are accepted.
 
 use rustc_hash::FxHashSet;
 
@@ -8,12 +8,12 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::model::walk::{self, Part};
 use crate::task::{Condition, Expression, FunctionId, Modal, PredicateId, Task};
 
-/// Maximum number of factors that change at rates, in a product whose sign can be decided exactly.
+/// Maximum number of continuously changing factors in a product whose sign can be decided exactly.
 const MOST_FACTORS: u32 = 2;
 
 impl Checker<'_> {
-    /// Requires that over-all conditions compare sums of products of at most two continuously
-    /// changing numbers, and that constraints use none.
+    /// Reports over-all conditions with products of more than two continuously changing numbers, or
+    /// division by one, and constraints on such numbers.
     pub(super) fn told_between(&mut self) {
         let flowing: FxHashSet<FunctionId> =
             self.task.actions.iter().flat_map(|a| &a.continuous).map(|rate| rate.fluent.function).collect();
@@ -50,7 +50,8 @@ impl Checker<'_> {
     }
 }
 
-/// Comparisons in over-all conditions, including those behind derived predicates.
+/// Sides and spans of the comparisons in over-all conditions, including those in the rules of
+/// derived predicates.
 fn over_all(task: &Task) -> Vec<(&[Expression; 2], Span)> {
     let mut conditions = Vec::new();
     for action in &task.actions {
@@ -69,7 +70,7 @@ fn over_all(task: &Task) -> Vec<(&[Expression; 2], Span)> {
     comparisons
 }
 
-/// Conditions with the bodies of all axioms that they depend on.
+/// Conditions, and the bodies of all rules of derived predicates that these depend on.
 fn closed<'t>(task: &'t Task, conditions: &[&'t Condition]) -> Vec<&'t Condition> {
     let mut all = conditions.to_vec();
     let mut seen: FxHashSet<PredicateId> = FxHashSet::default();
@@ -89,7 +90,8 @@ fn closed<'t>(task: &'t Task, conditions: &[&'t Condition]) -> Vec<&'t Condition
     all
 }
 
-/// Degree of an expression in the continuously changing numbers; `None` if one is a divisor.
+/// Degree of an expression as a polynomial in the continuously changing numbers `flowing`; `None`
+/// if one of these is in a divisor.
 fn degree(expression: &Expression, flowing: &FxHashSet<FunctionId>) -> Option<u32> {
     let all = |parts: &[Expression]| -> Option<Vec<u32>> {
         parts.iter().map(|part| degree(part, flowing)).collect()

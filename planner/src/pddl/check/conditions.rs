@@ -1,4 +1,4 @@
-//! Conditions in negation normal form.
+//! Checks of conditions, which are brought to negation normal form.
 
 use super::expressions::{Place, Value};
 use super::{Checker, Scope};
@@ -8,7 +8,8 @@ use crate::pddl::ast::{self, Comparison, Formula, Name, When};
 use crate::task::{Atom, Condition, Expression, Timed};
 
 impl Checker<'_> {
-    /// Condition, or its negation.
+    /// Checks a condition and brings it, or its negation if `negated`, to negation normal form;
+    /// `None` after a fault.
     pub(super) fn condition(
         &mut self,
         formula: &Formula,
@@ -109,7 +110,7 @@ impl Checker<'_> {
         Some(Condition::Compare(comparison, Box::new([left?, right?]), span))
     }
 
-    /// `=` compares objects or numbers.
+    /// Checks an equation (`=`), whose sides are both objects or both numbers.
     fn equality(
         &mut self,
         sides: &[ast::TermAst; 2],
@@ -159,7 +160,7 @@ impl Checker<'_> {
         self.object_term(term, scope).map(|(term, types)| Value::Object(term, types))
     }
 
-    /// The condition of a durative action, sorted by time.
+    /// Checks the condition of a durative action, and sorts its parts by time specifier.
     pub(super) fn timed_condition(
         &mut self,
         formula: &Formula,
@@ -203,7 +204,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Connective whose parts share one time specifier, which may as well stand outside.
+    /// Checks a condition whose leaves all have the same time specifier, by moving the specifier
+    /// outside.
     fn one_time(&mut self, formula: &Formula, scope: &mut Scope) -> Option<Timed<Condition>> {
         let mut times = Vec::new();
         collect_times(formula, &mut times);
@@ -244,7 +246,7 @@ fn at(when: When, condition: Condition) -> Timed<Condition> {
     timed
 }
 
-/// Conjunction without nested conjunctions.
+/// Conjunction of conditions, with nested conjunctions merged into it.
 pub(super) fn all_of(parts: Vec<Condition>) -> Condition {
     let mut flat = Vec::with_capacity(parts.len());
     for part in parts {
@@ -270,7 +272,7 @@ fn opposite(comparison: Comparison) -> Comparison {
     }
 }
 
-/// Time specifiers of the leaves; `None` for a leaf without one.
+/// Adds the distinct time specifiers of a formula's leaves; `None` for leaves without one.
 fn collect_times(formula: &Formula, into: &mut Vec<Option<When>>) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| collect_times(part, into)),
@@ -321,7 +323,7 @@ pub(super) fn span_of_formula(formula: &Formula) -> Span {
     }
 }
 
-/// Value of an expression without fluents.
+/// Value of an expression that consists of numbers only; `None` for other expressions.
 pub(super) fn constant(expression: &Expression) -> Option<f64> {
     let all = |parts: &[Expression]| parts.iter().map(constant).collect::<Option<Vec<f64>>>();
     Some(match expression {

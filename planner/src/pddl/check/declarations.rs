@@ -1,4 +1,4 @@
-//! Types, objects, predicates, functions and modules.
+//! Checks of the declarations of types, objects, predicates, functions and modules.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::task::{
     Slot, Type, TypeId, Written,
 };
 
-/// The type of everything.
+/// Type `object`, the supertype of all types.
 const OBJECT: TypeId = TypeId(0);
 
 impl Checker<'_> {
@@ -83,7 +83,7 @@ impl Checker<'_> {
         found
     }
 
-    /// Reports each cycle of types once, and breaks it.
+    /// Reports each cycle of types once, and breaks the cycle.
     fn type_cycles(&mut self, declared: &[ast::Typed]) {
         for index in 1..self.task.types.len() {
             let start = TypeId(index as u32);
@@ -186,7 +186,7 @@ impl Checker<'_> {
             Arc::new(names.map(|(index, own)| (own.name.clone(), ObjectId(index as u32))).collect());
     }
 
-    /// Declared types of a name; `object` if none is given or known.
+    /// Types of these names; `object` if none is given or declared.
     fn type_ids(&mut self, names: &[Name]) -> Vec<TypeId> {
         let mut types: Vec<TypeId> = names.iter().filter_map(|&name| self.find_type(name)).collect();
         if types.is_empty() {
@@ -209,7 +209,8 @@ impl Checker<'_> {
         declared.iter().map(|typed| self.parameter(typed)).collect()
     }
 
-    /// Named parameters; duplicates are reported.
+    /// Checks the parameters of an action, rule or module and opens them in `scope`; reports
+    /// duplicates.
     pub(super) fn scoped_parameters(&mut self, declared: &[ast::Typed], scope: &mut Scope) -> Vec<Parameter> {
         for (index, typed) in declared.iter().enumerate() {
             let Some(first) = declared[..index].iter().find(|first| first.name.symbol == typed.name.symbol)
@@ -266,7 +267,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Declares predicates by the heads of derived predicates if `:predicates` lacks them.
+    /// Declares derived predicates that `:predicates` lacks, by the heads of their rules.
     pub(super) fn declare_derived(&mut self, derived: &[ast::Derived]) {
         for rule in derived {
             let name = rule.head.name;
@@ -367,8 +368,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Types of a module parameter; unknown ones become `object`, as the planners that such files
-    /// were written for do not check them.
+    /// Declared types of a module's parameter. Unknown types are reported and dropped (all unknown:
+    /// `object`), as the planners that such files were written for do not check types.
     fn known_types(&mut self, typed: &ast::Typed) -> ast::Typed {
         let mut known = typed.clone();
         known.types.retain(|name| self.types.contains_key(&name.symbol));
@@ -385,7 +386,7 @@ impl Checker<'_> {
         known
     }
 
-    /// Target of an effect module: a number, an object function or the truth of an atom.
+    /// Term that an effect module writes: a number, an object function or the truth of an atom.
     fn written_place(&mut self, term: &ast::TermAst, scope: &Scope) -> Option<Written> {
         let ast::TermAst::Apply { name, arguments, span } = term else { return None };
         if !self.functions.contains_key(&name.symbol)

@@ -1,5 +1,5 @@
-//! Terms and numeric expressions: arity and type checks; object functions are told from numeric
-//! ones by their result types.
+//! Checks of terms and numeric expressions: numbers of arguments and types. Object functions are
+//! distinguished from numeric ones by their result types.
 
 use super::conditions::constant;
 use super::{Checker, Scope};
@@ -10,28 +10,28 @@ use crate::task::{
     CallTerm, Expression, Fluent, FunctionId, Parameter, PredicateId, PreferenceId, Term, TypeId,
 };
 
-/// Checked term: object or number.
+/// Value of a checked term.
 pub(super) enum Value {
-    /// Object of one of these types.
+    /// Object, with its possible types.
     Object(Term, Vec<TypeId>),
-    /// A number.
+    /// Number.
     Number(Expression),
-    /// The word `undefined`.
+    /// The name `undefined`.
     Undefined,
 }
 
-/// Context of an expression: it determines which names besides fluents have values.
+/// Context of an expression, which determines what may have a value there besides functions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Place {
-    /// Conditions and goals.
+    /// Condition or goal.
     Condition,
-    /// Effects of an instantaneous action.
+    /// Effect of an instantaneous action.
     Effect,
-    /// Conditions and effects of a durative action: `?duration` has a value.
+    /// Condition or effect of a durative action, where `?duration` has a value.
     Durative,
-    /// Bound on `?duration`, evaluated before `?duration` has a value.
+    /// Bound on `?duration`, where `?duration` itself has no value yet.
     Bound,
-    /// A metric: `total-time` and `is-violated` have values.
+    /// Metric, where `total-time` and `is-violated` have values.
     Metric,
 }
 
@@ -50,7 +50,7 @@ pub(super) fn span_of(term: &ast::TermAst) -> Span {
 }
 
 impl Checker<'_> {
-    /// Object term with its possible types.
+    /// Checks a term that must be an object; returns the term and its possible types.
     pub(super) fn object_term(&mut self, term: &ast::TermAst, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
         match term {
             ast::TermAst::Variable(name) => match scope.find(name.symbol) {
@@ -110,7 +110,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Function application.
+    /// Checks a function with its arguments.
     pub(super) fn fluent(
         &mut self,
         name: Name,
@@ -125,7 +125,7 @@ impl Checker<'_> {
         Some(Fluent { function, arguments, span })
     }
 
-    /// Arguments of a predicate.
+    /// Checks the arguments of a predicate.
     pub(super) fn predicate_arguments(
         &mut self,
         predicate: PredicateId,
@@ -139,7 +139,7 @@ impl Checker<'_> {
         self.arguments("predicate", name, &parameters, declared, arguments, span, scope)
     }
 
-    /// Call of a module of the wanted kind.
+    /// Checks a call of a module, which must be of the given kind.
     pub(super) fn call(&mut self, call: &ast::CallAst, kind: CallKind, scope: &Scope) -> Option<CallTerm> {
         let module = self.find_module(call.name)?;
         let known = self.task.module(module);
@@ -257,7 +257,7 @@ impl Checker<'_> {
         self.push(finding.with_help(help));
     }
 
-    /// Term as an object or a number.
+    /// Checks a term that may be an object or a number.
     pub(super) fn value(&mut self, term: &ast::TermAst, place: Place, scope: &Scope) -> Option<Value> {
         let object = |(term, types)| Value::Object(term, types);
         match term {
@@ -291,7 +291,7 @@ impl Checker<'_> {
         })
     }
 
-    /// A numeric expression.
+    /// Checks a numeric expression.
     pub(super) fn expression(
         &mut self,
         term: &ast::TermAst,
@@ -382,7 +382,7 @@ impl Checker<'_> {
         })
     }
 
-    /// Reports division by a constant zero.
+    /// Reports a division by a constant zero.
     pub(super) fn divides(&mut self, divisor: &Expression, span: Span) {
         if constant(divisor) == Some(0.0) {
             let finding =
@@ -443,7 +443,7 @@ fn article(kind: CallKind) -> &'static str {
     }
 }
 
-/// List that begins with a declared name.
+/// Span of the parenthesised list in which a declared name comes first.
 fn declared_list(checker: &Checker<'_>, name: Span) -> Span {
     let text = checker.task.sources.get(name.source as usize).map_or("", |source| source.text.as_str());
     let start = text[..name.start as usize].rfind('(').unwrap_or(name.start as usize);

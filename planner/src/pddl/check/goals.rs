@@ -1,4 +1,4 @@
-//! Goal, preferences, constraints on the trajectory, metric.
+//! Checks of the goal, preferences, trajectory constraints and metric.
 
 use super::conditions::all_of;
 use super::expressions::Place;
@@ -15,7 +15,7 @@ impl Checker<'_> {
         self.task.goal = Scoped { slots: scope.slots, body: all_of(hard) };
     }
 
-    /// Splits a goal into hard conditions and preferences.
+    /// Splits part of a goal: conditions go to `hard`, preferences and constraints to the task.
     fn goal_part(
         &mut self,
         formula: &Formula,
@@ -138,7 +138,7 @@ impl Checker<'_> {
     }
 }
 
-/// True if a formula holds a preference or constraint rather than a plain condition.
+/// True if a formula contains a preference or a trajectory constraint.
 fn is_soft(formula: &Formula) -> bool {
     match formula {
         Formula::Preference(..) | Formula::Modal { .. } => true,

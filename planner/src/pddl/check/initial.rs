@@ -1,4 +1,4 @@
-//! The initial state, timed literals included.
+//! Checks of the initial state, timed literals included.
 
 use std::collections::hash_map::Entry;
 
@@ -99,7 +99,7 @@ impl Checker<'_> {
         );
     }
 
-    /// Reports a timed literal over a derived predicate.
+    /// Reports a timed literal over a derived predicate; true if there was one.
     fn is_derived(&mut self, one: &Initial) -> bool {
         let Initial::Literal { name, span, .. } = one else { return false };
         let known = self.predicates.get(&name.symbol).map(|&known| &self.task.predicates[known as usize]);
@@ -189,9 +189,9 @@ impl Checker<'_> {
         }
     }
 
-    /// Drops the value of an undeclared function with a warning unless the name resembles a
-    /// declared one: problems are shared by variants of a domain. Other uses of the function are
-    /// errors.
+    /// Reports an undeclared function that gets an initial value. This is only a warning, and the
+    /// value is dropped, unless the name resembles a declared one, because problems are shared by
+    /// variants of a domain.
     fn unknown_function(&mut self, name: Name) {
         let written = self.name(name.symbol);
         let near = nearest(written, self.task.functions.iter().map(|own| own.name.as_str()));
@@ -205,8 +205,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Drops a function value on an undeclared object with a warning, as published problems contain
-    /// such lines; a fact on one is an error.
+    /// Reports an initial value of a function for an undeclared object, with a warning; true if the
+    /// value is to be dropped. Published problems contain such lines.
     fn value_of_unknown_object(&mut self, arguments: &[Name]) -> bool {
         let unknown = arguments.iter().find(|name| self.objects[name.symbol.0 as usize].is_none());
         let Some(&name) = unknown else { return false };
@@ -273,7 +273,7 @@ impl Checker<'_> {
     }
 }
 
-/// Whose arguments are looked at.
+/// Predicate or function whose arguments are checked, by index.
 #[derive(Clone, Copy)]
 enum Place {
     Predicate(u32),

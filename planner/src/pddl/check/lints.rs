@@ -1,4 +1,4 @@
-//! Findings on a readable task: conditions that nothing can achieve.
+//! Warnings about a faultless task, above all about goals that nothing can achieve.
 
 use rustc_hash::FxHashSet;
 
@@ -32,7 +32,7 @@ impl Checker<'_> {
     }
 }
 
-/// Finding on a constraint of a kind that no search supports.
+/// Warning about a constraint of a kind that no search supports; `None` for other kinds.
 fn not_planned(constraint: &Trajectory) -> Option<Diagnostic> {
     let name = match constraint.operator {
         Modal::AlwaysWithin => "always-within",
@@ -45,7 +45,7 @@ fn not_planned(constraint: &Trajectory) -> Option<Diagnostic> {
     Some(finding.with_help("ask for the same in conditions and the goal"))
 }
 
-/// Findings on durative actions that delete their own invariants.
+/// Warnings about durative actions whose start deletes one of their own invariants.
 pub(crate) fn defeated(task: &Task) -> Vec<Diagnostic> {
     let finding = |action: &Action| {
         let (atom, effect) = self_defeating(action)?;
@@ -62,7 +62,7 @@ pub(crate) fn defeated(task: &Task) -> Vec<Diagnostic> {
     task.actions.iter().filter_map(finding).collect()
 }
 
-/// Ground atoms implied by the condition.
+/// Appends the ground atoms that must hold for the condition to hold.
 fn certain_atoms<'c>(condition: &'c Condition, into: &mut Vec<&'c Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| certain_atoms(part, into)),
@@ -81,7 +81,8 @@ fn objects(atom: &Atom) -> Vec<ObjectId> {
     atom.arguments.iter().filter_map(object).collect()
 }
 
-/// Finding on a goal fact that is initially false and has no achiever.
+/// Error about a goal atom that is initially false and that no effect can make true; `None`
+/// otherwise.
 fn unreachable_goal(task: &Task, goal: &Atom, wanted: &[ObjectId]) -> Option<Diagnostic> {
     let predicate = task.predicate(goal.predicate);
     if predicate.stratum.is_some() {
@@ -164,7 +165,7 @@ fn nothing_adds(task: &Task, goal: &Atom, finding: Diagnostic) -> Diagnostic {
     ))
 }
 
-/// Objects that an argument of an effect can be.
+/// Objects that an argument of an effect may stand for.
 enum Achiever<'t> {
     Constant(ObjectId),
     Of(&'t Parameter),

@@ -1,5 +1,5 @@
-//! Checks that turn trees of names into a [`Task`]: every name looked up, every argument counted and typed,
-//! all findings at once.
+//! Checks that turn syntax trees into a [`Task`]: every name is looked up, every argument counted
+//! and typed, and all findings are collected.
 
 mod actions;
 mod between;
@@ -28,7 +28,7 @@ use super::parse;
 use crate::diagnostic::{Diagnostic, Findings, Severity, Source, Span};
 use crate::task::{Condition, Init, Object, ObjectId, Quantified, Scoped, Slot, Task, Type, TypeId};
 
-/// Every finding in a domain, or in a domain and a problem, faults and warnings, in the order of the text.
+/// All findings, errors and warnings, in a domain (and a problem), in text order.
 pub fn check(domain: &Source, problem: Option<&Source>) -> Findings {
     read_all(domain, problem, true).1
 }
@@ -37,7 +37,7 @@ impl Task {
     /// Reads and checks a domain and a problem.
     ///
     /// # Errors
-    /// Every finding, if any of them is a fault.
+    /// All findings, if at least one is an error.
     pub fn read(domain: &Source, problem: &Source) -> Result<Task, Findings> {
         let (task, findings) = read_all(domain, Some(problem), false);
         if findings.has_errors() { Err(findings) } else { Ok(task) }
@@ -83,25 +83,25 @@ fn read_all(domain: &Source, problem: Option<&Source>, lints: bool) -> (Task, Fi
     (task, Findings { sources, list: findings })
 }
 
-/// True if a finding is about a text with unreadable parentheses.
+/// True if a finding is about parentheses that could not be read as intended.
 fn is_torn(finding: &Diagnostic) -> bool {
     matches!(finding.code, "unbalanced" | "too-deep")
 }
 
-/// True if a finding reports a missing name that may be declared in an unread part.
+/// True if a finding reports a missing name that a part which could not be parsed may declare.
 fn is_missed(finding: &Diagnostic) -> bool {
     let names = ["undeclared-type", "undeclared-predicate", "undeclared-function", "undeclared-object"];
     let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
     matches!(finding.code, "no-goal" | "no-domain") || names.contains(&finding.code) && !is_near
 }
 
-/// True if a finding suggests a declared name for a misspelt one.
+/// True if a finding reports an undeclared name and suggests a declared one.
 fn is_misspelt(finding: &Diagnostic) -> bool {
     let is_near = finding.help.as_ref().is_some_and(|help| help.starts_with("did you mean"));
     matches!(finding.code, "undeclared-predicate" | "undeclared-function") && is_near
 }
 
-/// True if two spans are in one section, which begins with `(:` at the start of a line.
+/// True if no section (a line that begins with `(:`) starts between two spans.
 fn same_section(sources: &[Source], one: Span, other: Span) -> bool {
     if one.source != other.source {
         return false;
@@ -111,14 +111,14 @@ fn same_section(sources: &[Source], one: Span, other: Span) -> bool {
     !between.lines().skip(1).any(|line| line.trim_start().starts_with("(:"))
 }
 
-/// A variable in scope.
+/// Variable in scope.
 struct Variable {
     symbol: Symbol,
     slot: Slot,
     types: Vec<TypeId>,
 }
 
-/// Variables in scope, innermost last, and the number of slots assigned.
+/// Variables in scope, innermost last, and the number of slots assigned so far.
 #[derive(Default)]
 struct Scope {
     variables: Vec<Variable>,
@@ -142,12 +142,12 @@ struct Checker<'a> {
     modules: FxHashMap<Symbol, u32>,
     actions: FxHashMap<Symbol, Span>,
     preferences: FxHashMap<Symbol, u32>,
-    /// Objects that fit, by alternatives of types.
+    /// Objects of any of these types, by list of types (cache).
     fitting: FxHashMap<Vec<TypeId>, Arc<[ObjectId]>>,
-    /// Reported undeclared names by kind: the finding that collects further uses, and the nearest
-    /// declared name.
+    /// Undeclared names already reported, by code of the finding and name: the index of the
+    /// finding, which collects further uses, and the nearest declared name.
     reported: FxHashMap<(&'static str, Symbol), (usize, Option<String>)>,
-    /// Functions of another variant of the domain, to which the initial state gives values.
+    /// Undeclared functions and objects in initial values that were reported and dropped.
     left_out: FxHashSet<Symbol>,
 }
 
@@ -195,7 +195,7 @@ impl<'a> Checker<'a> {
         self.symbols.name(symbol)
     }
 
-    /// Source text of a span.
+    /// Source text at a span.
     fn written(&self, span: Span) -> &str {
         let text = self.task.sources.get(span.source as usize).map_or("", |source| source.text.as_str());
         text.get(span.start as usize..span.end as usize).unwrap_or("")
@@ -282,7 +282,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Objects of any of the types.
+    /// Objects of at least one of the types.
     fn fitting(&mut self, types: &[TypeId]) -> Arc<[ObjectId]> {
         if let Some(objects) = self.fitting.get(types) {
             return objects.clone();
@@ -301,8 +301,8 @@ impl<'a> Checker<'a> {
         objects
     }
 
-    /// Adds quantified variables to a scope; truncate `scope.variables` to the returned length to
-    /// close it.
+    /// Adds quantified variables to a scope. To close their scope, truncate `scope.variables` to
+    /// the returned length.
     fn quantify(&mut self, variables: &[ast::Typed], scope: &mut Scope) -> (usize, Vec<Quantified>) {
         let before = scope.variables.len();
         let mut quantified = Vec::with_capacity(variables.len());
@@ -325,7 +325,7 @@ impl<'a> Checker<'a> {
         types.iter().map(|&id| self.task.type_of(id).name.as_str()).collect::<Vec<_>>().join(" or ")
     }
 
-    /// True if an object could be of a type of each list.
+    /// True if some object may be of a type of `one` and of a type of `other`.
     fn overlap(&self, one: &[TypeId], other: &[TypeId]) -> bool {
         let is = |own: &Type, types: &[TypeId]| own.ancestors.iter().any(|ancestor| types.contains(ancestor));
         self.task.types.iter().any(|own| is(own, one) && is(own, other))

@@ -1,4 +1,4 @@
-//! Name lookup: an undeclared name is reported once, with the nearest declared one.
+//! Lookup of names. An undeclared name is reported once, with the nearest declared name.
 
 use rustc_hash::FxHashMap;
 
@@ -8,7 +8,7 @@ use crate::pddl::ast::{Name, Symbol};
 use crate::pddl::nearest;
 use crate::task::{FunctionId, ModuleId, ObjectId, PredicateId, Task, Term, TypeId};
 
-/// Maximum number of further uses shown for an undeclared name.
+/// Maximum number of further uses of an undeclared name that are shown.
 const MORE_USES: usize = 2;
 
 impl Checker<'_> {
@@ -79,8 +79,8 @@ impl Checker<'_> {
         self.push(finding);
     }
 
-    /// Variable meant by a name without its question mark, if no object has the name; reports the
-    /// omission.
+    /// Variable that a name stands for whose question mark was forgotten; reports the mistake.
+    /// `None` if the name is an object, or if no such variable is in scope.
     pub(super) fn without_question_mark(&mut self, name: Name, scope: &Scope) -> Option<(Term, Vec<TypeId>)> {
         if self.objects[name.symbol.0 as usize].is_some() {
             return None;
@@ -95,7 +95,7 @@ impl Checker<'_> {
         Some(meant)
     }
 
-    /// Help for an undeclared name that resembles no declared one.
+    /// Remedy for an undeclared name that resembles no declared one.
     fn help_for(&self, kind: &str, section: &str, name: Name) -> String {
         let written = self.name(name.symbol);
         match kind {
@@ -112,7 +112,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Reports an undeclared name; returns the declared name that was probably meant.
+    /// Reports an undeclared name; returns the declared name that was probably meant, if any.
     fn undeclared(
         &mut self,
         code: &'static str,
@@ -150,7 +150,7 @@ impl Checker<'_> {
         near
     }
 
-    /// Span of the declaration of a name that is suggested instead.
+    /// Span of the declaration of a name; `None` for built-in names.
     fn declaration(&self, kind: &str, name: &str) -> Option<Span> {
         let task = &self.task;
         match kind {
@@ -163,7 +163,8 @@ impl Checker<'_> {
         .filter(|span| span.end > 0)
     }
 
-    /// Registers a declaration; true if the name is new.
+    /// Registers a declared name under `id`, or reports that it was declared before (at `first`);
+    /// true if the name is new.
     pub(super) fn declare(
         &mut self,
         kind: &str,

@@ -1,11 +1,11 @@
-//! Language features that are used without the `:requirements` flag that allows them.
+//! Warnings about language features used without the `:requirements` flag that allows them.
 
 use super::Checker;
 use super::conditions::span_of_formula;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast::{ActionAst, Domain, EffectAst, Formula, ProblemAst};
 
-/// Language feature, with all requirements that allow it, narrowest first.
+/// Language feature that needs a requirement.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Feature {
     Typing,
@@ -49,11 +49,11 @@ impl Feature {
     }
 }
 
-/// Used features with their spans.
+/// Features that a task uses, with the spans of their uses.
 type Uses = Vec<(Feature, Span)>;
 
 impl Checker<'_> {
-    /// Warns once per missing requirement, at its first use.
+    /// Warns of each missing requirement once, at the first use of the feature.
     pub(super) fn requirements(&mut self, domain: &Domain, problem: Option<&ProblemAst>) {
         let mut uses = Uses::new();
         uses.extend(domain.types.first().map(|first| (Feature::Typing, first.name.span)));

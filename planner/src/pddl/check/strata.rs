@@ -6,7 +6,7 @@ use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::ast;
 use crate::task::{Condition, PredicateId, Rule};
 
-/// A use of a derived predicate in the body of a rule.
+/// Use of a derived predicate (`body`) in a rule of another (`head`), both by index.
 struct Use {
     head: usize,
     body: usize,
@@ -41,7 +41,7 @@ impl Checker<'_> {
         }
     }
 
-    /// Assigns a stratum to every derived predicate, and sorts the axioms by stratum.
+    /// Assigns a stratum to every derived predicate, and sorts the rules by stratum.
     pub(super) fn order_strata(&mut self) {
         let mut uses = Vec::new();
         for rule in &self.task.rules {
@@ -101,7 +101,7 @@ impl Checker<'_> {
     }
 }
 
-/// True if the rules of `from` use `to`, directly or transitively.
+/// True if the rules of `from` use `to`, directly or through other derived predicates.
 fn reaches(uses: &[Use], from: usize, to: usize) -> bool {
     let mut found = vec![from];
     let mut next = 0;

@@ -1,4 +1,5 @@
-//! Warnings about unused declarations, and about fluents that are used but never get a value.
+//! Warnings about declarations that are never used, and about numbers that are read but never get a
+//! value.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -9,15 +10,15 @@ use crate::task::{
     Task, Term,
 };
 
-/// Visits everything that actions, rules, goal, constraints and metric say.
+/// Visits everything in actions, rules, goal, constraints, preferences and metric.
 fn all<'t>(task: &'t Task, visit: &mut dyn FnMut(Part<'t>)) {
     task.actions.iter().for_each(|action| walk::action(action, visit));
     task.rules.iter().for_each(|rule| walk::condition(&rule.body, visit));
     walk::aims(task, visit);
 }
 
-/// Predicates and functions that occur in the initial state alone; tasks with attachments are
-/// exempt.
+/// Warnings about predicates and functions that only the initial state mentions; none for tasks
+/// with modules.
 pub(super) fn unused(task: &Task) -> Vec<Diagnostic> {
     if !task.modules.is_empty() {
         return Vec::new();
@@ -44,8 +45,8 @@ pub(super) fn unused(task: &Task) -> Vec<Diagnostic> {
     predicates.chain(functions).collect()
 }
 
-/// Numbers that are read but never get a value: a whole function, or a ground one in goal or
-/// metric.
+/// Warnings about numbers that are read but never get a value: all instances of a function, or
+/// single ones in the goal or metric. None for tasks with modules.
 pub(crate) fn without_value(task: &Task) -> Vec<Diagnostic> {
     let mut given: FxHashSet<FunctionId> =
         task.init.numbers.iter().map(|(fluent, _)| fluent.function).collect();

@@ -1,26 +1,26 @@
-//! Lines from lists, words and comments.
+//! Layout of lists, words and comments in lines.
 
 use super::tree::{LayoutNode, What};
 use crate::pddl::parse::ACTION_PARTS;
 
 /// Preferred maximum line width, characters.
 pub const WIDTH: usize = 120;
-/// Indentation of a part within its list.
+/// Indentation of the parts of a list relative to the list, columns.
 const STEP: usize = 2;
-/// Blanks before the comments of neighbouring lines.
+/// Number of blanks between the longest line of a group and its trailing comments.
 const BEFORE_COMMENT: usize = 2;
 
-/// Lists whose parts stand on lines of their own.
+/// Keywords of lists whose parts each begin on a new line.
 const ACTIONS: [&str; 4] = [":action", ":durative-action", ":process", ":event"];
 
-/// Keywords whose arguments begin on the same line, however long they are.
+/// First words of lists whose arguments begin on the same line, however long these are.
 const STAYING: [&str; 6] = ["not", "at", "over", "preference", ":goal", ":metric"];
 
-/// Table-like sections, in which the author's multiple blanks are kept.
+/// Sections in which the author's multiple blanks are kept, because they align columns.
 const TABLES: [&str; 7] =
     [":modules", ":types", ":objects", ":constants", ":predicates", ":functions", ":init"];
 
-/// Prints a text.
+/// Formats a text.
 pub fn print(roots: &[LayoutNode<'_>]) -> String {
     let mut page = Page::default();
     for (n, node) in roots.iter().enumerate() {
@@ -32,12 +32,12 @@ pub fn print(roots: &[LayoutNode<'_>]) -> String {
     page.finish()
 }
 
-/// Line under construction.
+/// Line that is being laid out.
 #[derive(Debug, Default)]
 struct Line {
     indent: usize,
     text: String,
-    /// Comment at the line's end, and its original column.
+    /// Comment at the end of the line, and its column in the original text.
     comment: Option<(String, usize)>,
 }
 
@@ -45,7 +45,7 @@ struct Line {
 struct Page {
     done: Vec<Line>,
     line: Line,
-    /// True while a table is printed.
+    /// True inside a section of [`TABLES`].
     in_table: bool,
 }
 
@@ -61,7 +61,7 @@ impl Page {
         self.line.indent + self.line.text.chars().count()
     }
 
-    /// Lays out a node at the end of a line with room for `closing` parentheses.
+    /// Appends a node to the present line; `closing` parentheses must fit after it.
     fn node(&mut self, node: &LayoutNode<'_>, closing: usize) {
         match &node.what {
             What::Word(word) => self.line.text.push_str(word),
@@ -137,11 +137,11 @@ impl Page {
     }
 }
 
-/// Indentation of a list's parts on lines of their own.
+/// Indentation of a list's parts that begin on lines of their own.
 enum Indent {
-    /// One step deeper than the line in which the list begins.
+    /// One step more than the line in which the list begins.
     Body,
-    /// Alignment: number of columns behind the opening.
+    /// Aligned at this many columns right of the opening bracket.
     Aligned(usize),
 }
 
@@ -167,7 +167,7 @@ fn is_always_broken(children: &[LayoutNode<'_>]) -> bool {
     is_head(children, &["define"]) || is_head(children, &ACTIONS)
 }
 
-/// List on one line; `None` if the author wrote it over several lines, or a comment is inside.
+/// Text of a list on one line; `None` if the author broke its lines, or if it contains a comment.
 fn flat(open: char, children: &[LayoutNode<'_>], close: char, in_table: bool) -> Option<String> {
     let mut text = String::from(open);
     for (n, child) in children.iter().enumerate() {
@@ -187,7 +187,7 @@ fn flat(open: char, children: &[LayoutNode<'_>], close: char, in_table: bool) ->
     Some(text)
 }
 
-/// Number of blanks before a node within a line.
+/// Blanks before a node within a line.
 fn blanks(node: &LayoutNode<'_>, in_table: bool) -> String {
     " ".repeat(if in_table { node.blanks.max(1) } else { 1 })
 }
@@ -202,7 +202,7 @@ fn flat_width(node: &LayoutNode<'_>, in_table: bool) -> Option<usize> {
     }
 }
 
-/// Children of a list that takes several lines, with the required line breaks.
+/// Children of a list that takes several lines, with the line breaks that the layout requires.
 fn broken<'a>(children: &[LayoutNode<'a>]) -> Vec<LayoutNode<'a>> {
     let mut children = children.to_vec();
     if let Some(first) = children.first_mut() {
@@ -219,14 +219,14 @@ fn broken<'a>(children: &[LayoutNode<'a>]) -> Vec<LayoutNode<'a>> {
     children
 }
 
-/// Sets at least one line break before each child from index `from` on, except trailing comments.
+/// Sets at least one line break before each child from index `from` on, except comments.
 fn set_breaks(children: &mut [LayoutNode<'_>], from: usize) {
     for child in children.iter_mut().skip(from).filter(|child| !child.is_comment()) {
         child.breaks = child.breaks.max(1);
     }
 }
 
-/// Puts each part of an action on a new line, with its value after its keyword.
+/// Begins each part of an action on a new line, with the value on the line of its keyword.
 fn parts_apart(children: &mut [LayoutNode<'_>]) {
     let is_part = |node: &LayoutNode<'_>| {
         node.word().is_some_and(|word| ACTION_PARTS.iter().any(|part| part.eq_ignore_ascii_case(word)))
@@ -243,7 +243,7 @@ fn parts_apart(children: &mut [LayoutNode<'_>]) {
     }
 }
 
-/// Breaks a list that was written on one line and is too wide for one.
+/// Sets line breaks in a list that was written on one line and is too long for one.
 fn explode(children: &mut [LayoutNode<'_>]) {
     let Some(head) = children.first().and_then(LayoutNode::word).map(str::to_ascii_lowercase) else { return };
     let beside = match head.as_str() {
@@ -263,8 +263,8 @@ fn explode(children: &mut [LayoutNode<'_>]) {
     }
 }
 
-/// Column of each line's comment: neighbouring comments are aligned, at the author's column if that
-/// was common.
+/// Column of the trailing comment of each line. Comments of neighbouring lines are aligned: at the
+/// author's column if they all stood there, else behind the longest line.
 fn comment_columns(lines: &[Line]) -> Vec<usize> {
     let mut columns = vec![0; lines.len()];
     let mut from = 0;

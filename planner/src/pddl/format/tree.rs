@@ -1,29 +1,29 @@
-//! Lists, words and comments of a text, with the line breaks before each.
+//! Tree of lists, words and comments, with the line breaks before each.
 
-/// Node of a text: a word, a comment or a list.
+/// Node of a text: word, comment or list.
 #[derive(Debug, Clone)]
 pub struct LayoutNode<'a> {
     /// Number of line breaks before the node.
     pub breaks: usize,
-    /// Number of blanks before the node, unless it begins a line.
+    /// Number of blanks between the node and the one before on the same line.
     pub blanks: usize,
-    /// Content.
+    /// Content of the node.
     pub what: What<'a>,
 }
 
-/// See [`Node`].
+/// Content of a [`LayoutNode`].
 #[derive(Debug, Clone)]
 pub enum What<'a> {
-    /// Anything between delimiters.
+    /// Word: text between delimiters.
     Word(&'a str),
-    /// Text from the semicolon to the end of the line, and its column.
+    /// Comment: text from the semicolon to the end of the line, and its column.
     Comment(&'a str, usize),
-    /// Opening sign, contents and closing sign.
+    /// List: opening bracket, children and closing bracket.
     List(char, Vec<LayoutNode<'a>>, char),
 }
 
 impl<'a> LayoutNode<'a> {
-    /// Word of the node, if the node is one.
+    /// Word of the node; `None` for lists and comments.
     pub fn word(&self) -> Option<&'a str> {
         match self.what {
             What::Word(word) => Some(word),
@@ -42,7 +42,7 @@ impl<'a> LayoutNode<'a> {
     }
 }
 
-/// Reads a text whose parentheses fit.
+/// Parses a text with balanced parentheses.
 pub fn read(text: &str) -> Vec<LayoutNode<'_>> {
     // The outermost list is the text itself.
     let mut open: Vec<(Gap, char, Vec<LayoutNode<'_>>)> = vec![(Gap::default(), '(', Vec::new())];
@@ -98,7 +98,7 @@ fn put<'a>(open: &mut [(Gap, char, Vec<LayoutNode<'a>>)], Gap { breaks, blanks }
     }
 }
 
-/// Gap between two nodes.
+/// Line breaks and blanks between two nodes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Gap {
     breaks: usize,

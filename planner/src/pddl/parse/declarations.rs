@@ -1,4 +1,5 @@
-//! Requirements, typed lists, predicates, functions, modules, derived predicates and the initial state.
+//! Parsing of requirements, typed lists, predicates, functions, modules, derived predicates and the
+//! initial state.
 
 use super::{Parser, refused};
 use crate::attachment::CallKind;
@@ -10,7 +11,7 @@ use crate::pddl::ast::{
 use crate::pddl::lex::Kind;
 use crate::pddl::nearest;
 
-/// Requirements of PDDL 1.2 to 3.1 and PDDL/M whose features are read.
+/// Supported requirements of PDDL 1.2 to 3.1 and PDDL/M.
 const REQUIREMENTS: &[&str] = &[
     ":strips",
     ":typing",
@@ -40,7 +41,8 @@ const REQUIREMENTS: &[&str] = &[
     ":grounding-modules",
 ];
 
-/// Requirements that change the meaning of all other parts, and are refused.
+/// Requirements whose features change the meaning of everything else and are not supported, with
+/// the name of the feature.
 const REFUSED: &[(&str, &str)] = &[
     (":time", "PDDL+ processes and events"),
     (":processes", "PDDL+ processes and events"),
@@ -86,7 +88,8 @@ impl Parser<'_> {
         }
     }
 
-    /// `a b - t c - (either t u) d`, from child number `skip` on. With or without question marks.
+    /// Parses a typed list, such as `a b - t c - (either t u) d`, from child `skip` of a node on.
+    /// `variables`: its names must begin with a question mark.
     pub(super) fn typed_list(&mut self, list: usize, skip: usize, variables: bool) -> Vec<Typed> {
         let mut declared: Vec<Typed> = Vec::new();
         let mut untyped_from = 0;
@@ -140,15 +143,14 @@ impl Parser<'_> {
         declared
     }
 
-    /// Assigns types to the names before them; types without names, as in generated files, are
-    /// ignored.
+    /// Assigns types to the names from index `from` on.
     fn give_types(&self, declared: &mut [Typed], from: usize, types: Vec<Name>) {
         for typed in &mut declared[from..] {
             typed.types.clone_from(&types);
         }
     }
 
-    /// A type, or `(either t u …)`.
+    /// Parses a type or `(either t u …)`.
     fn types(&mut self, node: usize) -> Vec<Name> {
         if self.is_list(node) && self.head(node) == Some("either") {
             let nodes: Vec<usize> = self.children(node).skip(1).collect();
@@ -181,7 +183,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `(f ?x) (g) - number (h ?y) - place`
+    /// Parses the functions of a section, such as `(f ?x) (g) - number (h ?y) - place`.
     pub(super) fn functions(&mut self, section: usize, into: &mut Vec<FunctionDeclaration>) {
         let mut untyped_from = into.len();
         let mut nodes = self.children(section).skip(1);
@@ -208,7 +210,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `(name ?a - t … [(f ?a) …] kind fn@lib.so)`
+    /// Parses a module, `(name ?a - t … [(f ?a) …] kind fn@lib.so)`.
     fn module(&mut self, list: usize) -> Option<ModuleDeclaration> {
         const SHAPE: &str = "a module is `(name ?a - type … kind function@library)`, \
             its kind cost, conditionchecker, effect (after the fluents that it writes) or grounding";
@@ -257,7 +259,8 @@ impl Parser<'_> {
         Some(ModuleDeclaration { signature: Signature { name, parameters }, writes, kind, function })
     }
 
-    /// Typed variables among the children of a module, which has no parameter list of its own.
+    /// Parses the typed variables among the children of a module, which has no parameter list of
+    /// its own.
     fn typed_nodes(&mut self, nodes: &[usize]) -> Vec<Typed> {
         let mut declared: Vec<Typed> = Vec::new();
         let mut untyped_from = 0;
@@ -278,7 +281,7 @@ impl Parser<'_> {
         declared
     }
 
-    /// A fluent or atom that an effect module writes.
+    /// Parses a function or atom that an effect module writes.
     fn written_term(&mut self, node: usize) -> Option<TermAst> {
         if !self.is_list(node) {
             self.expected("a fluent that the module writes", node, "for example `(x ?o)`");
@@ -312,7 +315,7 @@ impl Parser<'_> {
         }
     }
 
-    /// `(:oplinit init@lib.so)`: words by themselves, or options.
+    /// Parses `:oplinit`: names such as `init@lib.so`, or options with arguments.
     pub(super) fn module_setup(&mut self, section: usize, into: &mut Vec<ModuleOptionAst>) {
         let (lists, words): (Vec<usize>, Vec<usize>) =
             self.children(section).skip(1).partition(|&node| self.is_list(node));
@@ -374,7 +377,7 @@ impl Parser<'_> {
         }
     }
 
-    /// True for a timed literal `(at 5 (p a))`, false for a fact of a predicate `at`.
+    /// True for a timed literal such as `(at 5 (p a))`, false for a fact of a predicate `at`.
     fn is_timed(&self, node: usize) -> bool {
         let mut children = self.children(node).skip(1);
         let time =
@@ -486,7 +489,7 @@ impl Parser<'_> {
     }
 }
 
-/// Value of an expression without fluents.
+/// Value of a term that consists of numbers only; `None` for other terms.
 fn constant(term: &TermAst) -> Option<f64> {
     use crate::pddl::ast::Arithmetic;
     match term {

@@ -1,4 +1,4 @@
-//! Effects of actions.
+//! Parsing of effects.
 
 use super::{Parser, refused};
 use crate::pddl::ast::{Assignment, EffectAst, TermAst, When};
@@ -16,7 +16,7 @@ fn assignment(word: &str) -> Option<Assignment> {
 }
 
 impl Parser<'_> {
-    /// Parses an effect; `timed`: its parts carry time specifiers.
+    /// Parses an effect. `timed`: its parts have time specifiers (durative actions).
     pub(super) fn effect(&mut self, node: usize, timed: bool) -> Option<EffectAst> {
         match self.tree.nodes[node].kind {
             Kind::Bracket => return self.call(node).map(EffectAst::Call),
@@ -81,7 +81,7 @@ impl Parser<'_> {
         }
     }
 
-    /// True if these nodes may be a fluent and its new value.
+    /// True if these nodes may be a function and its new value.
     fn gives_value(&self, rest: &[usize]) -> bool {
         rest.len() == 2 && self.word(rest[0]).is_none_or(|word| !word.starts_with('?'))
     }

@@ -1,4 +1,4 @@
-//! Conditions, goals, constraints, terms and durations.
+//! Parsing of conditions, goals, constraints, terms and durations.
 
 use super::{Parser, refused};
 use crate::diagnostic::Diagnostic;
@@ -8,9 +8,9 @@ use crate::pddl::ast::{
 use crate::pddl::lex::Kind;
 use crate::pddl::nearest;
 
-/// Connectives, which begin a formula and are no predicates.
+/// Connectives: words that begin a formula and name no predicate.
 const CONNECTIVES: &[&str] = &["and", "or", "not", "imply", "forall", "exists"];
-/// Inequality operators of other languages.
+/// Operators for "not equal" in other languages, which PDDL does not have.
 const UNEQUAL: &[&str] = &["!=", "/=", "<>", "~="];
 
 pub(super) fn comparison(word: &str) -> Option<Comparison> {
@@ -34,7 +34,7 @@ fn arithmetic(word: &str) -> Option<Arithmetic> {
     })
 }
 
-/// Modal operator, with its numbers of times and of formulas.
+/// Modal operator of this name, with the number of its times and of its conditions.
 fn modal(word: &str) -> Option<(Modal, usize, usize)> {
     Some(match word {
         "always" => (Modal::Always, 0, 1),
@@ -51,7 +51,8 @@ fn modal(word: &str) -> Option<(Modal, usize, usize)> {
 }
 
 impl Parser<'_> {
-    /// Time specifier of a part of a durative action: `(at start …)`, `(over all …)`, `(at end …)`.
+    /// Time specifier of `(at start …)`, `(over all …)` or `(at end …)`, with the node inside if
+    /// there is one; `None` for other lists.
     pub(super) fn timing(&self, node: usize) -> Option<(When, Option<usize>)> {
         let mut children = self.children(node);
         let first = self.word(children.next()?)?;
@@ -67,7 +68,8 @@ impl Parser<'_> {
         if body.is_some_and(|body| self.word(body).is_some()) { None } else { Some((when, body)) }
     }
 
-    /// Parses a condition, goal or constraint; `timed`: its parts carry time specifiers.
+    /// Parses a condition, goal or constraint. `timed`: its parts have time specifiers (durative
+    /// actions).
     pub(super) fn formula(&mut self, node: usize, timed: bool) -> Option<Formula> {
         match self.tree.nodes[node].kind {
             Kind::Bracket => return self.call(node).map(Formula::Call),
@@ -134,14 +136,14 @@ impl Parser<'_> {
         }
     }
 
-    /// True for a modal operator, whose arguments are formulas, unlike those of a predicate with
-    /// the same name.
+    /// True if the arguments are those of a modal operator (formulas), not of a predicate with the
+    /// same name.
     fn is_modal(&self, rest: &[usize]) -> bool {
         rest.last().is_some_and(|&last| self.word(last).is_none())
     }
 
-    /// Children of a node, if their number is that of the shape; otherwise a finding that shows the
-    /// shape.
+    /// The nodes `rest` if there are `N`; otherwise `None`, and a finding that shows the right form
+    /// `shape`.
     pub(super) fn exactly<const N: usize>(
         &mut self,
         node: usize,
@@ -280,7 +282,7 @@ impl Parser<'_> {
         self.head(node).is_none_or(|head| CONNECTIVES.contains(&head) || self.children(node).count() > 0)
     }
 
-    /// A call of a module, `[name arg …]`.
+    /// Parses a call of a module, `[name arg …]`.
     pub(super) fn call(&mut self, node: usize) -> Option<CallAst> {
         let children: Vec<usize> = self.children(node).collect();
         let Some((&first, rest)) = children.split_first() else {
@@ -307,7 +309,7 @@ impl Parser<'_> {
         calls
     }
 
-    /// An argument of a predicate, function or call.
+    /// Parses an argument of a predicate, function or call.
     pub(super) fn object_term(&mut self, node: usize) -> Option<TermAst> {
         let span = self.span(node);
         match self.tree.nodes[node].kind {
@@ -339,8 +341,8 @@ impl Parser<'_> {
         Some(TermAst::Apply { name, arguments: arguments?, span: self.span(node) })
     }
 
-    /// Numeric expression, or an object where the other side is one: side of a comparison, assigned
-    /// value, duration, metric.
+    /// Parses a term that may be a number: a side of a comparison, an assigned value, a duration or
+    /// a metric.
     pub(super) fn number(&mut self, node: usize) -> Option<TermAst> {
         let span = self.span(node);
         match self.tree.nodes[node].kind {
@@ -399,7 +401,8 @@ impl Parser<'_> {
         }
     }
 
-    /// `(= ?duration e)`, `(and (>= ?duration e) (<= ?duration f))`, `(at start (…))`, `()`.
+    /// Parses bounds on a duration: `(= ?duration e)`, `(and (>= ?duration e) (<= ?duration f))`,
+    /// `(at start (…))` or `()`.
     pub(super) fn duration_bounds(
         &mut self,
         node: usize,
@@ -462,7 +465,7 @@ fn mirrored(comparison: Comparison) -> Comparison {
     }
 }
 
-/// Parses a finite number (`inf`, `nan` and `infinity` are names).
+/// Parses a finite number; `None` for other words (`inf`, `nan` and `infinity` are names).
 fn number(word: &str) -> Option<f64> {
     let first = word.trim_start_matches(['+', '-', '.']).chars().next()?;
     first.is_ascii_digit().then(|| word.parse::<f64>().ok()).flatten().filter(|number| number.is_finite())

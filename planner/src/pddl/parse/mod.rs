@@ -1,6 +1,6 @@
-//! Parser: turns the tree of lists into the tree of a domain or problem.
+//! Parser: turns the tree of lists into the syntax tree of a domain or problem.
 //!
-//! Every fault becomes a finding and reading goes on behind it, so that all findings of a file come at once.
+//! After a fault, parsing continues, so that all findings of a file are reported at once.
 
 mod declarations;
 mod effects;
@@ -11,7 +11,7 @@ use super::lex::{self, Children, Kind, Symbols, Tree};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::pddl::nearest;
 
-/// Reads a domain file (source number `source`).
+/// Parses a domain file, source number `source`; faults are appended to `findings`.
 pub fn domain(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> Domain {
     let tree = lex::read(text, source, symbols, findings);
     symbols.declare_predicates(&tree);
@@ -28,7 +28,7 @@ pub fn domain(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec
     domain
 }
 
-/// Reads a problem file (source number `source`).
+/// Parses a problem file, source number `source`; faults are appended to `findings`.
 pub fn problem(text: &str, source: u32, symbols: &mut Symbols, findings: &mut Vec<Diagnostic>) -> ProblemAst {
     let tree = lex::read(text, source, symbols, findings);
     let mut parser = Parser { tree: &tree, text, source, symbols, findings };
@@ -52,7 +52,7 @@ struct Parser<'a> {
     findings: &'a mut Vec<Diagnostic>,
 }
 
-/// Sections of a domain.
+/// Keywords of the sections of a domain.
 pub const DOMAIN_SECTIONS: &[&str] = &[
     ":requirements",
     ":oplinit",
@@ -67,7 +67,7 @@ pub const DOMAIN_SECTIONS: &[&str] = &[
     ":constraints",
 ];
 
-/// Sections of a problem.
+/// Keywords of the sections of a problem.
 pub const PROBLEM_SECTIONS: &[&str] = &[
     ":domain",
     ":requirements",
@@ -80,7 +80,7 @@ pub const PROBLEM_SECTIONS: &[&str] = &[
     ":metric",
 ];
 
-/// Parts of an action.
+/// Keywords of the parts of an action.
 pub const ACTION_PARTS: &[&str] =
     &[":parameters", ":precondition", ":condition", ":effect", ":duration", ":grounding", ":vars"];
 
@@ -90,7 +90,8 @@ impl<'a> Parser<'a> {
         Span { source: self.source, start: node.start, end: node.end }
     }
 
-    /// Only the opening sign of a list, or the whole word: enough to point at long lists.
+    /// Span of a list's opening bracket and first word, or of a whole word: enough to point at a
+    /// long list.
     fn head_span(&self, node: usize) -> Span {
         match self.tree.children(node).next() {
             Some(first) if matches!(self.tree.nodes[first].kind, Kind::Word(_)) => Span {
@@ -106,7 +107,7 @@ impl<'a> Parser<'a> {
         self.tree.children(node)
     }
 
-    /// The word of a node, case-folded.
+    /// Case-folded word of a node; `None` for a list.
     fn word(&self, node: usize) -> Option<&'a str> {
         match self.tree.nodes[node].kind {
             Kind::Word(symbol) => Some(self.symbols.name(symbol)),
@@ -114,7 +115,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// First word of a list.
+    /// Case-folded first word of a list; `None` if the list is empty or begins with another list.
     fn head(&self, list: usize) -> Option<&'a str> {
         let first = self.children(list).next()?;
         self.word(first)
@@ -165,7 +166,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A plain name: neither variable nor keyword.
+    /// Parses a name, which is neither a variable nor a keyword; otherwise reports that `what` was
+    /// expected.
     fn name(&mut self, node: usize, what: &str) -> Option<Name> {
         match self.tree.nodes[node].kind {
             Kind::Word(symbol) if !self.symbols.name(symbol).starts_with(['?', ':']) => {
@@ -178,7 +180,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// The sections of `(define (KIND name) …)`.
+    /// Sections of `(define (KIND name) …)`, with its name written to `name`; `None` if there is no
+    /// such definition.
     fn definition(&mut self, kind: &str, name: &mut Option<Name>) -> Option<Vec<usize>> {
         let roots: Vec<usize> = self.tree.roots().collect();
         let other = if kind == "domain" { "problem" } else { "domain" };
@@ -249,7 +252,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Keyword of a section; or a finding, and the keyword probably meant.
+    /// Keyword of a section. If the section has none, reports that and returns the keyword that was
+    /// probably meant.
     fn section_keyword(&mut self, section: usize, known: &[&'static str]) -> Option<&'a str> {
         let keyword = self.head(section).filter(|_| self.is_list(section));
         if keyword.is_none_or(|keyword| !keyword.starts_with(':')) {
@@ -311,13 +315,12 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// True if the last finding was an unknown section, which may have declared names that are
-    /// missing later.
+    /// True if the last finding was an unknown section, whose declarations may be missing later.
     fn leaves_unread(&self) -> bool {
         self.findings.last().is_some_and(|finding| finding.code == "unknown-section")
     }
 
-    /// Reports an unknown section; returns the keyword that was probably meant.
+    /// Reports an unknown section; returns the keyword that was probably meant, if any.
     fn unknown_section(
         &mut self,
         section: usize,
@@ -360,7 +363,7 @@ impl<'a> Parser<'a> {
         meant
     }
 
-    /// A section that a problem has once.
+    /// Reports a section that a problem has for the second time.
     fn second(&mut self, section: usize, keyword: &str) {
         let (span, message) = (self.head_span(section), format!("a second `{keyword}`"));
         self.findings.push(
@@ -497,7 +500,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Reports an unknown part of an action; returns the part that was probably meant.
+    /// Reports an unknown part of an action; returns the keyword that was probably meant, if any.
     fn unknown_part(&mut self, keyword: usize, part: &str) -> Option<&'static str> {
         let message = format!("no part `{part}` is known in an action");
         let span = self.span(keyword);
@@ -510,7 +513,7 @@ impl<'a> Parser<'a> {
         near
     }
 
-    /// Checks that a durative action has a duration and an instantaneous one has none.
+    /// Reports a durative action without a duration, or an instantaneous one with a duration.
     fn duration_fits(&mut self, action: &ActionAst, has_duration: bool) {
         let span = action.name.span;
         let name = self.symbols.name(action.name.symbol);
@@ -544,13 +547,13 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// Finding on a supported syntax of an unsupported feature.
+/// Error about a keyword whose feature is not supported.
 fn refused(keyword: &str, feature: &str, span: Span) -> Diagnostic {
     let message = format!("`{keyword}` is not supported ({feature})");
     Diagnostic::error("not-supported", message, span, "not supported")
 }
 
-/// Text shortened to one line, for a message.
+/// Text on one line, cut after 57 characters if longer than 60, for a message.
 pub(super) fn shortened(text: &str) -> String {
     let mut line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     if line.chars().count() > 60 {

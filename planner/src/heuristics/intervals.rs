@@ -176,8 +176,8 @@ pub(super) struct Intervals {
     amounts_on: Vec<Vec<u32>>,
     /// True, by comparison, if some precondition, condition or goal contains the comparison.
     needed: Vec<bool>,
-    /// Nodes that raise a number with the amount of one application, or that assign a positive constant
-    /// to it with the constant, by number.
+    /// Nodes that raise a number by a constant or assign a positive constant to it, each with that
+    /// constant; by number.
     givers: Vec<Vec<(u32, f64)>>,
     /// True if intervals are needed: some effect or comparison is beyond subgoaling with repetitions.
     dynamic: bool,
@@ -186,8 +186,8 @@ pub(super) struct Intervals {
     widened: Vec<[u8; 2]>,
     /// Node that last widened the interval of a number, by number; `NONE` for none.
     mover: Vec<u32>,
-    /// Values of each number after few applications, from which state-dependent amounts are estimated
-    /// (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
+    /// Values that each number can reach by one change of its value in the state; state-dependent amounts
+    /// are estimated from them (in the spirit of Li, Scala, Haslum and Bogomolov 2018).
     near: Vec<Near>,
     times: Vec<u32>,
     /// Facts that the last applied node achieves, each with the number of applications needed.

@@ -1,9 +1,9 @@
-//! Parallel portfolio: the results equal those of running the searches one after another.
+//! Parallel execution of searches with the results of running them one after another.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Runs jobs in parallel threads. Returns their results in order, up to the first conclusive one;
-/// later jobs are cancelled.
+/// Runs jobs in parallel threads. Returns their results in order, up to and including the first for
+/// which `ends_it` is true; the jobs after that one are told to stop through their flag.
 pub fn in_order<R: Send>(
     jobs: Vec<impl FnOnce(&AtomicBool) -> R + Send>,
     ends_it: impl Fn(&R) -> bool,

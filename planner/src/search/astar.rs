@@ -1,5 +1,5 @@
-//! A* with LM-cut (Hart, Nilsson and Raphael 1968; Helmert and Domshlak 2009): an optimal plan with
-//! its proof.
+//! A* with LM-cut (Hart, Nilsson and Raphael 1968; Helmert and Domshlak 2009): finds an optimal plan
+//! and proves it optimal.
 
 use std::collections::BTreeMap;
 
@@ -11,44 +11,45 @@ use crate::memory::{MemoryLimit, Rows};
 use super::lazy::{Counts, End};
 use super::store::{NO_STATE, Store};
 
-/// Memory of an open-list entry, bytes, including spare capacity.
+/// Memory of an open-list entry in bytes, including spare capacity.
 const ENTRY_BYTES: usize = 8;
-/// Bytes of a bucket of the open list.
+/// Memory of a bucket of the open list, in bytes.
 const BUCKET_BYTES: usize = 64;
 
-/// Lower bound on the cost from a state to the goal.
+/// Lower bound on the cost from a state to the goal, in search costs.
 #[derive(Clone, Copy, Debug)]
 struct Bound {
     cost: u32,
-    /// True if the bound is the state's own; false if inherited from its parent.
+    /// True if the heuristic was computed for the state itself, false if the bound is inherited from
+    /// the parent.
     is_own: bool,
 }
 
-/// The search.
+/// A* search.
 pub(crate) struct AStar<'a> {
     task: &'a Compiled,
     successors: Successors,
     heuristic: LandmarkCut,
     store: Store,
-    /// Lower bounds by state.
+    /// Lower bound of each state.
     bounds: Rows<Bound>,
-    /// Open list by f, then by h; LIFO among ties.
+    /// Open list ordered by f, then by h; the newest entry first among ties.
     open: BTreeMap<(u32, u32), Vec<u32>>,
     entries: usize,
     counts: Counts,
 }
 
-/// Limits of the search.
+/// Limits of an A* search.
 #[derive(Clone, Copy)]
 pub(crate) struct AStarLimits<'a> {
     pub memory: MemoryLimit,
-    /// States evaluated at most.
+    /// Maximum number of evaluated states.
     pub evaluations: u64,
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<'a> AStar<'a> {
-    /// Search of a task whose search costs are exact up to scale.
+    /// Search of a task whose search costs are proportional to those of its metric.
     pub(crate) fn new(task: &'a Compiled) -> AStar<'a> {
         AStar {
             task,
@@ -62,12 +63,13 @@ impl<'a> AStar<'a> {
         }
     }
 
-    /// Counts so far.
+    /// Counts since the beginning of the search.
     pub(crate) fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Searches to the end; `on_bound` gets every improved lower bound, in search costs.
+    /// Searches until a plan is found, none exists or a limit is reached; `on_bound` gets every
+    /// improved lower bound on plan costs, in search costs.
     pub(crate) fn run(&mut self, limits: AStarLimits<'_>, on_bound: &mut dyn FnMut(u32)) -> End {
         let (mut state, mut proven) = (self.task.initial.clone(), None);
         let (first, _) = self.store.insert(&state, NO_STATE, 0, 0);
@@ -106,7 +108,8 @@ impl<'a> AStar<'a> {
         End::Exhausted
     }
 
-    /// Evaluates a state whose bound is inherited, and reopens it unless it is a dead end.
+    /// Computes the heuristic of a state whose bound is inherited, and puts the state back into the
+    /// open list unless it is a dead end.
     fn evaluate(&mut self, id: u32, state: &[u32], stop: &(dyn Fn() -> bool + Sync)) {
         self.counts.evaluated += 1;
         let inherited = self.bounds[id as usize].cost;
@@ -142,18 +145,18 @@ impl<'a> AStar<'a> {
         }
     }
 
-    /// Lower bound on the cost of plans through a state.
+    /// Lower bound on the cost of plans through a state (f), in search costs.
     fn through(&self, id: u32) -> u32 {
         self.store.cost(id).saturating_add(self.bounds[id as usize].cost)
     }
 
-    /// Opens a state.
+    /// Adds a state to the open list.
     fn push(&mut self, id: u32) {
         self.open.entry((self.through(id), self.bounds[id as usize].cost)).or_default().push(id);
         self.entries += 1;
     }
 
-    /// Pops the state with minimum f.
+    /// Removes the state with minimum f from the open list; returns f and the state.
     fn pop(&mut self) -> Option<(u32, u32)> {
         let mut bucket = self.open.first_entry()?;
         let (through, _) = *bucket.key();
@@ -165,7 +168,7 @@ impl<'a> AStar<'a> {
         id.map(|id| (through, id))
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the search, in bytes.
     fn bytes(&self) -> usize {
         let open = self.entries * ENTRY_BYTES + self.open.len() * BUCKET_BYTES;
         self.store.bytes()[0] + self.bounds.bytes() + open + self.heuristic.bytes()

@@ -1,4 +1,4 @@
-//! Solving of a grounded classical task.
+//! Solver for grounded tasks of instantaneous actions.
 
 use crate::explain::{Refusals, explain};
 use crate::ground::GroundTask;
@@ -9,8 +9,9 @@ use crate::task::Task;
 
 use super::run::{ClassicalEnd, ClassicalOptions, FIRST_WORK, solve};
 
-/// Plans a classical task ([`crate::classical::compiled::is_classical`]); `check` validates each
-/// plan and rejects those that are no better than earlier ones. `soft`: the task has soft goals.
+/// Plans for a task that [`crate::classical::compiled::is_classical`]. `check` validates a plan and
+/// returns `None` for one that is no better than an earlier one; `soft` is true if the task has soft
+/// goals.
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn plan_classical(
     task: &Task,
@@ -68,7 +69,7 @@ pub(crate) fn plan_classical(
     })
 }
 
-/// Plan in the words of the task.
+/// Plan with the names of actions and objects in the task, for a sequence of operators.
 pub(crate) fn named(task: &Task, grounded: &GroundTask, operators: &[u32]) -> Plan {
     let steps = operators.iter().map(|&operator| {
         let origin = &grounded.actions[operator as usize].origin;

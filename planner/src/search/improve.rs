@@ -1,5 +1,5 @@
-//! Plan improvement: action elimination, block reordering, and replanning of windows (in the spirit
-//! of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
+//! Plan improvement: action elimination, reordering of blocks, and replanning of windows of steps (in
+//! the spirit of Nakhost and Müller 2010 and of Siddiqui and Haslum 2015).
 
 mod undo;
 
@@ -12,41 +12,41 @@ use crate::heuristics::relaxed::{Counting, Relaxed};
 use super::lookahead::Lookahead;
 use super::store::{NO_STATE, Store};
 
-/// Steps in the smallest windows.
+/// Number of steps in the smallest windows.
 const SMALLEST_WINDOW: usize = 4;
-/// States evaluated for a window in the first round.
+/// Number of states evaluated for a window in the first round.
 const FIRST_EVALUATIONS: u32 = 12;
-/// Maximum distance estimate of a kept state, per cent of the remaining budget.
+/// Share of the heuristic estimate that counts when a state is compared with the budget, in per cent.
 const TRUST_PERCENT: u64 = 80;
 
-/// Improver of one plan after another.
+/// Plan improver for a task.
 pub struct Improve<'a> {
     task: &'a Compiled,
     successors: &'a Successors,
     stop: &'a (dyn Fn() -> bool + Sync),
     /// Operators that write a variable, by variable.
     writers: Lists<u32>,
-    /// True, by variable, if written in the window at hand.
+    /// True, by variable, if the window being replanned writes the variable.
     touched: Vec<bool>,
     lookahead: Lookahead,
     store: Store,
-    /// Cost of an operator for improvement, by operator.
+    /// Cost of each operator, as improvement counts it.
     costs: Vec<u32>,
     queue: BinaryHeap<std::cmp::Reverse<(u64, u32, u32, u32)>>,
     state: Vec<u32>,
     next: Vec<u32>,
     applicable: Vec<u32>,
-    /// Evaluations made.
+    /// Number of states evaluated so far.
     pub evaluated: u64,
-    /// Evaluations that may be made.
+    /// Maximum number of states to evaluate.
     pub evaluation_limit: u64,
-    /// Work done besides the heuristic's.
+    /// Work done so far (see [`Relaxed::work`]).
     work: u64,
     work_limit: u64,
 }
 
 impl<'a> Improve<'a> {
-    /// Plan improver for a task.
+    /// Plan improver for a task that ends early once `stop` returns true.
     pub fn new(
         task: &'a Compiled,
         successors: &'a Successors,
@@ -73,18 +73,18 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Cost of a plan for improvement.
+    /// Cost of a plan, as improvement counts it.
     pub(crate) fn cost(&self, plan: &[u32]) -> u64 {
         plan.iter().map(|&op| u64::from(self.costs[op as usize])).sum()
     }
 
-    /// Work so far, in the units of a search.
+    /// Work done so far (see [`Relaxed::work`]).
     pub(crate) fn work(&self) -> u64 {
         self.work
     }
 
-    /// Improves the plan in place until no window helps, `work` is used up, or stopped; `on_better`
-    /// gets every better plan.
+    /// Improves a plan in place until no window gets better or the limits are reached; `on_better` gets
+    /// every better plan. True if it ended because nothing got better.
     pub fn run(&mut self, plan: &mut Vec<u32>, work: u64, on_better: &mut dyn FnMut(&[u32])) -> bool {
         self.work_limit = self.work().saturating_add(work);
         let mut best = self.cost(plan);
@@ -131,7 +131,7 @@ impl<'a> Improve<'a> {
         self.work() > self.work_limit || self.evaluated >= self.evaluation_limit || (self.stop)()
     }
 
-    /// Action elimination: removes a step with all later ones that lose a precondition, if the goal
+    /// Action elimination: removes a step, with all later ones that are then inapplicable, if the goal
     /// is still reached.
     fn eliminate(&mut self, plan: &mut Vec<u32>) {
         let task = self.task;
@@ -169,8 +169,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Moves dependent steps next to each other. Any order that preserves the order of interfering
-    /// steps has the same effect.
+    /// Reorders a plan so that dependent steps are next to each other; interfering steps keep their
+    /// order, so the plan's effect is the same.
     fn rearrange(&mut self, plan: &mut Vec<u32>, round: usize) {
         let reverse = round % 2 == 1;
         let (mut after, mut waits) = dependencies(self.task, plan);
@@ -212,7 +212,7 @@ impl<'a> Improve<'a> {
         *plan = order;
     }
 
-    /// Replans every window of this size; consecutive windows overlap by half.
+    /// Replans every window of `size` steps; consecutive windows overlap by half.
     fn windows(&mut self, plan: &mut Vec<u32>, size: usize, evaluations: u32, all: bool) {
         let task = self.task;
         let mut needs = Needs::new(task, plan);
@@ -236,8 +236,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// True if the rest of a plan still reaches the goal after a replanned window; certain without
-    /// numbers, as a window's goal does not include them.
+    /// True if a replanned window and the rest of the plan still reach the goal. Always true for tasks
+    /// without numbers: the window's goal does not contain numeric conditions.
     fn fits(&mut self, from: &[u32], window: &[u32], rest: &[u32]) -> bool {
         let task = self.task;
         if !task.some_impossible() {
@@ -253,8 +253,8 @@ impl<'a> Improve<'a> {
         works && task.is_goal(&state)
     }
 
-    /// Plan from the state to the goal facts that is cheaper than `budget`, if a short search finds
-    /// one.
+    /// Plan from a state to goal facts that is cheaper than the steps of `window`; `None` if a short
+    /// search finds none.
     fn replan(
         &mut self,
         from: &[u32],
@@ -311,7 +311,7 @@ impl<'a> Improve<'a> {
         best.map(|(_, plan)| plan)
     }
 
-    /// Heuristic over the operators that write only variables that the window writes.
+    /// Heuristic restricted to operators that write only variables written in the window.
     fn restricted(&mut self, window: &[u32], goal: &[u32]) -> Relaxed {
         let task = self.task;
         self.touched.fill(false);
@@ -383,8 +383,8 @@ impl<'a> Improve<'a> {
         }
     }
 
-    /// Applies the relaxed plan as far as possible; accepts a goal state on its path if cheap
-    /// enough.
+    /// Applies the relaxed plan as far as possible; a goal state on the way, at a cost below `bound`,
+    /// becomes the best plan.
     fn try_lookahead(
         &mut self,
         relaxed: &Relaxed,
@@ -415,7 +415,7 @@ impl<'a> Improve<'a> {
     }
 }
 
-/// Pairs of a variable and an operator that writes it.
+/// Pairs of a variable (or number) and an operator that writes it.
 fn writes(task: &Compiled) -> impl Iterator<Item = (u32, u32)> + Clone + '_ {
     (0..task.operators() as u32).flat_map(move |op| {
         let mut variables: Vec<u32> = task.written(op).collect();
@@ -429,7 +429,7 @@ fn writes_only(task: &Compiled, operator: u32, touched: &[bool]) -> bool {
     task.written(operator).all(|v| touched[v as usize])
 }
 
-/// For each step, the later steps that depend on it, and its number of dependencies.
+/// Later steps that must stay behind each step, and number of earlier steps that must stay before it.
 fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     let mut after: Vec<Vec<u32>> = vec![Vec::new(); plan.len()];
     let mut waits = vec![0u32; plan.len()];
@@ -458,10 +458,10 @@ fn dependencies(task: &Compiled, plan: &[u32]) -> (Vec<Vec<u32>>, Vec<u32>) {
     (after, waits)
 }
 
-/// Regressed needs of a plan's remainder at each of its steps.
+/// Facts that the rest of a plan needs, at each of its steps.
 struct Needs {
-    /// Steps at which a value of a variable is needed, with the value, or written (`u32::MAX`), by
-    /// variable; rising.
+    /// For each variable, the steps that need a value (step, value) or write the variable (step,
+    /// `u32::MAX`), in order; empty for tasks with conditional effects or axioms.
     events: Vec<Vec<(u32, u32)>>,
 }
 
@@ -490,8 +490,8 @@ impl Needs {
         Needs { events }
     }
 
-    /// Facts that must hold before step `end`; with conditional effects or axioms, the whole state
-    /// at that point.
+    /// Facts that must hold before step `end`; for tasks with conditional effects or axioms, all facts
+    /// of the state there.
     fn at(&self, task: &Compiled, plan: &[u32], end: usize) -> Vec<u32> {
         if self.events.is_empty() {
             if end == plan.len() {

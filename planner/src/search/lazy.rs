@@ -17,47 +17,48 @@ use super::store::{NO_STATE, Store};
 /// Priority boost of preferred operators when a heuristic makes progress.
 const BOOST: i64 = 1000;
 
-/// Configuration of one search.
+/// Configuration of a lazy best-first search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strategy {
-    /// Weight of weighted A*; `None`: greedy.
+    /// Weight of the heuristic in weighted A*; `None` for greedy search.
     pub weight: Option<u32>,
-    /// Operator costs of the heuristics.
+    /// Operator costs that the heuristic counts.
     pub counting: Counting,
-    /// True to try lookahead states.
+    /// True to try states along relaxed plans as well.
     pub lookahead: bool,
-    /// True for LIFO tie-breaking among equally good states, false for FIFO.
+    /// True if ties go to the newest entry (LIFO), false if to the oldest (FIFO).
     pub newest: bool,
-    /// True to order further open lists by the landmark count.
+    /// True to use further open lists, ordered by the landmark count.
     pub landmarks: bool,
-    /// True to prefer also operators that achieve landmarks.
+    /// True to prefer operators that achieve landmarks, too.
     pub towards_landmarks: bool,
-    /// Cost bound: only plans cheaper than this (in the search's costs) are of interest.
+    /// Only plans with search costs below this bound are accepted.
     pub bound: u32,
-    /// Metric bound: only plans with a final state below this value are accepted.
+    /// Only plans whose final state has a metric value below this are accepted; `None` for no such
+    /// bound.
     pub better_than: Option<f64>,
-    /// Work limit (see [`Relaxed::work`]).
+    /// Maximum work (see [`Relaxed::work`]).
     pub work_limit: u64,
-    /// Evaluation limit.
+    /// Maximum number of evaluated states.
     pub evaluation_limit: u64,
 }
 
-/// End of a search.
+/// Result of a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// A plan.
+    /// A plan was found: its operators in order.
     Plan(Vec<u32>),
-    /// No plan exists, or none below the bound.
+    /// Nothing is left to search: no plan exists, or none below the bound, if the search is complete.
     Exhausted,
-    /// The work limit.
+    /// The limit of work or evaluations was reached; the search can be continued.
     Limit,
-    /// The caller's stop signal.
+    /// The caller stopped the search.
     Stopped,
-    /// The memory limit.
+    /// The memory limit was reached.
     Memory,
 }
 
-/// Counts of a search.
+/// Counts of a search: evaluated states, expanded states, and work (see [`Relaxed::work`]).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Counts {
     pub evaluated: u64,
@@ -65,7 +66,7 @@ pub struct Counts {
     pub work: u64,
 }
 
-/// Data shared between searches of one task.
+/// Data that all searches of a task share.
 pub struct Shared<'a> {
     pub task: &'a Compiled,
     pub successors: &'a Successors,
@@ -76,53 +77,53 @@ pub struct Shared<'a> {
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Limits of a search, over all its runs together.
+/// Limits of a search, counted from its beginning over all its turns.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowed<'c> {
-    /// See [`Relaxed::work`].
+    /// Maximum work (see [`Relaxed::work`]).
     pub work: u64,
-    /// States evaluated.
+    /// Maximum number of evaluated states.
     pub evaluations: u64,
-    /// Memory taken.
+    /// Maximum memory.
     pub memory: MemoryLimit,
-    /// Set once the search's result is no longer needed.
+    /// True once the result of the search is no longer needed.
     pub cancelled: &'c AtomicBool,
 }
 
 impl Allowed<'_> {
-    /// True if a search must end: stopped, or its result is no longer needed.
+    /// True if the search must end: the caller stopped, or the result is no longer needed.
     pub(crate) fn has_ended(&self, shared: &Shared<'_>) -> bool {
         self.cancelled.load(Ordering::Relaxed) || (shared.stop)()
     }
 }
 
-/// Resumable search; after [`End::Limit`] it can continue.
+/// Lazy best-first search that can be continued after [`End::Limit`].
 pub(crate) struct Search<'a, 's> {
     shared: &'s Shared<'a>,
     strategy: Strategy,
     started: bool,
-    /// The stop signal came within a visit.
+    /// True if the caller stopped the search during a visit.
     stopped: bool,
     store: Store,
     relaxed: Relaxed,
     lookahead: Lookahead,
-    /// Open lists: all operators and preferred ones, by heuristic and by landmarks.
+    /// Open lists: all operators and preferred operators by heuristic, then both by landmark count.
     lists: [OpenList; 4],
     best: [u32; 2],
-    /// Accepted landmarks by state.
+    /// Accepted landmarks of each state.
     status: Status,
     counts: Counts,
-    /// Entries made since memory was looked at.
+    /// Number of open-list entries since memory was last checked.
     unseen: usize,
     state: Vec<u32>,
     next: Vec<u32>,
     applicable: Vec<u32>,
     preferred: Vec<u32>,
-    /// States along the last lookahead.
+    /// States along the last lookahead, in order.
     trail: Vec<u32>,
 }
 
-/// Runs one search.
+/// Runs a search from the initial state; returns its result and counts.
 pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, cancelled: &AtomicBool) -> (End, Counts) {
     let mut search = Search::new(shared, strategy);
     let (work, evaluations) = (strategy.work_limit, strategy.evaluation_limit);
@@ -131,14 +132,14 @@ pub(crate) fn search(shared: &Shared<'_>, strategy: Strategy, cancelled: &Atomic
 }
 
 impl Counts {
-    /// Adds the counts of another search.
+    /// Adds the counts of another search to these.
     pub(crate) fn add(&mut self, other: Counts) {
         self.evaluated += other.evaluated;
         self.expanded += other.expanded;
         self.work += other.work;
     }
 
-    /// Difference to earlier counts.
+    /// Counts since an earlier time, at which they were `before`.
     pub(crate) fn since(self, before: Counts) -> Counts {
         Counts {
             evaluated: self.evaluated - before.evaluated,
@@ -148,14 +149,15 @@ impl Counts {
     }
 }
 
-/// Number of queue entries between two checks of the memory limit; an iteration counts for several.
+/// Number of open-list entries between two checks of the memory limit.
 pub const MOST_UNSEEN: usize = 4096;
+/// Number of entries that one iteration of a search counts as, besides those that it makes.
 pub const UNSEEN_A_ROUND: usize = 16;
-/// A fixed price of making and storing a state, in units of [`Relaxed::work`].
+/// Work of generating and storing one state, in units of [`Relaxed::work`].
 const STATE_WORK: u64 = 20;
 
 impl<'a, 's> Search<'a, 's> {
-    /// Search before its first step.
+    /// Search that has not begun.
     pub(crate) fn new(shared: &'s Shared<'a>, strategy: Strategy) -> Search<'a, 's> {
         let task = shared.task;
         Search {
@@ -183,12 +185,12 @@ impl<'a, 's> Search<'a, 's> {
         self.relaxed.work + (self.counts.evaluated + self.counts.expanded) * STATE_WORK
     }
 
-    /// Counts so far.
+    /// Counts since the beginning of the search.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
 
-    /// Searches on as far as is allowed.
+    /// Continues the search within limits.
     pub(crate) fn run(&mut self, allowed: Allowed<'_>) -> End {
         if self.strategy.bound == 0 {
             return End::Exhausted;
@@ -226,7 +228,7 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the search, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         let lists: usize = self.lists.iter().map(OpenList::bytes).sum();
         self.store.bytes()[0] + lists + self.status.bytes() + self.relaxed.bytes()
@@ -236,7 +238,8 @@ impl<'a, 's> Search<'a, 's> {
         memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
-    /// Generates the successor of an entry and visits it if worthwhile.
+    /// Generates the successor of an open-list entry and visits it if it is new or worth another visit;
+    /// returns a plan if one is found.
     fn follow(&mut self, parent: u32, operator: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
         let cost = task.with_cost(self.store.cost(parent), operator);
@@ -256,8 +259,8 @@ impl<'a, 's> Search<'a, 's> {
         self.visit(id)
     }
 
-    /// True if a known state is to be visited again: never expanded, or (weighted A*) reached at
-    /// lower cost.
+    /// True if a known state is to be visited again: it was never expanded, or is now reached at lower
+    /// cost in a search that counts costs.
     fn again(&mut self, id: u32, parent: u32, operator: u32, cost: u32) -> bool {
         let reopens = self.strategy.weight.is_some() || self.strategy.bound != u32::MAX;
         if cost < self.store.cost(id) && reopens {
@@ -267,8 +270,9 @@ impl<'a, 's> Search<'a, 's> {
         !self.store.is_expanded(id)
     }
 
-    /// Evaluates and expands `self.state`, then its lookahead states while they improve. After a
-    /// dead end, half of the lookahead is tried.
+    /// Evaluates and expands `self.state`, then the lookahead states from there while the estimate
+    /// improves; returns a plan if one is found. After a dead end in a lookahead, the state in the
+    /// middle of it is tried.
     fn visit(&mut self, mut id: u32) -> Option<Vec<u32>> {
         let task = self.shared.task;
         let mut last = u32::MAX;
@@ -298,14 +302,14 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// True if a plan that ends in `self.state` is good enough.
+    /// True if a plan that ends in `self.state` meets the bound on the metric.
     fn is_better(&self) -> bool {
         let task = self.shared.task;
         let costs = || task.measure.of_last(&task.numbers, &self.state);
         self.strategy.better_than.is_none_or(|bound| costs().is_none_or(|cost| cost < bound))
     }
 
-    /// Moves `self.state` to the middle of the last lookahead; `None` if that was expanded before.
+    /// Moves `self.state` to the middle of the last lookahead; `None` if that state has been expanded.
     fn step_back(&mut self) -> Option<u32> {
         self.trail.truncate(self.trail.len() / 2);
         let id = self.trail.last().copied().filter(|&id| !self.store.is_expanded(id))?;
@@ -357,7 +361,8 @@ impl<'a, 's> Search<'a, 's> {
         }
     }
 
-    /// Moves `self.state` to the lookahead state; `None` if there is none or the state is known.
+    /// Moves `self.state` to the end of a new lookahead; `None` if the lookahead is too short, too
+    /// costly or ends in an expanded state.
     fn look_ahead(&mut self, mut id: u32) -> Option<u32> {
         let task = self.shared.task;
         self.lookahead.run(task, &self.state, &self.relaxed.plan);

@@ -1,5 +1,5 @@
-//! Lookahead states: the applicable part of a relaxed plan, repaired where an operator no longer
-//! fits (Vidal 2004, "A lookahead strategy for heuristic search planning").
+//! Lookahead: applies as much of a relaxed plan as possible, and repairs the plan where an operator is
+//! not applicable (Vidal 2004, "A lookahead strategy for heuristic search planning").
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::heuristics::relaxed::{REFILL, Relevant};
@@ -10,22 +10,23 @@ use super::steer::movers;
 pub struct Lookahead {
     /// Operators that achieve each fact.
     achievers: Lists<u32>,
-    /// Number of remaining operators (and goals) that need a fact, by fact.
+    /// Number of goals and of operators still to apply that need a fact, by fact.
     pub(super) needed: Vec<i32>,
     pub(super) rest: Vec<Relevant>,
-    /// Operators of the relaxed plan that serve to change a number.
+    /// Operators of the relaxed plan that are there to satisfy a numeric condition.
     pub(super) moves: Vec<Relevant>,
-    /// Operators of the relaxed plan that refill numbers.
+    /// Operators of the relaxed plan that refill numbers consumed by others.
     pub(super) refills: Vec<Relevant>,
     pub(super) state: Vec<u32>,
     next: Vec<u32>,
-    /// Operators that change left minus right of a comparison, with the change, by comparison.
+    /// Operators that can move each comparison towards truth, with the change of left minus right (NaN
+    /// if it depends on the state).
     pub(super) movers: Lists<(u32, f64)>,
-    /// The operators applied, in order.
+    /// Operators applied by the last run, in order.
     pub plan: Vec<u32>,
 }
 
-/// Steps of a lookahead at most.
+/// Maximum number of steps of a lookahead.
 pub(super) const MOST_STEPS: usize = 20_000;
 
 impl Lookahead {
@@ -48,7 +49,8 @@ impl Lookahead {
         }
     }
 
-    /// Applies as much of the relaxed plan as possible; leaves the applied operators in `plan`.
+    /// Applies as much of a relaxed plan as possible from a state; leaves the applied operators in
+    /// `plan`.
     pub fn run(&mut self, task: &Compiled, from: &[u32], relaxed: &[Relevant]) {
         self.plan.clear();
         self.rest.clear();
@@ -77,8 +79,8 @@ impl Lookahead {
         self.steer_to_goal(task);
     }
 
-    /// Applies every applicable operator of the relaxed plan in order; number-changing ones are
-    /// delayed until an operator would disable them. True if any was applied.
+    /// Applies every applicable operator of the relaxed plan in order; true if any was applied.
+    /// Operators that only change numbers wait until another operator would disable them.
     fn pass(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         let mut rest = std::mem::take(&mut self.rest);
@@ -98,7 +100,7 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Applies refill operators wherever possible; true if any was applied.
+    /// Applies the operators that refill numbers as often as possible; true if any was applied.
     pub(super) fn fill(&mut self, task: &Compiled) -> bool {
         let before = self.plan.len();
         for place in 0..self.refills.len() {
@@ -111,7 +113,7 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Applies number-changing operators that the given operator would disable; true if any was
+    /// Applies the operators for numeric conditions that `operator` would disable; true if any was
     /// applied.
     fn hurry(&mut self, task: &Compiled, operator: u32) -> bool {
         let before = self.plan.len();
@@ -124,8 +126,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Applies an operator repeatedly, up to the relaxed plan's count, while applicable and needed;
-    /// returns the number of applications.
+    /// Applies an operator while it is applicable and its numeric condition is false, at most as often
+    /// as the relaxed plan says; returns the number of applications.
     pub(super) fn repeat(&mut self, task: &Compiled, entry: Relevant) -> u32 {
         let mut times = 0;
         while times < entry.times
@@ -144,8 +146,8 @@ impl Lookahead {
         self.plan.push(operator);
     }
 
-    /// Repairs the relaxed plan: an applicable operator that adds the same needed fact replaces an
-    /// inapplicable one.
+    /// Repairs the relaxed plan: an inapplicable operator is replaced by an applicable one that adds
+    /// the same needed fact, which is then applied. False if there is none.
     fn mend(&mut self, task: &Compiled) -> bool {
         for i in 0..self.rest.len() {
             for effect in task.effects.get(self.rest[i].operator as usize) {
@@ -170,14 +172,14 @@ impl Lookahead {
     }
 }
 
-/// Adds an operator's preconditions to the facts that the rest of the plan needs.
+/// Adds `by` to the number of needs of each precondition of an operator.
 pub(super) fn count(needed: &mut [i32], task: &Compiled, operator: u32, by: i32) {
     for &fact in task.preconditions.get(operator as usize) {
         needed[task.id(fact) as usize] += by;
     }
 }
 
-/// True if an operator deletes a precondition of another.
+/// True if an operator makes a precondition of another one false.
 fn takes_from(task: &Compiled, operator: u32, other: u32) -> bool {
     let effects = task.effects.get(operator as usize).iter().filter(|e| e.from == e.to);
     let mut effects = effects.map(|effect| effect.fact);

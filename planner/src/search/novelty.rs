@@ -1,10 +1,10 @@
-//! Best-first width search: novel states come first (Lipovetzky and Geffner 2017, BFWS(f5)).
-//! Novelty is judged among states with the same number of open landmarks and of achieved facts of
-//! the last relaxed plan. Most states need no heuristic, so this is fast, and strong where relaxed
-//! plans mislead.
+//! Best-first width search: novel states come first (Lipovetzky and Geffner 2017, BFWS(f5)). The
+//! novelty of a state is judged among states with the same number of open landmarks and of achieved
+//! facts of the last relaxed plan. Most states are not evaluated by a heuristic, so this is fast, and
+//! helps where relaxed plans mislead.
 //!
-//! A narrow search counts goals left instead of landmarks, and keeps only states that show a new fact (the first pass of
-//! Dual-BFWS): it ends soon, and often with a plan.
+//! A narrow search counts open goals instead of landmarks, and prunes states without a new fact (first
+//! pass of Dual-BFWS): it ends soon, and often with a plan.
 
 use rustc_hash::FxHashMap;
 
@@ -16,38 +16,42 @@ use super::lazy::{Allowed, Counts, End, MOST_UNSEEN, Shared, UNSEEN_A_ROUND};
 use super::open::OpenList;
 use super::store::{NO_STATE, Store};
 
-/// Maximum size of the novelty tables for pairs of facts, bytes; larger tasks use single facts.
+/// Maximum memory of the tables of seen pairs of facts, in bytes; beyond it, novelty is judged by
+/// single facts.
 const PAIR_TABLE_BYTES: usize = 256 << 20;
-/// Words of facts of a relaxed plan that are followed, at least and at most.
+/// Minimum and maximum number of 64-bit words for the facts of a relaxed plan that are followed, one
+/// bit each.
 const FOLLOWED_WORDS: [usize; 2] = [2, 8];
-/// Bits of a key that hold the depth of a state.
+/// Number of bits of an open-list key that hold the depth of a state.
 const DEPTH_BITS: u32 = 12;
-/// Work per state, in the units of the heuristics; the next constant is that of a narrow search,
-/// which soon ends or does not help.
+/// Work of generating one state, in units of the heuristics.
 const STATE_WORK: u64 = 30;
+/// Work of generating one state in a narrow search, which soon ends or does not help.
 const NARROW_STATE_WORK: u64 = 100;
 
-/// Data about a state besides the store's.
+/// Data that this search keeps about each state.
 #[derive(Clone, Copy)]
 struct Memory {
-    /// Index of the relaxed plan that is followed.
+    /// Index in [`NoveltySearch::anchors`] of the relaxed plan that the state follows.
     anchor: u32,
     left: u32,
-    /// Number of operators from the initial state.
+    /// Number of operators from the initial state to this state.
     depth: u32,
 }
 
+/// Facts and pairs of facts that were seen so far, by which the novelty of a state is judged.
 pub struct Novelty {
     pub facts: usize,
     pub pairs: bool,
-    /// Facts and pairs of facts seen, by the number of landmarks left and of facts of the relaxed plan made
-    /// true.
+    /// Sets of seen facts and of seen pairs, as bits, for each number of open landmarks and of achieved
+    /// facts of the relaxed plan.
     pub seen: FxHashMap<(u32, u32), (Vec<u64>, Vec<u64>)>,
     pub bytes: usize,
 }
 
 impl Novelty {
-    /// 1 for a new fact, 2 for a new pair, 3 for neither. `changed` are the facts that the last operator made true.
+    /// Novelty of a state: 1 for a new fact, 2 for a new pair of facts, 3 for neither. `changed` are
+    /// the facts that the last operator made true.
     pub fn of(&mut self, key: (u32, u32), state: &[u32], changed: &[u32]) -> u32 {
         let words = self.facts.div_ceil(64);
         let (facts, pairs) = self.seen.entry(key).or_insert_with(|| {
@@ -93,31 +97,32 @@ impl Novelty {
     }
 }
 
-/// Resumable search; after [`End::Limit`] it can continue.
+/// Best-first width search that can be continued after [`End::Limit`].
 pub struct NoveltySearch<'a, 's> {
     shared: &'s Shared<'a>,
-    /// Only cheaper plans (in the search's costs) are of interest.
+    /// Only plans with search costs below this bound are accepted.
     bound: u32,
     narrow: bool,
     started: bool,
     store: Store,
     status: Status,
     memory: Rows<Memory>,
-    /// Facts of the followed relaxed plan that have held since its anchor state, by state.
+    /// Facts of the followed relaxed plan that have been true since that plan was computed, as bits, by
+    /// state.
     done: Rows<u64>,
-    /// Facts of the followed relaxed plans.
+    /// Facts of each relaxed plan that is followed.
     anchors: Vec<Vec<u32>>,
     relaxed: Relaxed,
     novelty: Novelty,
     open: OpenList,
     facts: Vec<u32>,
     counts: Counts,
-    /// States made since memory was looked at.
+    /// Number of generated states since memory was last checked.
     unseen: usize,
 }
 
 impl<'a, 's> NoveltySearch<'a, 's> {
-    /// Search before its first step.
+    /// Search that has not begun; `narrow` prunes states without a new fact.
     pub fn new(shared: &'s Shared<'a>, bound: u32, narrow: bool) -> NoveltySearch<'a, 's> {
         let task = shared.task;
         NoveltySearch {
@@ -139,7 +144,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         }
     }
 
-    /// Counts so far.
+    /// Counts since the beginning of the search.
     pub(crate) fn counts(&self) -> Counts {
         Counts { work: self.work(), ..self.counts }
     }
@@ -148,7 +153,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         self.relaxed.work + self.counts.work
     }
 
-    /// True if the first state may lead to the goal.
+    /// Inserts the initial state; true if the goal is reachable in the relaxation.
     fn start(&mut self) -> bool {
         let task = self.shared.task;
         let (first, _) = self.store.insert(&task.initial, NO_STATE, 0, 0);
@@ -164,7 +169,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         reachable
     }
 
-    /// Landmark count, or goal count.
+    /// Landmark count of a state, or its goal count in a narrow search.
     fn left(&self, id: u32, state: &[u32]) -> u32 {
         let (landmarks, task) = (self.shared.landmarks, self.shared.task);
         match self.narrow {
@@ -173,7 +178,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         }
     }
 
-    /// Searches on as far as is allowed.
+    /// Continues the search within limits.
     pub fn run(&mut self, allowed: Allowed) -> End {
         if self.bound == 0 {
             return End::Exhausted;
@@ -203,8 +208,8 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         }
     }
 
-    /// Generates the successors of a state; returns the plan if one is a goal. The buffers hold the
-    /// state, a successor and the applicable operators.
+    /// Generates the successors of a state; returns a plan if one of them is a goal state. The buffers
+    /// are working memory: the state, a successor and the applicable operators.
     fn expand(
         &mut self,
         id: u32,
@@ -236,7 +241,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         None
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the search, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.store.bytes()[0]
             + self.status.bytes()
@@ -251,7 +256,7 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         memory.has_room(|| self.bytes(), self.store.bytes()[1])
     }
 
-    /// Computes a new relaxed plan to follow from this state; `None` for a dead end.
+    /// Computes a relaxed plan to follow from a state; returns its index, or `None` for a dead end.
     fn anchor(&mut self, state: &[u32]) -> Option<u32> {
         let task = self.shared.task;
         self.counts.evaluated += 1;
@@ -318,7 +323,8 @@ impl<'a, 's> NoveltySearch<'a, 's> {
         self.open.push(key, (child, 0));
     }
 
-    /// Landmark or goal count, and number of achieved facts of the relaxed plan.
+    /// Key of the novelty tables: landmark or goal count, and number of achieved facts of the relaxed
+    /// plan.
     fn kind(&self, id: u32) -> (u32, u32) {
         let done = self.done.row(id as usize);
         (self.memory[id as usize].left, done.iter().map(|word| word.count_ones()).sum())

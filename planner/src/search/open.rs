@@ -1,14 +1,14 @@
-//! Open lists: entries by rising key, by age among equal keys.
+//! Open lists: entries in order of rising key, oldest or newest first among equal keys.
 
 use std::collections::{BTreeMap, VecDeque};
 
-/// Open-list entry of a state not yet generated: parent and operator.
+/// Open-list entry for a successor that is not yet generated: parent state and operator.
 pub(crate) type Entry = (u32, u32);
 
-/// Number of keys with a bucket of their own; larger keys share a map.
+/// Number of keys that have a bucket of their own; larger keys share a map.
 const BUCKETS: usize = 1 << 14;
 
-/// Entries of a piece of a queue.
+/// Number of entries of one chunk of a queue.
 const PIECE: usize = 4096;
 
 /// FIFO queue in chunks, which grows without copying.
@@ -25,7 +25,7 @@ impl Queue {
         }
     }
 
-    /// First entry, or the `newest`.
+    /// Removes the oldest entry, or the newest if `newest`; `None` if the queue is empty.
     fn pop(&mut self, newest: bool) -> Option<Entry> {
         let piece = if newest { self.pieces.back_mut() } else { self.pieces.front_mut() }?;
         let entry = if newest { piece.pop_back() } else { piece.pop_front() };
@@ -44,14 +44,14 @@ impl Queue {
     }
 }
 
-/// Bucket-based open list.
+/// Open list made of one bucket per key.
 #[derive(Default)]
 pub(crate) struct OpenList {
     buckets: Vec<Queue>,
     lowest: usize,
     beyond: BTreeMap<u32, Queue>,
     len: usize,
-    /// The lower, the sooner this list is asked next.
+    /// Priority among several open lists: the list with the lowest value is used next.
     pub priority: i64,
 }
 
@@ -71,7 +71,7 @@ impl OpenList {
         self.lowest = self.lowest.min(bucket);
     }
 
-    /// Pops an entry with minimum key: the first inserted, or (`newest`) the last.
+    /// Removes an entry with the least key: the oldest such entry, or the newest if `newest`.
     pub(crate) fn pop(&mut self, newest: bool) -> Option<Entry> {
         if self.len == 0 {
             return None;
@@ -96,7 +96,7 @@ impl OpenList {
         self.len
     }
 
-    /// Memory of the entries, bytes, including spare capacity.
+    /// Approximate memory of the entries in bytes, including spare capacity.
     pub(crate) fn bytes(&self) -> usize {
         self.buckets.len() * size_of::<Queue>() + self.len * size_of::<Entry>() * 3 / 2
     }

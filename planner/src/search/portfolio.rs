@@ -1,55 +1,58 @@
-//! Portfolio of searches for a first plan, and the order of their turns.
+//! Portfolio of searches for a first plan, and the rounds in which the searches take turns.
 
 use serde::Serialize;
 
-/// The algorithm of a search of the portfolio.
+/// Algorithm of a search in the portfolio.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "engine")]
 pub enum Engine {
-    /// Lazy greedy best-first search with h_FF and landmark count in alternating open lists (Richter and Westphal 2010).
+    /// Lazy greedy best-first search with two alternating heuristics, h_FF and landmark count (Richter
+    /// and Westphal 2010).
     LazyGreedy {
-        /// True if operator costs count in the heuristic; false: unit costs.
+        /// True if the heuristic h_FF counts operator costs, false if every operator costs one.
         costs: bool,
-        /// Uses lookahead states along relaxed plans (Vidal 2004).
+        /// True if states along relaxed plans are tried as well (lookahead; Vidal 2004).
         lookahead: bool,
-        /// LIFO tie-breaking, or FIFO.
+        /// True if ties in the open list go to the newest entry (LIFO), false if to the oldest (FIFO).
         newest_first: bool,
-        /// Operators that achieve landmarks are preferred besides those of the relaxed plan.
+        /// True if operators that achieve landmarks are preferred, in addition to those of the relaxed
+        /// plan.
         prefers_landmarks: bool,
     },
-    /// Best-first width search: novelty beside goal count and relaxed plan (Lipovetzky and Geffner 2017).
+    /// Best-first width search: ranks states by novelty, in terms of open landmarks or goals and
+    /// relaxed-plan facts (Lipovetzky and Geffner 2017).
     Width {
-        /// True if states that are not novel are pruned.
+        /// True if states without a new fact are pruned, false if they only come later.
         prunes: bool,
     },
     /// Planning as satisfiability with parallel steps (Rintanen, Heljanko and Niemelä 2006).
     Satisfiability,
 }
 
-/// Conclusion from an exhausted search.
+/// Conclusion to draw when a search has exhausted its search space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Proof {
-    /// Exhaustion proves that no plan exists.
+    /// No plan exists.
     Unsolvable,
-    /// Exhaustion proves that no plan exists, unless the cost is bounded.
+    /// No plan exists, if the search had no cost bound; otherwise nothing is proven.
     UnsolvableWithoutBound,
-    /// Exhaustion proves nothing.
+    /// Nothing is proven.
     Nothing,
 }
 
-/// A search of the portfolio.
+/// One search of the portfolio.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Configuration {
-    /// Name.
+    /// Name of the search.
     pub name: &'static str,
     /// Search algorithm.
     #[serde(flatten)]
     pub engine: Engine,
-    /// Conclusion from an exhausted search.
+    /// Conclusion to draw when the search is exhausted.
     pub proof: Proof,
-    /// True if a turn is limited to the work of the first full round, for searches that succeed
-    /// soon or not at all.
+    /// True if each turn is limited to the work of the first full round, for searches that succeed soon
+    /// or not at all.
     pub is_capped: bool,
 }
 
@@ -65,8 +68,8 @@ const fn lazy(
     Configuration { name, engine, proof, is_capped: false }
 }
 
-/// Configurations of the portfolio. Only the first search counts costs, as cheap operators may lead
-/// nowhere.
+/// Searches of the portfolio. Only the first one counts operator costs, because preferring cheap
+/// operators can mislead.
 pub const PORTFOLIO: [Configuration; 7] = [
     lazy("lookahead, costs", true, true, false, true),
     lazy("lookahead, LIFO", false, true, true, true),
@@ -92,17 +95,17 @@ pub const PORTFOLIO: [Configuration; 7] = [
     },
 ];
 
-/// Portfolio indices of each round's turns; the first round is short. Within a round, every search
-/// has the same work limit.
+/// Indices in [`PORTFOLIO`] of the searches in each kind of round: the short first round, then two that
+/// alternate. All searches of a round have the same work limit.
 pub const ROUNDS: [&[usize]; 3] = [&[0, 6], &[0, 5, 2, 3, 6], &[1, 5, 2, 4, 6]];
-/// Divisor of the work of a search in the short round.
+/// Divisor of a search's work limit in the short first round.
 pub const SHORT_SHARE: u64 = 6;
-/// Factor on the work of each later round.
+/// Factor by which the work limit grows from one round to the next, after the first full round.
 pub const ROUND_FACTOR: u64 = 3;
-/// Index of the first search.
+/// Index in [`PORTFOLIO`] of the first search.
 pub const FIRST: usize = 0;
 
-/// Turns of a round.
+/// Indices in [`PORTFOLIO`] of the searches that take turns in a round, in order.
 pub fn turns(round: usize) -> &'static [usize] {
     match round {
         0 => ROUNDS[0],

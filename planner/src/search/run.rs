@@ -1,4 +1,4 @@
-//! Schedule of the portfolio's searches, and the improvement of their plans.
+//! Classical planning: runs the portfolio's searches in turns, and improves the plan that they find.
 
 use std::num::NonZeroUsize;
 use std::ops::Range;
@@ -20,55 +20,57 @@ use super::lazy::{self, Allowed, Counts, End, Shared, Strategy, search};
 use super::novelty;
 use super::portfolio::{Engine, FIRST, PORTFOLIO, Proof, ROUND_FACTOR, ROUNDS, SHORT_SHARE, turns};
 
-/// Options of a classical search.
+/// Options of classical planning.
 #[derive(Clone, Debug)]
 pub struct ClassicalOptions {
-    /// Keep improving until stopped or proven optimal.
+    /// True to improve the plan until stopped or proven optimal.
     pub anytime: bool,
-    /// Return the first plan, without improvement.
+    /// True to return the first plan without improvement.
     pub only_first: bool,
-    /// True if the task has soft goals: after the first plan, the search goes on as long as improvement is
-    /// allowed to.
+    /// True if the task has soft goals: after the first plan, search then continues for as long as
+    /// improvement may take.
     pub soft: bool,
-    /// Cost bound: only plans whose cost is below this.
+    /// Only plans that cost less than this, in the unit of the metric, are accepted; `None` for no
+    /// bound.
     pub bound: Option<f64>,
-    /// Memory that the search may take.
+    /// Maximum memory.
     pub memory: MemoryLimit,
-    /// States to evaluate at most.
+    /// Maximum number of evaluated states; `None` for no limit.
     pub evaluation_limit: Option<u64>,
-    /// Searches that may go on side by side.
+    /// Maximum number of searches in parallel; `None` for one.
     pub threads: Option<NonZeroUsize>,
-    /// Work of the first search before another is tried; later rounds get more.
+    /// Work of the first search before another one is tried; the limit grows in later rounds.
     pub first_work: u64,
 }
 
-/// Result of a classical search.
+/// Result of classical planning.
 #[derive(Clone, Debug)]
 pub struct ClassicalOutcome {
-    /// Reason for the end of the run.
+    /// Reason why planning ended.
     pub end: ClassicalEnd,
-    /// States evaluated.
+    /// Number of evaluated states.
     pub evaluated: u64,
-    /// States expanded.
+    /// Number of expanded states.
     pub expanded: u64,
-    /// Work done, in units of the heuristics.
+    /// Work done: a deterministic measure of effort.
     pub work: u64,
 }
 
-/// Reason a classical search ended.
+/// Reason why classical planning ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClassicalEnd {
-    /// Search ended with a plan as requested.
+    /// A plan was found, and improved as requested.
     Done,
-    /// The search space is exhausted: no plan exists, or none below the bound.
+    /// Search space exhausted: no plan exists, or none better than the last one or the bound.
     Exhausted,
-    /// Stopped from outside or by the evaluation limit.
+    /// Stopped by the caller or the evaluation limit.
     Stopped,
-    /// Memory limit reached.
+    /// The memory limit was reached.
     Memory,
 }
 
-/// Solves a task that is [`crate::classical::compiled::is_classical`].
+/// Plans for a task that [`crate::classical::compiled::is_classical`]; `on_plan` gets every better plan
+/// as operators and cost.
 pub fn solve(
     ground: &GroundTask,
     options: &ClassicalOptions,
@@ -115,15 +117,15 @@ pub fn solve(
     }
 }
 
-/// Work that every plan is improved for, however small the task.
+/// Minimum work of improving a plan.
 const LEAST_WORK: u64 = 5_000_000;
-/// Further work for each operator.
+/// Further work of improving a plan, for each operator of the task.
 const WORK_PER_OPERATOR: u64 = 1500;
-/// Factor on this work for the search for plans that keep more preferences.
+/// Factor on that work for tasks with soft goals, to find plans that satisfy more preferences.
 const SOFT_SHARE: u64 = 20;
-/// Work of the first search before the next is tried, by default.
+/// Default work of the first search before the next one is tried.
 pub const FIRST_WORK: u64 = 60_000_000;
-/// Weights of the searches for better plans, in order (Richter and Westphal 2010).
+/// Heuristic weights of the searches for better plans, in order (Richter and Westphal 2010).
 const WEIGHTS: [u32; 4] = [5, 3, 2, 1];
 
 const GREEDY: Strategy = Strategy {
@@ -139,16 +141,16 @@ const GREEDY: Strategy = Strategy {
     evaluation_limit: u64::MAX,
 };
 
-/// Turn from which a search that runs out of memory ends the run; before, other configurations may
-/// need less.
+/// Turn from which a search without memory ends planning; at earlier turns, other searches may need
+/// less memory.
 const LAST_RESORT: usize = ROUNDS[0].len() + 3;
 
-/// Resumable search for a first plan.
+/// A search for a first plan, which can be continued.
 enum Kept<'a, 's> {
     Lazy(Box<lazy::Search<'a, 's>>),
     Novelty(Box<novelty::NoveltySearch<'a, 's>>),
     Horizon(Box<horizon::SatSearch<'a, 's>>),
-    /// Finished search.
+    /// Search that is finished.
     Spent,
 }
 
@@ -196,7 +198,7 @@ impl<'a, 's> Kept<'a, 's> {
     }
 }
 
-/// Result of a turn.
+/// Result of one turn of a search.
 struct Taken<'a, 's> {
     place: usize,
     search: Kept<'a, 's>,
@@ -209,10 +211,10 @@ struct Run<'a, 's> {
     shared: &'s Shared<'a>,
     options: &'s ClassicalOptions,
     counts: Counts,
-    /// Only cheaper plans (in the search's costs) are of interest.
+    /// Only plans with search costs below this bound are of interest.
     bound: u32,
     best: Option<Vec<u32>>,
-    /// Number of adopted plans, each better than the one before.
+    /// Number of adopted plans; each is better than the one before.
     plans: u64,
     on_plan: &'s mut dyn FnMut(&[u32], f64),
 }
@@ -256,9 +258,10 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// First plan, and true if a search without lookahead may quickly find a shorter one.
+    /// First plan, and true if a search without lookahead is likely to find a shorter one quickly.
     ///
-    /// Several searches take turns, each going on where it stopped, with more and more work each round.
+    /// The searches of the portfolio take turns; each continues where it stopped, with a higher work
+    /// limit in each round.
     fn first(&mut self) -> Result<(Vec<u32>, bool), ClassicalEnd> {
         let mut kept: [Option<Kept<'a, 's>>; PORTFOLIO.len()] = Default::default();
         let (mut round, mut turn) = (0, 0);
@@ -293,8 +296,8 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// True if exhaustion proves that no plan exists; with a cost bound, only searches that reopen
-    /// states can prove this.
+    /// True if exhaustion of a search proves that no plan exists (within the cost bound, if there is
+    /// one).
     fn proves(&self, place: usize) -> bool {
         match PORTFOLIO[place].proof {
             Proof::Nothing => false,
@@ -303,7 +306,7 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// Turns from this one on that may run in parallel, within a round.
+    /// Range of turns, from this one on and within a round, that may run in parallel.
     fn side_by_side(&self, turn: usize, round: usize) -> Range<usize> {
         // What is left for a turn must be known before the one before it has ended.
         let counts = self.options.evaluation_limit.is_some() || self.shared.memory.counted().is_some();
@@ -311,8 +314,8 @@ impl<'a, 's> Run<'a, 's> {
         turn..turn + threads.min(round - turn % round)
     }
 
-    /// Runs searches for a first plan in parallel, each with a work limit; results up to the first
-    /// plan.
+    /// Runs searches in parallel for one turn each, with a work limit; returns results up to the first
+    /// conclusive one.
     fn take_turns(
         &self,
         kept: &mut [Option<Kept<'a, 's>>; PORTFOLIO.len()],
@@ -352,8 +355,8 @@ impl<'a, 's> Run<'a, 's> {
         end
     }
 
-    /// Improves a plan within a work budget and adopts it if best so far; true if more work would
-    /// change nothing.
+    /// Improves a plan within a work limit and adopts it if it is the best so far; true if improvement
+    /// ended because nothing got better.
     fn improve(&mut self, mut plan: Vec<u32>, work: u64) -> bool {
         let mut improve = Improve::new(self.task, self.shared.successors, self.shared.stop);
         improve.evaluation_limit =
@@ -389,11 +392,11 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// Searches with falling weights for plans below the bound and improves each, until none
-    /// exists.
+    /// Searches with falling weights for plans below the bound and improves each, until the search is
+    /// exhausted, the same plans return, a limit is reached, or the total work reaches `until`.
     ///
-    /// Where the metric is no sum over the operators, no bound keeps a search from the plan that it found before: once all
-    /// of them end so, there is nothing left to try. Ends too once so much work is done in all.
+    /// If the metric is no sum of operator costs, no bound excludes the plans found before; search ends
+    /// once all searches have twice found nothing better.
     fn anytime(&mut self, mut work_limit: u64, until: u64) -> ClassicalEnd {
         let mut turn = 0usize;
         let mut again = 0;
@@ -439,13 +442,13 @@ impl<'a, 's> Run<'a, 's> {
         }
     }
 
-    /// True if the search counts the exact cost of plans within the bound.
+    /// True if search costs are exact and the bound can be represented.
     fn counts_exactly(&self) -> bool {
         self.task.has_exact_costs() && self.bound < MOST_COUNTED
     }
 
-    /// Searches for plans with a better metric value if the metric depends on the final state
-    /// alone; `Exhausted` proves that none exists.
+    /// Searches for plans with a better metric value, if the metric depends on the final state alone;
+    /// `Exhausted` proves that none exists.
     fn beyond(&mut self) -> ClassicalEnd {
         let mut work_limit = self.options.first_work;
         for turn in 0.. {
@@ -467,7 +470,7 @@ impl<'a, 's> Run<'a, 's> {
         ClassicalEnd::Done
     }
 
-    /// Runs searches in parallel; results and counts, up to the first plan.
+    /// Runs searches in parallel; returns results and counts, up to and including the first plan.
     fn search_each(&self, strategies: &[Strategy]) -> Vec<(End, Counts)> {
         let limit = self.options.evaluation_limit.unwrap_or(u64::MAX);
         let evaluation_limit = limit.saturating_sub(self.counts.evaluated);

@@ -1,5 +1,5 @@
-//! Numeric lookahead: makes the relaxed plan's next operators applicable by changing numbers
-//! towards their conditions.
+//! Lookahead over numbers: changes numbers towards the conditions of the relaxed plan's operators, so
+//! that these become applicable.
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::classical::numbers::{NumberChange, repetitions};
@@ -8,13 +8,13 @@ use crate::heuristics::relaxed::Relevant;
 
 use super::lookahead::{Lookahead, MOST_STEPS, count};
 
-/// Maximum depth of operators enabled for each other.
+/// Maximum depth of recursion when an operator is made applicable by others.
 const DEPTH: u32 = 4;
-/// Number of passes over all conditions of an operator.
+/// Maximum number of passes over all conditions of an operator or the goal.
 const ROUNDS: usize = 4;
 
-/// Operators that increase left minus right of each comparison, with the amount; NaN if
-/// state-dependent.
+/// Operators that can change left minus right of each comparison by addition, with the change (NaN if
+/// it depends on the state).
 pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
     let numbers = &task.numbers;
     let mut pairs = Vec::new();
@@ -34,8 +34,8 @@ pub(super) fn movers(task: &Compiled) -> Lists<(u32, f64)> {
 }
 
 impl Lookahead {
-    /// Makes applicable the first remaining operator that lacks only numeric conditions, and
-    /// applies it.
+    /// Makes the first operator of the relaxed plan applicable that lacks only numeric conditions, and
+    /// applies it; false if there is none.
     pub(super) fn steer(&mut self, task: &Compiled) -> bool {
         if task.numbers.is_empty() || self.plan.len() >= MOST_STEPS {
             return false;
@@ -52,7 +52,7 @@ impl Lookahead {
         false
     }
 
-    /// Moves numbers towards the goal.
+    /// Changes numbers towards the numeric conditions of the goal.
     pub(super) fn steer_to_goal(&mut self, task: &Compiled) {
         if !task.numbers.is_empty() {
             let mut goal: Vec<u32> = task.goal.iter().map(|&f| task.id(f)).collect();
@@ -65,7 +65,8 @@ impl Lookahead {
         }
     }
 
-    /// Changes numbers towards conditions one after another, each preserving the earlier ones.
+    /// Changes numbers towards facts one after another, preferring changes that keep the earlier facts
+    /// true; true if any operator was applied.
     fn approach_all(&mut self, task: &Compiled, wanted: &[u32], depth: u32) -> bool {
         let mut moved = false;
         for place in 0..wanted.len() {
@@ -74,7 +75,7 @@ impl Lookahead {
         moved
     }
 
-    /// Makes an operator applicable that lacks only numeric conditions; `false` on failure.
+    /// Makes an operator applicable that lacks only numeric conditions; false if this fails.
     fn enable(&mut self, task: &Compiled, operator: u32, depth: u32) -> bool {
         let mut wanted: Vec<u32> =
             task.preconditions.get(operator as usize).iter().map(|&f| task.id(f)).collect();
@@ -94,8 +95,8 @@ impl Lookahead {
         task.applicable(operator, &self.state)
     }
 
-    /// Applies operators until a numeric condition holds, preferably preserving `keep`; true if any
-    /// was applied.
+    /// Applies operators until a numeric condition holds, preferring those that keep the facts `keep`
+    /// true; true if any was applied.
     fn approach(&mut self, task: &Compiled, fact: u32, keep: &[u32], depth: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || task.holds(fact, &self.state) {
@@ -125,8 +126,8 @@ impl Lookahead {
         self.plan.len() > before
     }
 
-    /// Cheapest applicable operator that achieves a comparison, with its number of applications;
-    /// operators that preserve `keep` are preferred.
+    /// Cheapest applicable operator whose repetition makes a comparison true, with the number of
+    /// applications; operators that keep the facts `keep` true come first. `None` if there is none.
     fn best_mover(&self, task: &Compiled, comparison: u32, keep: &[u32]) -> Option<(u32, u32)> {
         let gap = task.numbers.gap(comparison as usize, &self.state);
         let relation = task.numbers.comparisons[comparison as usize].relation;
@@ -150,12 +151,13 @@ impl Lookahead {
         best.map(|(_, mover)| mover)
     }
 
-    /// Change of left minus right of a comparison by an operator in the state at hand.
+    /// Change of left minus right of a comparison by one application of an operator in the present
+    /// state.
     fn gain(&self, task: &Compiled, operator: u32, comparison: u32) -> f64 {
         task.numbers.gain_in(comparison, &task.numbers.changes[operator as usize], &self.state)
     }
 
-    /// True if this many applications of an operator falsify a condition that holds now.
+    /// True if a numeric condition holds now and no longer after `times` applications of an operator.
     fn breaks(&self, task: &Compiled, operator: u32, times: u32, fact: u32) -> bool {
         let variable = task.variables[fact as usize] as usize;
         if variable < task.numbers.first || !task.holds(fact, &self.state) {
@@ -167,8 +169,8 @@ impl Lookahead {
         !task.numbers.comparisons[comparison].relation.holds(gap, 0.0)
     }
 
-    /// Enables and applies the relaxed plan's supporter of a fact, up to the total consumption of
-    /// the number.
+    /// Makes the relaxed plan's operator for a numeric condition, or one of its refilling operators,
+    /// applicable and applies it as often as the relaxed plan says.
     fn support(&mut self, task: &Compiled, fact: u32, depth: u32) {
         if let Some(entry) = self.moves.iter().find(|r| r.until == fact).copied() {
             if self.enable(task, entry.operator, depth - 1) {

@@ -1,12 +1,12 @@
-//! Generated states, packed into words, without duplicates.
+//! Generated states without duplicates, packed into 64-bit words.
 
 use crate::classical::compiled::Compiled;
 use crate::memory::{Rows, soon};
 
-/// No state.
+/// Value that stands for no state.
 pub(crate) const NO_STATE: u32 = u32::MAX;
 
-/// Position of a variable in a packed state.
+/// Position of a variable's bits in a packed state.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     word: u32,
@@ -14,28 +14,28 @@ struct Place {
     mask: u64,
 }
 
-/// Packed states with parent, operator and cost.
+/// Packed states, each with its parent, operator and path cost.
 pub(crate) struct Store {
     places: Vec<Place>,
-    /// Number of words of the packed variables; numbers follow, one word each.
+    /// Number of words for the packed variables; the numbers follow, one word each.
     packed_words: usize,
-    /// Position of the numbers in an unpacked state.
+    /// Index of the first number in an unpacked state.
     numbers: usize,
     packed: Rows<u64>,
-    /// Open addressing: state numbers, `NO_STATE` for free.
+    /// Hash table with open addressing: index of a state, or [`NO_STATE`] for a free slot.
     table: Vec<u32>,
     ways: Rows<Way>,
     scratch: Vec<u64>,
 }
 
-/// Parent and operator of a state.
+/// How a state was reached: parent, operator and path cost.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     parent: u32,
     operator: u32,
-    /// Path cost from the initial state, in search costs.
+    /// Cost of the path from the initial state, in search costs.
     cost: u32,
-    /// True if the successors were generated.
+    /// True if the state's successors have been generated.
     expanded: bool,
 }
 
@@ -49,7 +49,7 @@ fn hash(words: &[u64]) -> u64 {
 }
 
 impl Store {
-    /// Empty store for a task's states (without derived variables).
+    /// Empty store for a task's states; derived variables are not stored but recomputed.
     pub(crate) fn new(task: &Compiled) -> Store {
         let mut order: Vec<usize> = (0..task.basic).collect();
         let bits = |v: usize| 32 - task.domains[v].saturating_sub(1).leading_zeros();
@@ -92,14 +92,16 @@ impl Store {
         self.ways.clear();
     }
 
-    /// Memory of the store, and of the table's next growth if near, bytes.
+    /// Memory of the store, and memory of its hash table after the next growth (0 unless near), in
+    /// bytes.
     pub(crate) fn bytes(&self) -> [usize; 2] {
         let table = size_of_val(&self.table[..]);
         let next = if soon(self.ways.len() * 3 / 2, self.table.len()) { 2 * table } else { 0 };
         [self.packed.bytes() + self.ways.bytes() + table, next]
     }
 
-    /// Inserts a state with parent, operator and cost; returns its number and true if new.
+    /// Inserts a state with its parent, operator and path cost; returns the state's index, and true if
+    /// the state is new.
     pub(crate) fn insert(&mut self, state: &[u32], parent: u32, operator: u32, cost: u32) -> (u32, bool) {
         self.scratch.fill(0);
         for (place, &value) in self.places.iter().zip(state) {
@@ -141,7 +143,7 @@ impl Store {
         }
     }
 
-    /// Unpacks a state, derived variables included.
+    /// Unpacks a state into `state` and computes its derived variables.
     pub(crate) fn load(&self, task: &Compiled, id: u32, state: &mut Vec<u32>) {
         let words = self.packed.row(id as usize);
         state.clear();
@@ -154,28 +156,28 @@ impl Store {
         task.derive(state);
     }
 
-    /// Cost from the first state.
+    /// Cost of the best known path from the initial state to a state, in search costs.
     pub(crate) fn cost(&self, id: u32) -> u32 {
         self.ways[id as usize].cost
     }
 
-    /// Records a cheaper path to a state.
+    /// Replaces the path to a state by a cheaper one.
     pub(crate) fn improve(&mut self, id: u32, parent: u32, operator: u32, cost: u32) {
         let way = &mut self.ways[id as usize];
         *way = Way { parent, operator, cost, ..*way };
     }
 
-    /// True if the state's successors were generated.
+    /// True if the state's successors have been generated.
     pub(crate) fn is_expanded(&self, id: u32) -> bool {
         self.ways[id as usize].expanded
     }
 
-    /// Marks a state as expanded, or (`false`) as to be expanded again.
+    /// Marks a state as expanded, or as to be expanded again (`false`).
     pub(crate) fn set_expanded(&mut self, id: u32, expanded: bool) {
         self.ways[id as usize].expanded = expanded;
     }
 
-    /// Operators on the path from the initial state.
+    /// Operators on the path from the initial state to a state.
     pub(crate) fn plan_to(&self, mut id: u32) -> Vec<u32> {
         let mut plan = Vec::new();
         while self.ways[id as usize].parent != NO_STATE {

@@ -1,5 +1,6 @@
-//! SAT encoding of a task up to a horizon (Kautz and Selman 1992). Several operators share a step
-//! if they can be applied in a fixed order (exists-step, Rintanen, Heljanko and Niemelä 2006).
+//! SAT encoding of a task for plans of a given number of steps (Kautz and Selman 1992). Several
+//! operators share a step if they can be applied in a fixed order (exists-step; Rintanen, Heljanko and
+//! Niemelä 2006).
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::clauses::Literal;
@@ -9,10 +10,11 @@ use crate::ground::GroundFact;
 use super::goals::in_order;
 use super::order::{Use, order, uses};
 
-/// Maximum number of literals in one step's clauses.
+/// Maximum number of literals in the clauses of one step.
 const MOST_LITERALS: usize = 2_000_000;
 
-/// Literal at a step, or at the state after it.
+/// Literal about step 0 or the state before it, or (`later`) about the state after it; repeated for
+/// every step.
 #[derive(Clone, Copy, Default)]
 struct Said {
     literal: Literal,
@@ -25,14 +27,15 @@ impl Said {
     }
 }
 
-/// Clauses of one step, to be repeated for each step.
+/// Encoding of one step, which is repeated for every step of a plan.
 pub(super) struct Form {
-    /// Variables per step: facts, operators, and auxiliary ones for facts deleted within the step.
+    /// Number of variables per step: facts, operators, and auxiliary variables for facts deleted within
+    /// the step.
     pub stride: usize,
     facts: usize,
-    /// Over the facts of any moment.
+    /// Clauses over the facts of one state.
     always: Lists<Said>,
-    /// Clauses over a step and the facts of the state after it.
+    /// Clauses over a step, the state before it and the state after it.
     step: Lists<Said>,
     /// Operators that add a fact, by fact.
     pub adders: Lists<u32>,
@@ -40,14 +43,15 @@ pub(super) struct Form {
     pub order: Vec<u32>,
     /// Goal facts in a reasonable order (Koehler and Hoffmann 2000).
     pub goals: Vec<u32>,
-    /// First moment at which a fact can hold, or an operator can be applied; `u32::MAX` for never.
+    /// First state in which a fact can hold, by fact; `u32::MAX` for never.
     first_fact: Vec<u32>,
+    /// First step in which an operator can be applied, by operator; `u32::MAX` for never.
     first_operator: Vec<u32>,
 }
 
 impl Form {
-    /// Encoding of a task without conditional effects or axioms; `None` for others, or if too
-    /// large.
+    /// Encoding of a task without conditional effects, axioms and numbers; `None` for other tasks, or
+    /// if the encoding would be too large.
     pub(super) fn new(task: &Compiled, mutex_groups: &[Vec<GroundFact>]) -> Option<Form> {
         let conditional = task.effects.all().iter().any(|effect| effect.from != effect.to);
         if conditional || !task.axiom_heads.is_empty() || task.some_impossible() {
@@ -83,17 +87,18 @@ impl Form {
         Some(form)
     }
 
-    /// Variable of a fact at a moment.
+    /// Variable of a fact in a state; state 0 is the initial one.
     pub(super) fn fact(&self, fact: u32, moment: usize) -> u32 {
         (moment * self.stride) as u32 + fact
     }
 
-    /// Variable of an operator at a step, between the state of the same number and the next.
+    /// Variable of an operator at a step, which leads from the state of the same number to the next
+    /// one.
     pub(super) fn operator(&self, operator: u32, step: usize) -> u32 {
         (step * self.stride + self.facts) as u32 + operator
     }
 
-    /// Number of literals of one step.
+    /// Number of literals in the clauses of one step.
     pub(super) fn size(&self) -> usize {
         self.always.all().len() + self.step.all().len()
     }
@@ -102,7 +107,7 @@ impl Form {
         Said { literal: Literal::new(self.operator(operator, 0), true), later: false }
     }
 
-    /// Adds the exclusions: one value per variable, and at most one fact per mutex group.
+    /// Adds clauses for exactly one value per variable and at most one fact per mutex group.
     fn exclude(&mut self, task: &Compiled, mutex_groups: &[Vec<GroundFact>]) {
         for (&offset, &size) in task.offsets.iter().zip(&task.domains) {
             self.always.push((offset..offset + size).map(|fact| is(fact, false)));
@@ -121,7 +126,7 @@ impl Form {
         }
     }
 
-    /// Clauses for preconditions and effects of operators, and the frame axioms.
+    /// Adds clauses for preconditions, effects and frame axioms.
     fn change(&mut self, task: &Compiled) {
         for operator in 0..task.operators() as u32 {
             let not = self.does(operator).not();
@@ -139,7 +144,7 @@ impl Form {
         }
     }
 
-    /// Clauses that exclude an operator after an earlier one in the order that deletes one of its
+    /// Adds clauses against operators that follow, within a step, an operator that deletes one of their
     /// preconditions.
     fn keep_order(&mut self, order: &[(u32, u32)], uses: &[Vec<Use>]) {
         // By fact: operators of its chain in order, each with its circle.
@@ -156,8 +161,9 @@ impl Form {
         }
     }
 
-    /// Auxiliary chain of one fact within a strong component: a deletion disables all later
-    /// operators that need the fact.
+    /// Adds clauses for one fact and the operators of a strong component that use it: once one of them
+    /// deletes the fact, no later one that needs it can be applied. A chain of auxiliary variables
+    /// keeps their number linear.
     fn chain(&mut self, chain: &[(u32, u32, bool, bool)]) {
         let Some(last) = chain.iter().rposition(|user| user.2) else { return };
         let mut gone: Option<Said> = None;
@@ -181,7 +187,7 @@ impl Form {
         }
     }
 
-    /// Clauses for plans of `horizon` steps.
+    /// Solver with the clauses for plans of `horizon` steps.
     pub(super) fn solver(&self, task: &Compiled, horizon: usize) -> Solver {
         let mut solver = Solver::new(horizon * self.stride + self.facts);
         let mut unit = |variable: u32, positive: bool| solver.add(&[Literal::new(variable, positive)]);
@@ -221,19 +227,21 @@ impl Form {
         }
     }
 
-    /// Earliest step at which the goal can hold under delete relaxation; `None` for never.
+    /// First state in which every goal fact can hold under delete relaxation; `None` if some goal fact
+    /// never can.
     pub(super) fn earliest(&self, task: &Compiled) -> Option<usize> {
         let latest = task.goal.iter().map(|&f| self.first_fact[task.id(f) as usize]).max().unwrap_or(0);
         (latest != u32::MAX).then_some(latest as usize)
     }
 }
 
-/// Literal of a fact at a step, or (`later`) right after it.
+/// Literal of a fact in a state, or (`later`) in the state after the next step.
 fn is(fact: u32, later: bool) -> Said {
     Said { literal: Literal::new(fact, true), later }
 }
 
-/// Earliest steps of facts and operators under delete relaxation.
+/// First state of each fact and first step of each operator under delete relaxation; `u32::MAX` for
+/// never.
 fn first_moments(task: &Compiled) -> (Vec<u32>, Vec<u32>) {
     let mut facts = vec![u32::MAX; task.facts];
     let mut operators = vec![u32::MAX; task.operators()];

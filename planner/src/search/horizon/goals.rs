@@ -1,10 +1,10 @@
-//! Reasonable goal order: a goal that cannot be achieved any more once another holds comes before
-//! that one (Koehler and Hoffmann 2000, transitively closed).
+//! Reasonable order of goals: a goal comes earlier if it cannot be achieved any more once another one
+//! holds (Koehler and Hoffmann 2000, transitively closed).
 
 use crate::classical::compiled::{Compiled, Lists};
 use crate::ground::GroundFact;
 
-/// The goals' facts in order.
+/// Goal facts in a reasonable order.
 pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<GroundFact>], adders: &Lists<u32>) -> Vec<u32> {
     let goals: Vec<u32> = task.goal.iter().map(|&goal| task.id(goal)).collect();
     let excluded = excluded(task, mutex_groups, &goals);
@@ -20,7 +20,7 @@ pub(super) fn in_order(task: &Compiled, mutex_groups: &[Vec<GroundFact>], adders
     arranged(&ways).into_iter().map(|goal| goals[goal as usize]).collect()
 }
 
-/// True, by goal and fact, if goal and fact are mutex.
+/// True, by goal and fact, if the fact is mutex with the goal.
 fn excluded(task: &Compiled, mutex_groups: &[Vec<GroundFact>], goals: &[u32]) -> Vec<Vec<bool>> {
     let with = |&goal: &u32| {
         let mut excluded = vec![false; task.facts];
@@ -36,8 +36,8 @@ fn excluded(task: &Compiled, mutex_groups: &[Vec<GroundFact>], goals: &[u32]) ->
     goals.iter().map(with).collect()
 }
 
-/// Goals in order, from the achievers of each goal with the goals that each achiever conflicts
-/// with.
+/// Goals in a reasonable order. `ways` lists, for each goal, its achievers, each as the list of goals
+/// with which that achiever conflicts.
 pub fn arranged(ways: &[Vec<Vec<u32>>]) -> Vec<u32> {
     let goals = ways.len();
     // By goal: those that come before it, directly or not.

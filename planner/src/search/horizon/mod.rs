@@ -1,5 +1,6 @@
-//! Planning as satisfiability for several horizons in parallel (Rintanen, Heljanko and Niemelä
-//! 2006). Strong where many operators share a step and heuristics mislead; for small tasks only.
+//! Planning as satisfiability, with several numbers of steps tried in turn (Rintanen, Heljanko and
+//! Niemelä 2006). Strong where many operators share a step and heuristics mislead; only for small
+//! tasks.
 
 mod form;
 #[doc(hidden)]
@@ -16,58 +17,59 @@ use self::support::{Agenda, Support};
 
 use super::lazy::{Allowed, Counts, End, Shared};
 
-/// Horizons that are searched side by side.
+/// Number of horizons (plan lengths in steps) that are tried alternately.
 const ABREAST: usize = 6;
-/// Work of each horizon's turn.
+/// Work of one turn of a horizon, in the unit of [`Solver::work`].
 const TURN_WORK: u64 = 400_000;
-/// Steps of the longest plans looked for.
+/// Maximum horizon.
 const MOST_STEPS: usize = 1_000;
-/// Literals of all steps of a horizon at most.
+/// Maximum number of literals of a horizon.
 const MOST_LITERALS: usize = 4_000_000;
-/// Work per literal of a new clause.
+/// Work of adding one literal to a solver, in the unit of [`Solver::work`].
 const LITERAL_WORK: u64 = 4;
+/// Approximate memory of one literal in a solver, in bytes.
 const LITERAL_BYTES: usize = 16;
 
-/// Solver for plans with a fixed number of steps.
+/// SAT solver for plans with a fixed number of steps.
 struct Horizon {
     steps: usize,
     solver: Solver,
     agenda: Agenda,
 }
 
-/// Resumable search; after [`End::Limit`] it can continue.
+/// Search by satisfiability that can be continued after [`End::Limit`].
 pub struct SatSearch<'a, 's> {
     shared: &'s Shared<'a>,
-    /// Only cheaper plans (in the search's costs) are of interest.
+    /// Only plans with search costs below this bound are accepted.
     bound: u32,
     started: bool,
-    /// SAT encoding; `None` for unsupported tasks.
+    /// Encoding of one step; `None` for tasks that have none.
     form: Option<Form>,
     open: Vec<Horizon>,
-    /// Steps of the next horizon.
+    /// Number of steps of the next horizon.
     next: usize,
     counts: Counts,
 }
 
 impl<'a, 's> SatSearch<'a, 's> {
-    /// Search before its first step.
+    /// Search that has not begun.
     pub fn new(shared: &'s Shared<'a>, bound: u32) -> SatSearch<'a, 's> {
         let counts = Counts::default();
         SatSearch { shared, bound, started: false, form: None, open: Vec::new(), next: 0, counts }
     }
 
-    /// Counts so far.
+    /// Counts since the beginning of the search.
     pub fn counts(&self) -> Counts {
         self.counts
     }
 
-    /// Memory, bytes.
+    /// Approximate memory of the solvers, in bytes.
     pub(crate) fn bytes(&self) -> usize {
         self.open.iter().map(|horizon| horizon.solver.bytes()).sum()
     }
 
-    /// Continues within the limits; [`End::Exhausted`] means that no more can be done, and proves
-    /// nothing.
+    /// Continues the search within limits. [`End::Exhausted`] only means that nothing more can be
+    /// tried; it is no proof.
     pub fn run(&mut self, allowed: Allowed) -> End {
         if !std::mem::replace(&mut self.started, true) {
             self.form = Form::new(self.shared.task, self.shared.mutex_groups);
@@ -88,13 +90,13 @@ impl<'a, 's> SatSearch<'a, 's> {
         }
     }
 
-    /// Number of literals of the next horizon; `None` if no further one is allowed.
+    /// Number of literals of the next horizon; `None` if it would be too long or too large.
     fn next_literals(&self) -> Option<usize> {
         let literals = self.next.saturating_mul(self.form.as_ref()?.size());
         (self.next <= MOST_STEPS && literals <= MOST_LITERALS).then_some(literals)
     }
 
-    /// Adds a longer horizon if allowed by the limits.
+    /// Adds the next horizon; false if the limits forbid it.
     fn lengthen(&mut self, allowed: &Allowed) -> bool {
         let (Some(form), Some(literals)) = (&self.form, self.next_literals()) else { return false };
         let steps = self.next;
@@ -109,7 +111,8 @@ impl<'a, 's> SatSearch<'a, 's> {
         true
     }
 
-    /// Runs the solver on each horizon in turn; returns the result if conclusive.
+    /// Runs the solver of each horizon for one turn; returns a result that ends the search, or `None`.
+    /// After a proof that a horizon has no plan, shorter ones are dropped with it.
     fn turn(&mut self, allowed: &Allowed) -> Option<End> {
         for place in 0..self.open.len() {
             if self.counts.work > allowed.work {
@@ -134,7 +137,7 @@ impl<'a, 's> SatSearch<'a, 's> {
         None
     }
 
-    /// Plan of a horizon that was satisfied.
+    /// Plan of a satisfied horizon; `Exhausted` if the plan is not below the cost bound.
     fn found(&self, place: usize) -> End {
         let (Some(form), Horizon { steps, solver, .. }) = (&self.form, &self.open[place]) else {
             return End::Exhausted;

@@ -1,19 +1,17 @@
-//! Operator order in which few operators delete preconditions of later ones; those that do not can
-//! share a step.
+//! Order of operators within a step, in which few operators delete preconditions of later ones.
 
 use crate::classical::compiled::Compiled;
 
-/// Use of a fact by an operator of a parallel step.
+/// Use of a fact by an operator in a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Use {
     pub fact: u32,
     pub needs: bool,
-    /// True if the operator deletes the fact without needing a fact that makes it mutex with
-    /// operators that need the fact.
+    /// True if the operator deletes the fact and can share a step with other operators that need it.
     pub takes: bool,
 }
 
-/// Facts that each operator needs or deletes for others.
+/// Facts that each operator needs, or deletes while other operators may need them.
 pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
     let used = |operator: usize| {
         let needs = task.preconditions.get(operator);
@@ -35,8 +33,8 @@ pub(super) fn uses(task: &Compiled) -> Vec<Vec<Use>> {
     (0..task.operators()).map(used).collect()
 }
 
-/// Operators in order, each with the number of its strong component in the disabling graph
-/// (Rintanen, Heljanko and Niemelä 2006); operators of different components disable no later ones.
+/// Operators in order, each with the index of its strong component in the disabling graph (Rintanen,
+/// Heljanko and Niemelä 2006). An operator disables no later operator of another component.
 pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
     // Nodes: operators, then facts. From an operator to what it takes, from a fact to who needs it.
     let operators = uses.len();
@@ -58,8 +56,8 @@ pub(super) fn order(task: &Compiled, uses: &[Vec<Use>]) -> Vec<(u32, u32)> {
     order
 }
 
-/// Strongly connected component of each node (Tarjan 1972); components reachable from a node's have
-/// lower numbers.
+/// Index of each node's strongly connected component (Tarjan 1972); a component that can be reached
+/// from another one has the lower index.
 pub fn components(edges: &[Vec<u32>]) -> Vec<u32> {
     const OPEN: u32 = u32::MAX;
     let mut found = vec![OPEN; edges.len()];

@@ -1,6 +1,6 @@
-//! Decision heuristic: an operator that supports the earliest open subgoal (Rintanen 2012,
-//! "Planning as satisfiability: heuristics"). Once all are supported, facts persist and nothing
-//! else is done.
+//! Decision heuristic of the SAT search: decides for an operator that supports the earliest open
+//! subgoal (Rintanen 2012, "Planning as satisfiability: heuristics"). Once all subgoals are supported,
+//! facts persist and no more operators are applied.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -11,15 +11,15 @@ use crate::clauses::solver::{Decide, Solver};
 
 use super::form::Form;
 
-/// Subgoals supported since the last conflict: decisions only add values, so they need no second
-/// check.
+/// Subgoals handled since the last conflict. Until the next one, decisions only add values, so a
+/// supported subgoal need not be checked again.
 #[derive(Default)]
 pub(super) struct Agenda {
-    /// True, by moment and fact, if it is or was a subgoal.
+    /// True, by state and fact, if the fact is or was a subgoal there.
     seen: Vec<bool>,
-    /// Subgoals to be looked at, by moment and rank.
+    /// Open subgoals as (state, rank, fact), earliest state first.
     subgoals: BinaryHeap<Reverse<(usize, u32, u32)>>,
-    /// Number of conflicts when the agenda was built.
+    /// Number of conflicts of the solver when the agenda was built.
     conflicts: u64,
 }
 
@@ -31,7 +31,7 @@ impl Agenda {
     }
 }
 
-/// Decision heuristic for plans of a given number of steps.
+/// Decision heuristic for plans with a given number of steps.
 pub(super) struct Support<'a> {
     pub task: &'a Compiled,
     pub form: &'a Form,
@@ -48,7 +48,7 @@ impl Support<'_> {
         solver.value(Literal::new(self.form.operator(operator, step), true))
     }
 
-    /// Restarts the agenda from the goals.
+    /// Restarts the agenda from the goals; returns the work done.
     fn begin(&mut self, solver: &Solver) -> u64 {
         let (facts, agenda) = (self.task.facts, &mut *self.agenda);
         agenda.conflicts = solver.conflicts();
@@ -61,7 +61,8 @@ impl Support<'_> {
         (self.horizon * facts / 16) as u64
     }
 
-    /// Operator for the earliest unsupported subgoal, with its step; adds to `work`.
+    /// Operator that can support the earliest unsupported subgoal, with its step; `None` if all
+    /// subgoals are supported. Adds the work done to `work`.
     fn open(&mut self, solver: &Solver, work: &mut u64) -> Option<(u32, usize)> {
         while let Some(Reverse((moment, rank, fact))) = self.agenda.subgoals.pop() {
             let adders = self.form.adders.get(fact as usize);
@@ -97,7 +98,8 @@ impl Support<'_> {
         None
     }
 
-    /// Completes the assignment: variables keep their values, and no more operators are applied.
+    /// Appends literals that complete the assignment: variables keep their values, and no more
+    /// operators are applied.
     fn rest(&self, solver: &Solver, out: &mut Vec<Literal>) {
         let mut held = self.task.initial.clone();
         for moment in 1..=self.horizon {

@@ -1,18 +1,17 @@
-//! Cancels steps that undo each other in counting plans: steps that only change numbers by
-//! constants.
+//! Removes plan steps that cancel each other, among steps that only change numbers by constants.
 //!
-//! Other steps are moved to where they can first be taken, so that a number need not come back for them. Then steps
-//! that move the same numbers in opposite directions go together, as many of each as cancel out, where the rest of the
-//! plan still reaches the goal.
+//! Other steps are first moved to the earliest position where they are applicable, so that a number
+//! need not return to a value for their sake. Then groups of steps that change the same numbers in
+//! opposite directions are removed where the rest of the plan still reaches the goal.
 
 use rustc_hash::FxHashMap;
 
 use super::Improve;
 use crate::classical::compiled::Compiled;
 
-/// Maximum number of steps of one kind that are cancelled together.
+/// Maximum number of steps of one operator that are removed together.
 const MOST_TOGETHER: u32 = 6;
-/// Words of all the states along a plan, at most.
+/// Maximum number of words of all states along a plan; longer plans are left alone.
 const MOST_WORDS: usize = 1 << 24;
 
 /// Operator that cancels another one, with the number of applications of each.
@@ -23,7 +22,7 @@ struct Opposite {
     other: usize,
 }
 
-/// Steps of a plan that only change numbers by constants, each with its inverses.
+/// Operators of a plan that only change numbers by constants, each with the operators that cancel it.
 struct Shifts {
     opposites: FxHashMap<u32, Vec<Opposite>>,
 }
@@ -52,8 +51,8 @@ impl Shifts {
     }
 }
 
-/// Numbers that an operator changes, sorted, with the amounts; `None` if the operator does anything
-/// else.
+/// Numbers that an operator changes by constants, ascending, with the amounts; `None` if the operator
+/// does anything else.
 fn shift(task: &Compiled, operator: u32) -> Option<(Vec<u32>, Vec<f64>)> {
     let changes = &task.numbers.changes[operator as usize];
     if changes.is_empty() || !task.effects.get(operator as usize).is_empty() {
@@ -68,7 +67,8 @@ fn shift(task: &Compiled, operator: u32) -> Option<(Vec<u32>, Vec<f64>)> {
     Some(gains.into_iter().unzip())
 }
 
-/// Numbers of both steps whose changes cancel.
+/// Least numbers of applications of two operators whose changes then cancel; `None` if there are none
+/// up to the limit.
 fn balance(one: &[f64], other: &[f64]) -> Option<(usize, usize)> {
     let counts = (1..=MOST_TOGETHER).flat_map(|own| (1..=MOST_TOGETHER).map(move |count| (own, count)));
     let cancels = |&(own, count): &(u32, u32)| {
@@ -79,7 +79,7 @@ fn balance(one: &[f64], other: &[f64]) -> Option<(usize, usize)> {
 }
 
 impl Improve<'_> {
-    /// Removes steps of a plan that cancel out.
+    /// Removes steps of a plan that cancel each other.
     pub(super) fn undo(&mut self, plan: &mut Vec<u32>) {
         let task = self.task;
         if task.numbers.is_empty() || plan.len().saturating_mul(task.initial.len()) > MOST_WORDS {
@@ -95,7 +95,7 @@ impl Improve<'_> {
         self.cancel(plan, &shifts, &mut states);
     }
 
-    /// Recomputes the states along a plan from the last valid one on.
+    /// Extends the states along a plan, from the last one given to the end of the plan.
     fn follow(&mut self, plan: &[u32], states: &mut Vec<Vec<u32>>) {
         for &operator in &plan[states.len() - 1..] {
             let mut next = Vec::new();
@@ -107,7 +107,7 @@ impl Improve<'_> {
         self.work += plan.len() as u64 * 2;
     }
 
-    /// True if steps can be applied from a state and reach the goal.
+    /// True if the steps can be applied from a state and end in a goal state.
     fn reaches(&mut self, from: &[u32], steps: impl Iterator<Item = u32>) -> bool {
         let task = self.task;
         self.state.clear();
@@ -123,7 +123,8 @@ impl Improve<'_> {
         task.is_goal(&self.state)
     }
 
-    /// Moves every other step to the earliest position where it is applicable.
+    /// Moves every step that does more than change numbers to the earliest position where it is
+    /// applicable, if the plan remains valid.
     fn pull(&mut self, plan: &mut [u32], shifts: &Shifts, states: &mut Vec<Vec<u32>>) {
         for from in 0..plan.len() {
             let operator = plan[from];
@@ -145,7 +146,8 @@ impl Improve<'_> {
         }
     }
 
-    /// Removes steps together with the nearest earlier ones that they undo.
+    /// Removes steps together with the nearest earlier steps that they cancel, if the plan remains
+    /// valid.
     fn cancel(&mut self, plan: &mut Vec<u32>, shifts: &Shifts, states: &mut Vec<Vec<u32>>) {
         let mut at = 0;
         'next: while at < plan.len() && !self.over() {
@@ -173,8 +175,8 @@ impl Improve<'_> {
     }
 }
 
-/// Positions of the given step, of later ones of its kind, and of the nearest earlier ones that
-/// they undo, sorted; `None` if there are too few.
+/// Positions, in ascending order, of the step at `at`, of later ones of its operator, and of the
+/// nearest earlier ones that they cancel; `None` if there are too few.
 fn together(plan: &[u32], at: usize, opposite: Opposite) -> Option<Vec<usize>> {
     let behind = (at..plan.len()).filter(|&index| plan[index] == plan[at]).take(opposite.own);
     let ahead = (0..at).rev().filter(|&index| plan[index] == opposite.operator).take(opposite.other);

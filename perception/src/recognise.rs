@@ -34,12 +34,12 @@ pub use model::{Handle, ModelError, ObjectModel, Range, Shape, Top, check_models
 pub use percept::{Evidence, Percept, Sighting, Stance, probability_of};
 pub use published::Published;
 
-/// Recogniser: assigns known objects to segments.
+/// Method that assigns known objects to the segments of a scene.
 pub trait Recogniser: Send + Sync {
     /// Name for selection on the command line and in files.
     fn name(&self) -> &'static str;
 
-    /// Percepts of all segments, in segment order; an object on or in another follows that one. The
-    /// models are mutually exclusive hypotheses.
+    /// Percepts of all segments, in segment order; where a segment is two objects, the one on or in
+    /// the other comes first. The models are mutually exclusive hypotheses.
     fn recognise(&self, scene: &Scene, seen: &Visibility, models: &[ObjectModel]) -> Vec<Percept>;
 }

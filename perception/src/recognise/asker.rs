@@ -11,15 +11,15 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector2, Vector3};
 const SAME_SIDE: f64 = 0.9;
 /// Number of a body's points at which each camera's alignment with the body is tested. From: chosen.
 const WITNESSES: usize = 160;
-/// Minimum seen-through share of a body's points, against other cameras, for a camera to count as
-/// misregistered there. From: chosen.
+/// Share of a body's points seen through by a camera above which the camera counts as misregistered
+/// there, if better cameras see the body. From: chosen.
 const ASTRAY: f64 = 0.5;
 
 /// Tolerance on the distance to a measured surface when testing whether a body is in view, metres.
 /// From: chosen.
 pub(super) const IN_VIEW_M: f64 = 0.06;
 
-/// Visibility queries at points above the surface, over all cameras.
+/// Visibility queries at points of the surface's frame, over all cameras.
 #[derive(Clone)]
 pub struct Asker<'a> {
     pub views: Vec<Lying<'a>>,
@@ -32,8 +32,9 @@ pub struct Lying<'a> {
     pub map: &'a DepthMap,
     pub surface_from_camera: Isometry3<f64>,
     pub viewpoint: Point3<f64>,
-    /// Camera from surface.
+    /// Rotation from the surface's to the camera's frame.
     turn: Matrix3<f64>,
+    /// Translation from the surface's to the camera's frame, metres.
     shift: Vector3<f64>,
 }
 
@@ -49,18 +50,18 @@ impl<'a> Lying<'a> {
         }
     }
 
-    /// Camera moved so that its points near the body shift by this much, metres along both axes of
-    /// the surface.
+    /// Camera shifted by −`x` and −`y` along the axes of the surface, metres, with all points that
+    /// it measured.
     pub fn moved(&self, [x, y]: [f64; 2]) -> Lying<'a> {
         Lying::of(self.map, Translation3::new(-x, -y, 0.0) * self.surface_from_camera)
     }
 
-    /// Point (surface frame) in the camera's frame.
+    /// Transforms a point from the surface's frame to the camera's.
     fn seen_at(&self, place: &Point3<f64>) -> Point3<f64> {
         (self.turn * place.coords + self.shift).into()
     }
 
-    /// [`DepthMap::look`] for a point in the surface's frame.
+    /// State of a point of the surface's frame in this view, as [`DepthMap::look`].
     pub fn look(&self, place: &Point3<f64>, tolerance_m: f64) -> Seen {
         self.map.look_from(&self.seen_at(place), tolerance_m)
     }
@@ -85,8 +86,8 @@ impl<'a> Asker<'a> {
         Asker { views, tolerance_m }
     }
 
-    /// Best knowledge of a point (surface frame): free in any view outweighs surface, hidden and
-    /// never.
+    /// State of a point (surface frame) over all views: free in any view outweighs surface, hidden
+    /// and never.
     pub fn look(&self, x: f64, y: f64, z: f64) -> Seen {
         let place = Point3::new(x, y, z);
         let mut best = Seen::Never;
@@ -99,13 +100,13 @@ impl<'a> Asker<'a> {
         best
     }
 
-    /// Horizontal direction from a body to the cameras that had it in view, if all saw the same
-    /// side.
+    /// Mean horizontal direction (unit length) from a body to the cameras that have it in view;
+    /// `None` if the cameras are above it or see different sides.
     pub fn only_from(&self, round: &Round) -> Option<[f64; 2]> {
-        /// Horizontal distance from the axis below which a camera looks from no side, metres.
+        /// Horizontal distance from the axis below which a camera counts as above the body, metres.
         /// From: chosen.
         const ABOVE_M: f64 = 0.1;
-        /// Directions that add up to less cancel out. From: rounding.
+        /// Minimum length of the sum of the directions; below it, they cancel out. From: rounding.
         const CANCELLED: f64 = 1e-9;
         let place = Point3::new(round.x, round.y, round.middle_m);
         let saw = self.views.iter().filter(|view| view.look(&place, IN_VIEW_M) > Seen::Never);
@@ -117,8 +118,9 @@ impl<'a> Asker<'a> {
         each.iter().all(|eye| eye.dot(&mean) > SAME_SIDE).then_some(mean.into())
     }
 
-    /// Standard deviation of the best measurement of a surface point, metres; `None` if more
-    /// accurate cameras look through it, so that it is noise or a mixed pixel.
+    /// Standard deviation of the best measurement of a surface point, metres, 0 if no camera
+    /// measures it; `None` if more accurate cameras look through it, so that it is noise or a mixed
+    /// pixel.
     pub fn support(&self, p: &Point3<f64>) -> Option<f64> {
         let (mut through, mut here) = (0.0, 0.0);
         let mut best_m = f64::INFINITY;
@@ -138,10 +140,10 @@ impl<'a> Asker<'a> {
     }
 }
 
-/// Cameras that do not look through a body which others see.
+/// Removes the cameras that look through a body which better cameras see.
 fn without_astray<'a>(all: Vec<Lying<'a>>, points: &[Point3<f64>]) -> Vec<Lying<'a>> {
-    /// Minimum measured share of the sampled points of a body in view of a camera, as a divisor.
-    /// From: chosen.
+    /// Divisor of the number of sampled points: a camera that measures or sees through fewer is not
+    /// judged. From: chosen.
     const EDGE: usize = 8;
     let step = points.len().div_ceil(WITNESSES).max(1);
     let witnesses: Vec<Point3<f64>> = points.iter().step_by(step).copied().collect();

@@ -3,59 +3,69 @@
 use crate::outline::Rectangle;
 use crate::round::Round;
 
-/// An upright frustum; metres.
+/// An upright cone frustum, closed or open at the top.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
-    /// Axis, surface frame.
+    /// Axis position along x, surface frame, metres.
     pub x: f64,
+    /// Axis position along y, surface frame, metres.
     pub y: f64,
-    /// Heights of foot and rim above the surface.
+    /// Height of the foot above the surface, metres.
     pub base_m: f64,
+    /// Height of the rim above the surface, metres.
     pub top_m: f64,
-    /// Radius at both.
+    /// Radius at the foot, metres.
     pub foot_m: f64,
+    /// Radius at the rim, metres.
     pub rim_m: f64,
-    /// Thickness of wall and floor; `None` if closed.
+    /// Thickness of the wall and floor of an open vessel, metres; `None` if closed at the top.
     pub wall_m: Option<f64>,
 }
 
-/// An upright box; metres.
+/// An upright box, rotated about the vertical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
-    /// Reference point inside the body for its sides, surface frame.
+    /// Reference point of the box along x, surface frame, metres.
     pub x: f64,
+    /// Reference point of the box along y, surface frame, metres.
     pub y: f64,
     /// Sine and cosine of the rotation about the vertical.
     pub turn: (f64, f64),
-    /// Minimum and maximum along the box's own axes and height.
+    /// Lowest corner: from the reference point along the box's two axes, and height above the
+    /// surface, metres.
     pub low: [f64; 3],
+    /// Highest corner: from the reference point along the box's two axes, and height above the
+    /// surface, metres.
     pub high: [f64; 3],
 }
 
-/// Ray: origin, and direction per metre of depth; surface frame, metres.
+/// A camera ray in the surface's frame.
 #[derive(Clone, Copy, Debug)]
+/// Origin, metres.
 pub struct Ray {
     pub from: [f64; 3],
+    /// Shift along the ray per metre of depth.
     pub along: [f64; 3],
 }
 
-/// A body that a ray can meet.
+/// A body whose surface a ray may hit.
 pub trait Body {
     /// Minimum depth at which a ray hits the body, metres; infinite if it misses.
     fn depth_m(&self, ray: &Ray) -> f64;
 
-    /// The body moved along both axes of the surface, metres.
+    /// Body shifted by `shift_m` along x and y of the surface, metres.
     fn moved(&self, shift_m: [f64; 2]) -> Self;
 }
 
 impl Frustum {
-    /// The closed frustum whose side was fitted, between two heights.
+    /// Closed frustum with the side of a fitted body between two heights, surface frame, metres.
     pub fn around(round: &Round, base_m: f64, top_m: f64) -> Frustum {
         let [foot_m, rim_m] = [base_m, top_m].map(|z| round.radius_at(z));
         Frustum { x: round.x, y: round.y, base_m, top_m, foot_m, rim_m, wall_m: None }
     }
 
-    /// Depths at which a ray crosses the infinite cone of the side, drawn in by `wall_m`, in order.
+    /// Both depths, ascending, at which a ray (origin relative to the foot's centre) crosses the
+    /// infinite cone of the side, narrowed by `wall_m`; `None` if it misses.
     #[inline(always)]
     fn cone(&self, from: [f64; 3], [dx, dy, dz]: [f64; 3], wall_m: f64) -> Option<[f64; 2]> {
         /// Minimum height of a body, metres. From: rounding.
@@ -106,7 +116,7 @@ impl Body for Frustum {
 }
 
 impl Cuboid {
-    /// The box that stands on a rectangle, between two heights.
+    /// Box over a rectangle between two heights, surface frame, metres.
     pub fn around(rectangle: &Rectangle, base_m: f64, top_m: f64) -> Cuboid {
         let [half_x, half_y] = rectangle.along_m.map(|side| 0.5 * side);
         Cuboid {
@@ -118,7 +128,8 @@ impl Cuboid {
         }
     }
 
-    /// Box extended at one of four ends: both ends of its first side, then both of its second.
+    /// Box extended by `by_m` metres at one end: 0 and 1 are the ends of its first side, 2 and 3 of
+    /// its second.
     pub fn longer(&self, end: usize, by_m: f64) -> Cuboid {
         let mut longer = *self;
         match end % 2 {
@@ -128,12 +139,12 @@ impl Cuboid {
         longer
     }
 
-    /// Length of the side with this end, metres.
+    /// Length of the side that ends at `end` (0 to 3, as for [`Cuboid::longer`]), metres.
     pub fn length_m(&self, end: usize) -> f64 {
         self.high[end / 2] - self.low[end / 2]
     }
 
-    /// Box rotated about its reference point.
+    /// Box rotated about the vertical through its reference point.
     pub fn turned(&self, by_rad: f64) -> Cuboid {
         let ((sin, cos), (sin_by, cos_by)) = (self.turn, by_rad.sin_cos());
         Cuboid { turn: (sin * cos_by + cos * sin_by, cos * cos_by - sin * sin_by), ..*self }

@@ -53,13 +53,14 @@ pub(super) const BASIC: [(&str, [f64; 2], [f64; 2], [f64; 2]); 11] = [
     ("brown", [0.26, 0.73], [0.09, 0.35], [30.0, 103.0]),
 ];
 
-/// Basic colour term that a word is, as models and percepts spell it.
+/// Basic colour term that a word is, spelt as in models and percepts; `None` for other words.
 pub fn basic(word: &str) -> Option<&'static str> {
     let word = if word == "gray" { "grey" } else { word };
     BASIC.iter().map(|(name, ..)| *name).find(|name| *name == word)
 }
 
-/// Colour and the rest of a name that begins with one: "red cup", or the symbol "red-cup".
+/// Splits a name that begins with a basic colour ("red cup", "red-cup") into colour and rest;
+/// `None` for other names.
 pub fn coloured(name: &str) -> Option<(&'static str, &str)> {
     let (first, rest) = name.split_once([' ', '-'])?;
     Some((basic(first)?, rest))

@@ -1,8 +1,9 @@
 //! Our recogniser: compares hypotheses by the likelihood of the measurements, given their
 //! visibility.
 //!
-//! Every known object and every family of things that are none of them is a hypothesis with a likelihood for size, form,
-//! upper end and handle. A feature that was not in view has the same likelihood under all of them, so that doubt stays.
+//! Every known object, and every family of other everyday objects, is a hypothesis with a
+//! likelihood for size, form, upper end and handle. A feature out of view has the same likelihood
+//! under every hypothesis, so that doubt stays.
 
 use super::Recogniser;
 use super::ends::Side;
@@ -50,8 +51,8 @@ pub struct Descry {
     /// Exponent on the likelihoods of sizes and form; below 1 it softens them for effects outside
     /// the measurement model. From: chosen.
     pub temper: f64,
-    /// Exponent on the likelihood ratio between a known object, or a box length, and the object's
-    /// own measures: real objects differ from their models. From: chosen.
+    /// Exponent on the likelihood ratios from rays, of a known object or of a box's lengths,
+    /// against the object's own measures: real objects differ from their models. From: chosen.
     pub verified: f64,
 }
 
@@ -72,11 +73,13 @@ impl Default for Descry {
 /// Family of everyday objects: prior share, form, upper end and handle, with broad sizes.
 struct Family {
     share: f64,
+    /// Form of the body; `None` is neither round nor a box.
     shape: Option<Shape>,
     top: Top,
     handle: Handle,
-    /// Median and log-normal spread of height and width, metres.
+    /// Median, metres, and log-normal spread of the height.
     height: (f64, f64),
+    /// Median, metres, and log-normal spread of the width.
     width: (f64, f64),
 }
 
@@ -138,8 +141,9 @@ impl Descry {
     /// Percepts after alternative explanations of each segment: a known body on or in another
     /// object, or a body with a neck.
     ///
-    /// The percepts of an alternative replace the segment's if the pixels are far likelier under the
-    /// alternative, and if its bodies are more probably known objects than the whole segment is.
+    /// The percepts of an alternative replace those of the segment if the pixels are far likelier
+    /// under the alternative, and if the alternative's body is more probably a known object than
+    /// the whole segment is.
     fn explained(
         &self,
         setting: &Setting,
@@ -191,7 +195,8 @@ impl Descry {
         explained.into_iter().flatten().collect()
     }
 
-    /// Judges both parts of a split segment, with the log likelihood ratio against one body.
+    /// Judges both parts of a split segment: percepts, and log likelihood ratio of two bodies
+    /// against one.
     fn judge_parts(
         &self,
         setting: &Setting,
@@ -215,7 +220,8 @@ impl Descry {
         Parted { body: judge(body, upper), rest: judge(rest, lower), log }
     }
 
-    /// Judges a body with a neck: sizes of the whole body, form of the part below the shoulder.
+    /// Judges a body with a neck by the sizes of the whole body and the form of its part below the
+    /// shoulder.
     fn judge_necked(
         &self,
         setting: &Setting,
@@ -233,8 +239,8 @@ impl Descry {
     }
 }
 
-/// Segment with its foot on the bottom of the vessel around it, if rays make that far likelier than
-/// a foot on the vessel.
+/// Segment `of` moved onto the bottom of the vessel around it; `None` unless the rays make that far
+/// likelier than a foot on top of the vessel.
 fn within(setting: &Setting, of: usize, sigma_m: f64, seen: &Visibility) -> Option<Segment> {
     let (body, vessel) = resting::in_vessel(setting.scene, of, sigma_m)?;
     let segments = &setting.scene.segments;
@@ -259,15 +265,17 @@ fn fitted(scene: &Scene, seen: &Visibility) -> Sensor {
     residuals.fit(&KINECT)
 }
 
-/// Number of things like a known object of stated colours that have another one, for each such object.
-/// From: chosen, as many as have another handle.
+/// Expected number of objects that match a known object of stated colours in all but colour, per
+/// such object. From: chosen, as many as have another handle.
 const OTHER_COLOUR: f64 = 0.5;
 
-/// Probability of each model, and its likelier stance.
+/// Result of weighing the models, with one entry per model.
 struct Weighed {
+    /// Probability that the object is the model.
     probabilities: Vec<f64>,
-    /// Probability that it is like each model but of another colour.
+    /// Probability that the object matches the model in all but colour.
     recoloured: Vec<f64>,
+    /// Likeliest stance of the object if it is the model.
     stances: Vec<Stance>,
 }
 
@@ -355,8 +363,8 @@ impl Descry {
         percept(setting.scene, segment, measured, models, named, stances, (probabilities, kinds), unknown)
     }
 
-    /// Probability and stance of each model; `against`: log likelihood of further evidence against
-    /// each stance, standing or lying either way.
+    /// Weighs the models. `against`: for each model, log likelihood ratios from rays if it stands,
+    /// and if it lies with either end as foot.
     fn weigh(
         &self,
         models: &[ObjectModel],
@@ -422,7 +430,7 @@ impl Descry {
         Weighed { probabilities, recoloured, stances }
     }
 
-    /// Log likelihoods of a closed object lying, with either end as foot; empty if it cannot lie.
+    /// Log likelihoods of a lying round object with either end as foot; empty if it cannot lie.
     fn lying_logs(&self, toppled: Option<&Toppled>, log: impl Fn(&Measured) -> f64) -> Vec<f64> {
         let Some(toppled) = toppled else { return Vec::new() };
         let ways = toppled.ways.each_ref().map(|way| &way.measured);
@@ -453,7 +461,7 @@ impl Descry {
     }
 
     /// Log likelihood of objects that resemble a model except for one feature, with sizes within a
-    /// tenth; `lids`: factor for those with a lid.
+    /// tenth; `lids`: factor on the share of those with a lid.
     fn look_alike_log(&self, model: &ObjectModel, models: &[ObjectModel], m: &Measured, lids: f64) -> f64 {
         /// Relative deviation of a look-alike's size or taper from the known object's.
         /// From: chosen.
@@ -461,17 +469,21 @@ impl Descry {
         /// Ratio of the width of a uniform distribution to its standard deviation. From: derived,
         /// the root of 12, as of any uniform distribution.
         const UNIFORM: f64 = 3.46;
-        /// Shares of look-alikes with a handle, with a lid, with flat sides, with another taper,
-        /// with other sides. From: chosen, a guess.
+        /// Share of look-alikes with a handle. From: chosen, a guess.
         const HANDLED: f64 = 0.5;
+        /// Share of look-alikes with a lid. From: chosen, a guess.
         const LIDDED: f64 = 0.3;
+        /// Share of look-alikes with flat sides. From: chosen, a guess.
         const FLAT: f64 = 0.2;
+        /// Share of look-alikes with another taper. From: chosen, a guess.
         const TAPERED: f64 = 0.3;
+        /// Share of look-alikes with other sides. From: chosen, a guess.
         const LONGER: f64 = 0.3;
-        /// Share of look-alikes with one longer or shorter side, by a relative amount but at least
-        /// the resolution; hidden sides leave this in doubt. From: chosen, so that an end that no
-        /// look showed leaves it in doubt.
+        /// Share of look-alikes of a box with one longer or shorter side; a hidden side leaves this
+        /// in doubt. From: chosen, so that an end that no look showed leaves it in doubt.
         const OTHER_SIDE: f64 = 0.25;
+        /// Difference in length of a look-alike box's deviating side, as a share of the length, at
+        /// least [`APART_M`]. From: chosen.
         const BY: f64 = 0.2;
         let near = |r: Range| (r.middle(), ALIKE.hypot((r.high / r.low).ln() / UNIFORM));
         let height = near(model.height_m);
@@ -536,9 +548,9 @@ fn stranger_log(family: &Family, models: &[ObjectModel], m: &Measured) -> f64 {
     (1.0 - known).max(STRANGER).ln()
 }
 
-/// Probability that an object of a family, as measured, is described by a model of a kind and so is
-/// no stranger: same make, sizes within the model's ranges. A single object without ranges
-/// describes no others.
+/// Probability that an object of a family, as measured, is described by a model: same shape, upper
+/// end and handle, and sizes within the model's ranges. A model with single values describes no
+/// others.
 fn covers(model: &ObjectModel, family: &Family, m: &Measured) -> f64 {
     let same_make =
         family.shape == Some(model.shape) && model.top == family.top && model.handle == family.handle;

@@ -28,19 +28,19 @@ pub(super) fn top_hidden(asker: &Asker, footprint: &Rectangle, top: f64) -> bool
 /// Likelihood of each length of one side of a box, relative to the likeliest.
 #[derive(Clone, Debug)]
 pub struct Side {
-    /// Smallest length that was tried, metres (steps of [`EDGE_M`]), and the log-likelihood of each
-    /// length.
+    /// Smallest tried length, metres; further lengths follow in steps of [`EDGE_M`].
     least_m: f64,
+    /// Log likelihood of each tried length, 0 for the likeliest.
     logs: Vec<f64>,
 }
 
 impl Side {
-    /// Flattens the likelihoods by an exponent.
+    /// Raises the likelihoods to a power.
     pub fn soften(&mut self, exponent: f64) {
         self.logs.iter_mut().for_each(|log| *log *= exponent);
     }
 
-    /// The lengths that were tried, metres, and the log of each.
+    /// Tried lengths, metres, each with its log likelihood.
     fn tried(&self) -> impl Iterator<Item = (f64, f64)> {
         self.logs.iter().enumerate().map(|(n, log)| (self.least_m + EDGE_M * n as f64, *log))
     }
@@ -61,8 +61,8 @@ impl Side {
         (0..steps).map(|n| self.likelihood(length_m(n))).sum::<f64>() / f64::from(steps)
     }
 
-    /// Integral of the likelihood over a density of lengths; `beyond`: mass beyond the longest
-    /// tried length.
+    /// Integral of the likelihood over a density of lengths; `beyond`: probability of lengths
+    /// beyond the longest tried one.
     pub fn sum(&self, density: impl Fn(f64) -> f64, beyond: f64) -> f64 {
         /// Number of steps below the smallest tried length that are integrated too. From: rounding.
         const SHORTER: usize = 8;
@@ -72,12 +72,12 @@ impl Side {
         tried + beyond * self.logs.last().map_or(0.0, |log| log.exp())
     }
 
-    /// The longest that was tried, metres.
+    /// Longest tried length, metres.
     pub fn longest_m(&self) -> f64 {
         self.least_m + EDGE_M * self.logs.len().saturating_sub(1) as f64
     }
 
-    /// The likeliest length, metres: of equals the longest.
+    /// Likeliest length, metres; the longest of equally likely ones.
     pub fn likeliest_m(&self) -> f64 {
         self.tried().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(length_m, _)| length_m)
     }
@@ -85,11 +85,12 @@ impl Side {
 
 /// Step of the sums over lengths, metres. From: work.
 const STEP_M: f64 = 0.5 * EDGE_M;
-/// Log likelihood ratio from which an end is certain. From: chosen.
+/// Log likelihood ratio against a length at which no further lengths are tried. From: chosen.
 const SURE: f64 = 40.0;
-/// Steps of the search for a box's sides and rotation, metres and radians, each with its maximum
-/// repetitions. From: work, a turn moves the ends of what is 15 cm long by as much.
+/// Step sizes of the search for a box's sides, metres, and rotation, radians. From: work, a turn
+/// moves the ends of what is 15 cm long by as much.
 const SOUGHT: [(f64, f64); 2] = [(EDGE_M, 0.026), (0.5 * EDGE_M, 0.013)];
+/// Maximum number of steps of each size. From: work.
 const TRIES: usize = 8;
 /// Number of alternations between registering the views and fitting the box. From: work.
 const ROUNDS: usize = 2;
@@ -138,8 +139,8 @@ impl Boxed<'_> {
         }
     }
 
-    /// Likelihoods of lengths of the side between two ends; each length by the likelier end, with
-    /// the views shifted to match.
+    /// Likelihoods of the lengths of the side between two ends (as for [`Cuboid::longer`]), up to
+    /// `longest_m`. Either end may move, and the views are shifted to match.
     fn side(&self, ends: [usize; 2], longest_m: f64) -> Side {
         let length_m = self.body.length_m(ends[0]);
         let log = |placed: &[Placed]| placed.iter().map(|view| view.log).sum::<f64>();
@@ -174,7 +175,7 @@ impl Boxed<'_> {
 }
 
 /// Likelihoods of the lengths of both sides of a box from the surrounding rays, up to `longest_m`,
-/// starting from one of two rectangles.
+/// starting from the likelier of two rectangles.
 pub fn sides(rays: &Rays, about: [&Rectangle; 2], heights_m: (f64, f64), longest_m: f64) -> [Side; 2] {
     let [mut one, other] = about.map(|rectangle| Boxed::of(rays, rectangle, heights_m));
     if other.log > one.log {

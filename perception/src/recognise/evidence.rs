@@ -22,19 +22,22 @@ use nalgebra::Point3;
 const HANDLE_REACHES_M: [f64; 3] = [0.010, 0.018, 0.026];
 /// Heights at which a handle is sought, as shares of the body's height. From: chosen.
 const HANDLE_HEIGHTS: [f64; 3] = [0.35, 0.55, 0.72];
-/// Heights at which a camera must look through the side, as shares of the body's height, and the
-/// minimum number of them: the foot of a far side is often hidden by the near one. From: chosen.
+/// Heights at which a camera is tested for looking through the side, as shares of the body's
+/// height. From: chosen.
 const SIDE_HEIGHTS: [f64; 4] = [0.35, 0.5, 0.65, 0.8];
+/// Minimum number of [`SIDE_HEIGHTS`] at which a camera must look through the side: the foot of a
+/// far side is often hidden by the near one. From: chosen.
 const THROUGH: usize = 3;
 /// Maximum share of directions in which a handle could be hidden for a body to count as having none.
 /// From: chosen.
 pub(super) const UNSEEN: f64 = 0.08;
-/// Share of a protrusion's reach up to which it may be the body's own blurred side. From: chosen.
+/// Share of a protrusion's reach below which a point may lie on the body's own blurred side.
+/// From: chosen.
 const ROOT: f64 = 0.35;
 /// Log likelihood ratio from which an inside is reported as seen or absent. From: chosen.
 const SAID: f64 = 1.5;
-/// Number of body points per point required of a visible handle, for a far and for a near one.
-/// From: chosen.
+/// Divisors of the number of a body's points that give the number required of a visible handle, for
+/// a far and for a near body. From: chosen.
 pub(super) const HANDLE_POINTS: (usize, usize) = (30, 150);
 /// Lower and upper limit of the number of points required of a visible handle. From: chosen.
 pub(super) const HANDLE_FEWEST: (usize, usize) = (6, 60);
@@ -46,55 +49,62 @@ const HANDLE_HIGH_M: f64 = 0.012;
 const BESIDE_M: f64 = 0.012;
 /// Minimum height of an object, metres. From: rounding.
 const LEAST_HEIGHT_M: f64 = 0.001;
-/// Minimum and maximum height of the rim, as shares of the body's height. From: chosen.
+/// Minimum and maximum height of the rim, which is no part of the side, as shares of the body's
+/// height. From: chosen.
 const RIMS: (f64, f64) = (0.1, 0.45);
-/// Number of side points that share an error, and maximum number of such groups. From: chosen.
+/// Number of side points that share an error. From: chosen.
 const SHARING: f64 = 12.0;
+/// Maximum number of groups of side points with independent errors. From: chosen.
 const MOST_GROUPS: f64 = 60.0;
 
 /// Measures of one segment.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub evidence: Evidence,
-    /// Thickness of the surface in the same cloud, metres: noise plus the remaining merging error.
+    /// Root mean square distance of the surface's own points from its plane, metres: noise plus the
+    /// remaining merging error.
     pub blur_m: f64,
+    /// Best-fitting upright round body; `None` if no circle fits.
     pub round: Option<Round>,
+    /// Best-fitting rectangle of the side, seen from above; `None` if there are too few points.
     pub rectangle: Option<Rectangle>,
     /// Residual of the side from the best round body of the other stance (horizontal axis for a
     /// standing object, vertical for a lying one), metres; infinite if there is none.
     pub rival_m: f64,
     /// Height above the support, metres.
     pub height_m: f64,
+    /// Standard deviation of the height, metres.
     pub height_sigma_m: f64,
     /// True if an occluder may hide the true top.
     pub top_hidden: bool,
     /// The bounding rectangle seen from above, surface frame.
     pub footprint: Rectangle,
-    /// Likelihoods of the sides' lengths if the object is a box; computed for possible requested
-    /// boxes only.
+    /// Likelihoods of the lengths of both sides of the footprint if the object is a box; `None` if
+    /// its height fits no known box.
     pub sides: Option<[Side; 2]>,
-    /// Share of the round body's expected visible side through which a camera looked, evidence
-    /// against the form.
+    /// Share of the directions in which a camera looked through the place of the round body's side:
+    /// evidence against that form.
     pub looked_through: f64,
     /// Effective number of independent points on the side.
     pub independent: f64,
-    /// Standard deviation of one measurement, metres.
+    /// Standard deviation of one depth measurement, metres.
     pub sigma_m: f64,
-    /// Share of sides and top that was seen or looked past.
+    /// Share of the object's sides and top that a camera measured or saw past.
     pub seen_fraction: f64,
     /// Evidence of rays about the upper end.
     pub upper: Upper,
-    /// Pixels of the body.
+    /// Colours of the body's pixels.
     pub painted: Painted,
 }
 
 impl Measured {
-    /// Distance between merged views of one surface, metres, a lower bound on measurement accuracy.
+    /// Distance between merged views of one surface, metres, a lower bound on measurement accuracy;
+    /// 0 for a single view.
     pub fn apart_m(&self) -> f64 {
         if self.evidence.views > 1 { self.blur_m } else { 0.0 }
     }
 
-    /// Centre of the footprint, and distance to its corners, metres.
+    /// Centre of the footprint (surface frame), and distance to its corners, metres.
     pub fn footprint_reach(&self) -> ([f64; 2], f64) {
         let [long_m, short_m] = self.footprint.sides_m;
         ([self.footprint.x, self.footprint.y], 0.5 * distance(long_m, short_m))
@@ -111,9 +121,9 @@ pub(super) struct Looked {
 pub(super) struct Setting<'a> {
     pub scene: &'a Scene,
     pub sensor: Sensor,
-    /// The sides of the boxes that are asked about, heights too.
+    /// Width, depth and height ranges of all known boxes, metres.
     box_sides_m: Vec<Range>,
-    /// The reach of each segment.
+    /// Bounding rectangle of each segment, seen from above.
     reaches: Vec<Reach>,
 }
 
@@ -123,19 +133,20 @@ impl<'a> Setting<'a> {
         Setting { scene, sensor, box_sides_m, reaches: scene.segments.iter().map(Reach::of).collect() }
     }
 
-    /// The cameras asked about a segment.
+    /// Visibility queries around a segment, without cameras that are misregistered there.
     pub fn asker<'v>(&self, segment: &Segment, seen: &'v Visibility, m: &Measured) -> Asker<'v> {
         let world_from_surface = self.scene.surface.surface_from_world.inverse();
         Asker::of(seen, world_from_surface, &segment.points, tolerance_m(m.sigma_m))
     }
 
-    /// Maximum length of a box hypothesis for the object, metres; `None` if its height fits no
-    /// requested box.
+    /// Maximum side length that is tried for the object as a box, metres; `None` if its height is
+    /// that of no side of a known box.
     fn longest_box_m(&self, m: &Measured) -> Option<f64> {
         /// Multiple of a known box's length up to which lengths are tried, to distinguish longer
         /// objects. From: chosen.
         const LONGER: f64 = 1.3;
-        /// Number of spreads of a height from which a difference is beyond doubt. From: chosen.
+        /// Number of standard deviations of a height from which a difference is beyond doubt.
+        /// From: chosen.
         const SURE: f64 = 6.0;
         let out_m = SURE * m.height_sigma_m;
         let may_be = |range: &&Range| {
@@ -177,7 +188,8 @@ fn rays(segment: &Segment, own: (&[Point3<f64>], &Measured), asker: &Asker, sett
     rays_around(([x, y], half_m, PIXELS), segment, own, asker, setting)
 }
 
-/// Pixels around an object of a given half width, at most `pixels` of each view.
+/// Pixels around an object centred at `[x, y]`, out to its half width and a margin; about `pixels`
+/// of each view.
 pub(super) fn rays_around(
     ([x, y], half_m, pixels): ([f64; 2], f64, f64),
     segment: &Segment,
@@ -288,7 +300,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     const LOST_M: f64 = 0.001;
     /// Quantile of the points of a band that defines its edge. From: chosen.
     const END: f64 = 0.985;
-    /// Points of a band that are enough to go by. From: work.
+    /// Maximum number of points used of a band. From: work.
     const ENOUGH: usize = 600;
     let bands = SILHOUETTES.map(|(low, high)| (base_m + low * height, base_m + high * height));
     let in_band = |&(low, high): &(f64, f64)| {
@@ -323,7 +335,7 @@ fn silhouettes(round: &Round, segment: &Segment, asker: &Asker, base_m: f64, hei
     edges
 }
 
-/// Number of views with the point (surface frame) in the image and unoccluded.
+/// Number of views with the point (surface frame) in the image, measured or hidden.
 fn views_of(asker: &Asker, place: &Point3<f64>) -> usize {
     asker.views.iter().filter(|view| !matches!(view.look(place, IN_VIEW_M), Seen::Never)).count()
 }
@@ -389,9 +401,11 @@ fn measure_round(
     }
 }
 
-/// The visibility around the body, direction by direction.
+/// Visibility around a round body, direction by direction.
 struct Sectors {
+    /// True for each direction in which the side was measured.
     measured: [bool; SECTORS],
+    /// True for each direction in which a camera looked through the side.
     looked_through: [bool; SECTORS],
     /// Seen-through share of possible handle positions, by direction.
     handle_free: [f64; SECTORS],
@@ -433,7 +447,7 @@ impl Sectors {
         share(&self.looked_through)
     }
 
-    /// Share of the circumference that was measured, or beside which a camera looked past.
+    /// Share of the directions in which the side was measured or a camera saw past it.
     fn covered_share(&self) -> f64 {
         let covered = |i: usize| self.measured[i] || self.handle_free[i] > 0.5;
         (0..SECTORS).filter(|&i| covered(i)).count() as f64 / SECTORS as f64
@@ -449,7 +463,7 @@ impl Sectors {
     }
 }
 
-/// Directions in which two or more points lie on the side.
+/// True for each direction in which two or more points lie on the side.
 pub(super) fn measured_sectors(
     round: &Round,
     points: &[Point3<f64>],
@@ -477,8 +491,11 @@ pub(super) struct Protrusion {
     /// Direction of the protrusion: sine and cosine.
     direction: (f64, f64),
     width_m: f64,
+    /// Number of points of the protrusion.
     points: usize,
+    /// Minimum number of points of a handle.
     least: usize,
+    /// True if the protrusion is as high as a handle and begins above the foot.
     inside_height: bool,
 }
 
@@ -494,7 +511,7 @@ impl Protrusion {
         const HEIGHTS: (f64, f64) = (0.08, 1.02);
         /// Number of sectors combined for a protrusion. From: chosen.
         const WINDOW: usize = 3;
-        /// Minimum number of points. From: chosen.
+        /// Minimum number of points of a protrusion. From: chosen.
         const FEWEST: usize = 3;
         /// Quantiles of a protrusion's points that define its extent across and in height.
         /// From: chosen.
@@ -554,8 +571,8 @@ impl Protrusion {
         round.outside_m(p) > PLACE_M && along > 0.0 && across.abs() < HANDLE_WIDTH_M
     }
 
-    /// True if the protrusion is a handle, and not an artefact of misaligned views of a side with
-    /// the spread `spread_m` about its form, metres.
+    /// True if the protrusion is a handle rather than an artefact of misaligned views; `spread_m`:
+    /// root mean square distance of the side's points from the body, metres.
     fn is_handle(&self, spread_m: f64) -> bool {
         self.points >= self.least
             && (HANDLE_M.0.max(SPREADS * spread_m)..HANDLE_M.1).contains(&self.reach_m)

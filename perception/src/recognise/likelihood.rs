@@ -8,13 +8,15 @@ use super::rays::BELL;
 use crate::noise::normal_cdf;
 use crate::scale::{APART_M, EDGE_M, HANDLE_M, PLACE_M, SHAPE_M};
 
-/// Minimum density and least chance that are assumed. From: chosen.
+/// Minimum probability density of a measure. From: chosen.
 const LEAST_DENSITY: f64 = 1e-12;
+/// Minimum probability of a height of which only a lower bound was seen. From: chosen.
 const LEAST_CHANCE: f64 = 1e-6;
-/// Minimum share of a family's objects of the measured size that are of a known kind. From: chosen.
+/// Minimum probability that an object, as measured, is none of the known ones. From: chosen.
 pub(super) const STRANGER: f64 = 0.05;
 
-/// Probability that the measured value lies within a range; `None` for a single value.
+/// Probability that the true value lies within a range, given the measured value; 0 for a range of
+/// one value.
 pub(super) fn inside(value: f64, sigma: f64, r: Range) -> f64 {
     normal_cdf((value - r.low) / sigma) - normal_cdf((value - r.high) / sigma)
 }
@@ -23,7 +25,8 @@ pub(super) fn inside(value: f64, sigma: f64, r: Range) -> f64 {
 /// with it a real mug that narrows was no mug.
 const ASTRAY: f64 = 0.002;
 
-/// Density of a measure under a range: a uniform, blurred by the measurement.
+/// Probability density of a measured value given a range: uniform, blurred by the measurement
+/// error.
 pub(super) fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
     /// Width below which a range is a single value, as a share of the measurement's spread. From: chosen.
     const NARROW: f64 = 0.2;
@@ -35,7 +38,8 @@ pub(super) fn within_density(value: f64, sigma: f64, r: Range) -> f64 {
     }
 }
 
-/// Log density of a measure under a range (uniform, blurred by the measurement) or, without one, under everyday sizes (log-normal).
+/// Log density of a measured value given a range (uniform, blurred by the measurement error) or,
+/// without one, given everyday objects (log-normal: median and spread).
 fn measure_log(value: f64, sigma: f64, range: Option<Range>, everyday: (f64, f64)) -> f64 {
     match range {
         Some(r) => {
@@ -54,7 +58,7 @@ pub(super) const WIDTHS: (f64, f64) = (0.10, 0.6);
 /// Median and log-normal spread of the tapers of everyday things, dimensionless. From: chosen, a
 /// guess; nothing was measured.
 const TAPERS: (f64, f64) = (0.95, 0.25);
-/// Minimum error of a taper, however well the side is measured. From: chosen.
+/// Minimum standard deviation of a taper, however well the side is measured. From: chosen.
 const RATIO_SIGMA: f64 = 0.05;
 
 pub(super) fn height_log(range: Option<Range>, everyday: (f64, f64), m: &Measured) -> f64 {
@@ -77,8 +81,8 @@ pub(super) fn diameter_log(range: Option<Range>, everyday: (f64, f64), m: &Measu
     measure_log(2.0 * m.evidence.radius_m, diameter_sigma_m(m), range, everyday)
 }
 
-/// Log density of diameter and form of a round body jointly: a circle narrower than the body is no
-/// circle of its side, so roundness is no evidence then.
+/// Joint log density of diameter and form of a round body: an outlying diameter is not that of the
+/// body's side, so roundness is no evidence then.
 pub(super) fn round_log(range: Option<Range>, m: &Measured) -> f64 {
     let form = form_log(Some(Shape::Round), m);
     let Some(r) = range.filter(|_| m.round.is_some()) else { return diameter_log(range, WIDTHS, m) + form };
@@ -100,7 +104,7 @@ pub(super) fn taper_log(range: Option<Range>, m: &Measured) -> f64 {
 }
 
 /// Log probability that the taper lies outside a range by more than a margin, for look-alikes with
-/// another side.
+/// another taper.
 pub(super) fn other_taper_log(range: Range, margin: f64, m: &Measured) -> f64 {
     let (taper, sigma) = taper(m);
     (1.0 - inside(taper, sigma, Range { low: range.low - margin, high: range.high + margin }))
@@ -141,7 +145,8 @@ pub(super) fn box_sides_log(sides: Option<(Range, Range)>, m: &Measured) -> f64 
     sides.map_or_else(none, |(width, depth)| both_sides_log(m, [known(width), known(depth)]))
 }
 
-/// Log density of both sides for look-alikes: median and log-normal spread of each side.
+/// Log density of both sides for look-alikes; `sides`: median, metres, and log-normal spread of
+/// each.
 pub(super) fn alike_sides_log(sides: [(f64, f64); 2], m: &Measured) -> f64 {
     both_sides_log(
         m,
@@ -203,7 +208,8 @@ fn raw_form_log(shape: Option<Shape>, m: &Measured) -> f64 {
     miss_log(miss, m)
 }
 
-/// Log likelihood of the side's misfit to a form, metres.
+/// Log likelihood of a form from which the side's points have the root mean square distance
+/// `miss_m`, metres.
 fn miss_log(miss_m: f64, m: &Measured) -> f64 {
     /// Minimum error of a form, as a share of the spread of a measurement. From: chosen.
     const OF_SIGMA: f64 = 0.7;
@@ -230,10 +236,11 @@ pub(super) fn handle_log(handle: Handle, m: &Measured) -> f64 {
     /// of a side; from the second it is a handle. From: chosen, the first is the least reach of a
     /// handle.
     const REACHES_M: (f64, f64) = (HANDLE_M.0, 0.022);
-    /// Probabilities that a visible handle is missed, and that one out of view is found all the
-    /// same. From: chosen.
+    /// Probability that a handle in view is missed. From: chosen.
     const MISSED: f64 = 0.04;
+    /// Probability that a handle in view is found. From: chosen.
     const FOUND: f64 = 0.9;
+    /// Probability that a handle is found wherever it is, even out of view. From: chosen.
     const STRAY: f64 = 0.02;
     /// Probabilities that no handle is found where there is none, and that one is found.
     /// From: chosen.

@@ -60,7 +60,7 @@ pub enum Top {
     Any,
 }
 
-/// Whether the object has a handle at its side.
+/// Presence of a handle at the object's side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Handle {
@@ -114,13 +114,14 @@ pub struct ObjectModel {
 }
 
 impl ObjectModel {
-    /// The sides of a box, its height too; none of what is no box.
+    /// Width, depth and height of a box; `None` for other shapes.
     pub(super) fn box_sides_m(&self) -> Option<[Range; 3]> {
         let (width, depth) = self.width_m.zip(self.depth_m).filter(|_| self.shape == Shape::Box)?;
         Some([width, depth, self.height_m])
     }
 
-    /// A closed box with each of its other sides down; none of what is open, has a handle or is no box.
+    /// Models of a box on its other sides; empty if the object is open at the top, has a handle or
+    /// is no box.
     pub(super) fn on_other_sides(&self) -> Vec<ObjectModel> {
         let sides = self.box_sides_m().filter(|_| self.top != Top::Open && self.handle != Handle::One);
         let Some([width, depth, height]) = sides else { return Vec::new() };
@@ -132,16 +133,17 @@ impl ObjectModel {
     }
 }
 
-/// Greatest length, metres, and taper that is not a mistake. From: chosen.
+/// Maximum length that is not a mistake, metres. From: chosen.
 const LONGEST_M: f64 = 5.0;
+/// Maximum taper that is not a mistake. From: chosen.
 const WIDEST_TAPER: f64 = 10.0;
 
-/// Tapers of which one is meant if none is given. From: chosen.
+/// Range of tapers of a model that states none. From: chosen.
 fn any_taper() -> Range {
     Range { low: 0.7, high: 1.05 }
 }
 
-/// An object model that means nothing.
+/// Fault of an object model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ModelError {
     /// A measure that the shape needs is not given.
@@ -159,11 +161,11 @@ pub enum ModelError {
     Range {
         /// Name of the object.
         object: String,
-        /// The field.
+        /// Name of the field.
         field: &'static str,
-        /// Its least value.
+        /// Least value that was given.
         low: f64,
-        /// Its greatest value.
+        /// Greatest value that was given.
         high: f64,
         /// What was expected, with its unit.
         expected: &'static str,

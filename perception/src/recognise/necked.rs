@@ -8,12 +8,14 @@ use crate::segment::{Scene, Segment, quantile, top_m};
 
 /// Minimum taper of a model that may have a shoulder; less is a straight side. From: chosen.
 const NARROWS: f64 = 1.3;
-/// Shares of the height that show body and neck. From: chosen.
+/// Lower share of the height, which shows the part below the shoulder. From: chosen.
 const BODY: f64 = 0.4;
+/// Upper share of the height, which shows the neck. From: chosen.
 const NECK: f64 = 0.1;
 /// Minimum radius, as a share of the body's, that still belongs below the shoulder. From: chosen.
 const SHOULDER: f64 = 0.9;
-/// Minimum share of the body's points on its side. From: chosen, more than half.
+/// Minimum share of the lower part's points that lie on its fitted side. From: chosen, more than
+/// half.
 const ON_SIDE: f64 = 0.55;
 /// Quantile of the distances from the axis that defines a radius. From: chosen, some points lie on
 /// the top.
@@ -21,18 +23,20 @@ const RADIUS: f64 = 0.75;
 
 /// A body with a neck.
 pub(super) struct Necked {
-    /// Whole body, and its part below the shoulder.
+    /// Whole body.
     pub whole: Segment,
+    /// Part of the body below the shoulder.
     pub body: Segment,
+    /// Height of the whole body above its support, metres.
     pub height_m: f64,
-    /// Diameter at the base over diameter at the top.
+    /// Diameter at the base over diameter at the neck.
     pub taper: f64,
-    /// Segments that are pieces of the body.
+    /// Indices of the segments that are pieces of the body.
     pub pieces: Vec<usize>,
 }
 
-/// Body with a neck that a segment may be together with coaxial pieces on top, if some model is one
-/// of that height.
+/// Joins segment `of` and the coaxial segments on top into a body with a neck; `None` unless some
+/// model narrows so and has that height.
 pub(super) fn necked(scene: &Scene, of: usize, models: &[ObjectModel], sigma_m: f64) -> Option<Necked> {
     let low = &scene.segments[of];
     let narrows = |m: &ObjectModel| m.shape == Shape::Round && m.taper.low > NARROWS;

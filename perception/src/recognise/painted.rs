@@ -1,7 +1,8 @@
-//! Pixels of a body, and their likelihood under colours while the light changes.
+//! Pixels of a body, and their likelihood given colours under changing light.
 //!
-//! Brighter or dimmer light and shading change lightness alone, mostly downwards. A cast of the light shifts the plane of saturation
-//! and hue by the same step everywhere, so the hue of what is nearly grey says nothing.
+//! Shading and the brightness of the light change lightness alone, mostly downwards. Coloured light
+//! shifts saturation and hue, as a vector, equally everywhere, so that the hue of nearly grey
+//! pixels says nothing.
 
 use super::colour::{BASIC, CIRCLE_DEG, Colour, ColourRange};
 use super::likelihood::{log_sum, within_density};
@@ -10,27 +11,32 @@ use crate::scale::PLACE_M;
 use crate::visibility::{DepthMap, Seen, Visibility};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
-/// Mean and standard deviation of the logarithm of a surface's lightness beside that of the same surface where light falls straight:
-/// shading, dim light, exposure. From: chosen, of five pairs that were tried on painted patches under simulated light.
+/// Mean and standard deviation of the logarithm of a surface's lightness over its lightness in
+/// direct light: shading, dim light, exposure. From: chosen, of five pairs that were tried on
+/// painted patches under simulated light.
 const SHADE: (f64, f64) = (-0.25, 0.3);
-/// Standard deviation of the cast of the light, and of the sensor's errors in the dark (at lightness 1), in saturation.
-/// From: chosen, white cups of real recordings lie 0.07 to 0.09 from grey.
+/// Standard deviation of the saturation from coloured light. From: chosen, white cups of real
+/// recordings lie 0.07 to 0.09 from grey.
 const CAST: f64 = 0.05;
+/// Standard deviation of the saturation from sensor noise at lightness 1; it grows as lightness
+/// falls. From: chosen.
 const DARK: f64 = 0.02;
 /// Share of a body's pixels that show a highlight, a shadow's edge, a print or a neighbour. From: chosen.
 const OTHERS: f64 = 0.1;
-/// Density of such pixels: any lightness, in its logarithm, saturation and hue. From: derived, the logarithm of lightness spans 3, and
-/// saturations on a screen reach 0.7.
+/// Probability density of the pixels of [`OTHERS`]: uniform over the logarithm of lightness, saturation and hue
+/// (degrees). From: derived, the logarithm of lightness spans 3, and saturations on a screen reach
+/// 0.7.
 const OTHERS_DENSITY: f64 = 1.0 / (3.0 * 0.7 * CIRCLE_DEG);
-/// Pixels of a view from which its voice is whole: light and print are shared by all of a view's pixels. From: chosen.
+/// Number of pixels from which a view has full weight: light and print are common to all pixels of
+/// a view. From: chosen.
 const WHOLE: f64 = 8.0;
 /// Correlation of the errors of two views: both see the same body in the same room. From: chosen, ten views tell as much as three
 /// independent ones.
 const SHARED: f64 = 0.3;
-/// Points of a body whose pixels are looked at. From: work.
+/// Maximum number of a body's points whose pixels are used. From: work.
 const POINTS: usize = 48;
 
-/// Colour of a pixel.
+/// Colour of a pixel in Oklab, polar form.
 #[derive(Clone, Copy, Debug)]
 struct Pixel {
     lightness: f64,
@@ -38,8 +44,9 @@ struct Pixel {
     hue_deg: f64,
 }
 
-/// Curve of sRGB: its straight part, where it ends and how steep, then offset and exponent. From: sensor, IEC 61966-2-1.
+/// Straight part of the sRGB curve: upper end and slope. From: sensor, IEC 61966-2-1.
 const STRAIGHT: (f64, f64) = (0.040_45, 12.92);
+/// Curved part of the sRGB curve: offset and exponent. From: sensor, IEC 61966-2-1.
 const BENT: (f64, f64) = (0.055, 2.4);
 /// Matrix from linear sRGB to cone responses. From: paper, Ottosson (2020), "A perceptual color space for image processing".
 const CONES_FROM_RGB: Matrix3<f64> = Matrix3::new(
@@ -65,7 +72,8 @@ const LAB_FROM_CONES: Matrix3<f64> = Matrix3::new(
     0.782_771_766_2,
     -0.808_675_766_0,
 );
-/// Lightness below which a pixel is taken for this dark, so that logarithms and saturations stay finite. From: chosen.
+/// Lower limit of lightness and saturation in logarithms and divisions, which keeps both finite.
+/// From: chosen.
 const DARKEST: f64 = 0.05;
 
 impl Pixel {
@@ -82,7 +90,8 @@ impl Pixel {
 
     /// Density of the pixel under a range of colours, blurred by the light and the sensor.
     fn density(&self, range: &ColourRange) -> f64 {
-        /// Hue of a grey is spread over the circle, degrees. From: derived, a third of it.
+        /// Maximum standard deviation of a hue, degrees: the hue of a grey is open. From: derived,
+        /// a third of it.
         const OPEN_DEG: f64 = CIRCLE_DEG / 3.0;
         let shaded = |lightness: f64| lightness.max(DARKEST).ln();
         let Range { low, high } = range.lightness;
@@ -98,11 +107,12 @@ impl Pixel {
     }
 }
 
-/// Pixels of a body as its views show them.
+/// Colours of a body's pixels, by view.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Painted {
     views: Vec<Vec<Pixel>>,
-    /// Log likelihood of all pixels under each basic colour, and under several of them side by side; empty if no pixel was seen.
+    /// Log likelihood of all pixels under each basic colour, then under all of them side by side;
+    /// empty if no pixel was seen.
     logs: Vec<f64>,
 }
 
@@ -134,7 +144,8 @@ impl Painted {
         painted
     }
 
-    /// Log likelihood of all pixels of a body that has these colours and no others. A view has one voice, however many pixels.
+    /// Log likelihood of all pixels of a body that has exactly these colours; a view counts for one
+    /// pixel at most.
     fn log(&self, colours: &[Colour]) -> f64 {
         let ranges: Vec<ColourRange> = colours.iter().map(Colour::range).collect();
         let of = |pixel: &Pixel| {
@@ -148,8 +159,9 @@ impl Painted {
         sum / (1.0 + SHARED * (voices().sum::<f64>() - 1.0).max(0.0))
     }
 
-    /// Log likelihoods of the pixels of a body with the stated colours, and of one with any others, relative to a body of which nothing
-    /// is known; both are 0 where no colour is stated or no pixel was seen.
+    /// Log likelihoods of the pixels of a body with the stated colours, and of one with other
+    /// colours, relative to a body of unknown colour; both are 0 if no colour is stated or no pixel
+    /// was seen.
     pub(super) fn weigh(&self, stated: &[Colour]) -> [f64; 2] {
         if self.logs.is_empty() || stated.is_empty() {
             return [0.0; 2];
@@ -161,7 +173,8 @@ impl Painted {
         [self.log(stated), mean(&others)].map(|log| log - mean(&self.logs))
     }
 
-    /// Probability of each basic colour; the rest is that it has several. Empty if no pixel was seen.
+    /// Probability of each basic colour; the rest to one is that of several colours. Empty if no
+    /// pixel was seen.
     pub(super) fn names(&self) -> Vec<(String, f64)> {
         let total = log_sum(&self.logs);
         BASIC.iter().zip(&self.logs).map(|((name, ..), log)| ((*name).into(), (log - total).exp())).collect()

@@ -1,4 +1,4 @@
-//! Comparison of one body with two for the pixels around a segment.
+//! Comparison of one body with two as explanations of the pixels around a segment.
 
 use super::body::{Body, Cuboid, Frustum, Ray};
 use super::evidence::Measured;
@@ -52,12 +52,13 @@ pub(super) struct Standing<'a> {
 }
 
 impl<'a> Standing<'a> {
-    /// Object of its measured height, on a given foot height.
+    /// Object of the measured height whose foot is at `base_m`.
     pub fn at(measured: &'a Measured, base_m: f64) -> Standing<'a> {
         Standing { measured, base_m, top_m: base_m + measured.height_m }
     }
 
-    /// Round body from the measures: a vessel with walls, or closed.
+    /// Round body from the measures, open with walls of `wall_m` or closed; `None` if no circle
+    /// fits.
     fn round(&self, wall_m: Option<f64>) -> Option<Form> {
         let round = self.measured.round?;
         Some(Form::Round(Frustum { wall_m, ..Frustum::around(&round, self.base_m, self.top_m) }))
@@ -76,7 +77,7 @@ impl<'a> Standing<'a> {
     }
 }
 
-/// Body on or in its holder.
+/// Two objects: a body that stands on or in a holder.
 #[derive(Clone, Copy)]
 pub(super) struct Held<'a> {
     pub body: Standing<'a>,
@@ -87,7 +88,7 @@ pub(super) struct Held<'a> {
 }
 
 impl Held<'_> {
-    /// Log likelihoods of the views for the likeliest pair of body and holder.
+    /// Log likelihood of each view given the likeliest pair of body and holder.
     fn logs(&self, rays: &Rays) -> Vec<f64> {
         let holders: Vec<Form> = if self.is_within {
             self.holder.round(Some(WALL_M)).into_iter().collect()
@@ -101,8 +102,8 @@ impl Held<'_> {
     }
 }
 
-/// Log likelihoods of the views for the likeliest of some bodies, against no body; zero if none is
-/// likelier.
+/// Log likelihood of each view given the likeliest of `bodies`, against no body; zeros if no body
+/// is likelier than none.
 fn best<B: Body + Sync>(rays: &Rays, bodies: &[B]) -> Vec<f64> {
     let of = |body: &B| pool::map(&rays.views, 1, |view| placed(view, body, [0.0; 2], MERGED).log);
     let none = vec![0.0; rays.views.len()];
@@ -110,8 +111,8 @@ fn best<B: Body + Sync>(rays: &Rays, bodies: &[B]) -> Vec<f64> {
     bodies.iter().map(of).chain([none]).max_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default()
 }
 
-/// Log likelihood ratio of two explanations, summed over the views; each view's evidence against
-/// the first is bounded.
+/// Log likelihood ratio of explanation `with` against `without`, summed over the views; a view's
+/// evidence against `with` is bounded.
 fn likelier_log(with: &[f64], without: &[f64]) -> f64 {
     let of_view = |(with, without): (&f64, &f64)| match with - without {
         log if log < 0.0 => bounded(log, BAD_VIEW),
@@ -120,7 +121,7 @@ fn likelier_log(with: &[f64], without: &[f64]) -> f64 {
     with.iter().zip(without).map(of_view).sum()
 }
 
-/// Log likelihood ratio of a body and its holder against both in one piece.
+/// Log likelihood ratio of two objects, body and holder, against one whole object.
 pub(super) fn parted_log(rays: &Rays, whole: Standing, held: Held) -> f64 {
     likelier_log(&held.logs(rays), &best(rays, &whole.forms()))
 }

@@ -15,10 +15,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Published {
-    /// Scale of size differences in metres (α). From: chosen, paper 004 does not state it.
+    /// Size difference that lowers the similarity to 1/e, metres (α). From: chosen, paper 004 does
+    /// not state it.
     pub alpha_m: f64,
-    /// Minimum score of a known object (θ). From: paper, 004 names it; its value is that of the
-    /// code that its authors published (fawkes).
+    /// Minimum score at which a segment is labelled as a known object (θ). From: paper, 004 names
+    /// it; its value is that of the code that its authors published (fawkes).
     pub theta: f64,
 }
 
@@ -73,7 +74,8 @@ impl Recogniser for Published {
 }
 
 impl Published {
-    /// sim_size: the product of e^(−|d′ − d| / α) over the three dimensions of the bounding box.
+    /// Size similarity: the product of e^(−|d′ − d| / α) over the three dimensions of the bounding
+    /// box, with d′ measured and d the model's nearest value.
     fn size_similarity(&self, model: &ObjectModel, size_m: &[f64; 3]) -> f64 {
         let [width, depth] = match model.shape {
             Shape::Round => [model.diameter_m; 2],

@@ -1,8 +1,9 @@
 //! Likelihood of the depths measured around a body, given the body.
 //!
-//! Each pixel met the body, something nearer, what lies behind it, or nothing that is there; a body is as likely as all pixels together
-//! make it, against there being none. Neighbouring pixels err together, so that each counts for a part of a look only, and no view says
-//! more against a body than that it may be a bad one.
+//! Each pixel shows the body, something nearer, the background, or is a stray return. The
+//! likelihood of a body is that of all pixels together, relative to no body. Neighbouring pixels
+//! have correlated errors, so each counts as a part of a measurement, and the evidence of a view
+//! against a body is bounded, as the view may be a bad one.
 
 use super::asker::{Asker, Lying};
 use super::body::{Body, Ray};
@@ -13,14 +14,15 @@ use crate::surface::floor;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rustc_hash::FxHashSet;
 
-/// Approximate number of pixels sampled per view, for the existence of a body and for its extent.
-/// From: work.
+/// Approximate number of pixels sampled per view to test whether a body exists. From: work.
 pub(super) const PIXELS: f64 = 300.0;
+/// Approximate number of pixels sampled per view to measure a body's extent. From: work.
 pub const EDGE_PIXELS: f64 = 1200.0;
-/// Probabilities of an occluder, of background being the surface, and of background being another
-/// object. From: chosen.
+/// Probability that the return is from an occluder before the body. From: chosen.
 const NEARER: f64 = 0.1;
+/// Probability that the background is the surface. From: chosen.
 const SURFACE: f64 = 0.6;
+/// Probability that the background is another object. From: chosen.
 const ELSE: f64 = 0.3;
 /// Depth range over which another object is uniformly distributed, metres. From: chosen.
 const ANYWHERE_M: f64 = 1.0;
@@ -42,32 +44,35 @@ pub struct Rays {
 
 /// Pixels of one view.
 pub struct ViewRays {
+    /// Position of the camera, metres.
     pub from: [f64; 3],
-    /// Offsets of a ray displaced by the lateral noise, to either side and up.
+    /// Shifts of a ray's direction by the lateral noise, in three balanced directions.
     pub wander: [[f64; 3]; 3],
     pub pixels: Vec<Pixel>,
-    /// Number of independent looks that each pixel counts for.
+    /// Number of independent measurements that each pixel counts for, at most 1.
     pub looks: f64,
 }
 
 /// A pixel with a return.
 #[derive(Clone, Copy)]
 pub struct Pixel {
+    /// Shift along the ray per metre of depth.
     pub along: [f64; 3],
+    /// Measured depth, metres.
     pub depth_m: f64,
     /// Standard deviation of the depth, metres.
     pub sigma_m: f64,
-    /// Density of the depth without a body, per metre.
+    /// Probability density of the depth without a body, per metre.
     pub without: f64,
     /// True if the pixel shows another object.
     pub other: bool,
 }
 
-/// The region around the body that is asked about.
+/// Region whose pixels are evidence about a body; surface frame, metres.
 pub struct Around {
     pub x: f64,
     pub y: f64,
-    /// The radius around the body within which pixels are used, metres.
+    /// Half width of the region along x and y, metres.
     pub reach_m: f64,
     pub base_m: f64,
     pub top_m: f64,
@@ -98,7 +103,7 @@ impl Rays {
         Rays { views: asker.views.iter().filter_map(view).collect() }
     }
 
-    /// The rays in another frame.
+    /// Rays transformed from the surface's frame to another.
     pub fn moved(&self, there_from_surface: &Isometry3<f64>) -> Rays {
         let turn = |way: &[f64; 3]| (there_from_surface.rotation * Vector3::from(*way)).into();
         let pixel = |pixel: &Pixel| Pixel { along: turn(&pixel.along), ..*pixel };
@@ -112,7 +117,7 @@ impl Rays {
     }
 }
 
-/// Log likelihood ratio of a view that is uninformative with probability `bad`.
+/// Bounds the log likelihood ratio of a view that is uninformative with probability `bad`.
 pub fn bounded(log: f64, bad: f64) -> f64 {
     let against = |log: f64| ((1.0 - bad) * log.exp() + bad).ln();
     if log < 0.0 { against(log) } else { -against(-log) }
@@ -197,7 +202,7 @@ impl ViewRays {
     }
 }
 
-/// Log of a product of ratios, each at most [`MOST`]; takes the log of several at once.
+/// Log of a product of ratios, each clamped to e^±[`MOST`]; takes one logarithm for many ratios.
 fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
     /// Exponent, in units of [`MOST`], beyond which one more factor could overflow a product.
     /// From: rounding.
@@ -216,7 +221,7 @@ fn log_product(ratios: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Pixel {
-    /// Density of the depth given a body at a depth.
+    /// Probability density of the measured depth given a body at depth `at_m`, per metre.
     #[inline(always)]
     pub fn with_body(&self, at_m: f64) -> f64 {
         /// Probability of a stray return. From: derived, the sensor's.
@@ -232,12 +237,12 @@ impl Pixel {
     }
 }
 
-/// Integral of a bell of height and spread 1. From: derived, the root of two pi.
+/// Integral of a Gaussian of height and standard deviation 1. From: derived, the root of two pi.
 pub(super) const BELL: f64 = 2.506_628_274_631_000_2;
 
 #[inline(always)]
 pub fn normal(off: f64, sigma: f64) -> f64 {
-    /// Number of spreads beyond which the density is zero. From: rounding.
+    /// Number of standard deviations beyond which the density is zero. From: rounding.
     const NONE: f64 = 6.0;
     let spreads = off / sigma;
     if spreads.abs() > NONE { 0.0 } else { (-0.5 * spreads * spreads).exp() / (sigma * BELL) }

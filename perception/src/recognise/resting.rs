@@ -1,7 +1,8 @@
 //! Known round bodies on or in another object, segmented together with it.
 //!
-//! A known body is sought from above: the height map of a segment is searched for circles of the radii that known bodies have, along which
-//! heights drop. What surrounds such a circle tells the height of what would bear the body, or the vessel that it would stand in.
+//! The height map of a segment is searched for circles with the radius of a known body along which
+//! the height drops. The points around such a circle show the height of the body's support, or the
+//! vessel that it stands in.
 
 use super::model::{ObjectModel, Range, Shape};
 use crate::round::{self, Round, SECTORS, distance, sector};
@@ -26,23 +27,25 @@ const MOST: usize = 3;
 /// Minimum and maximum distance from a body in which its surroundings are searched, metres.
 /// From: chosen, no nearer than an edge is known.
 const AROUND_M: (f64, f64) = (EDGE_M + SHAPE_M, 0.02);
-/// Minimum number of directions around a body with a visible support. From: chosen, a single view
-/// shows half of what is around a foot.
+/// Minimum number of directions (of 36) around a body in which its support is seen. From: chosen, a
+/// single view shows half of what is around a foot.
 const BEARS: usize = 9;
-/// Share of the maximum directional support that a level must reach; the highest such level is the
-/// support. From: chosen, nearly all.
+/// Minimum number of directions in which a level is seen, as a share of that of the most seen
+/// level; the highest such level is the support. From: chosen, nearly all.
 const NEARLY: f64 = 0.8;
 /// Standard deviation of the support's height, metres. From: derived, a place.
 const LEVEL_SIGMA_M: f64 = PLACE_M;
-/// Minimum number of directions in which an enclosing vessel must be seen for a body inside, unless
-/// a support right beside the foot is seen in as many. From: chosen.
+/// Minimum number of directions (of 36) in which a vessel must be seen around a body that stands in
+/// it. From: chosen.
 const ALL_AROUND: usize = 27;
+/// Number of directions (of 36) with a level seen right beside the foot from which on that level,
+/// not the bottom of a vessel, is the support. From: chosen.
 const BORNE: usize = 14;
-/// Part below the top, as a share of the lowest known body's height, that determines the axis.
-/// From: chosen.
+/// Height below the top within which points determine the axis, as a share of the height of the
+/// lowest known body. From: chosen.
 const SIDE: f64 = 0.8;
-/// Minimum share of the points between top and support on the body's side. From: chosen, more than
-/// half.
+/// Minimum share of the points around the circle's side that lie on the fitted body. From: chosen,
+/// more than half.
 const ON_SIDE: f64 = 0.55;
 /// Maximum distance of a handle's points from the body, metres. From: derived, the greatest reach
 /// of one.
@@ -56,21 +59,22 @@ const FEWEST_LEFT: usize = 60;
 pub(super) struct Resting {
     pub body: Segment,
     pub rest: Segment,
-    /// True if the body stands in the remainder, a vessel.
+    /// True if the remaining points are a vessel in which the body stands.
     pub is_within: bool,
 }
 
-/// A circle in the height map.
+/// A circle in the height map along which the height drops.
 #[derive(Clone, Copy, Debug)]
 struct Circle {
     x: f64,
     y: f64,
     radius_m: f64,
     top_m: f64,
+    /// Share of the circle with a height drop.
     share: f64,
 }
 
-/// Radii of known round bodies, and the height of the lowest, metres.
+/// Radii of the known round bodies, and a lower bound of their heights, metres.
 pub(super) struct Rounds {
     radii_m: Vec<f64>,
     least_m: f64,
@@ -91,15 +95,16 @@ impl Rounds {
     }
 }
 
-/// Bodies with one of the given radii on or in a segment.
+/// Finds bodies with one of the given radii on or in a segment; `sigma_m`: standard deviation of a
+/// measurement, metres.
 pub(super) fn seek(segment: &Segment, models: &Rounds, sigma_m: f64) -> Vec<Resting> {
     let Some(map) = HeightMap::of(segment) else { return Vec::new() };
     let circles = map.circles(&models.radii_m);
     circles.iter().filter_map(|circle| resting(segment, circle, models.least_m, sigma_m)).collect()
 }
 
-/// Segment with its foot on the bottom of another one, a possible vessel that surrounds it at least
-/// as high as the foot; with the vessel's index.
+/// Segment `of` moved onto the bottom of another segment, a possible vessel that surrounds its
+/// foot, with the vessel's index; `None` if there is none.
 pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<(Segment, usize)> {
     let segment = &scene.segments[of];
     if segment.base_m < BOTTOM_M.0 + PLACE_M {
@@ -115,18 +120,22 @@ pub(super) fn in_vessel(scene: &Scene, of: usize, sigma_m: f64) -> Option<(Segme
 
 /// Height map of a segment.
 struct HeightMap {
+    /// Least x and y, surface frame, metres.
     low: [f64; 2],
+    /// Number of columns (along x) and rows (along y).
     size: [usize; 2],
-    /// Lowest height, and number of levels a cell apart.
+    /// Lowest height, surface frame, metres.
     base_m: f64,
+    /// Number of height levels, each as high as a cell is wide.
     levels: usize,
+    /// Height of the highest point of each cell, row by row, metres; −∞ without points.
     tops_m: Vec<f64>,
 }
 
 impl HeightMap {
     /// Height map of a segment; `None` if the segment is as large as furniture.
     fn of(segment: &Segment) -> Option<HeightMap> {
-        /// Cells at the most. From: work.
+        /// Maximum number of cells, counted over all levels. From: work.
         const MOST_CELLS: usize = 1 << 20;
         let (low, high) = bounds(&segment.points);
         let cells = |k: usize| ((high[k] - low[k]) / CELL_M) as usize + 1;
@@ -227,8 +236,8 @@ fn ring(radius_m: f64) -> Vec<(i32, i32)> {
     cells.filter(is_on).collect()
 }
 
-/// Finds the body below a circle that may be its rim, standing on its surroundings or in a vessel;
-/// `None` if lower than `least_m`.
+/// Finds the body whose upper edge may be `circle`, on a support or in a vessel; `None` if none
+/// fits or it is not higher than `least_m`.
 fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Option<Resting> {
     let outside_m = |p: &Point3<f64>| distance(p.x - circle.x, p.y - circle.y) - circle.radius_m;
     let mut beside = [false; SECTORS];
@@ -259,10 +268,11 @@ fn resting(segment: &Segment, circle: &Circle, least_m: f64, sigma_m: f64) -> Op
     (rest.indices.len() >= FEWEST_LEFT).then_some(Resting { body, rest, is_within })
 }
 
-/// Evidence of a support below a body: number of directions in which the foot's surroundings are
-/// seen, and in which a level at the foot is seen right beside it.
+/// Surroundings of a body's foot.
 struct Bearing {
+    /// Number of directions (of 36) with points beside the body at or above the foot.
     around: usize,
+    /// Number of directions (of 36) with points right beside the body at the foot's height.
     level: usize,
 }
 
@@ -285,8 +295,8 @@ impl Bearing {
     }
 }
 
-/// Height of the support around a body, metres above the surface; `None` if nothing well below its
-/// top is seen.
+/// Height of the support seen around a body, metres above the surface; `None` if none is seen above
+/// the segment's base.
 fn level_m(segment: &Segment, axis: &Round, top_m: f64) -> Option<f64> {
     let band_m = segment.base_m..top_m - APART_M;
     let level = |z: f64| ((z - segment.base_m) / EDGE_M) as usize;

@@ -1,9 +1,9 @@
 //! Local registration of views on one round body.
 //!
-//! Views are merged as wholes, and as such they lie within a centimetre or so of each other: localisation errs, a tracker drifts, and
-//! the front of a lone cup and its back have no point in common that would hold them together. Of a round body each view by itself
-//! tells where the axis stands. So each gets a small shift of its own, as likely as [`PLACE_M`] says, and axis, radius, slope and
-//! shifts are found together.
+//! Merging moves views as wholes, which leaves errors of about a centimetre: localisation errs, and
+//! the front and the back of a lone cup have no point in common. Each view of a round body by
+//! itself shows where the axis is. So each view gets a small shift with standard deviation
+//! [`PLACE_M`], found together with axis, radius and slope.
 
 use super::asker::{Asker, Lying};
 use crate::round::{
@@ -23,23 +23,25 @@ const ROUNDER: f64 = 0.85;
 /// Maximum distance of used points from the side, metres, decreasing over the iterations.
 /// From: chosen, one a step.
 const GATES_M: [f64; 8] = [0.02, 0.02, 0.016, 0.016, 0.012, 0.012, 0.01, 0.01];
-/// Number of points used of each view, and minimum number required. From: chosen.
+/// Maximum number of points used of each view. From: chosen.
 const ENOUGH: usize = 400;
+/// Minimum number of points on the side for a view to be used. From: chosen.
 const FEWEST: usize = 40;
-/// Minimum share of a view's points on the registered body, and their distance in standard
-/// deviations. From: chosen.
+/// Minimum share of a view's points that lie on the registered body. From: chosen.
 const ON_IT: f64 = 0.7;
+/// Maximum spread of a view's points about the registered body, in standard deviations of a
+/// measurement. From: chosen.
 const WELL: f64 = 1.3;
 
 /// Body with registered views.
 pub(super) struct Settled<'a> {
     pub segment: Segment,
-    /// Cameras at their registered poses.
+    /// Visibility queries with the cameras at their registered poses.
     pub asker: Asker<'a>,
     pub round: Round,
 }
 
-/// Body with its views registered on it; `None` if they already are, or if registration does not
+/// Registers the views on a round body; `None` if they already agree, or if registration does not
 /// make the points rounder.
 pub(super) fn settle<'a>(
     round: &Round,
@@ -96,8 +98,8 @@ impl Side {
     }
 }
 
-/// Body and shift of each view, surface frame, metres, by Gauss-Newton over axis, radius, slope and
-/// shifts. `None` if nothing moves, or if a view's points still do not lie on the body.
+/// Estimates the body and the shift of each view (surface frame, metres) by Gauss-Newton. `None` if
+/// no shift matters, one is too large, or a view's points still do not lie on the body.
 fn lay(round: &Round, sides: &[Side]) -> Option<(Round, Vec<[f64; 2]>)> {
     /// Number of body parameters (axis, radius, slope) before the shifts. From: derived, two for
     /// the axis and one each for radius and slope.
@@ -163,8 +165,8 @@ impl Side {
     /// True if the points, shifted back, lie on a body's side with the spread of the camera's
     /// noise.
     fn lies_on(&self, body: &Round, [x, y]: [f64; 2]) -> bool {
-        /// Maximum distance of tested points from the side, if also beyond two standard deviations,
-        /// metres. From: derived, the last of the gates.
+        /// Maximum distance of tested points from the side, metres, unless two standard deviations
+        /// are more. From: derived, the last of the gates.
         const GATE_M: f64 = GATES_M[GATES_M.len() - 1];
         let misses = self.points.iter().map(|p| body.outside_m(&Point3::new(p.x - x, p.y - y, p.z)));
         let near: Vec<f64> = misses.filter(|m| m.abs() < GATE_M.max(2.0 * self.sigma_m)).collect();
@@ -175,15 +177,19 @@ impl Side {
     }
 }
 
-/// Cells of a body's points seen from above, with their neighbours and height range.
+/// Cells that a body's points occupy seen from above, and the points' height range.
 struct Cells {
-    /// First cell of the bounding rectangle, and its size in cells.
+    /// Cell with the least x and y.
     first: [i32; 2],
+    /// Number of cells along x and y.
     sizes: [i32; 2],
-    /// Two flags per cell: points lie in the cell; points lie in or next to the cell.
+    /// True for each cell that holds points.
     own: Vec<bool>,
+    /// True for each cell that holds points or is next to one that does.
     beside: Vec<bool>,
+    /// Least coordinates of the points, x and y lowered by two cells, metres.
     low: Point3<f64>,
+    /// Greatest coordinates of the points, x and y raised by two cells, metres.
     high: Point3<f64>,
 }
 
@@ -220,7 +226,7 @@ impl Cells {
         [p.x, p.y].map(|m| floor(m / PLACE_M))
     }
 
-    /// Index of a point's cell in the rectangle.
+    /// Index of a point's cell; `None` outside the rectangle.
     fn place(&self, p: &Point3<f64>) -> Option<usize> {
         if !(p.x > self.low.x && p.x < self.high.x && p.y > self.low.y && p.y < self.high.y) {
             return None;
@@ -285,7 +291,7 @@ fn pixels_of(
     Some([ranges.next()?, ranges.next()?])
 }
 
-/// One point per small cube: the mean.
+/// Thins points to the mean of those in each cube of side [`EDGE_M`].
 fn thinned(points: impl Iterator<Item = Point3<f64>>) -> Vec<Point3<f64>> {
     let mut cubes: FxHashMap<[i32; 3], usize> = FxHashMap::default();
     let mut sums: Vec<(Vector3<f64>, f64)> = Vec::new();

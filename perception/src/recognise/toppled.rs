@@ -1,6 +1,6 @@
 //! Round objects lying on their side, measured like standing ones after rotation.
 //!
-//! Which of its ends is the foot is not known: it is turned both ways.
+//! Which end of a lying object is its foot is unknown, so that it is measured with either end down.
 
 use super::asker::Asker;
 use super::body::Frustum;
@@ -28,6 +28,7 @@ pub(super) struct Toppled {
     pub ways: [Way; 2],
     /// Pixels around the lying object.
     flat: Rays,
+    /// Height of the support, metres above the surface.
     base_m: f64,
 }
 
@@ -35,12 +36,13 @@ pub(super) struct Toppled {
 pub(super) struct Way {
     pub measured: Measured,
     rays: Rays,
+    /// Position of the foot along the axis, metres.
     foot_m: f64,
 }
 
 impl Toppled {
-    /// Measures of an object that may lie; `None` if no model lying is as large, or the object is
-    /// not round about a horizontal axis.
+    /// Measures of an object as lying; `None` if its top is hidden, no lying model is about as
+    /// large, or it is not round about an axis along the surface.
     pub fn of(
         setting: &Setting,
         segment: &Segment,
@@ -69,12 +71,12 @@ impl Toppled {
         Some(Toppled { ways, flat, base_m: segment.base_m })
     }
 
-    /// The spread of the side about the lying round body, metres.
+    /// Root mean square distance of the side's points from the lying round body, metres.
     pub fn spread_m(&self) -> f64 {
         self.ways[0].measured.evidence.round_residual_m
     }
 
-    /// References for lying models, by end.
+    /// References for verifying models that lie, with either end as foot.
     pub fn own(&self, measured: &Measured) -> [Own<'_>; 2] {
         let as_it_lies = Own::of(&self.flat, measured, self.base_m);
         self.ways.each_ref().map(|way| as_it_lies.turned(&way.rays, &way.measured, way.foot_m))
@@ -129,17 +131,17 @@ fn may_lie(model: &ObjectModel, m: &Measured) -> bool {
         && is_near(m.footprint.sides_m[0], 0.5 * long_m.low, long_m.high + out_m)
 }
 
-/// Handle of a lying object, if seen.
+/// Result of looking for the handle of a lying object.
 struct HandleSeen {
     sighting: Sighting,
     /// Share of the directions in which a handle could hide.
     unseen: f64,
-    /// Reach of the handle, metres.
+    /// Reach of the handle from the body, metres; 0 unless seen.
     reach_m: f64,
 }
 
 impl Found {
-    /// Handle beside or above the body; the support leaves no room below.
+    /// Looks for a handle beside or above the body; below the body, the support leaves no room.
     fn handle(&self) -> HandleSeen {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         let band = side_band(low, high);
@@ -162,8 +164,8 @@ impl Found {
         HandleSeen { sighting, unseen, reach_m }
     }
 
-    /// Standard deviation of the side without a possible handle, which is no evidence against
-    /// roundness, metres.
+    /// Root mean square distance of the side's points from the body, metres, without those of a
+    /// possible handle, which are no evidence against roundness.
     fn spread_without_handle_m(&self, sigma_m: f64) -> f64 {
         let LyingRound { round, ends_m: [low, high], .. } = self.body;
         round.spread_of(&self.points, (low, high), sigma_m, |p| round.outside_m(p) < PLACE_M)

@@ -10,13 +10,14 @@ use crate::scale::{EDGE_M, PLACE_M, SPREADS};
 /// Probability that a view is uninformative about an upper end. From: chosen.
 const BAD_VIEW: f64 = 0.002;
 
-/// Evidence about the upper end.
+/// Evidence of rays about a body's upper end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Upper {
     /// Log likelihood ratio of an open against a closed end.
     pub open_log: f64,
-    /// Share of the rays into the end that met something below, and share at the rim's height.
+    /// Share of the rays into the end that ended below the rim's height; 0 without rays.
     pub open: f64,
+    /// Share of the rays into the end that ended at or above the rim's height; 0 without rays.
     pub lid: f64,
 }
 
@@ -25,10 +26,11 @@ impl Upper {
     pub fn of<'v>(views: impl IntoIterator<Item = &'v ViewRays>, body: &Frustum) -> Upper {
         /// Distance from the rim within which a ray is uninformative, metres. From: chosen.
         const RIM_M: f64 = 0.006;
-        /// Minimum descent of a ray that tests an end. From: rounding.
+        /// Minimum descent of a ray that tests an end, per metre of depth. From: rounding.
         const LEVEL: f64 = 1e-3;
-        /// Share of informative rays into the end, and density of the others. From: chosen.
+        /// Share of informative rays into the end. From: chosen.
         const TELL: f64 = 0.9;
+        /// Probability density of the depth of an uninformative ray, per metre. From: chosen.
         const REST: f64 = 0.02;
         /// Probability that a ray into an open body meets its wall or floor rather than contents.
         /// From: chosen.

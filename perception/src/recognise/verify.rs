@@ -1,5 +1,5 @@
-//! Verification of known models: the likelihood of the views around a thing given a model, relative to that
-//! given the thing's own measures.
+//! Verification of known models: likelihood of the views around an object given a model, relative
+//! to that given the object's own measured shape.
 
 use super::body::{Body, Cuboid, Frustum};
 use super::evidence::Measured;
@@ -13,20 +13,22 @@ use crate::scale::{EDGE_M, PLACE_M};
 pub(super) const WALL_M: f64 = 0.003;
 /// Steps of the search for a body's best shift in a view, metres. From: work.
 const STEPS_M: [f64; 2] = [0.003, 0.0015];
-/// Maximum shift of registered views, metres, and maximum number of tries per step. From: derived,
-/// as exactly as an edge is known; work.
+/// Standard deviation of a body's shift in views registered at it, metres, and maximum number of
+/// steps of each size. From: derived, as exactly as an edge is known; work.
 const LAID: (f64, usize) = (EDGE_M, 2);
-/// Standard deviation and number of steps of the shift for views at their merged poses.
-/// From: derived, a place; work, so that they are moved up to 3 cm.
+/// Standard deviation of a body's shift in views at their merged poses, metres, and maximum number
+/// of steps of each size. From: derived, a place; work, so that they are moved up to 3 cm.
 pub(super) const MERGED: (f64, usize) = (PLACE_M, 7);
 
 /// Minimum radius of a round body, metres. From: rounding.
 const LEAST_M: f64 = 0.01;
 
-/// Log likelihood of a body in a view, and its best shift along both axes of the surface, metres.
+/// Best placement of a body in one view.
 #[derive(Clone, Copy)]
 pub(super) struct Placed {
+    /// Log likelihood ratio against no body, plus the log prior of the shift.
     pub log: f64,
+    /// Best shift of the body along x and y of the surface, metres.
     pub shift_m: [f64; 2],
 }
 
@@ -40,9 +42,9 @@ pub(super) struct Own<'a> {
     rays: &'a Rays,
     measured: &'a Measured,
     base_m: f64,
-    /// Per view: best shift of the frustum, and log likelihood of the better of frustum and box,
-    /// against no body.
+    /// Best shift of the measured frustum in each view; unmoved if no round body was fitted.
     placed: Vec<Placed>,
+    /// Log likelihood of each view, against no body, given the better of measured frustum and box.
     logs: Vec<f64>,
 }
 
@@ -66,14 +68,15 @@ impl<'a> Own<'a> {
         Own { rays, measured, base_m, placed: frustum.unwrap_or_else(unmoved), logs }
     }
 
-    /// Reference for the object rotated upright; the best explanation as lying is kept.
+    /// Reference for the object turned upright, with `rays` and `measured` turned too; the log
+    /// likelihoods of the object as it lies are kept.
     pub fn turned<'b>(&self, rays: &'b Rays, measured: &'b Measured, base_m: f64) -> Own<'b> {
         let placed = vec![Placed::UNMOVED; rays.views.len()];
         Own { rays, measured, base_m, placed, logs: self.logs.clone() }
     }
 
     /// Log likelihood ratio of a model against the best body with the object's own measures; at
-    /// most 0.
+    /// most 0, and 0 for a box.
     pub fn log_against(&self, model: &ObjectModel, stance: Stance) -> f64 {
         let (m, Shape::Round, Some(diameter_m)) = (self.measured, model.shape, model.diameter_m) else {
             return 0.0;
@@ -110,13 +113,13 @@ impl<'a> Own<'a> {
     }
 }
 
-/// Wall thickness of the likelier upper end, common to all bodies, because the upper end is judged
-/// separately.
+/// Wall thickness, metres, if the upper end is more likely open; `None` if closed. The same for all
+/// bodies, because the upper end is judged separately.
 fn wall_m(measured: &Measured) -> Option<f64> {
     (measured.upper.open_log > 0.0).then_some(WALL_M)
 }
 
-/// Evidence of one view, bounded against the model, as the view may be a bad one.
+/// Log likelihood ratio of one view, bounded below because the view may be uninformative.
 fn against(log: f64) -> f64 {
     if log < 0.0 { bounded(log, BAD_VIEW) } else { log }
 }
@@ -126,7 +129,8 @@ fn total(logs: &[f64]) -> f64 {
     logs.iter().sum()
 }
 
-/// Body at its best shift in a view, near an initial shift.
+/// Finds a body's best shift in a view by hill climbing from `from`; `spread_m`: prior standard
+/// deviation of the shift, metres, `tries`: maximum number of steps of each size.
 pub(super) fn placed(
     view: &ViewRays,
     body: &impl Body,

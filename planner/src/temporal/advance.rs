@@ -1,4 +1,5 @@
-//! State transitions of the temporal search: compressed actions, snap actions, and timed effects.
+//! Successor states of the temporal search: compressed actions, starts and ends of actions, and timed
+//! literals.
 
 use std::cell::{OnceCell, RefCell};
 use std::sync::Arc;
@@ -12,47 +13,47 @@ use super::order::Access;
 use super::touch::{Touched, expression_touches};
 use super::world::{Act, DurationRange, EvaluationContext, World};
 
-/// Snap action of a step or of a relaxed operator.
+/// Part of an action that a step or a relaxed operator applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Part {
-    /// Compressed: start and end as one operator.
+    /// The whole action: start and end as one step (compressed).
     Whole,
-    /// The start of an action that then stays open.
+    /// Start of an action that remains in progress.
     Start,
     /// End of an action in progress.
     End,
-    /// A timed effect, or an axiom.
+    /// A timed literal, or an axiom.
     Free,
 }
 
 /// An action in progress.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Open {
-    /// The action.
+    /// Index of the action.
     pub act: u32,
-    /// Parameter proposed by the grounding module.
+    /// Argument proposed by the grounding module; `None` if there is none.
     pub proposal: Option<Arc<str>>,
-    /// Possible durations, seconds.
+    /// Allowed durations, in seconds.
     pub span: DurationRange,
-    /// End effects that can still happen.
+    /// Conditional end effects that can still happen.
     pub gates: Gates,
 }
 
 impl Open {
-    /// Evaluation context inside an action in progress.
+    /// Evaluation context for conditions of the action in progress.
     fn moment<'s>(&'s self, state: &'s Values) -> EvaluationContext<'s> {
         let proposal = self.proposal.as_ref();
         EvaluationContext { state, duration_s: self.span.least_s, proposal, level: Level::Exact }
     }
 }
 
-/// Conditional end effects of an action in progress: one bit for each whose start or over-all
-/// conditions failed; empty without such effects.
+/// End effects with conditions on earlier times, as one bit each: 1 once such a condition has failed,
+/// so that the effect cannot happen. Empty for actions without such effects.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub struct Gates(Vec<u64>);
 
 impl Gates {
-    /// All gates open, for an action's end effects.
+    /// Gates at the start of an action: every end effect can still happen.
     fn open(effects: &[GroundEffect]) -> Gates {
         let remembered =
             effects.iter().rposition(|effect| effect.when.as_ref().is_some_and(|when| is_remembered(when)));
@@ -68,40 +69,41 @@ impl Gates {
     }
 }
 
-/// True if an end effect's condition refers to earlier times.
+/// True if an end effect has a condition on the start or the over-all interval of its action.
 fn is_remembered(when: &GroundWhen) -> bool {
     !when.at_start.is_empty() || !when.over_all.is_empty()
 }
 
-/// State of the temporal search: facts and numbers, the actions in progress, and the number of timed effects
-/// that have happened.
+/// State of the temporal search: facts and numbers, actions in progress, and number of past timed
+/// literals.
 #[derive(Debug, Clone)]
 pub struct Situation {
     /// Facts and numbers.
     pub state: Values,
-    /// Actions in progress, by start.
+    /// Actions in progress, in order of their starts.
     pub open: Vec<Open>,
-    /// Timed effects that have happened.
+    /// Number of timed literals that have happened.
     pub timed: usize,
 }
 
-/// Step of the search.
+/// Step of a temporal plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemporalStep {
-    /// The action; meaningless for timed effects.
+    /// Index of the action; meaningless for timed literals.
     pub act: u32,
-    /// Part; [`Part::Free`] is the next timed effect.
+    /// Part of the action; [`Part::Free`] stands for the next timed literal.
     pub part: Part,
-    /// Parameter proposed by the grounding module.
+    /// Argument proposed by the grounding module; `None` if there is none.
     pub proposal: Option<Arc<str>>,
-    /// Duration chosen by the schedule if it stretches the action, seconds.
+    /// Duration in seconds, if the schedule makes the action longer than its shortest duration; else
+    /// `None`.
     pub taken_s: Option<f64>,
-    /// Duration that the action may take; filled in by [`World::advance`].
+    /// Allowed durations in seconds; set by [`World::advance`].
     pub span: DurationRange,
 }
 
 impl TemporalStep {
-    /// Compressed action, without a proposal.
+    /// Step that applies a whole action, without a proposed argument.
     pub fn whole(act: u32) -> TemporalStep {
         TemporalStep {
             act,
@@ -114,7 +116,7 @@ impl TemporalStep {
 }
 
 impl World<'_> {
-    /// State after a step, or `None` if the step is inapplicable; sets the step's span.
+    /// Situation after a step, or `None` if the step is inapplicable; sets the step's `span`.
     pub fn advance(&self, from: &Situation, step: &mut TemporalStep) -> Result<Option<Situation>, Failure> {
         match step.part {
             Part::Whole => self.whole(from, step),
@@ -178,7 +180,8 @@ impl World<'_> {
         Ok(self.goes_on(&mut next)?.then_some(next))
     }
 
-    /// State after the start, and the durations possible.
+    /// State after the start of an action, and the allowed durations; `None` if the action cannot
+    /// start.
     fn started(
         &self,
         from: &Situation,
@@ -227,8 +230,8 @@ impl World<'_> {
         Ok(gates)
     }
 
-    /// Applies the end of an action already removed from the running ones; `false` if it cannot end
-    /// now.
+    /// Applies the end of an action that has been taken out of the actions in progress; false if it
+    /// cannot end now.
     fn finish(&self, own: &Open, situation: &mut Situation) -> Result<bool, Failure> {
         let act = &self.acts[own.act as usize];
         if !act.flow_effects.is_empty() {
@@ -249,8 +252,8 @@ impl World<'_> {
         self.apply(act.end_effects, &moment, &gate, state)
     }
 
-    /// State just before the end of an action with continuous effects; `None` if an invariant of a
-    /// running action fails in between.
+    /// State just before the end of an action with continuous effects; `None` if an over-all condition
+    /// fails on the way.
     fn flowed(&self, own: &Open, situation: &Situation) -> Result<Option<Values>, Failure> {
         let before = &situation.state;
         let mut last = before.clone();
@@ -288,8 +291,8 @@ impl World<'_> {
         Ok(Some(last))
     }
 
-    /// True if all actions in progress can continue in a state; records end effects that cannot
-    /// happen any more.
+    /// True if the over-all conditions of all actions in progress hold; records conditional end effects
+    /// that can no longer happen.
     fn goes_on(&self, situation: &mut Situation) -> Result<bool, Failure> {
         for open in &mut situation.open {
             let moment = EvaluationContext {
@@ -315,8 +318,8 @@ impl World<'_> {
         Ok(true)
     }
 
-    /// State after the last timed effect if nothing more is done; `None` while an action is in
-    /// progress.
+    /// Situation after the last timed literal if no further step is applied; `None` while an action is
+    /// in progress.
     pub fn ended(&self, situation: &Situation) -> Result<Option<Situation>, Failure> {
         let mut ended = situation.clone();
         while ended.open.is_empty() && ended.timed < self.ground.timed.len() {
@@ -326,8 +329,8 @@ impl World<'_> {
         Ok(ended.open.is_empty().then_some(ended))
     }
 
-    /// True if a plan may end in a state: the goal holds after the last timed effect (PDDL 2.2;
-    /// Edelkamp and Hoffmann 2004).
+    /// True if a plan may end in a situation: no action is in progress, and the goal holds after the
+    /// last timed literal (PDDL 2.2; Edelkamp and Hoffmann 2004).
     pub fn is_goal(&self, situation: &Situation) -> Result<bool, Failure> {
         if !situation.open.is_empty() || !self.keeps_goal(situation) {
             return Ok(false);
@@ -338,14 +341,14 @@ impl World<'_> {
         self.ended(situation)?.map_or(Ok(false), |ended| self.holds_at_end(&ended.state))
     }
 
-    /// True if the goal holds in a last state.
+    /// True if the goal holds in a state.
     pub fn holds_at_end(&self, state: &Values) -> Result<bool, Failure> {
         let moment = EvaluationContext { state, duration_s: 0.0, proposal: None, level: Level::Exact };
         self.holds(&self.ground.goal, &moment)
     }
 
-    /// True if the plain facts of the goal hold after the last timed effect, each by the last timed
-    /// effect on it.
+    /// True if the goal's facts, except derived ones, will hold after the last timed literal if no
+    /// further step is applied.
     fn keeps_goal(&self, situation: &Situation) -> bool {
         let at_end = |variable: u32| match self.last_given.get(&variable) {
             Some(&(timed, value)) if timed >= situation.timed => value,
@@ -357,23 +360,25 @@ impl World<'_> {
     }
 }
 
-/// Resources accessed by an action's start and, if durative, by its end.
+/// Resources that the start of an action accesses and, if the action is durative, those that its end
+/// accesses.
 pub(crate) type Touches = (Access, Option<Access>);
 
-/// Resources accessed by the happenings of every action, with derived variables traced to their
-/// basic ones.
+/// Resources that the happenings of every action access; derived variables are replaced by the basic
+/// ones behind them.
 pub struct Accesses<'w, 'a> {
-    /// Resources accessed by each action, computed on demand: most actions of a large task never happen.
+    /// Resources accessed by each action; computed on demand, as most actions of a large task never
+    /// happen.
     acts: Vec<OnceCell<Touches>>,
     watch: RefCell<Watch<'w, 'a>>,
-    /// Resources accessed by timed effects.
+    /// Resources accessed by each timed literal.
     pub timed: Vec<Access>,
-    /// Number of resources.
+    /// Number of resources: variables and numbers.
     pub resources: usize,
 }
 
 impl<'w, 'a> Accesses<'w, 'a> {
-    /// Accesses of all timed effects, and on demand of actions.
+    /// Accesses of all timed literals; those of actions follow on demand.
     pub fn new(world: &'w World<'a>) -> Accesses<'w, 'a> {
         let resources = world.ground.variables.len() + world.ground.numerics.len();
         let mut watch = Watch::new(world);
@@ -386,16 +391,16 @@ impl<'w, 'a> Accesses<'w, 'a> {
         Accesses { acts, watch: RefCell::new(watch), timed, resources }
     }
 
-    /// Resources accessed by one action.
+    /// Resources accessed by an action.
     pub fn of(&self, act: u32) -> &Touches {
         self.acts[act as usize].get_or_init(|| self.watch.borrow_mut().both(act))
     }
 }
 
-/// Recorder of the resources that happenings access, one after the other.
+/// Collector of the resources that one happening accesses at a time.
 struct Watch<'w, 'a> {
     world: &'w World<'a>,
-    /// Resources that each derived variable is derived from.
+    /// Basic resources behind each derived variable; empty for other variables.
     roots: Vec<Vec<u32>>,
     read: Touched,
     held: Touched,
@@ -437,7 +442,7 @@ impl<'w, 'a> Watch<'w, 'a> {
         self.access(act.flow_effects.iter().chain(act.end_effects))
     }
 
-    /// Access of the recorded reads together with these effects.
+    /// Access of a happening with these effects and the reads collected before; empties the collector.
     fn access<'e>(&mut self, effects: impl Iterator<Item = &'e GroundEffect>) -> Access {
         let (world, read) = (self.world, &mut self.read);
         for effect in effects {
@@ -476,7 +481,7 @@ impl<'w, 'a> Watch<'w, 'a> {
         Access { reads, holds, writes, adds }
     }
 
-    /// Resources with derived variables traced to their basic ones.
+    /// Resources with derived variables replaced by the basic resources behind them.
     fn traced(&self, resources: Vec<u32>) -> Vec<u32> {
         if resources.iter().all(|&resource| self.roots_of(resource).is_none()) {
             return resources;

@@ -1,4 +1,5 @@
-//! Classical compilation of durative actions: compressed, or split into start and end.
+//! Compilation of durative actions into instantaneous ones: each action compressed into one, or split
+//! into its start and its end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,9 +17,9 @@ use super::advance::{Part, TemporalStep};
 use super::space::Space;
 use super::world::{Act, DurationRange, NOTHING, World};
 
-/// First plan by the classical search over compressed actions, or start and end snap actions where
-/// needed; `None` if the task does not allow this or the search fails. Also returns evaluated
-/// states and work. Durations are ignored, so the plan may not fit in time.
+/// First plan by classical search over the compiled actions, with the numbers of evaluated states and
+/// of units of work. `None` if the task cannot be compiled or no plan is found. Durations are ignored,
+/// so the plan may not fit in time.
 pub fn classical_plan(
     space: &Space,
     memory: MemoryLimit,
@@ -56,15 +57,16 @@ pub fn classical_plan(
     Some((actions.iter().map(step).collect(), outcome.evaluated, outcome.work))
 }
 
-/// Maximum number of states evaluated by the classical search, if its plan may not fit in time.
+/// Maximum number of states that the classical search evaluates, if times can make its plan impossible.
 const MOST_EVALUATED: u64 = 20_000;
-/// Maximum number of actions split into start and end, and of added conditions for their
-/// invariants.
+/// Maximum number of actions that are split into start and end.
 const MOST_APART: usize = 5_000;
+/// Maximum number of conditions added to protect the over-all conditions of split actions.
 const MOST_GUARDS: usize = 2_000_000;
 
-/// Classical task with every action compressed or split, and the temporal action of each classical
-/// one.
+/// Classical task in which every action is compressed or split, and the temporal action and part behind
+/// each classical action. `None` for tasks with timed literals, state-dependent durations, too many
+/// split actions, or split actions together with derived facts.
 pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     let world = space.world;
     let apart: Vec<u32> = (0..world.acts.len() as u32).filter(|&act| space.open_act[act as usize]).collect();
@@ -102,11 +104,11 @@ pub fn compressed(space: &Space) -> Option<(GroundTask, Vec<(u32, Part)>)> {
     Some((task, parts))
 }
 
-/// Value of an action's own variable while the action is not running.
+/// Value of the variable that says if a split action is running, while it is not.
 const IDLE: u32 = 1;
 
-/// Start and end snap actions of an action; `running` holds in between. `None` if the action can
-/// never run.
+/// Start and end of a split action as two classical actions; the fact `running` holds in between.
+/// `None` if the action can never run.
 fn halves(act: &Act, seconds: f64, running: GroundFact) -> Option<[GroundAction; 2]> {
     let mut inside =
         in_one_go(&Act { at_end: &NOTHING, end_effects: &[], flow_effects: &[], ..act.clone() }, 0.0)?;
@@ -120,8 +122,8 @@ fn halves(act: &Act, seconds: f64, running: GroundFact) -> Option<[GroundAction;
     Some([inside, end])
 }
 
-/// Adds conditions so that no action deletes an invariant of a running one; `None` if there would
-/// be too many.
+/// Adds conditions so that no action deletes an over-all condition of a running split action; `None` if
+/// they would be too many.
 fn guard(world: &World, task: &mut GroundTask, parts: &[(u32, Part)]) -> Option<()> {
     let mut kept: FxHashMap<u32, Vec<(u32, u32, GroundFact)>> = FxHashMap::default();
     for (action, &(act, _)) in parts.iter().enumerate().filter(|(_, (_, part))| *part == Part::Start) {
@@ -168,7 +170,9 @@ fn seconds(act: &Act) -> Option<f64> {
     Some(least_s)
 }
 
-/// Compressed action; `None` if its own start deletes one of its invariants.
+/// Durative action as one classical action; `None` if its start deletes a later condition, its
+/// conditions contradict each other, or it has conditional effects on earlier times or a grounding
+/// module.
 fn in_one_go(act: &Act, seconds: f64) -> Option<GroundAction> {
     let after_start =
         |variable: u32| act.start_effects.iter().rev().filter_map(set).find(|fact| fact.variable == variable);

@@ -1,4 +1,4 @@
-//! Taking a plan apart for the large neighbourhood search.
+//! Removal of steps from a plan, for the large neighbourhood search.
 
 use crate::ground::{Conjunction, GroundFact, GroundOutcome};
 
@@ -7,17 +7,17 @@ use super::space::Space;
 use super::touch::Touched;
 use super::world::World;
 
-/// Pseudorandom generator with a seed (SplitMix64).
+/// Pseudorandom generator (SplitMix64).
 #[derive(Debug, Clone)]
 pub(crate) struct Chance(u64);
 
 impl Chance {
-    /// Generator from a seed.
+    /// Generator that starts from a seed.
     pub fn new(seed: u64) -> Chance {
         Chance(seed)
     }
 
-    /// A number below `end`; 0 if `end` is 0.
+    /// Pseudorandom number below `end`; 0 if `end` is 0.
     pub fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -27,7 +27,8 @@ impl Chance {
     }
 }
 
-/// Number itself without a seed, else its image under a permutation (the finaliser of SplitMix64).
+/// Image of a number under a permutation chosen by the seed (finaliser of SplitMix64); the number
+/// itself for seed 0.
 pub(super) fn shuffled(number: u64, seed: u64) -> u64 {
     if seed == 0 {
         return number;
@@ -38,7 +39,7 @@ pub(super) fn shuffled(number: u64, seed: u64) -> u64 {
     mixed ^ (mixed >> 31)
 }
 
-/// Facts and numbers still required while a plan is walked backwards.
+/// Facts and numbers that later steps require, while a plan is walked backwards.
 struct Asked<'w, 'a> {
     world: &'w World<'a>,
     facts: Vec<Option<u32>>,
@@ -59,12 +60,12 @@ impl Asked<'_, '_> {
     }
 }
 
-/// Steps of a sequence that a goal needs, by regression from the end: the last writers of the
-/// needed facts, and what these need. For derived facts, numbers and calls, all possible
-/// contributors stay.
+/// Steps of a plan that a goal needs, found by regression: the last writers of the needed facts, and
+/// what these writers need in turn. For derived facts, numbers and calls, all steps that may contribute
+/// are kept.
 ///
-/// An action whose start and end are apart is kept or dropped as a whole: once its start is found useful, the walk begins
-/// anew with its end kept.
+/// An action that is split into start and end is kept or dropped as a whole: once its start is found
+/// useful, the walk begins again with its end kept.
 pub(crate) fn keep_for(world: &World, steps: &[TemporalStep], goal: &Conjunction) -> Vec<TemporalStep> {
     let mut forced = vec![false; steps.len()];
     loop {
@@ -83,7 +84,7 @@ pub(crate) fn keep_for(world: &World, steps: &[TemporalStep], goal: &Conjunction
     }
 }
 
-/// Pairs of starts and ends.
+/// Indices of the start and the end of each split action.
 fn pairs(steps: &[TemporalStep]) -> Vec<(usize, usize)> {
     let mut open: Vec<usize> = Vec::new();
     let mut pairs = Vec::new();
@@ -170,7 +171,7 @@ fn walk(world: &World, steps: &[TemporalStep], goal: &Conjunction, forced: &[boo
     keep
 }
 
-/// Collects the condition of an action, except the part that its own start achieves.
+/// Requires the condition of an action, except facts that the action's own start achieves.
 fn ask_but_for(
     asked: &mut Asked,
     condition: &Conjunction,
@@ -183,7 +184,7 @@ fn ask_but_for(
     asked.ask(&Conjunction { facts, ..condition.clone() });
 }
 
-/// Resources behind each derived variable; `None` for other variables.
+/// Variables and numbers that the axioms of each derived variable read; `None` for other variables.
 fn derived_supports(world: &World) -> Vec<Option<Touched>> {
     let mut supports: Vec<Option<Touched>> =
         world.ground.variables.iter().map(|v| v.stratum.map(|_| Touched::default())).collect();
@@ -215,8 +216,8 @@ fn spread_derived(supports: &[Option<Touched>], asked: &mut Asked) {
     spread.into_iter().for_each(|variable| asked.facts[variable] = None);
 }
 
-/// Random part of a plan to keep while the rest is replanned: a prefix, or the steps for some
-/// goals.
+/// Random part of a plan, to be kept while the rest is replanned: a prefix, or the steps that some of
+/// the goals need.
 pub(crate) fn taken_apart(space: &Space, steps: &[TemporalStep], chance: &mut Chance) -> Vec<TemporalStep> {
     let goal = &space.world.ground.goal;
     let parts = goal.facts.len() + goal.comparisons.len() + goal.calls.len();

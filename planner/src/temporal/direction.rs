@@ -1,12 +1,12 @@
-//! Direction in which effects change numeric conditions.
+//! Direction in which effects move numeric conditions.
 
 use crate::ground::{Change, ComparisonId, GroundExpression, GroundOutcome, Relation};
 
 use super::touch::{Touched, expression_touches};
 use super::world::World;
 
-/// True if simultaneous effects may help a numeric condition; false if they move its sum away from
-/// the bound, or not at all, in every state.
+/// True if effects that happen together may help a numeric condition to hold; false if they surely
+/// leave the compared difference as it is or move it away from the bound.
 pub fn may_help(world: &World, outcomes: &[&GroundOutcome], comparison: ComparisonId) -> bool {
     let comparison = &world.ground.comparisons[comparison as usize];
     let sign = match comparison.relation {
@@ -47,8 +47,8 @@ pub fn may_help(world: &World, outcomes: &[&GroundOutcome], comparison: Comparis
     moved > 0.0
 }
 
-/// True if an expression is a weighted sum of numbers and of answers that do not depend on changed
-/// resources.
+/// True if an expression is a weighted sum of numbers and of attachment answers that do not depend on
+/// `changed`.
 fn is_sum(world: &World, expression: &GroundExpression, changed: &Touched) -> bool {
     let holds = |part: &GroundExpression| is_sum(world, part, changed);
     match expression {

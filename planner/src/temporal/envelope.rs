@@ -1,4 +1,5 @@
-//! Actions whose start and end must be separate in the search: those with required concurrency.
+//! Actions whose start and end must be separate steps in the search, because others have to happen in
+//! between (required concurrency).
 
 use std::collections::BTreeSet;
 
@@ -11,8 +12,8 @@ use crate::ground::{
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// True, by action, if the action is an envelope (required concurrency): others need a fact or
-/// greater number that exists only while it runs. All other actions can be compressed.
+/// True, by action, if other actions may need a fact or a higher number that exists only while the
+/// action runs (an envelope). All other actions can be compressed into one step.
 pub fn envelopes(world: &World) -> Vec<bool> {
     let wanted = Wanted::new(world);
     world
@@ -23,15 +24,15 @@ pub fn envelopes(world: &World) -> Vec<bool> {
         .collect()
 }
 
-/// True, by action, if durative: splitting all starts and ends covers every interleaving.
+/// True, by action, if the action is durative: splitting all of them covers every interleaving.
 pub fn all_apart(world: &World) -> Vec<bool> {
     world.acts.iter().map(|act| act.durative).collect()
 }
 
 /// Actions that must not overlap themselves, if every plan can be rearranged into a sequence of
-/// compressed actions; else `None`. The condition: no timed effects, and every action can delay its
-/// start until its end, or end right after its start, whatever happens in between (compare the
-/// compression-safe actions of Coles et al. 2009).
+/// compressed actions; `None` if this is not known. The condition: no timed literals, and every action
+/// can delay its start until just before its end, or end right after its start, whatever happens in
+/// between (compare the compression-safe actions of Coles et al. 2009).
 pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     if !world.ground.timed.is_empty() {
         return None;
@@ -73,8 +74,8 @@ pub fn in_one_go_suffices(world: &World) -> Option<BTreeSet<u32>> {
     Some(alone_with_itself)
 }
 
-/// True if an action that can start can also start just before its end; `kept`: variables that no
-/// other action changes.
+/// True if an action can start just before its end whenever it can start earlier. `kept` is true for
+/// variables that no other action changes.
 fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
     let kept = |fact: &GroundFact| act.over_all.facts.contains(fact) || kept(fact.variable);
     act.start_effects.is_empty()
@@ -90,7 +91,7 @@ fn starts_late(world: &World, kept: impl Fn(u32) -> bool, act: &Act) -> bool {
             .all(|when| when.at_start.is_empty() && when.over_all.is_empty())
 }
 
-/// True if an action may end right after its start without loss, as its end only affects locked
+/// True if an action can end right after its start without loss, because its end changes only locked
 /// variables.
 fn ends_early(locked: &[bool], act: &Act) -> bool {
     act.at_end.comparisons.is_empty()
@@ -110,8 +111,8 @@ fn plain(effect: &GroundEffect) -> Option<GroundFact> {
     }
 }
 
-/// True if only one action at a time changes a variable: every writer sets it at its start to the
-/// same value, which no condition needs and in which no writer can start.
+/// True if only one action at a time can change a variable: every writer sets the variable at its start
+/// to the same value, which no condition needs and from which no writer can start.
 fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> bool {
     let between = |writer: &u32| {
         let act = &world.acts[*writer as usize];
@@ -125,7 +126,7 @@ fn is_locked(world: &World, wanted: &Wanted, variable: u32, writers: &[u32]) -> 
         && writers.iter().all(|writer| between(writer) == first)
 }
 
-/// True for a state-independent expression.
+/// True if the value of an expression is the same in every state.
 pub(crate) fn settled(world: &World, expression: &GroundExpression) -> bool {
     match expression {
         GroundExpression::Constant(_) => true,
@@ -147,7 +148,7 @@ pub(crate) fn settled(world: &World, expression: &GroundExpression) -> bool {
 struct Wanted {
     facts: FxHashSet<GroundFact>,
     numbers: FxHashSet<NumericId>,
-    /// True, by variable, if a call reads it.
+    /// True, by variable, if some call reads the variable.
     read: Vec<bool>,
 }
 

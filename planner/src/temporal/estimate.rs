@@ -1,10 +1,12 @@
-//! The relaxed plan heuristic of the temporal search.
+//! Relaxed-plan heuristic of the temporal search.
 //!
-//! Labels spread from what holds to what operators give. They add up what is needed (the additive heuristic of Bonet
-//! and Geffner 2001), or they are times: the latest of what is needed, counted from when the resources of the plan so
-//! far are free again, so that idle resources are preferred to busy ones. A relaxed plan is read off the best supporters
-//! (Keyder and Geffner 2008). An operator supports a test if, done alone from the state at hand, it makes it true, or
-//! brings a comparison closer; then it counts as often as it must be repeated (compare Hoffmann 2003, Scala et al. 2016).
+//! Labels spread from the facts of a state through operators to the goal. A label is either a sum of
+//! costs (additive heuristic; Bonet and Geffner 2001) or a time: the latest time among the
+//! preconditions, counted from when the resources used by the plan so far are free again, so that idle
+//! resources are preferred to busy ones. A relaxed plan is extracted along the best supporters (Keyder
+//! and Geffner 2008). An operator supports a test (a numeric condition or call) if, applied alone in
+//! the evaluated state, it makes the test true or brings the compared numbers closer; it then counts as
+//! often as it must be repeated (compare Hoffmann 2003, Scala et al. 2016).
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -18,57 +20,59 @@ use super::advance::Part;
 use super::relaxed::{NOBODY, Operator, Relaxed, Seconds, Test, Waiter};
 use super::world::{EvaluationContext, World};
 
-/// Estimate of the heuristic for a state.
+/// Estimate of the distance from a state to the goal.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Estimate {
-    /// Sum of the costs of the relaxed plan's operators.
+    /// Sum of the costs of the operators in the relaxed plan.
     pub cost: f64,
-    /// Earliest time at which the goal could hold, in seconds from the beginning of the plan, if times count.
+    /// Earliest time at which the goal could hold, in seconds from the beginning of the plan; a sum of
+    /// costs if times do not count.
     pub finish_s: f64,
-    /// Operators of the relaxed plan that could be applied at once.
+    /// Operators of the relaxed plan whose preconditions hold in the state.
     pub preferred: Vec<(u32, Part)>,
-    /// Operators of the relaxed plan, in an applicable order.
+    /// Operators of the relaxed plan, in an order in which the relaxation can apply them.
     pub plan: Vec<(u32, Part)>,
 }
 
 /// State to estimate from.
 pub(crate) struct From<'f> {
-    /// Facts and numbers.
+    /// Facts and numbers of the state.
     pub state: &'f Values,
     /// Actions in progress.
     pub open: &'f [u32],
-    /// Time at which each resource is free, seconds; `None` to add costs up instead of counting time.
+    /// Time from which each resource is free, in seconds; `None` to add costs instead of estimating
+    /// times.
     pub ready_s: Option<&'f [f64]>,
 }
 
-/// Working memory of an evaluation.
+/// Working memory of the heuristic.
 #[derive(Debug, Default)]
 pub(super) struct Work {
     labels: Vec<f64>,
     supporters: Vec<(u32, f32)>,
     wanted: Vec<bool>,
-    /// State of each operator with more than one precondition.
+    /// Progress of each operator that has more than one precondition.
     waiting: Vec<Waiting>,
-    /// Label of the preconditions and own cost of each used operator.
+    /// Label of the preconditions, and own cost, of each operator that was used.
     fired: Vec<(f64, f64)>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
     evaluation: u32,
     goal: Vec<u32>,
-    /// Maximum goal label; recomputed once a goal is `nearer`.
+    /// Greatest label among the goals; recomputed if `nearer` is true.
     latest: f64,
     nearer: bool,
-    /// Lower bounds from each proposition to the goal, in costs and in time; empty until needed.
+    /// Lower bounds from each proposition to the goal, in costs and in seconds; empty until needed.
     remaining: [Vec<f64>; 2],
-    /// The most seconds that any operator was found to take.
+    /// Longest duration found for any operator so far, in seconds.
     dearest_s: f64,
-    /// Number of visited propositions and operators: a deterministic measure of work.
+    /// Number of propositions and operators visited: a deterministic measure of work.
     pub(super) spent: u64,
 }
 
-/// Progress of an operator's preconditions.
+/// Preconditions of an operator reached so far in an evaluation.
 #[derive(Debug, Clone, Copy, Default)]
 struct Waiting {
-    /// The evaluation that this is about.
+    /// Evaluation to which the other fields belong; in any other evaluation, nothing is reached yet.
     evaluation: u32,
     missing: u32,
     base: f64,
@@ -93,8 +97,8 @@ impl Work {
         }
     }
 
-    /// Records a reached precondition with its label; returns the combined label once all
-    /// preconditions are reached.
+    /// Records that a precondition of an operator is reached, with its label. Returns the combined
+    /// label of all preconditions once the last one is reached, else `None`.
     fn meet(&mut self, operator: u32, needs: u32, label: f64, timed: bool) -> Option<f64> {
         if needs == 1 {
             return Some(label);
@@ -108,7 +112,7 @@ impl Work {
         (waiting.missing == 0).then_some(waiting.base)
     }
 
-    /// Maximum goal label; propositions beyond it are useless.
+    /// Greatest label among the goals; propositions with greater labels are useless.
     fn latest(&mut self) -> f64 {
         if std::mem::take(&mut self.nearer) {
             let labels = self.goal.iter().map(|&need| self.labels[need as usize]);
@@ -138,7 +142,7 @@ impl Work {
     }
 }
 
-/// Label with a total order, for queues.
+/// Label with a total order, for priority queues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Key(pub(super) f64);
 
@@ -154,11 +158,12 @@ impl Ord for Key {
     }
 }
 
-/// Cost factor of uncertain support, which may need other changes first.
+/// Factor on the cost of an operator that may help a test only together with other changes.
 const UNSURE: f64 = 3.0;
 
 impl Relaxed {
-    /// Relaxed estimate of the distance to the goal; `None` if unreachable.
+    /// Estimate of the distance from a state to the goal; `None` if the goal is unreachable even in the
+    /// relaxation.
     pub fn estimate(&mut self, world: &World, from: &From) -> Result<Option<Estimate>, Failure> {
         for &call in &self.goal_gates {
             if !world.calls.agrees(call, None, from.state, Level::Relaxed)? {
@@ -247,7 +252,7 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Everything that the operator needs is reached, at this label.
+    /// Applies an operator whose preconditions are all reached, with `base` as their combined label.
     fn fire(&mut self, world: &World, from: &From, index: u32, base: f64) -> Result<(), Failure> {
         let hot = self.hot[index as usize];
         let timed = from.ready_s.is_some();
@@ -297,7 +302,8 @@ impl Relaxed {
         Ok(())
     }
 
-    /// Minimum and likely duration of an operator, seconds; `None` if it is never applicable.
+    /// Lower bound and likely value of an operator's duration, in seconds; `None` if the duration never
+    /// changes and makes the operator inapplicable.
     fn seconds(
         &mut self,
         world: &World,
@@ -328,7 +334,8 @@ impl Relaxed {
         Ok(Some(seconds.map_or((0.0, later_s), |seconds| (seconds, seconds))))
     }
 
-    /// Contribution of an operator to the measure besides time, in equivalent seconds.
+    /// Contribution of an operator to the plan measure apart from the makespan, in equivalent seconds
+    /// of makespan.
     fn counted_s(&self, world: &World, state: &Values, index: u32) -> Result<f64, Failure> {
         let operator = &self.operators[index as usize];
         match self.counted.get(operator.act as usize) {
@@ -341,8 +348,8 @@ impl Relaxed {
         }
     }
 
-    /// Repetitions of the operator from the state until its own effects satisfy a test; `None` if
-    /// it cannot help.
+    /// Number of applications of an operator until a test holds, by its own effects alone; `None` if it
+    /// cannot help.
     fn repetitions(
         &self,
         world: &World,
@@ -382,8 +389,8 @@ impl Relaxed {
         Ok((!hopeless).then_some(UNSURE))
     }
 
-    /// State after the effects of an operator on the numbers of tests, ignoring its conditions;
-    /// `None` if unknown in this state.
+    /// State after the effects of an operator alone, whatever its conditions, with the numbers that
+    /// tests read; `None` if the effects are not known in this state.
     fn effects_alone(
         &self,
         world: &World,
@@ -463,7 +470,7 @@ impl Relaxed {
     }
 }
 
-/// True if the operator's action changes numbers by constants.
+/// True if the numeric effects of an operator's action only add constants, without conditions.
 fn changes_by_constants(world: &World, operator: &Operator) -> bool {
     let Some(act) = world.acts.get(operator.act as usize) else { return false };
     let mut effects = act.start_effects.iter().chain(act.end_effects);
@@ -477,8 +484,8 @@ fn changes_by_constants(world: &World, operator: &Operator) -> bool {
         })
 }
 
-/// Proposed parameter accepted by the operator's own calls, `Some(None)` if it has none; `None` if
-/// nothing is accepted.
+/// First proposed argument that the operator's own calls accept, or `Some(None)` if the action takes no
+/// proposal; `None` if nothing is accepted.
 fn suiting(world: &World, state: &Values, operator: &Operator) -> Result<Option<Option<Arc<str>>>, Failure> {
     let agree = |proposal: Option<&Arc<str>>| -> Result<bool, Failure> {
         for &call in &operator.gates {

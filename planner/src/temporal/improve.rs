@@ -1,8 +1,9 @@
-//! Anytime search: a first plan, then better ones.
+//! Anytime search: finds a first plan, then better ones.
 //!
-//! The first search is greedy. Then come searches from the start that weigh what a plan costs ever more against how far
-//! the goal seems (restarting weighted A*, Richter, Thayer and Ruml 2010), and then a large neighbourhood search: a part
-//! of the plan is taken out, what is left is kept, and the goal is reached again from there within the bound.
+//! The first search is greedy. Then come searches from the beginning that give path costs ever more
+//! weight relative to the heuristic (restarting weighted A*; Richter, Thayer and Ruml 2010), and then a
+//! large neighbourhood search: part of the plan is removed, the rest is kept, and the goal is reached
+//! again from there at lower cost.
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -30,73 +31,76 @@ use super::world::World;
 /// Limits of the search for plans.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
-    /// Improve until stopped or proven best.
+    /// True to improve the plan until stopped or proven best.
     pub anytime: bool,
-    /// Return the first plan, without improvement.
+    /// True to return the first plan without improvement.
     pub first: bool,
-    /// Only plans below this.
+    /// Only plans with a measure below this bound are accepted.
     pub bound: f64,
-    /// States evaluated at most.
+    /// Maximum number of evaluated states.
     pub evaluations: u64,
-    /// Memory at most.
+    /// Maximum memory.
     pub memory: MemoryLimit,
-    /// Decides every choice that is left open.
+    /// Seed of all random choices.
     pub seed: u64,
 }
 
-/// Progress of the search, and the reason for its end.
+/// Progress of the search, and the reason why it ended.
 #[derive(Debug, Clone)]
 pub(crate) struct Progress {
-    /// Reason for the end.
+    /// Reason why the search ended.
     pub reason: Reason,
-    /// Effort of the search.
+    /// Counts of evaluated and expanded states, and of work.
     pub counts: Counts,
-    /// Number of plans found.
+    /// Number of plans found, each better than the one before.
     pub plans: u64,
-    /// Actions that might help if they overlap themselves, after exhausting every other
-    /// possibility.
+    /// Actions that might allow a plan if they overlapped themselves, once everything else is
+    /// exhausted.
     pub overlapping: Vec<u32>,
 }
 
-/// Reason a search for plans ended.
+/// Reason why a search for plans ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Reason {
-    /// Search space exhausted: without a plan, none exists, unless self-overlapping actions allow
-    /// one.
+    /// Search space exhausted: no (better) plan exists, unless self-overlapping actions allow one.
     Exhausted,
-    /// Open list empty, but parts of the space were pruned: nothing is proven.
+    /// Nothing is left to search, but parts of the space were pruned: nothing is proven.
     Unproven,
-    /// The effort that was meant to be spent is spent.
+    /// The effort planned for the search is used up.
     Enough,
-    /// Asked to stop, or the limit of evaluations is reached.
+    /// Stopped by the caller, or by the limit of evaluations.
     Stopped,
-    /// Memory limit reached.
+    /// The memory limit was reached.
     Memory,
 }
 
-/// Minimum work on improvement after a first plan without `anytime`, in evaluated states times
-/// operators.
+/// Effort of improving a plan without `anytime`, in evaluated states times actions, for each share of
+/// its steps.
 const IMPROVEMENT_WORK: u64 = 2_000_000;
+/// Number of steps of a plan that add one share of that effort.
 const STEPS_PER_SHARE: u64 = 16;
-const IMPROVEMENT_FACTOR: u64 = 20;
-/// Minimum of the limit on improvement work without `anytime`, which otherwise is the work of the
+/// Minimum effort of improving a plan without `anytime`, as a multiple of the states evaluated for the
 /// first plan.
+const IMPROVEMENT_FACTOR: u64 = 20;
+/// Minimum limit on the work of improving a plan without `anytime`; the limit is the work done before,
+/// if that is more.
 const LEAST_WORK: u64 = 150_000_000;
-/// Maximum number of consecutive fruitless repairs per step of the plan, without `anytime`.
+/// Maximum number of consecutive repairs without success, per step of the plan, without `anytime`.
 const PATIENCE: u64 = 10;
-/// Weights of the heuristic in the searches that improve a plan.
+/// Weights of the heuristic in the searches from the beginning that improve a plan.
 const WEIGHTS: [f64; 2] = [3.0, 1.0];
-/// Evaluations of the first, short search for a plan, at least and at most, and evaluated states times operators.
+/// Minimum and maximum number of evaluations of each first, short search for a plan.
 const FIRST_TRY: (u64, u64) = (50, 500);
+/// Effort of each first, short search for a plan, in evaluated states times actions.
 const FIRST_WORK: u64 = 2_000_000;
-/// Minimum number of evaluations of a search with self-overlapping actions.
+/// Minimum limit of evaluations of a search with self-overlapping actions.
 const LEAST_OVERLAPPED: u64 = 2_000;
-/// Evaluations of a search for a first plan before linear programs are tried.
+/// Number of evaluations of a search for a first plan before linear programs are tried.
 const SHORT: u64 = 500;
-/// Minimum number of evaluations of one repair in the large neighbourhood search.
+/// Minimum limit of evaluations of one repair in the large neighbourhood search.
 const REPAIR: u64 = 200;
 
-/// Searches for plans; `on_plan` gets each that improves on the one before.
+/// Searches for plans; `on_plan` gets every better plan.
 pub(crate) fn search_plans(
     world: &World,
     measure: &Measure,
@@ -140,7 +144,7 @@ pub(crate) fn search_plans(
     Ok(progress)
 }
 
-/// Searches for a first plan by linear programs; true if this ends the search.
+/// Searches for a first plan by linear programs; true if one is found, which ends the search.
 fn by_programs(
     world: &World,
     measure: &Measure,
@@ -161,8 +165,8 @@ fn by_programs(
     Ok(true)
 }
 
-/// Searches, with the same effort again, for a plan with self-overlapping actions, if no other plan
-/// is left to find.
+/// Searches once more, with about the same effort, for a plan with self-overlapping actions, after
+/// everything else is exhausted.
 fn overlapped(
     world: &World,
     measure: &Measure,
@@ -181,15 +185,16 @@ fn overlapped(
     Ok(())
 }
 
-/// Pass of searching for plans and improving them.
+/// One pass of searching for plans and improving them, with some of the actions split into start and
+/// end.
 struct Pass {
-    /// True, by action, if start and end are separate.
+    /// True, by action, if start and end are separate steps.
     apart: Vec<bool>,
-    /// True if nothing may be pruned.
+    /// True if nothing may be pruned that could lead to a plan.
     exact: bool,
-    /// Maximum number of simultaneous instances of an action.
+    /// Maximum number of instances of an action that are in progress at once.
     at_once: usize,
-    /// True if the search for a first plan ends after [`SHORT`] states.
+    /// True if the search for a first plan ends after [`SHORT`] evaluated states.
     is_short: bool,
 }
 
@@ -198,7 +203,7 @@ impl Pass {
         Pass { apart: apart.to_vec(), exact, at_once: 1, is_short: false }
     }
 
-    /// Continues from the plans and bound of earlier passes; true if no further pass can do better.
+    /// Runs the pass, with the best bound of earlier passes; true if no further pass is needed.
     fn run(
         &self,
         world: &World,
@@ -247,9 +252,9 @@ impl Pass {
         Ok(progress.reason != Reason::Unproven)
     }
 
-    /// True if plans of compressed actions cover all plans; rearranged into one, a plan stays
-    /// valid, but may end later. Records the actions for which this is known only without
-    /// self-overlap.
+    /// True if plans of compressed actions stand for all plans: any plan can be rearranged into one,
+    /// which stays valid but may end later. Adds actions to `overlapping` for which this holds only if
+    /// they do not overlap themselves.
     fn all_in_one_go(&self, space: &Space, progress: &Progress, overlapping: &mut BTreeSet<u32>) -> bool {
         if self.apart.contains(&true) || progress.plans > 0 && space.timed_measure() {
             return false;
@@ -265,26 +270,26 @@ struct Run<'r, 'w, 'a> {
     base: Base,
     exact: bool,
     at_once: usize,
-    /// States that the search for a first plan evaluates at most.
+    /// Maximum number of states that the search for a first plan evaluates.
     most_first: u64,
-    /// States that the classical search evaluated.
+    /// Number of states that the classical search evaluated.
     elsewhere: u64,
-    /// Work that all searches together may do.
+    /// Maximum work of all searches together.
     work: u64,
     limits: Limits,
     stop: &'r (dyn Fn() -> bool + Sync),
     progress: Progress,
-    /// Actions that could have overlapped themselves in the search behind a proof.
+    /// Actions that could have overlapped themselves in the search that proved exhaustion.
     overlapping: BTreeSet<u32>,
     on_plan: &'r mut dyn FnMut(&[Timed]) -> Result<(), Failure>,
     best: Option<Best>,
     tours: OnceCell<Option<Tours<'w, 'a>>>,
 }
 
-/// Best plan so far.
+/// Best plan found so far.
 struct Best {
     measured: f64,
-    /// Sum of the times at which the goals are achieved.
+    /// Sum of the times, in seconds, at which the goal's facts are achieved.
     slowness_s: f64,
     steps: Vec<TemporalStep>,
 }
@@ -352,7 +357,7 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Records the end of a search; true if it also ends the search for a first plan.
+    /// Records the result of a search; true if this ends the search for a first plan.
     fn took(&mut self, end: End) -> Result<bool, Failure> {
         let (reason, over) = match end {
             End::Found(steps) => (Reason::Unproven, self.take(steps)?),
@@ -369,8 +374,9 @@ impl Run<'_, '_, '_> {
         Ok(over)
     }
 
-    /// Adopts a plan if better than the best so far, without superfluous steps. Ties are broken by
-    /// the sum of goal achievement times, as earlier goals are closer to an improvement.
+    /// Adopts a plan, without superfluous steps and shortened, if it is better than the best one; true
+    /// if so. Of equally good plans, the one whose goals are achieved earlier is kept, as it is closer
+    /// to an improvement.
     fn take(&mut self, mut steps: Vec<TemporalStep>) -> Result<bool, Failure> {
         let Some((mut measured, mut base)) = self.space.replay_to_goal(&mut steps, self.stop)? else {
             return Ok(false);
@@ -392,7 +398,8 @@ impl Run<'_, '_, '_> {
         self.keep(plan, found)
     }
 
-    /// Adopts a plan if better than the best so far; `found`: the plan as found by the search.
+    /// Adopts a replayed plan if it is better than the best one; true if so. `found` is the plan as the
+    /// search found it, which is used if the improved one cannot be scheduled.
     fn keep(&mut self, plan: Replayed, found: Vec<TemporalStep>) -> Result<bool, Failure> {
         let (measured, mut steps, base) = plan;
         let ready_s = base.track.order.ready_s();
@@ -430,7 +437,7 @@ impl Run<'_, '_, '_> {
         Ok(better)
     }
 
-    /// Plan with its tours reordered, if better.
+    /// Plan with the stops of its tours reordered, if that is better.
     fn rearranged(&self, plan: Replayed) -> Result<Replayed, Failure> {
         match self.tours.get_or_init(|| Tours::new(self.space.world)) {
             Some(tours) => tours.rearranged(self.space, plan, self.stop),
@@ -491,7 +498,8 @@ impl Run<'_, '_, '_> {
         Ok(())
     }
 
-    /// Large neighbourhood search: destroys and repairs the plan until the budget is spent.
+    /// Large neighbourhood search: removes part of the plan and replans it, until the budget is used
+    /// up.
     fn neighbourhoods(&mut self, budget: u64) -> Result<(), Failure> {
         let mut chance = Chance::new(self.limits.seed);
         let mut idle = 0;
@@ -548,13 +556,14 @@ impl Run<'_, '_, '_> {
     }
 }
 
-/// Minimum difference that counts as better: above the rounding of sums of times.
+/// Minimum difference of the measure at which a plan counts as better, above the rounding of sums of
+/// times.
 fn tolerance(measured: f64) -> f64 {
     1e-6 * measured.abs().max(1.0)
 }
 
-/// Steps sorted by start, so that a prefix is what happens until some time. The order may be
-/// invalid as a sequence of compressed steps, because an early start may have a late end.
+/// Steps in order of their times, so that a prefix of them is what happens until some time. The order
+/// may be invalid as a sequence of compressed steps, because an action that starts early may end late.
 fn in_time_order(space: &Space, steps: &[TemporalStep]) -> Vec<TemporalStep> {
     let Ok(track) = space.track(steps) else { return steps.to_vec() };
     let mut starts: Vec<usize> = Vec::new();

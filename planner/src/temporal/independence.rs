@@ -1,4 +1,4 @@
-//! Independence of happenings: an action's start and end, and snap actions of several actions.
+//! Independence of the happenings of actions.
 
 use crate::ground::GroundOutcome;
 
@@ -8,14 +8,14 @@ use super::touch::{Touched, expression_touches};
 use super::world::{Act, World};
 
 impl World<'_> {
-    /// True if the search's steps cover every plan: no durations chosen for effects, no reads of
-    /// continuously changing numbers, and no required simultaneous starts or ends.
+    /// True if the steps of the search can produce every plan: no number depends on a chosen duration
+    /// or on continuous change, and no actions have to start or end at the very same time.
     pub fn is_complete(&self) -> bool {
         *self.complete.get_or_init(|| !self.chooses_numbers() && !some_only_together(self))
     }
 
-    /// True if an action's end is independent of its start: neither changes what the other
-    /// accesses.
+    /// True if the start and the end of an action are independent: neither changes what the other reads
+    /// or changes.
     pub(super) fn ends_freely(&self, act: &Act) -> bool {
         let [mut read, mut written, mut end_read, mut end_written] = [(); 4].map(|()| Touched::default());
         read.condition(self, act.at_start);

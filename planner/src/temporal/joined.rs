@@ -1,6 +1,6 @@
-//! Shortcuts: replaces two steps of one action by one: `(move a b)`, `(move b c)` by `(move a c)`.
-//! A search that follows relaxed plans fetches one thing after another and does not see such
-//! detours.
+//! Shortcuts: replaces two steps of one action by a single one, such as `(move a b)`, `(move b c)` by
+//! `(move a c)`. A search that follows relaxed plans reaches one goal after another and does not notice
+//! such detours.
 
 use crate::calls::Failure;
 use crate::ground::GroundOutcome;
@@ -10,12 +10,13 @@ use super::schedule::Replayed;
 use super::space::Space;
 use super::world::{Act, World};
 
-/// Maximum number of steps replayed, and of actions inspected, for one plan.
+/// Maximum number of steps replayed for one plan.
 const MOST_REPLAYED: usize = 20_000;
+/// Maximum number of actions inspected for one plan.
 const MOST_LOOKED_AT: usize = 20_000_000;
 
-/// Plan with pairs of steps replaced by one or removed while the plan gets no worse; always
-/// replayed.
+/// Plan in which pairs of steps are replaced by one step or removed, as long as the plan gets no worse.
+/// The result is a complete replay.
 pub fn shortened(space: &Space, mut plan: Replayed, stop: &dyn Fn() -> bool) -> Result<Replayed, Failure> {
     let mut left = MOST_REPLAYED;
     let mut looks = MOST_LOOKED_AT / space.world.acts.len().max(1);
@@ -52,8 +53,8 @@ pub fn shortened(space: &Space, mut plan: Replayed, stop: &dyn Fn() -> bool) -> 
     }
 }
 
-/// Pairs of steps by one action, the second of which needs an effect of the first; incomplete once
-/// stopped.
+/// Pairs of compressed steps of one action schema, the second of which needs an effect of the first;
+/// incomplete if `stop` returns true.
 fn pairs(world: &World, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> Vec<(usize, usize)> {
     let act = |step: &TemporalStep| &world.acts[step.act as usize];
     let is_whole = |step: &TemporalStep| step.part == Part::Whole && step.proposal.is_none();
@@ -76,7 +77,7 @@ fn pairs(world: &World, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> Vec<
     pairs
 }
 
-/// Actions of the same kind whose arguments each come from one of two actions.
+/// Actions of the same schema, each of whose arguments comes from one of two actions.
 fn instead<'w>(world: &'w World, first: u32, second: u32) -> impl Iterator<Item = u32> + use<'w> {
     let [one, other] = [first, second].map(|act| world.acts[act as usize].origin);
     let is_instead = move |act: &Act| {

@@ -1,9 +1,10 @@
 //! Search over happenings with linear programs (COLIN; Coles, Coles, Fox and Long 2012): times,
-//! durations and numbers are chosen together, and a sequence is kept while its linear program is
-//! feasible.
+//! durations and numbers are chosen together, and a sequence of happenings is kept while its linear
+//! program is feasible.
 //!
-//! Other searches try the ends of a range of durations, and look at numbers that flow only where an action ends. This one
-//! knows no more than a number's range: it is slower, and proves nothing.
+//! The other searches only try some durations of each action, and evaluate continuously changing
+//! numbers only at the ends of actions. This search is slower, because its heuristic knows only the
+//! range of each number, and its exhaustion proves nothing.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -25,30 +26,31 @@ use super::space::{Measure, Space};
 use super::timed::{Timed, to_plan};
 use super::world::{Act, DurationRange, World};
 
-/// States that are evaluated at most.
+/// Maximum number of evaluated states.
 const MOST_EVALUATED: u64 = 1_500;
 /// Maximum number of time-dependent numbers whose ranges are computed for the heuristic.
 const MOST_RANGES: usize = 8;
-/// Cost of a state without a relaxed plan, which may still be feasible with other numbers.
+/// Cost of a state without a relaxed plan, which may still lead to the goal with other values of its
+/// numbers.
 const FAR: f64 = 1e9;
-/// Squares of the comparisons of all programs, at most: some seconds.
+/// Maximum sum over all linear programs of the squared number of constraints: some seconds of
+/// computation.
 const MOST_WORK: u64 = 10_000_000;
-/// Bytes that states may take together.
+/// Maximum memory of all states together, in bytes.
 const MOST_BYTES: u64 = 100 << 20;
-/// Extra evaluations for better plans, besides as many as the first one took.
+/// Number of evaluations, besides as many as the first plan took, that are spent on better plans.
 const MORE: u64 = 100;
-/// Minimum difference that counts as better.
+/// Minimum difference of the measure at which a plan counts as better.
 const TOLERANCE: f64 = 1e-6;
-/// Weight of the makespan as a tie-breaker for a metric without it.
+/// Weight of the makespan, as a tie-breaker, in a metric without it.
 const TIME_WEIGHT: f64 = 1e-4;
 
-/// True if the task's numbers fit linear programs: no attachments.
+/// True if the task has no attachments, so that its numbers may fit linear programs.
 pub(super) fn is_linear(world: &World) -> bool {
     world.ground.calls.is_empty() && !world.proposes
 }
 
-/// Best plan by linear programs with a measure below the bound, with the number of evaluated
-/// states.
+/// Best plan found with a measure below the bound, `None` if none, and the number of evaluated states.
 pub(super) fn linear_plan(
     space: &Space,
     relaxed: &mut Relaxed,
@@ -81,28 +83,30 @@ struct Running {
     act: u32,
     end: u32,
     duration: Linear,
-    /// Numbers that the action changes continuously, with their rates per second.
+    /// Numbers that the action changes continuously, with the change per second.
     rates: Vec<(NumericId, f64)>,
 }
 
-/// Sequence of happenings with the resulting state.
+/// Sequence of happenings with the state that it leads to.
 #[derive(Debug, Clone)]
 struct Node {
-    /// Facts; the numbers are in `numbers`.
+    /// Facts of the state; its numbers are in `numbers`.
     state: Values,
     numbers: Vec<Linear>,
     open: Vec<Running>,
     timed: usize,
     costs: Option<Linear>,
-    /// Time variable of the last happening, and that of the last action's happening.
+    /// Time variable of the last happening; `None` before the first.
     last: Option<u32>,
+    /// Time variable of the last start or end of an action; `None` before the first.
     last_own: Option<u32>,
     program: Program,
-    /// Actions with the time variables of their starts and ends.
+    /// Actions with the time variables of their start and their end; no end for instantaneous ones.
     steps: Vec<(u32, u32, Option<u32>)>,
 }
 
-/// Next happening of a node.
+/// Happening that can come next: start of an action, end of an action in progress by its position, or
+/// timed literal.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Start(u32),
@@ -110,7 +114,8 @@ enum Next {
     Given,
 }
 
-/// Key of a node: facts, actions in progress, timed effects, and the ranges of the numbers and of time.
+/// Key for recognising equal nodes: facts, actions in progress, number of past timed literals, and
+/// ranges of the numbers and of time.
 type Seen = (Vec<u32>, Vec<u32>, usize, Vec<[i64; 2]>);
 
 struct Search<'s, 'w, 'a> {
@@ -122,7 +127,7 @@ struct Search<'s, 'w, 'a> {
     nodes: Vec<Node>,
     seen: FxHashSet<Seen>,
     evaluated: u64,
-    /// Comparisons of every program, squared.
+    /// Sum over all linear programs so far of the squared number of constraints.
     work: u64,
 }
 
@@ -164,7 +169,7 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok(best)
     }
 
-    /// Evaluates and enqueues a node, unless it is infeasible or known.
+    /// Evaluates a node and puts it into the queue, unless it is infeasible, too late or already known.
     fn keep(&mut self, node: Node, queue: &mut BinaryHeap<Reverse<(Key, u32)>>) -> Result<(), Failure> {
         self.evaluated += 1;
         self.work += (node.program.rows() as u64 + 1).pow(2);
@@ -202,7 +207,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         (0..node.open.len()).map(Next::End).chain(given).chain(starts.map(Next::Start)).collect()
     }
 
-    /// Node after a happening; `None` if inapplicable or nonlinear.
+    /// Node after one more happening; `None` if the happening is inapplicable or cannot be expressed
+    /// linearly.
     fn after(&self, node: &Node, next: Next) -> Result<Option<Node>, Failure> {
         let mut made = node.clone();
         let happens = match next {
@@ -223,7 +229,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok(made.goes_on(self.space.world).then_some(made))
     }
 
-    /// Plan of a node, if the goal holds after the last timed effect.
+    /// Plan of a node with its measure, if the goal holds after the last timed literal and the plan is
+    /// valid and better than the bound; else `None`.
     fn plan(&self, node: &Node) -> Result<Option<(f64, Vec<Timed>)>, Failure> {
         if !node.open.is_empty() {
             return Ok(None);
@@ -259,7 +266,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
         Ok((verdict.valid && better).then_some((measured, timed)))
     }
 
-    /// Measure of plans, with a little of the makespan added.
+    /// Objective of the linear program: measure of plans, with a little of the makespan added; `None`
+    /// if nonlinear.
     fn objective(&self, node: &Node, makespan: &Linear) -> Option<Linear> {
         match &self.space.measure {
             Measure::Makespan => Some(makespan.clone()),
@@ -275,8 +283,8 @@ impl<'w, 'a> Search<'_, 'w, 'a> {
     }
 }
 
-/// Earliest time of the last happening, with the state at that time, and with time-dependent
-/// numbers at their minimum and maximum; `None` if infeasible.
+/// Earliest time of the last happening in seconds, and states of the node: at that time, and with
+/// time-dependent numbers at their minimum and at their maximum. `None` if the program is infeasible.
 fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
     let now = node.last.map_or(Linear::constant(0.0), Linear::variable);
     let solution = node.program.minimised(&now)?;
@@ -302,8 +310,8 @@ fn states(node: &Node) -> Option<(f64, Vec<Values>)> {
 }
 
 impl Node {
-    /// Advances time to a happening: checks the invariants of running actions and applies
-    /// continuous effects.
+    /// Advances time to a happening: over-all conditions must hold until then, and continuous effects
+    /// are applied. `None` if infeasible.
     fn pass(&mut self, world: &World, now: u32) -> Option<()> {
         let now = Linear::variable(now);
         let Some(last) = self.last.map(Linear::variable) else { return Some(()) };
@@ -319,7 +327,8 @@ impl Node {
         holds.then_some(())
     }
 
-    /// Advances time to a start or an end, which comes before the next timed effect.
+    /// Advances time to the start or end of an action, before the next timed literal; `None` if
+    /// infeasible.
     fn act(&mut self, world: &World, now: u32) -> Option<()> {
         if let Some(next) = world.ground.timed.get(self.timed) {
             let latest = Linear::constant(next.time_s - EPSILON_S);
@@ -392,7 +401,7 @@ impl Node {
         })
     }
 
-    /// Adds a condition on the present state; false if it is obviously infeasible.
+    /// Requires a condition of the present state; false if it cannot hold or is not linear.
     fn asks(&mut self, world: &World, condition: &Conjunction, duration: Option<&Linear>) -> bool {
         condition.calls.is_empty()
             && condition.facts.iter().all(|fact| self.state.values[fact.variable as usize] == fact.value)
@@ -434,7 +443,7 @@ impl Node {
         Some(())
     }
 
-    /// Truth of an effect's condition; `None` if it depends on times or earlier states.
+    /// Truth of an effect's condition; `None` if it depends on times or on earlier states.
     fn decides(&self, world: &World, when: &GroundWhen, duration: Option<&Linear>) -> Option<bool> {
         if !when.at_start.is_empty() || !when.over_all.is_empty() {
             return None;
@@ -444,7 +453,8 @@ impl Node {
         (!holds || trial.program.rows() == self.program.rows()).then_some(holds)
     }
 
-    /// True if all actions in progress can go on in the present state, and change numbers at known rates.
+    /// True if the over-all facts of all actions in progress hold, and their continuous effects have
+    /// constant rates.
     fn goes_on(&mut self, world: &World) -> bool {
         let facts = |open: &Running| {
             let mut facts = world.acts[open.act as usize].over_all.facts.iter();

@@ -1,4 +1,4 @@
-//! Options, end and counts of a search.
+//! Options, results and counts of a temporal search.
 
 use std::collections::BTreeSet;
 
@@ -6,51 +6,52 @@ use crate::memory::MemoryLimit;
 
 use super::advance::TemporalStep;
 
-/// Options of a search.
+/// Options of a temporal search.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Manner {
-    /// Weight of the heuristic relative to path cost; `None`: heuristic alone.
+    /// Weight of the heuristic relative to the path cost; `None` to search by the heuristic alone.
     pub weight: Option<f64>,
-    /// True if the heuristic counts time from when resources are free, instead of adding costs up.
+    /// True if the heuristic estimates time, counted from when resources are free; false if it adds
+    /// costs.
     pub timed: bool,
-    /// True to follow the relaxed plan of every state; false: only for states that improve on all
-    /// earlier ones.
+    /// True to follow the relaxed plan of every state, false only of states that improve on all earlier
+    /// ones.
     pub eager: bool,
-    /// Only plans that cost less than this.
+    /// Only plans with a measure below this bound are accepted.
     pub bound: f64,
-    /// Stop after this many evaluated states.
+    /// Maximum number of evaluated states.
     pub evaluations: u64,
-    /// Stop after this much work.
+    /// Maximum work (see [`Counts::work`]).
     pub work: u64,
-    /// Stop beyond this much memory.
+    /// Maximum memory.
     pub memory: MemoryLimit,
-    /// Decides between entries that rank the same; 0 for the order of their making.
+    /// Seed of the order among open-list entries of equal rank; 0 for oldest first.
     pub shuffle: u64,
-    /// True to distinguish equal states with different temporal options; then nothing is lost, and
-    /// exhaustion is a proof.
+    /// True to distinguish states with equal facts but different temporal options; exhaustion is then a
+    /// proof.
     pub exact: bool,
-    /// Number of times one action may be in progress at once.
+    /// Maximum number of instances of one action that are in progress at once.
     pub at_once: usize,
 }
 
-/// The end of a search.
+/// Result of a temporal search.
 #[derive(Debug, Clone)]
 pub(crate) enum End {
-    /// Steps from the base to the goal.
+    /// A plan was found: its steps from the base of the search to the goal.
     Found(Vec<TemporalStep>),
-    /// Search space within the bound exhausted.
+    /// Nothing is left to search within the bound.
     Exhausted {
-        /// True if no plan within the bound exists, except with self-overlapping actions; nothing
-        /// else was pruned.
+        /// True if no plan within the bound exists, apart from plans in which an action overlaps
+        /// itself.
         proven: bool,
         /// Actions that could have overlapped themselves.
         overlapping: BTreeSet<u32>,
     },
-    /// The budget of evaluations is used up.
+    /// The limit of evaluations or work was reached.
     Budget,
-    /// Asked to stop.
+    /// The caller stopped the search.
     Stopped,
-    /// Out of memory.
+    /// The memory limit was reached.
     Memory,
 }
 
@@ -61,6 +62,6 @@ pub(crate) struct Counts {
     pub evaluated: u64,
     /// States expanded.
     pub expanded: u64,
-    /// Work done: units of estimates, states and times.
+    /// Work done: a deterministic measure of effort on heuristics, states and schedules.
     pub work: u64,
 }

@@ -1,12 +1,12 @@
-//! Read set of a lifted condition, including facts that cannot change its value (no-moving-targets rule, PDDL
-//! 2.1).
+//! Keeps apart happenings that interfere by the strict rule of PDDL 2.1 ("no moving targets"), where
+//! grounding hides the interference.
 //!
-//! Where a static fact decides a part of a quantified or disjunctive condition, grounding leaves the rest of that part
-//! out. PDDL 2.1 (section 8.1) takes all that a condition mentions for what it reads, and so do strict validators: what
-//! changes it must not happen at the same time. Before or after makes no difference, so the search knows nothing of
-//! this: in the schedule of a finished plan, such happenings are moved apart. So it is with a derived fact: it reads
-//! every instance of what its rules mention, while grounding keeps those instances that decide it. And so it is with
-//! effects on what nobody asks for, and with conditions that always hold: grounding leaves them out, validators do not.
+//! By PDDL 2.1 (section 8.1), and in strict validators, a condition reads everything that it mentions,
+//! and nothing that it reads may change at the same time. Grounding drops parts of conditions that
+//! static facts decide, instances that cannot derive a derived fact, conditions that always hold, and
+//! effects that no condition needs. So the search does not see these reads and writes. This is no loss,
+//! as such happenings may still come before or after one another: they are moved apart in the schedule
+//! of the finished plan.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -21,40 +21,40 @@ use super::order::{Access, Inconsistent};
 use super::space::{Space, Track};
 use super::world::{Act, World};
 
-/// Maximum number of passes; separating two happenings may bring others together.
+/// Maximum number of passes over all happenings; separating two of them may bring others together.
 const MOST_ROUNDS: usize = 100;
-/// Number of compared pairs of happenings between two queries of `stop`.
+/// Number of compared happenings between two checks of the stop signal.
 const TOUCHES_A_LOOK: usize = 1024;
 
-/// Predicate or function: true for a function, and its number.
+/// Predicate or function: true for a function, and its index in the task.
 type Place = (bool, u32);
-/// Ground atom or function instance: true for a function, number of predicate or function,
-/// arguments.
+/// Ground atom or function instance: true for a function, index of the predicate or function, and
+/// argument objects.
 type Name = (bool, u32, Vec<u32>);
 
-/// Stands for arguments: all instances of a predicate or function.
+/// In place of arguments: all instances of a predicate or function.
 const ALL: u32 = u32::MAX;
-/// Stands for the arguments of one instance that only the state determines.
+/// In place of arguments: one instance that depends on the state.
 const SOME: u32 = u32::MAX - 1;
-/// Stands for a step: a timed literal.
+/// In place of a step: a timed literal.
 const GIVEN: usize = usize::MAX;
 
-/// A use of an atom or a number by a happening.
+/// Way in which a happening uses an atom or number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Use {
     Mentions,
     Adds,
     Deletes,
-    /// Adds or deletes one of several.
+    /// Adds or deletes an instance that depends on the state, or one among all instances.
     Changes,
-    /// Assigns a number; excludes every other access at the same time, another assignment too.
+    /// Assigns a number; excludes every other use at the same time, including another assignment.
     Writes,
 }
 
-/// Uses of atoms and numbers by a happening.
+/// All uses of atoms and numbers by one happening.
 type Uses = FxHashSet<(Name, Use)>;
 
-/// A happening of a plan that mentions or changes an atom.
+/// A happening of a plan that uses an atom or number.
 #[derive(Clone, Copy)]
 struct Touch {
     happening: u32,
@@ -62,7 +62,8 @@ struct Touch {
     does: Use,
 }
 
-/// Separates simultaneous mutex happenings; false if stopped early.
+/// Separates interfering happenings that are at the same time; false if stopped before it is done.
+/// Fails if the times do not allow it.
 pub fn keep_apart(
     space: &Space,
     steps: &[TemporalStep],
@@ -100,7 +101,7 @@ pub fn keep_apart(
     Ok(true)
 }
 
-/// True if start and end of an action are mutex.
+/// True if the start and the end of an action interfere.
 pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
     let [at_start, at_end] = Named::new(world.task).uses(world, act);
     at_start.iter().any(|(name, does)| {
@@ -108,13 +109,15 @@ pub(super) fn disturbs_itself(world: &World, act: &Act) -> bool {
     })
 }
 
-/// Two happenings in order; timed literals cannot be moved.
+/// Two happenings in the order in which they are to be separated: timed literals, which cannot move,
+/// come first.
 fn in_order(one: &Touch, other: &Touch) -> (u32, u32) {
     let key = |touch: &Touch| (touch.step != GIVEN, touch.happening);
     if key(one) < key(other) { (one.happening, other.happening) } else { (other.happening, one.happening) }
 }
 
-/// Happenings that access each atom, for atoms accessed in different ways.
+/// Happenings that use each atom or number, for those used in more than one way or assigned; adds the
+/// timed literals to the network.
 fn touches(
     space: &Space,
     steps: &[TemporalStep],
@@ -158,11 +161,12 @@ fn touches(
     Ok(touches)
 }
 
-/// Interner of accessed atoms and functions.
+/// Finds the atoms and numbers that an action's happenings use.
 struct Named {
-    /// Basic predicates of each derived predicate; empty for others.
+    /// Predicates on which each derived predicate depends; empty for other predicates.
     roots: Vec<Vec<u32>>,
-    /// True if functions may have objects as values: the state then decides which object a term names.
+    /// True if the task has object functions: the instance that a term denotes may then depend on the
+    /// state.
     is_loose: bool,
 }
 
@@ -182,7 +186,7 @@ impl Named {
         Named { roots: (0..task.predicates.len()).map(roots).collect(), is_loose }
     }
 
-    /// Uses of atoms and numbers by the start and the end of an action.
+    /// Uses of atoms and numbers by the start of an action and by its end.
     fn uses(&self, world: &World, act: &Act) -> [Uses; 2] {
         let origin = act.origin;
         let action = &world.task.actions[origin.schema as usize];
@@ -230,8 +234,8 @@ impl Named {
         }
     }
 
-    /// Records a change of an instance, and of all instances of its predicate or function where
-    /// these are read as a whole.
+    /// Records the change of an instance, and of the whole predicate or function where reads of all its
+    /// instances matter.
     fn written(&self, (is_function, place): Place, arguments: Vec<u32>, does: Use, into: &mut Uses) {
         into.insert(((is_function, place, arguments), does));
         if self.is_loose || !is_function {
@@ -242,7 +246,7 @@ impl Named {
         }
     }
 
-    /// Records a read of an instance, and of the fluents in its arguments.
+    /// Records the read of an instance, and of the functions in its arguments.
     fn mentioned(&self, (is_function, place): Place, terms: &[Term], binding: &[u32], into: &mut Uses) {
         self.terms(terms, binding, into);
         let arguments = objects(terms, binding).unwrap_or_else(|| vec![ALL]);
@@ -252,7 +256,7 @@ impl Named {
         }
     }
 
-    /// Notes the functions whose values terms stand for.
+    /// Records reads of the functions that occur in terms.
     fn terms(&self, terms: &[Term], binding: &[u32], into: &mut Uses) {
         for term in terms {
             if let Term::Function(fluent) = term {
@@ -281,7 +285,7 @@ impl Named {
         }
     }
 
-    /// Notes the numbers that an expression reads.
+    /// Records the reads of an expression.
     fn read(&self, expression: &Expression, binding: &[u32], into: &mut Uses) {
         match expression {
             Expression::Fluent(fluent) => {

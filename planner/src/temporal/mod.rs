@@ -1,4 +1,4 @@
-//! Search for timed plans.
+//! Temporal planning: search for plans with times.
 
 #[doc(hidden)]
 pub mod advance;

@@ -1,30 +1,29 @@
-//! Partial order behind a sequence of happenings (simple temporal network), and its earliest
-//! schedule.
+//! Partial order behind a sequence of happenings (simple temporal network), and its earliest schedule.
 //!
-//! A happening reads and writes resources (variables and numbers). Two happenings that could disturb each other keep
-//! the order of the sequence, [`EPSILON_S`] apart; others are free, so the sequence only fixes what matters. What must
-//! hold over all of an action must do so strictly between its start and its end: what brings it about or ends it
-//! keeps the order too, but may happen at the same time. Durations and timed effects bound the distance from above;
-//! the whole is a simple temporal network whose earliest solution is kept up to date by propagation.
+//! A happening reads and writes resources: variables and numbers. Two happenings that interfere keep
+//! the order of the sequence, [`EPSILON_S`] apart; all others are unordered. A happening that begins or
+//! ends the truth of an action's over-all condition also keeps its order towards the action's start and
+//! end, but may be simultaneous with them. Durations and timed literals give upper bounds on distances.
+//! The earliest solution of the network is updated by propagation.
 
 use crate::plan::EPSILON_S;
 
 use super::world::DurationRange;
 
-/// A shift below this is rounding.
+/// Shift of a time, in seconds, below which it counts as rounding.
 const ROUNDING_S: f64 = 1e-9;
 
-/// Resources that one happening accesses, by index.
+/// Resources that one happening accesses, by index: variables, then numbers.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
-    /// Must not change between the happening before and this one.
+    /// Resources whose value is read; they must not be written at the same time.
     pub reads: Vec<u32>,
-    /// Resources that must not change right after this happening (a start) or right before it (an
-    /// end), but may change with it.
+    /// Resources of over-all conditions: they must keep their value right after the happening (a start)
+    /// or right before it (an end), but may be written at the same time.
     pub holds: Vec<u32>,
-    /// Get a new value.
+    /// Resources that get a new value.
     pub writes: Vec<u32>,
-    /// Numbers that are increased or decreased by an amount: these commute with one another.
+    /// Numbers that are increased or decreased; such changes commute with one another.
     pub adds: Vec<u32>,
 }
 
@@ -36,7 +35,7 @@ struct Resource {
     holders: Vec<u32>,
 }
 
-/// Start and end of an action in progress or done.
+/// Start and end of an action, with the allowed distance between them.
 #[derive(Debug, Clone, Copy)]
 struct Tie {
     start: u32,
@@ -44,23 +43,23 @@ struct Tie {
     span: DurationRange,
 }
 
-/// Happenings in the order of a sequence, with their earliest times.
+/// Network of the happenings in a sequence, with their earliest times.
 #[derive(Debug, Clone)]
 pub struct Order {
     earliest_s: Vec<f64>,
-    /// Predecessors of each happening, with the minimum distance, seconds.
+    /// Happenings that each happening follows, with the minimum distance in seconds.
     after: Vec<Vec<(u32, f64)>>,
     fixed: Vec<(u32, f64)>,
     ties: Vec<Tie>,
     resources: Vec<Resource>,
 }
 
-/// The times cannot be made to fit: a duration or a timed effect is too early or too short.
+/// Error: the times cannot meet all durations and timed literals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Inconsistent;
 
 impl Order {
-    /// Empty network.
+    /// Network without happenings, over a number of resources.
     pub fn new(resources: usize) -> Order {
         Order {
             earliest_s: Vec::new(),
@@ -71,7 +70,7 @@ impl Order {
         }
     }
 
-    /// Earliest time of a happening.
+    /// Earliest time of a happening, in seconds.
     pub fn earliest_s(&self, happening: u32) -> f64 {
         self.earliest_s[happening as usize]
     }
@@ -81,8 +80,8 @@ impl Order {
         self.earliest_s.len()
     }
 
-    /// For each resource, the latest of the last accesses under `value`: write, read since,
-    /// addition since, hold since; -1 for none.
+    /// For each resource, the greatest `value` among the happenings of its last write, and of the
+    /// reads, additions and holds since then, in this order; -1 for none.
     pub fn touched(&self, value: impl Fn(u32) -> f64) -> impl Iterator<Item = [f64; 4]> {
         let latest =
             move |nodes: &[u32]| nodes.iter().fold(NEVER, |latest: f64, &node| latest.max(value(node)));
@@ -92,8 +91,8 @@ impl Order {
         })
     }
 
-    /// Minimum delay after `start` of each happening from `first` on, seconds; minus infinity if it
-    /// may come before.
+    /// Minimum delay of each happening from `first` on after the happening `start`, in seconds; minus
+    /// infinity if the happening may come before `start`.
     pub fn after_s(&self, start: u32, first: usize) -> Vec<f64> {
         let mut after_s = vec![f64::NEG_INFINITY; self.len() - first];
         after_s[start as usize - first] = 0.0;
@@ -124,15 +123,16 @@ impl Order {
         after_s
     }
 
-    /// Latest time of the happening with these distances, by the happenings whose times are fixed, seconds.
+    /// Latest time, in seconds, of a happening after which others must follow with the delays `after_s`
+    /// (from happening `first` on), given the times of timed literals; infinite if there are none.
     pub fn latest_s(&self, after_s: &[f64], first: usize) -> f64 {
         let bound =
             |&(node, time_s): &(u32, f64)| Some(time_s - after_s[(node as usize).checked_sub(first)?]);
         self.fixed.iter().filter_map(bound).fold(f64::INFINITY, f64::min)
     }
 
-    /// Calls `tell` for every distance of the network: from happening (`None`: start of the plan),
-    /// to happening, minimum seconds.
+    /// Calls `tell` for every distance of the network: from a happening, to a happening (`None` for the
+    /// beginning of the plan), and the minimum distance in seconds.
     pub fn distances(&self, mut tell: impl FnMut(Option<u32>, Option<u32>, f64)) {
         for (node, after) in self.after.iter().enumerate() {
             after.iter().for_each(|&(other, gap_s)| tell(Some(other), Some(node as u32), gap_s));
@@ -149,18 +149,18 @@ impl Order {
         }
     }
 
-    /// True if a happening is a timed effect, given from outside.
+    /// True if a happening is a timed literal.
     pub fn is_given(&self, happening: usize) -> bool {
         self.fixed.iter().any(|&(node, _)| node as usize == happening)
     }
 
-    /// Time of the last happening that is not given from outside.
+    /// Time of the last happening that is no timed literal, in seconds.
     pub fn makespan_s(&self) -> f64 {
         let own = self.earliest_s.iter().enumerate().filter(|&(index, _)| !self.is_given(index));
         own.fold(0.0, |latest, (_, &time_s)| latest.max(time_s))
     }
 
-    /// For each resource, the end of its last write or addition, seconds; 0 without accesses.
+    /// Time of the last write or addition of each resource, in seconds; 0 for none.
     pub fn ready_s(&self) -> Vec<f64> {
         let last = |resource: &Resource| {
             let done = resource.writer.iter().chain(&resource.adders);
@@ -169,7 +169,7 @@ impl Order {
         self.resources.iter().map(last).collect()
     }
 
-    /// An instantaneous happening, or the start of an action that stays open.
+    /// Appends an instantaneous step, or the start of an action; returns its happening.
     pub fn push(&mut self, access: &Access) -> u32 {
         let node = self.earliest_s.len() as u32;
         let mut after: Vec<(u32, f64)> = Vec::new();
@@ -208,7 +208,7 @@ impl Order {
         node
     }
 
-    /// The end of the action whose start is `start`.
+    /// Appends the end of the action that begins with the happening `start`; returns its happening.
     pub fn push_end(
         &mut self,
         start: u32,
@@ -233,7 +233,7 @@ impl Order {
         Ok(end)
     }
 
-    /// A happening that is given from outside at this time.
+    /// Appends a timed literal at a time in seconds; returns its happening.
     pub fn push_fixed(&mut self, access: &Access, time_s: f64) -> Result<u32, Inconsistent> {
         let node = self.push(access);
         self.fixed.push((node, time_s));
@@ -244,7 +244,8 @@ impl Order {
         Ok(node)
     }
 
-    /// Lets the second of each pair of happenings, the later in the sequence, follow the first.
+    /// Makes the second happening of each pair follow the first, [`EPSILON_S`] apart; the second is the
+    /// later one in the sequence.
     pub fn separate(&mut self, pairs: &[(u32, u32)]) -> Result<(), Inconsistent> {
         pairs.iter().for_each(|&(first, second)| self.after[second as usize].push((first, EPSILON_S)));
         self.propagate()
@@ -265,8 +266,8 @@ impl Order {
         }
     }
 
-    /// Raises earliest times until every distance holds (Bellman-Ford; most edges follow the
-    /// sequence, so a pass settles everything except the effects of upper bounds).
+    /// Raises earliest times until every distance holds (Bellman-Ford). Most edges follow the sequence,
+    /// so one pass settles everything except the effects of upper bounds.
     fn propagate(&mut self) -> Result<(), Inconsistent> {
         for _ in 0..self.ties.len() + 2 {
             let mut pushed = false;
@@ -302,11 +303,12 @@ impl Order {
     }
 }
 
-/// Earliest schedule of consecutive compressed actions, equal to [`Order`]'s where no upper bound
-/// shifts earlier happenings; stored as four times per resource.
+/// Earliest schedule of consecutive compressed actions, stored as four times per resource; equal to
+/// that of [`Order`] as long as no upper bound shifts earlier happenings.
 #[derive(Debug, Clone)]
 pub struct Clock {
-    /// Last write, last read since, last addition since, last hold since; negative for none.
+    /// Times, in seconds, of each resource's last write, and of the last read, addition and hold since;
+    /// negative for none.
     last_s: Vec<[f64; 4]>,
     latest_s: f64,
 }
@@ -314,22 +316,22 @@ pub struct Clock {
 const NEVER: f64 = -1.0;
 
 impl Clock {
-    /// Empty schedule.
+    /// Schedule without actions.
     pub fn new(resources: usize) -> Clock {
         Clock { last_s: vec![[NEVER; 4]; resources], latest_s: 0.0 }
     }
 
-    /// Earliest end of the last action, seconds.
+    /// End of the last action, in seconds.
     pub fn makespan_s(&self) -> f64 {
         self.latest_s
     }
 
-    /// For each resource, the end of its last write or addition, seconds; 0 without accesses.
+    /// Time of the last write or addition of each resource, in seconds; 0 for none.
     pub fn ready_s(&self) -> Vec<f64> {
         self.last_s.iter().map(|&[write_s, _, add_s, _]| write_s.max(add_s).max(0.0)).collect()
     }
 
-    /// Appends an action: its start, and its end if durative.
+    /// Appends an action at its earliest time: its start, and its end if durative.
     pub fn push(&mut self, start: &Access, end: Option<(&Access, DurationRange)>) {
         let mut start_s = self.after(start);
         let Some((end, span)) = end else {

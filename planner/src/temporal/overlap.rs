@@ -1,10 +1,10 @@
-//! Actions that run twice at once.
+//! Actions that overlap themselves: two instances of one action in progress at once.
 //!
-//! PDDL 2.1 does not forbid it, and whether there is a plan is then a question of another kind: without it plans need
-//! polynomial space, with it exponential space where ends are kept apart, and else nobody can decide (Gigante, Micheli,
-//! Montanari and Scala, Decidability and complexity of action-based temporal planning over dense time, 2022). The searches
-//! therefore start no action while it runs, and note where they could have: what they prove then holds for plans in which no action
-//! overlaps itself.
+//! PDDL 2.1 allows this, and it makes planning harder: deciding whether a plan exists needs polynomial
+//! space without self-overlap, exponential space with it if ends are kept apart, and is undecidable
+//! otherwise (Gigante, Micheli, Montanari and Scala, Decidability and complexity of action-based
+//! temporal planning over dense time, 2022). The searches therefore start no action while it is running, and record where they
+//! could have: their proofs cover only plans in which no action overlaps itself.
 
 use std::collections::BTreeSet;
 
@@ -17,17 +17,19 @@ use super::advance::{Part, Situation, TemporalStep};
 use super::touch::Touched;
 use super::world::{Act, DurationRange, World};
 
-/// True if an action can start while it is in progress; its grounding module is not asked.
+/// True if an action can start while it is in progress. For an action with a grounding module, this is
+/// assumed.
 pub(super) fn starts_again(world: &World, situation: &Situation, act: u32) -> Result<bool, Failure> {
     let nothing = DurationRange { least_s: 0.0, most_s: 0.0 };
     let mut step = TemporalStep { act, part: Part::Start, proposal: None, taken_s: None, span: nothing };
     Ok(!world.acts[act as usize].grounding.is_empty() || world.advance(situation, &mut step)?.is_some())
 }
 
-/// Actions among these that may be worth running twice at once.
+/// Actions, out of `acts`, that may be worth running in two instances at once.
 ///
-/// Of one that does nothing but bring about at its end, once and for all, what nobody ever changes again, the run that ends
-/// first is enough: a plan without the others is still a plan. Not where actions `earn` something.
+/// An action without effects other than facts at its end that nothing ever changes again is left out:
+/// of several instances, the first to end suffices. If actions can improve the metric (`earn`), none is
+/// left out.
 pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32> {
     if acts.is_empty() || earn {
         return acts.into_iter().collect();
@@ -45,7 +47,8 @@ pub(super) fn helpful(world: &World, acts: BTreeSet<u32>, earn: bool) -> Vec<u32
     acts.into_iter().filter(|&act| !once(&world.acts[act as usize])).collect()
 }
 
-/// Only value ever assigned to each changed variable; `None` if there are several.
+/// Only value that actions and timed literals ever give to each variable that they change; `None` if
+/// there are several.
 fn kept(world: &World) -> FxHashMap<u32, Option<u32>> {
     let acts = world.acts.iter().flat_map(|act| act.start_effects.iter().chain(act.end_effects));
     let given = world.ground.timed.iter().flat_map(|timed| &timed.outcomes);

@@ -1,4 +1,4 @@
-//! Numbers that are linear in the times of happenings, and linear programs over them.
+//! Numbers that are linear in the times of happenings, and linear programs over these times.
 
 use microlp::{ComparisonOp, LinearExpr, OptimizationDirection, Problem, Variable};
 
@@ -8,36 +8,36 @@ use crate::ground::{GroundExpression, Relation};
 /// (1e-7) of linear programs and comparisons.
 const STRICTLY: f64 = 1e-6;
 
-/// A number that is linear in variables of a [`Program`].
+/// Number that is linear in the variables of a [`Program`].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Linear {
     constant: f64,
-    /// Variables with their factors, by variable; no factor is zero.
+    /// Variables with their factors, in ascending order; no factor is zero.
     terms: Vec<(u32, f64)>,
 }
 
 impl Linear {
-    /// A number that depends on no variable.
+    /// Linear number without variables.
     pub fn constant(constant: f64) -> Linear {
         Linear { constant, terms: Vec::new() }
     }
 
-    /// A variable itself.
+    /// Linear number that equals a variable.
     pub fn variable(variable: u32) -> Linear {
         Linear { constant: 0.0, terms: vec![(variable, 1.0)] }
     }
 
-    /// Number as a constant, if it depends on no variable.
+    /// Value of a number without variables; `None` if it has any.
     pub fn as_constant(&self) -> Option<f64> {
         self.terms.is_empty().then_some(self.constant)
     }
 
-    /// False for a number without a value.
+    /// False if the number's value is undefined or infinite.
     pub fn is_finite(&self) -> bool {
         self.constant.is_finite()
     }
 
-    /// Sum with a multiple of another number.
+    /// Sum of this number and `factor` times another one.
     pub fn plus(&self, factor: f64, other: &Linear) -> Linear {
         let mut terms = self.terms.clone();
         for &(variable, other) in &other.terms {
@@ -50,7 +50,7 @@ impl Linear {
         Linear { constant: self.constant + factor * other.constant, terms }
     }
 
-    /// A multiple.
+    /// This number times a factor.
     pub fn times(&self, factor: f64) -> Linear {
         Linear::constant(0.0).plus(factor, self)
     }
@@ -62,7 +62,7 @@ impl Linear {
             .fold(self.constant, |sum, &(variable, factor)| sum + factor * values[variable as usize])
     }
 
-    /// Linear form of an expression; `None` if nonlinear, or if it asks an attachment.
+    /// Linear form of an expression; `None` if the expression is nonlinear or calls an attachment.
     pub fn of(
         expression: &GroundExpression,
         numbers: &[Linear],
@@ -105,7 +105,7 @@ impl Linear {
     }
 }
 
-/// Bounds on variables, and comparisons of linear numbers.
+/// Linear program: bounds on variables, and comparisons of linear numbers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Program {
     bounds: Vec<(f64, f64)>,
@@ -113,18 +113,19 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// A new variable between two bounds.
+    /// Adds a variable between two bounds; returns its index.
     pub fn variable(&mut self, least: f64, most: f64) -> u32 {
         self.bounds.push((least, most));
         self.bounds.len() as u32 - 1
     }
 
-    /// Number of comparisons that depend on variables.
+    /// Number of comparisons in the program.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }
 
-    /// Adds a comparison as a constraint; false if it is obviously infeasible.
+    /// Adds a comparison as a constraint; false if it cannot hold or is `Unequal`, which no linear
+    /// program expresses.
     pub fn ask(&mut self, left: &Linear, relation: Relation, right: &Linear) -> bool {
         let difference = left.plus(-1.0, right);
         if !difference.constant.is_finite() {
@@ -147,7 +148,8 @@ impl Program {
         true
     }
 
-    /// Values of the variables that minimise a number; `None` if infeasible.
+    /// Values of all variables that minimise a number; `None` if the program is infeasible or
+    /// unbounded.
     pub fn minimised(&self, objective: &Linear) -> Option<Vec<f64>> {
         let mut factors = vec![0.0; self.bounds.len()];
         objective.terms.iter().for_each(|&(variable, factor)| factors[variable as usize] = factor);

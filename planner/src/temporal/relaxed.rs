@@ -1,7 +1,8 @@
 //! Delete-relaxed task of the temporal search: operators over propositions.
 //!
-//! Numeric conditions, and calls whose answer depends on the state, are *tests*: propositions whose truth is looked up
-//! by evaluation, and which every operator moves that changes something they read.
+//! Numeric conditions, and calls whose answer depends on the state, are *tests*: propositions whose
+//! truth is evaluated in the state. Every operator that changes something that a test reads may make it
+//! true.
 
 use rustc_hash::FxHashMap;
 
@@ -20,7 +21,7 @@ use super::space::Space;
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// Something whose truth is looked up by evaluation.
+/// Proposition whose truth is evaluated: a comparison, or a call with the wanted answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Test {
     Comparison(ComparisonId),
@@ -33,113 +34,119 @@ pub(super) struct Operator {
     pub(super) part: Part,
     pub(super) needs: Vec<u32>,
     pub(super) gives: Vec<u32>,
-    /// Tests that the operator's numeric effects or facts may change.
+    /// Tests that the operator's effects may make true.
     pub(super) moves: Vec<u32>,
-    /// Calls that never change: asked once the rest is reached.
+    /// Calls that are no tests; asked once all preconditions are reached.
     pub(super) gates: Vec<(CallId, bool)>,
-    /// Lower bound on the duration that holds in every state, seconds.
+    /// Minimum duration in every state.
     pub(super) seconds: Seconds,
 }
 
-/// Data of an operator that every evaluation reads, side by side in memory.
+/// Data of an operator that every evaluation reads, close together in memory.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hot {
-    /// Index in [`Relaxed::given`] of the operator's first effect; its affected tests follow.
+    /// Index in [`Relaxed::given`] of the operator's first effect.
     pub(super) gives: u32,
+    /// Index in [`Relaxed::given`] behind the effects, where the tests begin that the operator may make
+    /// true.
     pub(super) moves: u32,
+    /// Index in [`Relaxed::given`] behind those tests.
     pub(super) end: u32,
     /// Number of preconditions.
     pub(super) needs: u32,
-    /// True if applicability needs no attachment.
+    /// True if the operator's applicability depends on no attachment.
     pub(super) plain: bool,
-    /// Duration, seconds; infinite if the action can never be applied, NaN if it depends on a call.
+    /// Duration, in seconds; infinite if the action is never applicable, NaN while unknown or if it
+    /// depends on the state.
     pub(super) seconds: f64,
-    /// Cost of being a step at all.
+    /// Cost of one step, apart from its duration, in seconds.
     pub(super) step: f64,
 }
 
 impl Hot {
-    /// True if applicability needs no attachment and the duration is known.
+    /// True if the operator's applicability depends on no attachment and its duration is known.
     pub(super) fn is_known(&self) -> bool {
         self.plain && !self.seconds.is_nan()
     }
 
-    /// Lower bound on the operator's cost, in time or costs; zero while unknown.
+    /// Lower bound on the operator's cost, in time (`timed`) or in summed costs; durations count as 0
+    /// while unknown.
     pub(super) fn least(&self, timed: bool) -> f64 {
         self.seconds.max(0.0) + if timed { 0.0 } else { self.step }
     }
 }
 
-/// An operator that needs a proposition.
+/// An operator that has a certain proposition as precondition.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Waiter {
     pub(super) operator: u32,
-    /// Only effect of the operator; [`NOBODY`] if there are several.
+    /// Only effect of the operator; [`NOBODY`] if there are several or none.
     pub(super) target: u32,
-    /// Duration as far as known now, seconds.
+    /// Duration as far as known, in seconds; 0 while unknown.
     pub(super) seconds: f64,
-    /// Cost of being a step at all.
+    /// Cost of one step, apart from its duration, in seconds.
     pub(super) step: f64,
 }
 
-/// Minimum duration of an operator, seconds.
+/// Minimum duration of an operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Seconds {
-    /// Constant, seconds; infinite if the action can never be applied.
+    /// The same in every state, in seconds; infinite if the action is never applicable.
     Known(f64),
-    /// Constant, but an attachment must be asked first.
+    /// The same in every state, but only known once the duration has been evaluated.
     Settled,
     /// Depends on the state.
     Depends,
 }
 
 impl Seconds {
-    /// Zero for an instantaneous snap action.
+    /// Zero if `zero`, unless the duration depends on the state.
     fn or_zero(self, zero: bool) -> Seconds {
         if zero && self != Seconds::Depends { Seconds::Known(0.0) } else { self }
     }
 }
 
-/// Relaxed task with the working memory of its evaluation.
+/// Relaxed task, with the working memory of its heuristic.
 pub(crate) struct Relaxed {
     pub(super) offsets: Vec<u32>,
     pub(super) tests: Vec<Test>,
-    /// Number of a test's proposition.
+    /// Proposition of each test.
     test_index: FxHashMap<Test, u32>,
-    /// True, by test, if an operator or the goal needs it.
+    /// True, by test, if an operator or the goal has the test as precondition.
     pub(super) asked: Vec<bool>,
-    /// The resources that each test reads.
+    /// Variables and numbers that each test reads, as indices of resources.
     pub(super) test_reads: Vec<Vec<u32>>,
-    /// The tests that read each resource.
+    /// Tests that read each resource.
     tests_on: Vec<Vec<u32>>,
     pub(super) test_base: u32,
-    /// Propositions "is running" and "is not running" of each split action.
+    /// Propositions "is running" and "is not running" of each action with separate start and end.
     pub(super) tokens: FxHashMap<u32, (u32, u32)>,
-    /// First token proposition.
+    /// First proposition about running actions.
     pub(super) token_base: u32,
     pub(super) operators: Vec<Operator>,
     pub(super) hot: Vec<Hot>,
-    /// Effects and moved tests of all operators, one operator after the other.
+    /// Effects and possibly satisfied tests of all operators, one operator after the other.
     pub(super) given: Vec<u32>,
-    /// The operators that need each proposition.
+    /// Operators that have a proposition as precondition, by proposition.
     pub(super) needed_by: Grouped<Waiter>,
     pub(super) goal: Vec<u32>,
     pub(super) goal_gates: Vec<(CallId, bool)>,
-    /// Mean duration, the weight of a step.
+    /// Mean duration of the operators in seconds, which is also the cost of one step.
     pub(super) unit: f64,
-    /// Contribution of each action to the measure beside time, in equivalent seconds.
+    /// Contribution of each action to the plan measure apart from the makespan, in equivalent seconds
+    /// of makespan.
     pub(super) counted: Vec<Option<GroundExpression>>,
     /// Operators without preconditions.
     pub(super) free: Vec<u32>,
     pub(super) work: Work,
-    /// Buffer for the changes of an operator under construction.
+    /// Buffer for what an operator under construction changes.
     touched: Touched,
 }
 
 pub(super) const NOBODY: u32 = u32::MAX;
 
 impl Relaxed {
-    /// The relaxed task of a space.
+    /// Relaxed task of a search space.
     pub fn new(space: &Space) -> Relaxed {
         let (world, open_act) = (space.world, &space.open_act);
         let mut relaxed = Relaxed { counted: space.measure.counted(world), ..Relaxed::empty(world) };
@@ -238,7 +245,7 @@ impl Relaxed {
         }
     }
 
-    /// The work done since this was asked last.
+    /// Work done since the last call of this function.
     pub(super) fn spent(&mut self) -> u64 {
         std::mem::take(&mut self.work.spent)
     }
@@ -247,7 +254,7 @@ impl Relaxed {
         self.test_index.get(&wanted).copied()
     }
 
-    /// True if a test reads the number.
+    /// True if a test reads a number.
     pub(super) fn is_tested(&self, number: NumericId) -> bool {
         !self.tests_on[self.offsets.len() + number as usize].is_empty()
     }
@@ -256,7 +263,8 @@ impl Relaxed {
         self.offsets[fact.variable as usize] + fact.value
     }
 
-    /// Adds the facts that an outcome may achieve; for an effect module, every value of its terms.
+    /// Adds the facts that an outcome may make true; for an effect module, all values of the variables
+    /// that it writes.
     fn given(&self, world: &World, outcome: &GroundOutcome, into: &mut Vec<u32>) {
         match outcome {
             GroundOutcome::Set(fact) => into.push(self.fact(*fact)),
@@ -278,7 +286,8 @@ impl Relaxed {
         facts.chain(comparisons.iter().map(|&comparison| self.test_base + comparison))
     }
 
-    /// Adds one operator for the unconditional effects, and one for each further condition.
+    /// Adds relaxed operators for one part of an action: one for its unconditional effects, and one for
+    /// each condition of its other effects.
     fn operator(
         &mut self,
         world: &World,
@@ -312,7 +321,7 @@ impl Relaxed {
         }
     }
 
-    /// Adds the operator of the effects under a further condition.
+    /// Adds the relaxed operator for the effects under one condition.
     fn under(
         &mut self,
         world: &World,
@@ -349,8 +358,8 @@ impl Relaxed {
         self.operators.push(Operator { act, part, needs, gives, moves, gates, seconds });
     }
 
-    /// Adds `token` (action open, or closed) to the add effects of the relaxed operators just made
-    /// for one snap action of `act`.
+    /// Adds the proposition `token` to the effects of all operators just added for one part of an
+    /// action.
     fn give(&mut self, act: u32, part: Part, token: u32) {
         let own = self.operators.iter_mut().rev().take_while(|operator| operator.act == act);
         own.filter(|operator| operator.part == part).for_each(|operator| operator.gives.push(token));
@@ -470,8 +479,8 @@ impl Relaxed {
         self.work = Work::new(count, self.operators.len());
     }
 
-    /// Lists operators by precondition; those that ask attachments come last, because their effects
-    /// may be useless by then.
+    /// Lists operators by precondition. Those that depend on attachments come last, as their effects
+    /// may be reached otherwise by then.
     fn index_needs(&mut self, propositions: usize) {
         let waiter = |hot: &Hot, operator: usize| {
             let target = match self.given[hot.gives as usize..hot.end as usize] {
@@ -491,7 +500,7 @@ impl Relaxed {
     }
 }
 
-/// True, by call, if a condition uses it without a proposed parameter.
+/// True, by call, if some condition uses it without a proposed argument.
 fn plain_calls(world: &World) -> Vec<bool> {
     let mut plain = vec![false; world.ground.calls.len()];
     let mut note = |condition: &Conjunction| {
@@ -509,7 +518,7 @@ fn plain_calls(world: &World) -> Vec<bool> {
     plain
 }
 
-/// Conditions taken together.
+/// Several conditions combined.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Merged {
     facts: Vec<GroundFact>,
@@ -531,14 +540,14 @@ impl Merged {
     }
 }
 
-/// True if the start of an action may itself achieve a fact that is needed after it.
+/// True if the start of an action may itself make a fact true that is needed later.
 fn may_give(world: &World, act: &Act, fact: &GroundFact) -> bool {
     let derived = world.ground.variables[fact.variable as usize].stratum.is_some();
     let gives = |effect: &GroundEffect| effect.outcome == GroundOutcome::Set(*fact);
     derived && !act.start_effects.is_empty() || act.start_effects.iter().any(gives)
 }
 
-/// True if the start of an action changes something that a call reads.
+/// True if an action changes something that a call reads, at its start or continuously.
 fn may_turn(world: &World, act: &Act, call: CallId) -> bool {
     let (mut read, mut written) = (Touched::default(), Touched::default());
     read.call(world, call);
@@ -567,7 +576,7 @@ fn needs_of_whole(world: &World, act: &Act) -> Merged {
     merged
 }
 
-/// Duration of an action that holds in every state, seconds.
+/// Minimum duration of an action in every state.
 fn seconds_of(world: &World, act: usize) -> Seconds {
     let act = &world.acts[act];
     if !act.durative {

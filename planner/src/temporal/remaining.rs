@@ -1,5 +1,5 @@
-//! Lower bounds from propositions to the goal: a proposition that comes too late for a goal already within
-//! reach need not spread any further.
+//! Lower bounds from propositions to the goal. A proposition that comes too late to improve on the
+//! goal's present label need not be followed further.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -10,10 +10,10 @@ use super::estimate::Key;
 use super::relaxed::Relaxed;
 
 impl Relaxed {
-    /// Lower bound on the relaxed plan between each proposition and the last goal, in time or
-    /// summed costs; infinite for useless ones.
+    /// Lower bound on the distance from each proposition to the last goal, in seconds (`timed`) or in summed
+    /// costs; infinite for propositions that lead to no goal.
     ///
-    /// Durations that are not known without a state count as nothing, and so does what else an operator needs.
+    /// Durations that depend on the state count as zero, and so do all other preconditions of an operator.
     pub(super) fn remaining(&self, timed: bool) -> Vec<f64> {
         let mut remaining = vec![f64::INFINITY; self.needed_by.keys()];
         let givers = self.operators.iter().zip(0u32..).flat_map(|(operator, index)| {

@@ -1,10 +1,10 @@
-//! Tightening a plan's schedule after the search.
+//! Schedule compression: shortens a plan after the search.
 //!
-//! A sequence of steps leaves free what does not matter, but it does fix who comes first where two steps disturb each
-//! other. The happenings are nodes of a simple temporal network (Dechter, Meiri and Pearl 1991), with edges for
-//! durations, for the order of what disturbs each other, and for what is given from outside. Its longest path says when
-//! the plan ends, and why: only a step that changes place with a neighbour on that path can end the plan earlier (as in
-//! the neighbourhoods of van Laarhoven, Aarts and Lenstra 1992).
+//! A sequence of steps orders only those that interfere, but it may order these unfavourably.
+//! Happenings are the nodes of a simple temporal network (Dechter, Meiri and Pearl 1991), with edges
+//! for durations, for the order of interfering happenings, and for timed literals. The longest path in
+//! the network determines the makespan: only a step that changes places with a neighbour on that path
+//! can shorten the plan (as in the neighbourhoods of van Laarhoven, Aarts and Lenstra 1992).
 
 use petgraph::algo::bellman_ford;
 use petgraph::graph::{DiGraph, NodeIndex};
@@ -15,14 +15,14 @@ use super::advance::{Part, TemporalStep};
 use super::order::Order;
 use super::space::{Base, Space, Track};
 
-/// Steps that are replayed at most for one plan.
+/// Maximum number of steps replayed for one plan.
 const MOST_REPLAYED: usize = 50_000;
 
-/// Plan with the results of its replay.
+/// Result of replaying a plan: its measure, its steps, and the situation at its end.
 pub(crate) type Replayed = (f64, Vec<TemporalStep>, Base);
 
-/// Plan with steps on its critical path exchanged while this improves it; never worse, always
-/// replayed.
+/// Plan in which steps on the critical path change places while this improves the plan; never worse
+/// than before. The result is a complete replay.
 pub(crate) fn tightened(
     space: &Space,
     mut plan: Replayed,
@@ -58,7 +58,7 @@ pub(crate) fn tightened(
     }
 }
 
-/// Pairs of different steps that follow each other on the longest path of the network, the last first.
+/// Pairs of different steps that follow each other on the longest path of the network, last pair first.
 fn critical_pairs(steps: &[TemporalStep], track: &Track) -> Vec<(usize, usize)> {
     let path = longest_path(&track.order);
     let step_of = steps_of(steps, track);
@@ -72,7 +72,7 @@ fn critical_pairs(steps: &[TemporalStep], track: &Track) -> Vec<(usize, usize)> 
     pairs
 }
 
-/// Happenings on a critical path of the network, from the end of the plan to its beginning.
+/// Happenings on a longest path of the network, from the end of the plan to its beginning.
 pub fn longest_path(order: &Order) -> Vec<usize> {
     let mut network: DiGraph<(), f64> = DiGraph::with_capacity(order.len() + 1, 4 * order.len());
     let begin = network.add_node(());
@@ -98,7 +98,7 @@ pub fn longest_path(order: &Order) -> Vec<usize> {
     path
 }
 
-/// The step that each happening belongs to; `None` for timed effects.
+/// Step to which each happening belongs; `None` for timed literals.
 fn steps_of(steps: &[TemporalStep], track: &Track) -> Vec<Option<usize>> {
     let mut step_of = vec![None; track.order.len()];
     let mut open: Vec<usize> = Vec::new();

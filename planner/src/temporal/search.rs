@@ -1,8 +1,8 @@
-//! Forward search over happenings: one search, parameterised by how open entries are ordered.
+//! Forward search over happenings; options decide how open entries are ordered.
 //!
-//! Lazy best-first search (Richter and Westphal 2010): an entry is a parent and a step; its state is made, and its
-//! heuristic evaluated, only when it is taken from the queue. Preferred steps have a queue of their own, which is
-//! served more often after progress.
+//! It is a lazy best-first search (Richter and Westphal 2010): an open entry is a parent state and a
+//! step. The new state is generated, and evaluated by the heuristic, only once its entry is taken from
+//! the queue. Preferred steps have a queue of their own, which is served more often after progress.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use super::store::Store;
 use super::timed::schedule;
 use super::world::DurationRange;
 
-/// The key of an entry in the queue, smaller first, then older or as shuffled.
+/// Rank of an open entry: lower keys first, and among equal keys by age or in shuffled order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Rank(f64, u64);
 
@@ -56,24 +56,28 @@ struct Node {
 }
 
 const NONE: u32 = u32::MAX;
-/// Mark of states passed by a lookahead only; the search may still reach them.
+/// Bit in a state's extra word: a lookahead passed the state without evaluating it, and the search may
+/// still reach it.
 const PASSED: u64 = 1 << 63;
-/// Work of scheduling a step of a path, and of generating a state.
+/// Work of scheduling one step of a path.
 const WORK_A_STEP: u64 = 20;
+/// Work of generating one state.
 const WORK_A_STATE: u64 = 50;
-/// Number of queue entries between two checks of the memory limit; a state counts for several.
+/// Number of open entries between two checks of the memory limit.
 const MOST_UNSEEN: usize = 4096;
+/// Number of open entries that generating one state counts as, besides those that it makes.
 const UNSEEN_A_STATE: usize = 64;
-/// Priority of the preferred queue after progress (Richter and Westphal 2010).
+/// Priority of the queue of preferred steps after progress (Richter and Westphal 2010).
 const BOOST: i64 = 1000;
 
-/// Key of an action in progress: action, proposal, duration bits, gates of its end.
+/// Part of a state's key for an action in progress: action, proposal, bits of its shortest duration,
+/// and gates of its end effects.
 type OpenKey = (u32, Option<Arc<str>>, u64, Gates);
 
-/// The actions in progress, and the number of timed effects that have happened.
+/// Actions in progress, and number of past timed literals.
 type Phase = (Vec<Open>, usize);
 
-/// One search from a base.
+/// One temporal search from a base.
 pub(crate) struct Search<'s, 'w, 'a> {
     space: &'s Space<'w, 'a>,
     relaxed: &'s mut Relaxed,
@@ -85,7 +89,7 @@ pub(crate) struct Search<'s, 'w, 'a> {
     costs: Rows<f64>,
     phases: Rows<Phase>,
     phase_ids: FxHashMap<(Vec<OpenKey>, usize), u32>,
-    /// Actions in progress in all phases.
+    /// Number of actions in progress, summed over all phases.
     opened: usize,
     mark_ids: FxHashMap<u64, u32>,
     proposals: Vec<Arc<str>>,
@@ -94,36 +98,36 @@ pub(crate) struct Search<'s, 'w, 'a> {
     sequence: u64,
     best_heuristic: f64,
     counts: Counts,
-    /// Entries made since memory was looked at.
+    /// Number of open entries since memory was last checked.
     unseen: usize,
-    /// True if something was left out that might have led to a plan.
+    /// True if something was pruned that might have led to a plan.
     lossy: bool,
-    /// Actions at their maximum overlap with themselves that could have started again.
+    /// Actions that could have started once more while running as often as allowed.
     overlapping: BTreeSet<u32>,
     /// Relaxed plan of the state evaluated last, to be followed next.
     ahead: Option<Ahead>,
 }
 
-/// Times of the happenings on a path.
+/// Times of a path.
 #[derive(Debug, Default)]
 struct Times {
     makespan_s: f64,
-    /// Mark that distinguishes equal states: in exact searches, everything on which future times
-    /// depend; else the time from the latest start of an action in progress to the end of
-    /// everything.
+    /// Number that distinguishes states with equal facts. In exact searches it covers everything on
+    /// which future times depend; otherwise it is the time from the latest start of an action in
+    /// progress to the end of all actions.
     mark: u64,
-    /// Time at which each resource is free, seconds.
+    /// Time from which each resource is free, in seconds; `None` if the heuristic does not need it.
     ready_s: Option<Vec<f64>>,
 }
 
-/// Relaxed plan to follow as far as possible.
+/// Relaxed plan to be followed as far as possible, and the state from which it starts.
 struct Ahead {
     from: u32,
     plan: Vec<(u32, Part)>,
 }
 
 impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
-    /// Prepares a search.
+    /// Search that has not begun.
     pub fn new(
         space: &'s Space<'w, 'a>,
         relaxed: &'s mut Relaxed,
@@ -156,7 +160,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
     }
 
-    /// Searches.
+    /// Runs the search to its end; returns its result and counts.
     pub fn run(mut self, stop: &dyn Fn() -> bool) -> Result<(End, Counts), Failure> {
         let nowhere = TemporalStep {
             act: NONE,
@@ -260,7 +264,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.manner.bound.is_finite() || self.manner.weight.is_some()
     }
 
-    /// Times of the happenings up to a new step; `Err` if inconsistent.
+    /// Times of the path to a parent state and a new step; an error if they are inconsistent.
     fn times(&mut self, parent: u32, step: &TemporalStep, open: bool) -> Result<Times, Inconsistent> {
         let wanted = self.manner.timed || self.bounded() && self.space.timed_measure();
         if !self.space.tight && !wanted {
@@ -293,7 +297,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(Times { makespan_s, mark, ready_s: self.manner.timed.then(|| track.order.ready_s()) })
     }
 
-    /// Processes a state: dropped if known or too expensive, else evaluated and expanded.
+    /// Processes a generated state: it is dropped if known or too expensive, else evaluated and
+    /// expanded. Returns `Found` if a plan ends here.
     fn visit(
         &mut self,
         parent: u32,
@@ -336,8 +341,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(None)
     }
 
-    /// Follows a relaxed plan: applies its steps in order wherever applicable, until none is (Vidal
-    /// 2004).
+    /// Follows a relaxed plan: applies its steps, the first applicable one each time, until none is
+    /// applicable (Vidal 2004).
     fn look_ahead(&mut self, ahead: Ahead) -> Result<Option<End>, Failure> {
         let mut from = self.situation(ahead.from);
         let mut node = ahead.from;
@@ -376,8 +381,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         }
     }
 
-    /// True if a plan is valid with its times. From a base, the plan's prefix is unknown here, and
-    /// the plan counts as valid.
+    /// True if the plan that ends in a state remains valid with its times. A plan whose first steps
+    /// belong to a base counts as valid, as those steps are not known here.
     fn works_out(&self, node: u32) -> Result<bool, Failure> {
         let settled = !self.space.is_open && self.space.world.ground.timed.is_empty();
         if settled || !self.base.track.actions.is_empty() {
@@ -388,7 +393,8 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         Ok(reaches && (self.space.is_open || schedule(self.space, &path, &|| false).is_some()))
     }
 
-    /// Unevaluated node on a lookahead's path; `None` if known or temporally inconsistent.
+    /// Adds a state on the path of a lookahead without evaluating it; `None` if it is known or its
+    /// times are inconsistent.
     fn pass(&mut self, parent: u32, step: TemporalStep, situation: &Situation, costs: f64) -> Option<u32> {
         let times = self.times(parent, &step, !situation.open.is_empty()).ok()?;
         let extra = self.extra(situation, times.mark) | PASSED;
@@ -413,7 +419,7 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         false
     }
 
-    /// True if a state's continuations depend on its path's times beyond the marks of this search.
+    /// True if a state's continuations depend on times of its path that its mark does not cover.
     fn depends_on_times(&self, situation: &Situation) -> bool {
         let fits =
             !self.manner.exact && (!situation.open.is_empty() || !self.space.world.ground.timed.is_empty());
@@ -482,12 +488,12 @@ impl<'s, 'w, 'a> Search<'s, 'w, 'a> {
         self.enqueue(node, situation, &estimate, key)
     }
 
-    /// True if an action has its maximum number of instances in progress.
+    /// True if as many instances of an action are in progress as allowed.
     fn is_full(&self, situation: &Situation, act: u32) -> bool {
         situation.open.iter().filter(|open| open.act == act).count() >= self.manner.at_once
     }
 
-    /// Records an action that could have overlapped itself.
+    /// Records that an action could have overlapped itself, if it can start once more.
     fn note_overlap(&mut self, situation: &Situation, act: u32) -> Result<(), Failure> {
         if self.overlapping.contains(&act) {
             return Ok(());

@@ -1,5 +1,5 @@
-//! Search space shared by several searches on one task: possible steps, accessed resources, measure
-//! of plans.
+//! Search space that several searches of one task share: applicable steps, accessed resources, and
+//! measure of plans.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -15,31 +15,32 @@ use super::order::{Clock, Inconsistent, Order};
 use super::timed::is_valid;
 use super::world::{Act, DurationRange, EvaluationContext, World};
 
-/// Maximum number of replays of a plan whose stretched actions stretch others.
+/// Maximum number of replays of a plan in which longer durations make further actions longer.
 const MOST_STRETCHED: usize = 8;
-/// Differences of times that rounding makes are no stretch.
+/// Difference of times, in seconds, up to which an action does not count as longer than its shortest
+/// duration.
 const LEAST_STRETCH_S: f64 = 1e-7;
-/// Number of replayed steps between two queries of `stop`.
+/// Number of replayed steps between two checks of the stop signal.
 const STEPS_A_LOOK: usize = 256;
 
-/// Measure of plans.
+/// Measure of plans; lower is better.
 #[derive(Debug, Clone)]
 pub enum Measure {
-    /// End of the last action.
+    /// End of the last action, in seconds.
     Makespan,
-    /// Costs of the actions times a sign, plus a weight times the makespan.
+    /// Sum of action costs times a sign, plus the makespan times a weight.
     Additive {
-        /// One, or minus one if additive costs are rewards.
+        /// 1 to minimise action costs, -1 to maximise them.
         sign: f64,
-        /// Weight of the makespan.
+        /// Weight of the makespan, per second.
         time_weight: f64,
     },
-    /// An expression over the last state and the makespan, to be made small.
+    /// Expression over the final state and the makespan, to be minimised.
     Expression(GroundExpression),
 }
 
 impl Measure {
-    /// Possibility that actions improve the measure.
+    /// Tells if actions can improve the measure.
     fn earns(&self, world: &World) -> Earns {
         let expression = match self {
             Measure::Makespan => return Earns::Never,
@@ -68,8 +69,9 @@ impl Measure {
         effects.map(|effect| &effect.outcome).chain(given).map(earns).max().unwrap_or(Earns::Never)
     }
 
-    /// Contribution of each action to the measure besides time, in equivalent seconds; `None` if
-    /// time or costs do not count, or the measure is nonlinear.
+    /// Contribution of each action to the plan measure apart from the makespan, in equivalent seconds
+    /// of makespan; `None` if the action contributes nothing, the makespan does not count, or the
+    /// measure is nonlinear.
     pub fn counted(&self, world: &World) -> Vec<Option<GroundExpression>> {
         let times = |factor: f64, of: &GroundExpression| {
             GroundExpression::Product(vec![GroundExpression::Constant(factor), of.clone()])
@@ -105,34 +107,34 @@ impl Measure {
     }
 }
 
-/// Search space with everything shared by several searches.
+/// Search space of a task, with data that several searches share.
 pub struct Space<'w, 'a> {
-    /// The task.
+    /// Task with its actions.
     pub world: &'w World<'a>,
-    /// True, by action, if start and end are separate.
+    /// True, by action, if start and end are separate steps.
     pub open_act: Vec<bool>,
     /// Measure of plans.
     pub measure: Measure,
     /// Resources accessed by happenings.
     pub accesses: Accesses<'w, 'a>,
-    /// Actions tried where a fact holds, by variable and value.
+    /// Actions grouped by their rarest fact at start, by that fact's variable and value.
     pivots: Vec<Vec<Vec<u32>>>,
-    /// Actions that are looked at everywhere.
+    /// Actions without facts at start.
     everywhere: Vec<u32>,
-    /// True if times can make a sequence impossible.
+    /// True if times can make a sequence of steps impossible.
     pub tight: bool,
-    /// Possibility that actions improve the measure; unless certain, a prefix as expensive as
-    /// another plan is pruned.
+    /// Tells if actions can improve the measure. Unless they surely can, a plan prefix that is no better
+    /// than the bound is pruned.
     pub earns: Earns,
     /// True if effects or costs of some action depend on its chosen duration.
     stretches: bool,
-    /// True if so, or if numbers change continuously: a plan's effects are then known only with its
-    /// times.
+    /// True if `stretches`, or if numbers change continuously: the effects of a plan are then known
+    /// only with its times.
     pub is_open: bool,
 }
 
 impl<'w, 'a> Space<'w, 'a> {
-    /// The space in which the given actions have start and end apart.
+    /// Search space in which the actions marked in `open_act` have separate starts and ends.
     pub fn new(world: &'w World<'a>, open_act: Vec<bool>, measure: Measure) -> Space<'w, 'a> {
         let ground = world.ground;
         let mut pivots: Vec<Vec<Vec<u32>>> =
@@ -162,7 +164,7 @@ impl<'w, 'a> Space<'w, 'a> {
         Space { world, open_act, measure, accesses, pivots, everywhere, tight, earns, stretches, is_open }
     }
 
-    /// Actions whose facts at start hold, in order.
+    /// Actions whose facts at start hold in a state, in ascending order.
     pub fn candidates(&self, state: &Values) -> Vec<u32> {
         let pivots = &self.pivots;
         let by_fact =
@@ -181,7 +183,7 @@ impl<'w, 'a> Space<'w, 'a> {
         self.time_weight() > 0.0
     }
 
-    /// Weight of a second of the makespan in the measure; zero where that is not known.
+    /// Weight of a second of makespan in the measure; 0 if it is not known.
     pub fn time_weight(&self) -> f64 {
         match self.measure {
             Measure::Makespan => 1.0,
@@ -190,25 +192,25 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// The clock after steps that are all done in one go.
+    /// Schedule of the compressed actions among some steps.
     pub fn clock(&self, steps: &[TemporalStep]) -> Clock {
         let mut clock = Clock::new(self.accesses.resources);
         steps.iter().filter(|step| step.part == Part::Whole).for_each(|step| self.tick(&mut clock, step));
         clock
     }
 
-    /// Lets a step that is done in one go happen on a clock.
+    /// Appends a compressed action to a schedule.
     pub fn tick(&self, clock: &mut Clock, step: &TemporalStep) {
         let (start, end) = self.accesses.of(step.act);
         clock.push(start, end.as_ref().map(|end| (end, step.span)));
     }
 
-    /// Empty track.
+    /// Temporal network without steps.
     pub fn begin(&self) -> Track {
         Track::new(self.accesses.resources)
     }
 
-    /// True if the measure of a partial plan needs its times.
+    /// True if the measure of a partial plan depends on its times.
     pub fn timed_measure(&self) -> bool {
         match &self.measure {
             Measure::Makespan => true,
@@ -217,14 +219,14 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// The track of a sequence of steps.
+    /// Temporal network of a sequence of steps.
     pub fn track(&self, steps: &[TemporalStep]) -> Result<Track, Inconsistent> {
         let mut track = self.begin();
         steps.iter().try_for_each(|step| track.push(self, step))?;
         Ok(track)
     }
 
-    /// Contribution of an action to an additive metric.
+    /// Contribution of a step to an additive measure; 0 for other measures.
     pub fn step_cost(&self, before: &Values, step: &TemporalStep) -> Result<f64, Failure> {
         let Measure::Additive { sign, .. } = self.measure else { return Ok(0.0) };
         if matches!(step.part, Part::End | Part::Free) {
@@ -239,7 +241,7 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(sign * self.world.evaluate(self.world.acts[step.act as usize].cost, &moment)?)
     }
 
-    /// Measure of a plan or prefix, from additive costs, final state and makespan.
+    /// Measure of a plan or prefix, from its sum of costs, its final state and its makespan in seconds.
     pub fn measured(&self, costs: f64, state: &Values, makespan_s: f64) -> Result<f64, Failure> {
         match &self.measure {
             Measure::Makespan => Ok(makespan_s),
@@ -253,8 +255,9 @@ impl<'w, 'a> Space<'w, 'a> {
         }
     }
 
-    /// Replays a sequence of steps from the initial state; returns measure and resulting base.
-    /// `None` if a step is inapplicable, or if a long sequence is stopped.
+    /// Replays a sequence of steps from the initial state; returns its measure, and the situation at
+    /// its end. `None` if a step is inapplicable, the times are inconsistent, or a long sequence is
+    /// stopped.
     pub fn replay(
         &self,
         steps: &mut [TemporalStep],
@@ -281,8 +284,8 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok(Some((measured, Base { situation, costs, track, clock })))
     }
 
-    /// Replays a whole plan; `None` also if the goal does not hold at the end. Effects of a
-    /// stretched action use its stretched duration.
+    /// Replays a whole plan; `None` also if the goal does not hold at its end. If the schedule makes an
+    /// action longer whose effects depend on its duration, the effects of the longer duration are used.
     pub fn replay_to_goal(
         &self,
         steps: &mut [TemporalStep],
@@ -311,8 +314,8 @@ impl<'w, 'a> Space<'w, 'a> {
         Ok((!self.is_open || is_valid(self, steps, stop)).then_some((measured, base)))
     }
 
-    /// Fixes the durations of stretched actions on a track where effects depend on them; true if
-    /// there are any.
+    /// Sets the duration of actions that the schedule makes longer, if their effects or costs depend on
+    /// it; true if any was set.
     fn stretch(&self, steps: &mut [TemporalStep], track: &Track) -> bool {
         let mut any = false;
         for (step, action) in steps.iter_mut().zip(&track.actions) {
@@ -328,33 +331,34 @@ impl<'w, 'a> Space<'w, 'a> {
     }
 }
 
-/// Start of a search: the situation after some steps.
+/// Starting point of a search: the situation after some steps.
 #[derive(Debug, Clone)]
 pub struct Base {
-    /// The situation.
+    /// State, actions in progress, and number of past timed literals.
     pub situation: Situation,
-    /// Additive costs so far.
+    /// Sum of costs so far, for an additive measure.
     pub costs: f64,
-    /// Steps so far, in time.
+    /// Temporal network of the steps so far.
     pub track: Track,
-    /// Schedule for tasks whose times never shift.
+    /// Earliest schedule of the steps so far; used if times cannot make a sequence impossible.
     pub clock: Clock,
 }
 
 /// Temporal network of a sequence of steps, with the starts and ends of its actions.
 #[derive(Debug, Clone)]
 pub struct Track {
-    /// The order.
+    /// Network of the happenings.
     pub order: Order,
-    /// Start of each step's action, and its end if known; `None` for ends and timed effects.
+    /// Happenings of each step: the start and, once known, the end of its action; `None` for steps that
+    /// end an action, and for timed literals.
     pub actions: Vec<Option<(u32, Option<u32>)>>,
-    /// First happening since something was in progress without interruption.
+    /// First happening since which some action has been in progress without interruption.
     epoch: usize,
     open: Vec<Started>,
     timed: usize,
 }
 
-/// An action in progress on a track.
+/// An action in progress.
 #[derive(Debug, Clone)]
 struct Started {
     step: usize,
@@ -369,7 +373,7 @@ impl Track {
         Track { order: Order::new(resources), actions: Vec::new(), epoch: 0, open: Vec::new(), timed: 0 }
     }
 
-    /// Adds a step.
+    /// Appends a step; fails if the times become inconsistent.
     pub fn push(&mut self, space: &Space, step: &TemporalStep) -> Result<(), Inconsistent> {
         let mut action = None;
         match step.part {
@@ -407,12 +411,13 @@ impl Track {
         Ok(())
     }
 
-    /// Hash of all past times on which the future can depend.
+    /// Hash of all past times on which the future can depend; 0 if there are none.
     ///
-    /// With nothing in progress and no timed effect to come there is nothing: all that follows can be shifted. An action
-    /// in progress must end in time after all that its end will follow: that depends on how long after its start,
-    /// at least, everything is over that was done to each resource, as far as its duration reaches. With timed effects
-    /// to come, times matter as they are, those behind the last timed effect being all the same.
+    /// Without actions in progress and timed literals to come, everything that follows can be shifted
+    /// in time. An action in progress must end after everything that its end has to follow, yet within
+    /// its duration: this depends on the minimum delay of the last accesses to each resource after its
+    /// start, as far as its longest duration reaches. With timed literals to come, absolute times
+    /// matter up to the last of them.
     pub fn mark(&self, space: &Space) -> u64 {
         let last_s =
             space.world.ground.timed.get(self.timed..).and_then(<[_]>::last).map(|timed| timed.time_s);
@@ -441,7 +446,7 @@ impl Track {
         hasher.finish() | 1
     }
 
-    /// Ends all actions in progress as soon as possible.
+    /// Ends all actions in progress as early as possible; fails if the times become inconsistent.
     pub fn close(&mut self, space: &Space) -> Result<(), Inconsistent> {
         let open = std::mem::take(&mut self.open);
         open.iter().try_for_each(|open| self.end(space, open))
@@ -454,7 +459,7 @@ impl Track {
         Ok(())
     }
 
-    /// Lets every timed effect that is left happen.
+    /// Appends all timed literals still to come; fails if the times become inconsistent.
     pub fn pass_timed(&mut self, space: &Space) -> Result<(), Inconsistent> {
         for (access, timed) in space.accesses.timed.iter().zip(&space.world.ground.timed).skip(self.timed) {
             self.order.push_fixed(access, timed.time_s)?;
@@ -462,7 +467,8 @@ impl Track {
         Ok(())
     }
 
-    /// Start of the action in progress that started last, seconds.
+    /// Start of the action in progress that started last, in seconds; `None` if no action is in
+    /// progress.
     pub fn latest_open_s(&self) -> Option<f64> {
         self.open.iter().map(|open| self.order.earliest_s(open.start)).max_by(f64::total_cmp)
     }

@@ -1,4 +1,4 @@
-//! Packed states, each stored once.
+//! Generated states of the temporal search without duplicates, packed into 64-bit words.
 
 use std::hash::Hasher;
 
@@ -7,7 +7,7 @@ use rustc_hash::FxHasher;
 use crate::ground::{GroundTask, Values};
 use crate::memory::{Rows, soon};
 
-/// Position of a variable's value in the words of a packed state.
+/// Position of a variable's bits in the words of a packed state.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: u32,
@@ -15,9 +15,10 @@ struct Field {
     mask: u64,
 }
 
-/// States as words, with a table to find equal ones.
+/// Packed states, with a hash table that finds equal ones.
 ///
-/// A state is its variables, bit-packed, its numbers, and one word that the search adds (what is in progress).
+/// A state consists of its variables (packed), its numbers, and one extra word of the search for what
+/// else distinguishes states.
 pub(crate) struct Store {
     fields: Vec<Field>,
     value_words: usize,
@@ -49,7 +50,7 @@ impl Store {
         Store { fields, value_words, words, scratch, table: vec![EMPTY; 1024], count: 0 }
     }
 
-    /// Inserts a state; returns its number and true if new.
+    /// Inserts a state with its extra word; returns its index, and true if the state is new.
     pub fn insert(&mut self, state: &Values, extra: u64) -> (u32, bool) {
         self.scratch.fill(0);
         for (field, &value) in self.fields.iter().zip(&state.values) {
@@ -81,7 +82,7 @@ impl Store {
         (self.count - 1, true)
     }
 
-    /// State with a number, and its extra word.
+    /// Unpacks a state by index into `into`; returns its extra word.
     pub fn get(&self, index: u32, into: &mut Values) -> u64 {
         let words = self.words.row(index as usize);
         into.values.clear();
@@ -94,7 +95,8 @@ impl Store {
         words[words.len() - 1]
     }
 
-    /// Memory of the store, and of the table's next growth if near, bytes.
+    /// Memory of the store, and memory of its hash table after the next growth (0 unless near), in
+    /// bytes.
     pub fn bytes(&self) -> [usize; 2] {
         let table = size_of_val(&self.table[..]);
         let next = if soon(2 * self.count as usize, self.table.len()) { 2 * table } else { 0 };

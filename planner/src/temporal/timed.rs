@@ -1,4 +1,4 @@
-//! Timed plan, and its validation.
+//! Plans with times, and their validation.
 
 use crate::plan::Plan;
 use crate::validate::validate;
@@ -11,16 +11,16 @@ use super::world::World;
 /// Action of a plan with its times.
 #[derive(Debug, Clone)]
 pub(crate) struct Timed {
-    /// The step of the search.
+    /// Step of the search.
     pub step: TemporalStep,
-    /// Start time, seconds.
+    /// Start time, in seconds.
     pub start_s: f64,
-    /// Duration, seconds.
+    /// Duration, in seconds.
     pub duration_s: f64,
 }
 
-/// Earliest schedule of a plan; `None` if stopped, or if timed effects leave no room to separate
-/// mutex happenings.
+/// Earliest schedule of a plan, with interfering happenings apart; `None` if stopped, or if the times
+/// cannot be made valid.
 pub(super) fn schedule(space: &Space, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> Option<Vec<Timed>> {
     let mut track = space.track(steps).ok()?;
     track.pass_timed(space).ok()?;
@@ -39,7 +39,7 @@ pub(super) fn schedule(space: &Space, steps: &[TemporalStep], stop: &dyn Fn() ->
     }
 }
 
-/// The actions of a track at their earliest times.
+/// Actions of a temporal network at their earliest times.
 fn timed(steps: &[TemporalStep], track: &Track) -> Vec<Timed> {
     let actions =
         track.actions.iter().zip(steps).filter_map(|(action, step)| action.map(|action| (action, step)));
@@ -63,15 +63,15 @@ fn timed(steps: &[TemporalStep], track: &Track) -> Vec<Timed> {
     plan
 }
 
-/// True if the validator accepts a plan with its times; needed with continuous change, or effects
-/// that depend on chosen durations, where the search does not know the order of happenings.
+/// True if the validator accepts a plan with its times. Needed with continuous change, or if effects
+/// depend on chosen durations: the search then does not know the order of happenings.
 pub(super) fn is_valid(space: &Space, steps: &[TemporalStep], stop: &dyn Fn() -> bool) -> bool {
     let Some(timed) = schedule(space, steps, stop) else { return false };
     let world = space.world;
     validate(world.task, world.calls.attachments(), &to_plan(world, &timed)).valid
 }
 
-/// Plan in the names of its task.
+/// Plan with the names of actions and objects in the task.
 pub(crate) fn to_plan(world: &World, timed: &[Timed]) -> Plan {
     let classical = world.ground.durative.is_empty() && world.ground.timed.is_empty();
     let steps = timed.iter().map(|timed| {

@@ -1,8 +1,9 @@
 //! Detection of actions that may have to start, or to end, at the very same time.
 //!
-//! What holds over all of an action holds strictly between its start and its end. So two actions may start at one time
-//! of which each gives what the other holds, and two may end at one time of which each takes that away. The search lets
-//! one happen after the other, and sees neither: where there may be such actions, it proves nothing.
+//! An over-all condition must hold strictly between start and end of its action. So two actions may
+//! have to start at one time if each achieves the over-all condition of the other, and to end at one
+//! time if each deletes it. The search orders all happenings and finds no such plan: where there may be
+//! such actions, its exhaustion proves nothing.
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
@@ -14,11 +15,11 @@ use super::advance::derived_roots;
 use super::touch::Touched;
 use super::world::{Act, World};
 
-/// Held or set resource: a value of a variable; or a variable or number whatever its value.
+/// Resource that is held or set, and its value; `None` for any value, and for numbers.
 type Place = (u32, Option<u32>);
 
-/// True if some actions may be able only to start, or only to end, simultaneously, as far as known
-/// without a search.
+/// True if some actions may only be able to start, or to end, at the very same time; judged from the
+/// actions alone.
 pub(super) fn some_only_together(world: &World) -> bool {
     let roots = derived_roots(world);
     let held: Vec<Vec<Place>> = world.acts.iter().map(|act| held(world, &roots, act)).collect();
@@ -38,7 +39,8 @@ pub(super) fn some_only_together(world: &World) -> bool {
         || in_a_circle(world, &taken, |act| act.end_effects, takes)
 }
 
-/// True if actions form a circle in which each holds a resource that an effect of the next one meets.
+/// True if some actions form a cycle in which each holds a resource on which an effect of the next one
+/// acts, as `meets` tells of the held value and the set value.
 fn in_a_circle<'w>(
     world: &World<'w>,
     held: &[Vec<Place>],
@@ -73,7 +75,7 @@ fn in_a_circle<'w>(
     circles.iter().any(|circle| circle.iter().filter(|node| node.index() < acts as usize).count() > 1)
 }
 
-/// Resources that must hold over all of an action, without numeric bounds: of simultaneous changes,
+/// Resources of an action's over-all condition. Numeric bounds are left out: of simultaneous changes,
 /// those that keep a bound can come first.
 fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
     let mut places = Vec::new();
@@ -94,7 +96,7 @@ fn held(world: &World, roots: &[Vec<u32>], act: &Act) -> Vec<Place> {
     places
 }
 
-/// Resources that an effect sets.
+/// Resources that an effect changes, with the value set.
 fn set(world: &World, effect: &GroundEffect) -> Vec<Place> {
     if let GroundOutcome::Set(fact) = &effect.outcome {
         return vec![(fact.variable, Some(fact.value))];

@@ -1,4 +1,4 @@
-//! Variables and numbers that conditions, expressions and effects read or change.
+//! Variables and numbers that conditions and expressions read, or effects change.
 
 use crate::ground::{
     CallId, ComparisonId, Conjunction, GroundExpression, GroundOutcome, NumericId, Place, VariableId,
@@ -6,17 +6,18 @@ use crate::ground::{
 
 use super::world::World;
 
-/// Variables and numbers.
+/// Set of variables and numbers, possibly with duplicates.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Touched {
-    /// Finite-domain variables.
+    /// Indices of finite-domain variables.
     pub variables: Vec<VariableId>,
-    /// Numbers.
+    /// Indices of numbers.
     pub numbers: Vec<NumericId>,
 }
 
 impl Touched {
-    /// Both as resources: variables, then numbers after all `variables` of the task; in order, each once.
+    /// Variables and numbers as indices of resources, in ascending order, each once: number `n` has
+    /// index `n` plus the number of `variables` in the task.
     pub fn resources(&self, variables: usize) -> Vec<u32> {
         let numbers = self.numbers.iter().map(|&number| number + variables as u32);
         let mut resources: Vec<u32> = self.variables.iter().copied().chain(numbers).collect();
@@ -25,40 +26,40 @@ impl Touched {
         resources
     }
 
-    /// True if both contain the same variable or number.
+    /// True if the two sets have a variable or number in common.
     pub fn meets(&self, other: &Touched) -> bool {
         self.variables.iter().any(|variable| other.variables.contains(variable))
             || self.numbers.iter().any(|number| other.numbers.contains(number))
     }
 
-    /// Clears the sets and keeps their memory.
+    /// Empties the set and keeps its memory.
     pub fn clear(&mut self) {
         self.variables.clear();
         self.numbers.clear();
     }
 
-    /// Adds the resources that the answer of a call depends on.
+    /// Adds the variables and numbers that the answer of a call depends on.
     pub fn call(&mut self, world: &World, call: CallId) {
         let (variables, numbers) = world.calls.reads(call);
         self.variables.extend(variables);
         self.numbers.extend(numbers);
     }
 
-    /// Adds the resources that a numeric condition reads.
+    /// Adds the variables and numbers that a numeric condition reads.
     pub fn comparison(&mut self, world: &World, comparison: ComparisonId) {
         let comparison = &world.ground.comparisons[comparison as usize];
         expression_touches(world, &comparison.left, self);
         expression_touches(world, &comparison.right, self);
     }
 
-    /// Adds the resources that a condition reads.
+    /// Adds the variables and numbers that a condition reads.
     pub fn condition(&mut self, world: &World, condition: &Conjunction) {
         self.variables.extend(condition.facts.iter().map(|fact| fact.variable));
         condition.comparisons.iter().for_each(|&comparison| self.comparison(world, comparison));
         condition.calls.iter().for_each(|&(call, _)| self.call(world, call));
     }
 
-    /// Adds the resources that an outcome changes.
+    /// Adds the variables and numbers that the outcome of an effect changes.
     pub fn outcome(&mut self, world: &World, outcome: &GroundOutcome) {
         match outcome {
             GroundOutcome::Set(fact) => self.variables.push(fact.variable),
@@ -78,7 +79,7 @@ impl Touched {
     }
 }
 
-/// Adds the read set of an expression.
+/// Adds the variables and numbers that an expression reads.
 pub(crate) fn expression_touches(world: &World, expression: &GroundExpression, touched: &mut Touched) {
     match expression {
         GroundExpression::Fluent(fluent) => touched.numbers.push(*fluent),

@@ -1,6 +1,7 @@
-//! Tour improvement (local search, Croes 1958, Or 1976): where steps of one action lead from place
-//! to place, as drives do, the stops of the tour are reordered or dropped, and the connecting steps
-//! are rebuilt. A step-by-step search treats each order as separate plans, which are too many.
+//! Tour improvement by local search (Croes 1958, Or 1976). If steps of one action lead from place to
+//! place, such as drives, the stops of that tour are reordered or left out, and the steps between them
+//! are built anew. A search that works step by step treats each order as a plan of its own, and there
+//! are too many.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -11,34 +12,36 @@ use super::schedule::Replayed;
 use super::space::Space;
 use super::world::World;
 
-/// Steps that are replayed at most for one plan.
+/// Maximum number of steps replayed for one plan.
 const MOST_REPLAYED: usize = 20_000;
-/// Maximum number of actions of a task for an index by arguments.
+/// Maximum number of actions of a task for which tours are improved.
 const MOST_ACTS: usize = 200_000;
-/// Differences below this do not count as better.
+/// Minimum difference of the measure at which a plan counts as better.
 const BETTER: f64 = 1e-6;
 
-/// Actions of a task, indexed by arguments.
+/// Index of a task's actions by schema and arguments, for improving tours.
 pub struct Tours<'w, 'a> {
     acts: HashMap<(u32, &'a [u32]), u32>,
     world: &'w World<'a>,
 }
 
-/// A part of a plan that leads from place to place.
+/// Part of a plan whose steps of one action schema lead from place to place.
 struct Tour {
-    /// Travel action, and the argument positions of its origin and its destination.
+    /// Action schema of the travel steps.
     schema: u32,
+    /// Argument position of the place where a travel step begins.
     from: usize,
+    /// Argument position of the place where a travel step ends.
     to: usize,
-    /// Arguments of one travel step.
+    /// Arguments of the first travel step.
     arguments: Vec<u32>,
-    /// Steps before the tour.
+    /// Steps of the plan before the tour.
     before: Vec<TemporalStep>,
-    /// Places along the tour, with the steps at each.
+    /// Stops along the tour, with the steps done at each.
     stops: Vec<Stop>,
 }
 
-/// Place with the steps done there.
+/// Place, with the steps done there.
 #[derive(Clone)]
 struct Stop {
     place: u32,
@@ -46,7 +49,7 @@ struct Stop {
 }
 
 impl<'w, 'a> Tours<'w, 'a> {
-    /// Index of a world's actions; `None` if there are too many.
+    /// Index of a world's actions; `None` if they are too many.
     pub fn new(world: &'w World<'a>) -> Option<Self> {
         if world.acts.len() > MOST_ACTS {
             return None;
@@ -58,7 +61,8 @@ impl<'w, 'a> Tours<'w, 'a> {
         Some(Tours { acts, world })
     }
 
-    /// Plan with its tours reordered while this improves it; always replayed.
+    /// Plan in which stops of tours are reordered or left out while this improves the plan. The result
+    /// is a complete replay.
     pub fn rearranged(
         &self,
         space: &Space,
@@ -86,7 +90,7 @@ impl<'w, 'a> Tours<'w, 'a> {
         }
     }
 
-    /// The tours of a plan with two steps that lead on or more.
+    /// Tours of a plan, each with at least two travel steps.
     fn tours(&self, steps: &[TemporalStep]) -> Vec<Tour> {
         let origin = |step: &TemporalStep| self.world.acts[step.act as usize].origin;
         let is_whole = |step: &TemporalStep| step.part == Part::Whole && step.proposal.is_none();
@@ -125,7 +129,7 @@ impl<'w, 'a> Tours<'w, 'a> {
         tours
     }
 
-    /// Plan with the tour's stops replaced; `None` if no action connects two stops.
+    /// Plan with other stops in a tour; `None` if no action leads from one stop to the next.
     fn assembled(&self, tour: &Tour, stops: &[Stop]) -> Option<Vec<TemporalStep>> {
         let mut steps = tour.before.clone();
         let mut at = tour.arguments[tour.from];
@@ -143,7 +147,7 @@ impl<'w, 'a> Tours<'w, 'a> {
 }
 
 impl Tour {
-    /// Stops with one left out, with some of them the other way round, and with one earlier or later.
+    /// Variants of the stops: each one left out, each section reversed, and each one moved elsewhere.
     fn orders(&self) -> impl Iterator<Item = Vec<Stop>> + '_ {
         let all = self.stops.len();
         let less = (0..all).map(|n| {
@@ -168,7 +172,8 @@ impl Tour {
     }
 }
 
-/// Argument positions of origin and destination, judged by consecutive actions.
+/// Argument positions of origin and destination that most consecutive steps of an action agree with;
+/// `None` if none do.
 fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     let width = all.first()?.len();
     let pairs =
@@ -180,7 +185,8 @@ fn leads(all: &[&[u32]]) -> Option<(usize, usize)> {
     (most > 0).then_some(best)
 }
 
-/// True if an action begins where one of its kind has ended, with all other arguments equal.
+/// True if a step begins at the place where the step before it has ended, with all other arguments
+/// equal.
 fn follows(first: &[u32], second: &[u32], from: usize, to: usize) -> bool {
     let is_same = |n: usize| n == from || n == to || first[n] == second[n];
     first[to] == second[from] && (0..first.len()).all(is_same)

@@ -1,4 +1,4 @@
-//! Starts, runs and ends of actions: evaluates conditions and applies effects on unpacked states.
+//! Evaluation of conditions and effects of durative actions on states of the temporal search.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -16,59 +16,60 @@ use crate::model::relation::quotient;
 use crate::plan::EPSILON_S;
 use crate::task::{Task, Term};
 
-/// Ground action of the temporal search; an instantaneous one has everything at its start.
+/// Ground action of the temporal search; an instantaneous action has only conditions and effects at its
+/// start.
 #[derive(Debug, Clone)]
 pub struct Act<'a> {
-    /// Lifted action and its arguments.
+    /// Action schema and arguments.
     pub origin: &'a Origin,
     /// True if durative.
     pub durative: bool,
-    /// Bounds on the duration.
+    /// Bounds on the duration, all of which must hold.
     pub bounds: &'a [GroundDurationBound],
-    /// Position of the duration within its bounds: 0 is the shortest, 1 the longest; above 0 only
-    /// where the shortest cannot give all effects.
+    /// Duration to choose, as a position between its bounds: 0 for the shortest, 1 for the longest.
+    /// Above 0 only in copies of actions whose effects depend on their duration.
     pub share: f64,
-    /// Holds right before the start.
+    /// Condition right before the start.
     pub at_start: &'a Conjunction,
-    /// Holds strictly between start and end.
+    /// Condition that holds strictly between start and end.
     pub over_all: &'a Conjunction,
-    /// Holds right before the end.
+    /// Condition right before the end.
     pub at_end: &'a Conjunction,
-    /// Happens at the start.
+    /// Effects at the start.
     pub start_effects: &'a [GroundEffect],
     /// Continuous effects, with their rates.
     pub flow_effects: &'a [GroundEffect],
-    /// Happens at the end.
+    /// Effects at the end.
     pub end_effects: &'a [GroundEffect],
     /// Contribution to an additive metric.
     pub cost: &'a GroundExpression,
-    /// Grounding calls: module and arguments.
+    /// Calls of grounding modules: index of the module, and arguments.
     pub grounding: Vec<(usize, Vec<u32>)>,
-    /// True if the end is independent of the start; computed on demand.
+    /// True if start and end are independent of each other; computed on demand.
     pub(super) ends_freely: OnceCell<bool>,
 }
 
-/// Positions within the duration bounds that are tried besides the shortest, if effects depend on
-/// the duration.
+/// Positions between the shortest (0) and the longest (1) duration that are tried, besides the
+/// shortest, for actions whose effects depend on their duration.
 const SHARES: [f64; 2] = [0.5, 1.0];
 
 pub static NOTHING: Conjunction =
     Conjunction { facts: Vec::new(), comparisons: Vec::new(), calls: Vec::new() };
 
-/// State with the other inputs of expressions.
+/// State, together with everything else that the value of an expression depends on.
 #[derive(Clone, Copy)]
 pub struct EvaluationContext<'s> {
     /// The state.
     pub state: &'s Values,
-    /// `?duration` of the action at hand, in seconds.
+    /// Value of `?duration`, in seconds.
     pub duration_s: f64,
-    /// The parameter that a grounding module proposed.
+    /// Argument proposed by a grounding module; `None` if there is none.
     pub proposal: Option<&'s Arc<str>>,
     /// Level of accuracy at which attachments answer.
     pub level: Level,
 }
 
-/// The duration that an action may take, in seconds.
+/// Range of durations that an action may take, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DurationRange {
     /// Shortest duration.
@@ -78,14 +79,15 @@ pub struct DurationRange {
 }
 
 impl DurationRange {
-    /// The span reduced to a chosen duration, if any; `None` if that is not allowed.
+    /// Range reduced to a chosen duration, if there is one; `None` if the range does not contain it.
     pub fn taking(self, taken_s: Option<f64>) -> Option<DurationRange> {
         let Some(taken_s) = taken_s else { return Some(self) };
         (self.least_s <= taken_s && taken_s <= self.most_s)
             .then_some(DurationRange { least_s: taken_s, most_s: taken_s })
     }
 
-    /// Span reduced by an [`EPSILON_S`] at excluded bounds; its middle if there is less room.
+    /// Range that stays [`EPSILON_S`] inside strict bounds; the middle of the allowed range if there is
+    /// less room.
     fn strictly_inside(self, bounds: DurationRange) -> DurationRange {
         let least_s = self.least_s.max(bounds.least_s + EPSILON_S);
         let most_s = self.most_s.min(bounds.most_s - EPSILON_S);
@@ -101,32 +103,34 @@ impl DurationRange {
     }
 }
 
-/// The ground task in the form that the temporal search applies.
+/// Ground task in the form that the temporal search uses.
 pub struct World<'a> {
     /// The lifted task.
     pub task: &'a Task,
     /// The ground task.
     pub ground: &'a GroundTask,
-    /// Calls.
+    /// Calls of attachments.
     pub calls: Calls<'a>,
-    /// Durative actions first, in the ground task's order, then instantaneous ones, then durative ones again that take longer.
+    /// Actions: durative ones, then instantaneous ones, then copies of durative ones with a longer
+    /// duration.
     pub acts: Vec<Act<'a>>,
-    /// True if the steps of the search can make every plan; computed on demand.
+    /// True if the steps of the search can produce every plan; computed on demand.
     pub(super) complete: OnceCell<bool>,
-    /// True if grounding modules propose parameters.
+    /// True if some action has a grounding module.
     pub proposes: bool,
-    /// Axioms by stratum.
+    /// Axioms of each stratum.
     strata: Vec<Vec<&'a Axiom>>,
-    /// Variables that axioms set.
+    /// Derived variables.
     derived: Vec<usize>,
-    /// True, by variable, if an object fluent; empty if none is.
+    /// True, by variable, if the variable stands for an object fluent; empty if none does.
     objects: Vec<bool>,
-    /// Index and value of the last timed effect on each variable set by timed effects.
+    /// Last timed literal that sets each variable: its index and the value; only for variables set by
+    /// timed literals.
     pub(super) last_given: FxHashMap<u32, (usize, u32)>,
 }
 
 impl<'a> World<'a> {
-    /// World of a ground task and its bound calls.
+    /// World of a ground task, with its calls of attachments.
     pub fn new(task: &'a Task, ground: &'a GroundTask, calls: Calls<'a>) -> World<'a> {
         let durative = ground.durative.iter().map(|action| Act {
             origin: &action.origin,
@@ -194,13 +198,13 @@ impl<'a> World<'a> {
         World { task, ground, calls, acts, complete, proposes, strata, derived, objects, last_given }
     }
 
-    /// True if numbers depend on times: on the chosen duration of an action, or on how long one has been
-    /// running.
+    /// True if numbers depend on the times of a plan: on a chosen duration, or on continuous change.
     pub fn chooses_numbers(&self) -> bool {
         self.acts.iter().any(|act| !act.flow_effects.is_empty() || chooses_effects(act))
     }
 
-    /// True if effects depend on a duration without a maximum, of which no fraction can be tried.
+    /// True if effects depend on a duration without an upper bound, so that no position within its
+    /// bounds can be tried.
     pub fn chooses_without_end(&self) -> bool {
         let ends = |act: &Act| {
             let mut relations = act.bounds.iter().map(|bound| bound.relation);
@@ -214,14 +218,15 @@ impl<'a> World<'a> {
         self.acts.iter().any(chooses_cost)
     }
 
-    /// First state, with derived variables up to date.
+    /// Initial state, derived variables included.
     pub fn initial(&self) -> Result<Values, Failure> {
         let mut state = self.ground.initial.clone();
         self.derive(&mut state)?;
         Ok(state)
     }
 
-    /// Value of an expression; NaN if undefined. `total-time` and preferences count as zero.
+    /// Value of an expression; NaN if undefined. `total-time` and violations of preferences count as
+    /// zero.
     pub fn evaluate(
         &self,
         expression: &GroundExpression,
@@ -287,9 +292,10 @@ impl<'a> World<'a> {
         Ok(true)
     }
 
-    /// Durations allowed by the bounds at the start; `None` if none.
+    /// Durations that the bounds at the start allow in a state; `None` if there are none.
     ///
-    /// A durative action takes at least [`EPSILON_S`], unless it must take less and its end is free of its start.
+    /// A durative action takes at least [`EPSILON_S`], unless it must be shorter and its end is
+    /// independent of its start.
     pub fn span(&self, act: &Act, moment: &EvaluationContext) -> Result<Option<DurationRange>, Failure> {
         let mut span = DurationRange { least_s: 0.0, most_s: f64::INFINITY };
         let mut strict = DurationRange { least_s: f64::NEG_INFINITY, most_s: f64::INFINITY };
@@ -330,7 +336,7 @@ impl<'a> World<'a> {
         Ok((span.least_s <= span.most_s && span.least_s.is_finite()).then_some(span))
     }
 
-    /// True if the bounds that are evaluated at the end allow this duration.
+    /// True if the bounds that are evaluated at the end of an action allow the duration in `moment`.
     pub fn end_allows(&self, act: &Act, moment: &EvaluationContext) -> Result<bool, Failure> {
         for bound in act.bounds.iter().filter(|bound| bound.at_end) {
             let seconds = self.evaluate(&bound.seconds, moment)?;
@@ -341,11 +347,12 @@ impl<'a> World<'a> {
         Ok(true)
     }
 
-    /// Applies effects: `moment` is the state before, `into` a copy that becomes the state after,
-    /// with axioms re-derived. `gate`: true if an effect's conditions on earlier times were met.
+    /// Applies effects. `moment` holds the state before; `into` is a copy of that state and becomes the
+    /// state after, derived variables included. `gate` is true for effects whose conditions on earlier
+    /// times were met.
     ///
-    /// `Ok(false)` if a number becomes undefined or infinite, or changes of a number or an object contradict each other: then the
-    /// effects cannot happen.
+    /// Returns false if the effects cannot happen: a number becomes undefined or infinite, or changes
+    /// of a number or object fluent contradict each other.
     pub fn apply(
         &self,
         effects: &[GroundEffect],
@@ -415,7 +422,7 @@ impl<'a> World<'a> {
         !self.objects.is_empty() && self.objects[variable as usize]
     }
 
-    /// Brings derived variables up to date.
+    /// Recomputes the derived variables of a state.
     pub(super) fn derive(&self, state: &mut Values) -> Result<(), Failure> {
         if self.derived.is_empty() {
             return Ok(());
@@ -448,13 +455,14 @@ impl<'a> World<'a> {
 }
 
 impl Act<'_> {
-    /// True if effects, bounds or cost depend on a duration that the schedule may choose.
+    /// True if effects, bounds at the end or the cost depend on a duration that is left to the
+    /// schedule.
     pub fn is_read_off(&self) -> bool {
         self.share == 0.0 && (chooses_effects(self) || chooses_cost(self))
     }
 }
 
-/// True if the cost of an action depends on its chosen duration.
+/// True if the cost of an action depends on a duration that can be chosen.
 fn chooses_cost(act: &Act) -> bool {
     !is_fixed(act) && mentions_duration(act.cost)
 }
@@ -463,7 +471,7 @@ fn is_fixed(act: &Act) -> bool {
     act.bounds.iter().any(|bound| bound.relation == Relation::Equal && !bound.at_end)
 }
 
-/// True if effects, or bounds at the end, depend on the chosen duration.
+/// True if effects or bounds at the end depend on a duration that can be chosen.
 fn chooses_effects(act: &Act) -> bool {
     let timed = |effect: &GroundEffect| match &effect.outcome {
         GroundOutcome::Change { amount, .. } => mentions_duration(amount),

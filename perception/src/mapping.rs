@@ -1,11 +1,16 @@
-//! The map of a building from a drive with a range camera (Viejo and Cazorla, *Construcción de mapas 3D y extracción de primitivas geométricas
-//! del entorno*).
+//! The map of a building from a drive with a range camera (Viejo and Cazorla, *Construcción de mapas 3D y extracción de
+//! primitivas geométricas del entorno*).
 //!
-//! The pipeline, a file a step: what the camera saw at each stop of the drive, levelled ([`Station`]), and its plan without floor and ceiling;
-//! how two stops in a row lie to each other ([`rectify_pair`]: ICP-EM, Eq. 1 to 3); where the drive came by again ([`closures`]) and all poses
-//! together ([`PoseGraph`]), which the paper leaves open; all points as small pieces of surface ([`Cells`], normals by regions: Eq. 4); the
-//! orientations of walls ([`orientations`]: k-means); patches grown and planes put through them ([`PlaneEstimator`], [`Constraints`]) and joined
-//! ([`FuseOptions`]); pillars and round walls ([`UprightCylinder`]); the map of walls, level surfaces and open floor ([`Survey`], [`RoomMap`]); where to go next to see more of it ([`next_poses`]).
+//! The steps, in order:
+//! - [`Station`]: the levelled points of one stop of the drive, and their plan without floor and ceiling.
+//! - [`rectify_pair`]: relative pose of two consecutive stations (ICP-EM, Eq. 1 to 3).
+//! - [`closures`] and [`PoseGraph`]: loop closures and optimised poses, which the paper leaves open.
+//! - [`Cells`]: all points as small surface elements with normals (by regions, Eq. 4).
+//! - [`orientations`]: orientations of walls (k-means).
+//! - [`PlaneEstimator`], [`Constraints`], [`FuseOptions`]: patches, the planes through them, and joining these planes.
+//! - [`UprightCylinder`]: pillars and round walls.
+//! - [`Survey`], [`RoomMap`]: the map of walls, level surfaces and open floor.
+//! - [`next_poses`]: where to go next to see more of the building.
 
 mod cells;
 mod closure;

@@ -9,8 +9,8 @@ use nalgebra::{Isometry2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Accumulated sums over the points of cubes and over the directions to the camera; points are
-/// added station by station and not kept.
+/// Sums over the points of each cube and over their directions to the camera; points are added station by station and
+/// not kept.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Stored", into = "Stored")]
 pub struct Cells {
@@ -19,19 +19,19 @@ pub struct Cells {
     sums: Vec<Sums>,
 }
 
-/// A cube that holds points.
+/// Sums over the points in one cube.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Sums {
     /// Integer coordinates of the cube.
     cube: [i32; 3],
     count: u32,
-    /// Sum of the points, from the cube's corner, metres.
+    /// Sum of the points relative to the cube's corner, metres.
     sum: [f32; 3],
-    /// Sum of unit vectors towards the camera.
+    /// Sum of the points' unit vectors towards the camera.
     towards: [f32; 3],
 }
 
-/// Cells in file form.
+/// Serialised form of [`Cells`].
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stored {
@@ -39,23 +39,23 @@ struct Stored {
     cells: Vec<Sums>,
 }
 
-/// Cells that cannot be.
+/// Reason why cells are invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CellsError {
-    /// Edge length that is not positive.
+    /// The edge length is not positive and finite.
     #[error("cells with an edge of {edge_m} m: give a positive length, such as 0.1")]
     Edge {
         /// Given edge.
         edge_m: f64,
     },
-    /// A stored cell is invalid.
+    /// A stored cell has no points, a sum that is not finite, or occurs twice.
     #[error(
         "cell {index} of the stored ones is damaged (its count is {count}, or a sum is no number, or it occurs twice): store the map anew"
     )]
     Damaged {
-        /// Index of the station.
+        /// Index of the stored cell.
         index: usize,
-        /// Number of points of the station.
+        /// Its number of points.
         count: u32,
     },
 }
@@ -95,45 +95,45 @@ impl TryFrom<Stored> for Cells {
 pub struct Facet {
     /// Centroid, in the map, metres.
     pub at: Point3<f64>,
-    /// Unit normal, towards the observer.
+    /// Unit normal, towards the camera.
     pub normal: Vector3<f64>,
-    /// Points in the cube.
+    /// Number of points in the cube.
     pub points: u32,
 }
 
-/// Contents of a cube, with or without a known normal.
+/// Points of one cube in summary, with or without a known normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Region {
     /// Centroid, in the map, metres.
     pub at: Point3<f64>,
     /// Mean of the unit vectors towards the camera.
     pub towards: Vector3<f64>,
-    /// Unit normal, towards the observer.
+    /// Unit normal, towards the camera; `None` if the evidence does not suffice.
     pub normal: Option<Vector3<f64>>,
     pub points: u32,
 }
 
 impl Region {
-    /// Surface element, if the evidence suffices.
+    /// Surface element of the region; `None` without a normal.
     pub fn facet(&self) -> Option<Facet> {
         self.normal.map(|normal| Facet { at: self.at, normal, points: self.points })
     }
 }
 
-/// Options for normals.
+/// Options for normals by regions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalOptions {
-    /// Minimum number of points of a region; smaller cubes are noise.
+    /// Minimum number of points of a cube; cubes with fewer are noise.
     pub least_points: u32,
-    /// Minimum share of a region's points relative to the fullest cube within reach: edges of
-    /// surfaces are blurred along the line of sight.
+    /// Minimum number of points of a cube, as a share of those in the fullest cube within `reach`; others are blurred
+    /// edges.
     pub least_share: f64,
-    /// Radius of a region around the point's own cube, in cubes.
+    /// Number of cubes on each side of a cube whose centroids form its normal.
     pub reach: i64,
-    /// Minimum number of regions that are evidence enough.
+    /// Minimum number of neighbouring cubes for a normal.
     pub least_regions: usize,
-    /// Minimum ratio of the length of the mean cross product (Eq. 4) to the mean length; below it,
-    /// the products do not agree on a direction.
+    /// Minimum ratio of the length of the mean cross product (Eq. 4) to the mean length; below it, the products
+    /// disagree about the direction, and there is no normal.
     pub agreement: f64,
 }
 
@@ -144,10 +144,10 @@ impl Default for NormalOptions {
 }
 
 impl Cells {
-    /// An empty grid.
+    /// Creates an empty grid with cubes of an edge, metres.
     ///
     /// # Errors
-    /// If the edge is no positive length.
+    /// If the edge is not positive and finite.
     pub fn new(edge_m: f64) -> Result<Cells, CellsError> {
         if !(edge_m > 0.0 && edge_m.is_finite()) {
             return Err(CellsError::Edge { edge_m });
@@ -160,7 +160,7 @@ impl Cells {
         self.edge_m
     }
 
-    /// Cells that hold points.
+    /// Number of cells that hold points.
     pub fn len(&self) -> usize {
         self.sums.len()
     }
@@ -170,15 +170,15 @@ impl Cells {
         self.sums.is_empty()
     }
 
-    /// Points that were added.
+    /// Number of points that were added.
     pub fn points(&self) -> u64 {
         self.sums.iter().map(|s| u64::from(s.count)).sum()
     }
 
-    /// Adds the points of a station (level frame), seen from `height_m` above its origin, up to
-    /// depth `far_m`.
+    /// Adds the points of a station (level frame, metres) up to depth `far_m`; the camera is `height_m` above its
+    /// origin.
     ///
-    /// Points that are not finite, or farther out than a million cells, are passed over.
+    /// Points that are not finite, or farther out than a million cells, are skipped.
     pub fn add(
         &mut self,
         points: &[Point3<f32>],
@@ -213,12 +213,12 @@ impl Cells {
         }
     }
 
-    /// Surface elements of all cells with sufficient evidence, in cell order.
+    /// Surface elements of all cells with sufficient evidence, ordered by cell coordinates.
     pub fn facets(&self, options: &NormalOptions) -> Vec<Facet> {
         self.regions(options).iter().filter_map(Region::facet).collect()
     }
 
-    /// Regions of all cells above the noise limits, in cell order.
+    /// Regions of all cells above the noise limits, ordered by cell coordinates.
     pub(super) fn regions(&self, options: &NormalOptions) -> Vec<Region> {
         let _span = tracing::debug_span!("normals by regions", cells = self.len()).entered();
         let region = |sums: &Sums| {
@@ -244,7 +244,8 @@ impl Cells {
         found.into_iter().map(|(_, region)| region).collect()
     }
 
-    /// Plan of the points in a height band; vertically stacked cells form one spot.
+    /// Horizontal positions of the cells in a height band, as spots weighted by points and thinned to `thin_m`, so that
+    /// vertically stacked cells form one spot.
     pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, least_points: u32, thin_m: f64) -> Vec<Spot> {
         let kept = self.sums.iter().filter(|s| s.count >= least_points);
         let at = kept.map(|s| (self.centroid(s), f64::from(s.count)));
@@ -258,7 +259,7 @@ impl Cells {
         Point3::new(axis(0), axis(1), axis(2))
     }
 
-    /// Cubes around one.
+    /// Occupied cubes at most `reach` cubes from the given one along each axis, without that cube.
     fn around(&self, own: &Sums, reach: i64) -> Vec<&Sums> {
         let span = || -reach..=reach;
         let [a, b, c] = own.cube.map(i64::from);
@@ -269,8 +270,8 @@ impl Cells {
     }
 }
 
-/// Surface normal at `at`: normalised sum of the cross products of all pairs of vectors to the
-/// centroids of neighbouring regions (Eq. 4), or `None` if the regions are too few or disagree.
+/// Surface normal at `at`: normalised sum of the cross products of all pairs of vectors to the centroids of
+/// neighbouring regions (Eq. 4). `None` if the regions are too few or disagree.
 ///
 /// Each product is first flipped `towards` the camera, as opposite pairs would cancel.
 pub fn by_regions(

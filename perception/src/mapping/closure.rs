@@ -11,21 +11,21 @@ use nalgebra::{Isometry2, Matrix2, Matrix3, Point2, Vector2};
 /// Options for loop closures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClosureOptions {
-    /// Minimum route length between two stations for a loop closure, metres.
+    /// Minimum length of the drive between the two stations of a loop closure, metres.
     pub apart_m: f64,
-    /// Assumed drift of poses, as a share of the route between two stations.
+    /// Assumed drift of poses, as a share of the distance driven between two stations.
     pub drift: f64,
-    /// Upper limit of the assumed drift, metres.
+    /// Upper limit of the assumed drift of the position, metres.
     pub most_m: f64,
     /// Maximum heading difference of two stations of a loop closure, radians.
     pub turn_rad: f64,
-    /// Maximum drift of the heading, radians.
+    /// Maximum assumed drift of the heading, radians.
     pub heading_drift_rad: f64,
-    /// Minimum share of the jointly visible spots that must match.
+    /// Minimum share of the jointly visible plan points that must match.
     pub explained: f64,
-    /// Length of the stretches of the drive that are compared, metres.
+    /// Length of the sections of the drive whose merged plans are compared, metres.
     pub stretch_m: f64,
-    /// Spacing of the stretches, metres.
+    /// Distance driven between stations that are compared with earlier ones, metres.
     pub every_m: f64,
 }
 
@@ -60,28 +60,29 @@ impl ClosureOptions {
 /// Loop closure: a station that shows the same place as a much earlier one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closure {
-    /// The earlier station.
+    /// Index of the earlier station.
     pub from: usize,
-    /// The later.
+    /// Index of the later station.
     pub to: usize,
-    /// Relative pose of the two.
+    /// Relative pose of the two stations, with its information.
     pub fit: PairFit,
 }
 
-/// Standard deviation of the coarse likelihood field, metres; search steps, metres and radians.
+/// Coarse search: standard deviation of the likelihood field, metres; step of the position, metres; step of the
+/// heading, radians.
 const COARSE: (f64, f64, f64) = (0.2, 0.1, 0.03);
-/// Approximate number of spots by which starts are scored.
+/// Maximum number of plan points by which a start pose is scored.
 const SOME: usize = 400;
-/// Half the resolution of the search, metres and radians: possible error of a start.
+/// Standard deviations of the best start pose of the coarse search: position, metres, and heading, radians.
 const START: (f64, f64) = (0.15, 0.05);
-/// Maximum score difference (mean log density), and minimum distance, metres, of a rival that makes
-/// a fit ambiguous.
+/// Start poses that score within the first value of the best (mean log density) and lie beyond the second from it,
+/// metres, make a fit ambiguous.
 const RIVAL: (f64, f64) = (0.1, 0.5);
 
-/// Finds loop closures of a drive, from poses chained from pairwise fits, one per station.
+/// Finds loop closures of a drive. `poses`: one per station, chained from pairwise fits.
 ///
 /// # Errors
-/// If an option or a pose cannot be used.
+/// If an option or a pose is out of range.
 pub fn closures(
     stations: &[Station],
     poses: &[Isometry2<f64>],
@@ -116,7 +117,8 @@ fn checked(
     poses.iter().enumerate().try_for_each(|(i, pose)| check_pose("station", i, pose))
 }
 
-/// Stations to be matched against earlier ones, by distance driven.
+/// Indices of the stations to be compared with earlier ones: one per `every_m` of distance driven. `ways`: distance
+/// driven up to each station, metres.
 fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
     let mut last = 0.0;
     (0..ways.len())
@@ -128,10 +130,10 @@ fn looked_at(ways: &[f64], options: &ClosureOptions) -> Vec<usize> {
         .collect()
 }
 
-/// Plan of some metres of the drive, in the frame of the station in the middle.
+/// Merged plan of a section of the drive, in the frame of its middle station.
 struct Stretch {
     spots: Vec<Spot>,
-    /// The stations.
+    /// Poses of the section's stations in the section's frame.
     here_from_level: Vec<Isometry2<f64>>,
     field: FieldOfView,
 }
@@ -149,7 +151,7 @@ impl Stretch {
         Stretch::of(near.map(|i| (&plans[i], poses[at].inv_mul(&poses[i]))), rectify)
     }
 
-    /// Merged plan of several stations, with their viewpoints.
+    /// Merges the plans of several stations, each with its pose.
     fn of<'a>(
         plans: impl Iterator<Item = (&'a Vec<Spot>, Isometry2<f64>)> + Clone,
         rectify: &RectifyOptions,
@@ -161,23 +163,23 @@ impl Stretch {
         Stretch { spots, here_from_level: plans.map(|(_, pose)| pose).collect(), field: rectify.field }
     }
 
-    /// True for places visible from one of the stations.
+    /// True if a place is in the field of view of one of the stations.
     fn sees(&self, place: &Point2<f64>) -> bool {
         self.here_from_level.iter().any(|pose| self.field.sees(&pose.inverse_transform_point(place)))
     }
 
-    /// Spots that the other stretch could see too at the given relative pose.
+    /// Plan points that are also in the other section's field of view, at the given relative pose.
     fn shared(&self, other_from_here: &Isometry2<f64>, other: &Stretch) -> Vec<Spot> {
         self.spots.iter().filter(|s| other.sees(&(other_from_here * s.at))).copied().collect()
     }
 }
 
-/// Localises one drive in another from a rough pose, within `options.most_m` and
-/// `options.heading_drift_rad`; stations have poses in their drive's frame. `None` if too little
-/// matches, or the result is ambiguous.
+/// Localises one drive in another, searching around a rough pose within `options.most_m` and
+/// `options.heading_drift_rad`. `before`, `after`: stations with their poses in the frame of their drive. `None` if too
+/// little matches, or the result is ambiguous.
 ///
 /// # Errors
-/// If an option or a pose cannot be used.
+/// If an option or a pose is out of range.
 pub fn relocate(
     before: (&[Station], &[Isometry2<f64>]),
     after: (&[Station], &[Isometry2<f64>]),
@@ -196,10 +198,10 @@ pub fn relocate(
     Ok(searched(&stretch(before), &stretch(after), start, options.most_m, rectify, options))
 }
 
-/// Optimised poses of a drive from pairwise fits and loop closures.
+/// Optimised poses of a drive from pairwise fits of consecutive stations and loop closures.
 ///
 /// # Errors
-/// If there are not as many pairs as steps between the stations that closures name, or a fit is not finite.
+/// If a closure names a station beyond those of `pairs`, or a fit is not finite.
 pub fn correct_drive(pairs: &[PairFit], closures: &[Closure]) -> Result<Settled, GraphError> {
     let edge = |from: usize, to: usize, fit: &PairFit, doubtful: bool| Edge {
         from,
@@ -213,7 +215,7 @@ pub fn correct_drive(pairs: &[PairFit], closures: &[Closure]) -> Result<Settled,
     PoseGraph { poses: chained(pairs), edges: steps.chain(again).collect() }.settle()
 }
 
-/// Path length up to each pose, metres.
+/// Distance driven up to each pose, metres.
 fn ways_m(poses: &[Isometry2<f64>]) -> Vec<f64> {
     let mut way = 0.0;
     let mut last = poses.first().map_or(Vector2::zeros(), |p| p.translation.vector);
@@ -229,7 +231,7 @@ fn reach_m(way_m: f64, options: &ClosureOptions) -> f64 {
     (0.3 + options.drift * way_m).min(options.most_m)
 }
 
-/// Nearest earlier station that may show the same place.
+/// Index of the nearest earlier station that may show the same place as station `to`; `None` if there is none.
 fn candidate(poses: &[Isometry2<f64>], ways: &[f64], to: usize, options: &ClosureOptions) -> Option<usize> {
     let apart = |from: usize| (poses[from].translation.vector - poses[to].translation.vector).norm();
     let near = (0..to)
@@ -239,9 +241,9 @@ fn candidate(poses: &[Isometry2<f64>], ways: &[f64], to: usize, options: &Closur
     near.min_by(|&a, &b| apart(a).total_cmp(&apart(b)))
 }
 
-/// Fit from the best start within reach; `None` if it explains too little. If starts along a line
-/// score equally (a bare corridor), the fit is uninformative along that line; if starts all around
-/// do, it is rejected.
+/// Fit from the best start pose within reach; `None` if it explains too little of the plan. If start poses along a line
+/// score equally (a bare corridor), the fit has no information along that line; if they do in all directions, it is
+/// rejected.
 fn searched(
     before: &Stretch,
     after: &Stretch,
@@ -279,7 +281,7 @@ fn searched(
     Some(found)
 }
 
-/// Scores of all starts within reach: agreement of two stretches where both could see.
+/// Scores (mean log density where both sections could see) of all start poses within reach; `None` without plan points.
 fn scores(
     before: &Stretch,
     after: &Stretch,

@@ -1,5 +1,5 @@
-//! Cylinders, announced in the paper: pillars from spots outside the planes, and round walls, where
-//! one cylinder replaces several planes.
+//! Cylinders, announced in the paper: pillars from points outside the planes, and round walls, where one cylinder
+//! replaces several planes.
 
 mod post;
 
@@ -16,34 +16,34 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct UprightCylinder {
-    /// Position of the axis, metres.
+    /// Position of the axis in the map, metres.
     pub middle: Point2<f64>,
     /// Radius, metres.
     pub radius_m: f64,
     /// True if seen from inside: a round wall.
     pub from_inside: bool,
-    /// Observed height range, metres.
+    /// Minimum and maximum observed height, metres.
     pub heights_m: (f64, f64),
-    /// The parts of the circle that were seen: from and to, anticlockwise from the x axis, radians.
+    /// Observed arcs of the circle: start and end, anticlockwise from the x axis, radians.
     pub arcs_rad: Vec<(f64, f64)>,
     /// Root mean square residual of the fit, metres.
     pub rms_m: f64,
-    /// Share of the observed points there that lie on the cylinder.
+    /// Share of the points observed on or near the cylinder that lie on its surface.
     pub share: f64,
 }
 
 impl UprightCylinder {
-    /// Observed part of the circle, radians.
+    /// Total length of the observed arcs, radians.
     pub fn arc_rad(&self) -> f64 {
         self.arcs_rad.iter().map(|(from, to)| to - from).sum()
     }
 
-    /// Point of the cylinder in a direction.
+    /// Point of the circle in a direction from the axis, map frame, metres.
     pub fn at(&self, angle_rad: f64) -> Point2<f64> {
         self.middle + Vector2::new(angle_rad.cos(), angle_rad.sin()) * self.radius_m
     }
 
-    /// Chords of the observed arcs, one per sector.
+    /// Chords of the observed arcs, as start and end points, one per sector.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
         let chords = |(from, to): &(f64, f64)| {
             let (from, count) = (*from, ((to - from) / PART_RAD).round().max(1.0) as usize);
@@ -54,20 +54,20 @@ impl UprightCylinder {
     }
 }
 
-/// Options for cylinders.
+/// Options for finding cylinders.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CylinderOptions {
-    /// Radii of pillars, metres.
+    /// Permitted radii of pillars, metres.
     pub pillar_m: RangeInclusive<f64>,
-    /// Radii of round walls, metres.
+    /// Permitted radii of round walls, metres.
     pub round_wall_m: RangeInclusive<f64>,
-    /// Maximum distance of a point from its surface, metres.
+    /// Maximum distance of a point from the cylinder's surface, metres.
     pub tolerance_m: f64,
-    /// Minimum arc of a pillar seen in one piece, radians; less may be a bend.
+    /// Minimum unbroken arc of a pillar, radians; a shorter one may be a bend of a wall.
     pub least_arc_rad: f64,
-    /// … and of a round wall: less may be the walls of a cluttered room.
+    /// Minimum unbroken arc of a round wall, radians; a shorter one may be the walls of a cluttered room.
     pub least_round_rad: f64,
-    /// Minimum share of the points seen there that lie on the cylinder.
+    /// Minimum share of the points observed on or near the cylinder that must lie on its surface.
     pub least_share: f64,
 }
 
@@ -84,43 +84,45 @@ impl Default for CylinderOptions {
     }
 }
 
-/// Number of sectors for the observed part of a circle.
+/// Number of sectors into which a circle is divided to record the observed ones.
 const PARTS: usize = 24;
+/// Angle of a sector, radians.
 const PART_RAD: f64 = TAU / PARTS as f64;
-/// Minimum number of occupied heights in an upright column of cells.
+/// Minimum number of occupied cells in a column.
 const LEVELS: u32 = 3;
-/// A narrower wall may be a side of a pillar, in diameters of the largest.
+/// Maximum width of a plane that may be a side of a pillar, in diameters of the largest pillar.
 const NARROW: f64 = 1.0;
-/// Distance below which points belong to a wider wall, in edges of cells.
+/// Maximum distance from a wide wall at which points belong to the wall, in cell edges.
 const OF_WALL: f64 = 1.5;
-/// Blur of a measured surface to each side, in tolerances.
+/// Blur of a measured surface to each side of it, in tolerances.
 const BLURRED: f64 = 3.0;
 /// Minimum number of planes that a round wall must replace.
 const PLANES: usize = 3;
-/// Circles that are tried at most, and steps of least squares.
+/// Maximum number of circles that are tried.
 const TRIES: usize = 3000;
+/// Number of least-squares steps.
 const STEPS: usize = 8;
 
-/// Cell of the plan with something upright.
+/// Cell of the floor plan with an upright surface.
 #[derive(Clone, Copy, Debug)]
 struct Column {
     at: Point2<f64>,
-    /// Mean direction to the camera.
+    /// Mean horizontal direction to the camera.
     towards: Vector2<f64>,
-    /// Occupied height levels, one bit each.
+    /// Number of occupied cells above each other.
     levels: u32,
     heights_m: (f64, f64),
 }
 
-/// Circle with its supporting columns.
+/// Circle with the indices of the columns on it.
 struct Circle {
     middle: Point2<f64>,
     radius_m: f64,
     on: Vec<usize>,
 }
 
-/// Finds cylinders, and removes the patches that are part of them. `patches`: planes through
-/// `regions` with a normal, numbered in that order.
+/// Finds cylinders, and removes the patches that are part of them. Patches are planes through those `regions` that have
+/// a normal; only upright regions in the height band count.
 pub(super) fn cylinders(
     regions: &[Region],
     patches: &mut Vec<Patch>,
@@ -149,7 +151,7 @@ pub(super) fn cylinders(
     found
 }
 
-/// True if the region lies on a patch, or just in front of or behind it.
+/// True if a region lies within `within_m` of a patch, across it and along it.
 fn is_of(patch: &Patch, region: &Region, within_m: f64) -> bool {
     let off = region.at - patch.middle;
     let along = off.dot(&patch.along);
@@ -157,7 +159,7 @@ fn is_of(patch: &Patch, region: &Region, within_m: f64) -> bool {
     patch.plane.height_m(&region.at).abs() <= within_m && along >= from - within_m && along <= to + within_m
 }
 
-/// True if a patch lies on a cylinder, with its ends and centre.
+/// True if the centre and both ends of a patch lie on a cylinder, within the tolerance.
 fn is_part(patch: &Patch, cylinder: &UprightCylinder, options: &CylinderOptions) -> bool {
     let (from, to) = patch.limits_m[0];
     let sagitta_m = 0.125 * (to - from).powi(2) / cylinder.radius_m;
@@ -169,7 +171,7 @@ fn is_part(patch: &Patch, cylinder: &UprightCylinder, options: &CylinderOptions)
     sagitta_m < cylinder.radius_m && [from, 0.5 * (from + to), to].iter().all(|a| off_m(*a) <= within_m)
 }
 
-/// Cells with upright surfaces, in order.
+/// Cells of the floor plan with at least [`LEVELS`] of the given regions, ordered by cell coordinates.
 fn columns<'a>(regions: impl Iterator<Item = &'a Region>, edge_m: f64) -> Vec<Column> {
     type Sums = (Vector3<f64>, Vector2<f64>, f64, u32, (f64, f64));
     let mut squares: FxHashMap<(i32, i32), Sums> = FxHashMap::default();
@@ -195,7 +197,7 @@ fn columns<'a>(regions: impl Iterator<Item = &'a Region>, edge_m: f64) -> Vec<Co
     keyed.into_iter().map(column).collect()
 }
 
-/// Columns that stand side by side.
+/// Indices of columns, grouped so that neighbours are at most two cells apart.
 fn groups(columns: &[Column], edge_m: f64) -> Vec<Vec<usize>> {
     let square = |c: &Column| ((c.at.x / edge_m).floor() as i32, (c.at.y / edge_m).floor() as i32);
     let mut left: FxHashMap<(i32, i32), usize> = columns.iter().map(square).zip(0..).collect();
@@ -218,7 +220,7 @@ fn groups(columns: &[Column], edge_m: f64) -> Vec<Vec<usize>> {
     found
 }
 
-/// Finds cylinders among columns, in order of support.
+/// Appends the cylinders among a group of columns to `found`, the best supported first.
 fn search(
     columns: &[Column],
     mut group: Vec<usize>,
@@ -239,7 +241,7 @@ fn search(
     }
 }
 
-/// Best-supported circle of a group, if it satisfies the options.
+/// Circle of a group that most columns support, of a permitted radius; `None` if there is none.
 fn best(columns: &[Column], group: &[usize], from_inside: bool, options: &CylinderOptions) -> Option<Circle> {
     let radii = if from_inside { &options.round_wall_m } else { &options.pillar_m };
     let mut draws = Draws::new(group.len() as u64);
@@ -266,7 +268,7 @@ fn best(columns: &[Column], group: &[usize], from_inside: bool, options: &Cylind
     (on.len() >= 5 && radii.contains(&radius_m)).then_some(Circle { middle, radius_m, on })
 }
 
-/// Circle through three points.
+/// Centre and radius of the circle through three points; `None` if they are nearly collinear.
 fn through(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> Option<(Point2<f64>, f64)> {
     let (u, v) = (b - a, c - a);
     let twice = 2.0 * u.perp(&v);
@@ -278,7 +280,7 @@ fn through(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> Option<(Point2<
     Some((a + to, to.norm()))
 }
 
-/// True if a column stands on a circle and was seen from the side that is asked for.
+/// True if a column stands on a circle and was seen from outside, or from inside if `from_inside`.
 fn is_on(
     column: &Column,
     middle: &Point2<f64>,
@@ -291,7 +293,8 @@ fn is_on(
     (off.norm() - radius_m).abs() <= options.tolerance_m && is_outward != from_inside
 }
 
-/// A step of Gauss and Newton on the distances from a circle.
+/// Centre and radius after one Gauss-Newton step on the distances of columns from a circle; `None` if they do not
+/// determine one.
 fn least_squares(
     columns: &[Column],
     on: &[usize],
@@ -310,8 +313,8 @@ fn least_squares(
     Some((middle + step.xy(), radius_m + step.z))
 }
 
-/// Circle as a cylinder; `None` if too little of it was seen, too much else was seen there, or a
-/// square post is as likely. `rest`: points off the circle.
+/// Circle as a cylinder; `None` if too little of it was seen, too much else was seen there, or a square post fits
+/// better. `rest`: columns off the circle.
 fn told(
     columns: &[Column],
     circle: &Circle,
@@ -360,7 +363,7 @@ fn told(
     })
 }
 
-/// Mean square distance of columns from a pillar, each at most the square of the tolerance.
+/// Mean squared distance of columns from a pillar, square metres; each distance is limited to the tolerance.
 fn misses_m2(columns: &[Column], circle: &Circle, tolerance_m: f64) -> f64 {
     let miss_m = |c: &Column| {
         let off = c.at - circle.middle;
@@ -369,7 +372,7 @@ fn misses_m2(columns: &[Column], circle: &Circle, tolerance_m: f64) -> f64 {
     mean_m2(columns.iter().map(|c| (c, miss_m(c))), tolerance_m)
 }
 
-/// Mean squared distance, each limited to the tolerance.
+/// Mean of squared distances, weighted by the columns' occupied cells; each distance is limited to the tolerance.
 fn mean_m2<'a>(misses: impl Iterator<Item = (&'a Column, f64)>, tolerance_m: f64) -> f64 {
     let (sum, weight) = misses.fold((0.0, 0.0), |(sum, weight), (c, miss_m)| {
         let levels = f64::from(c.levels);
@@ -378,7 +381,7 @@ fn mean_m2<'a>(misses: impl Iterator<Item = (&'a Column, f64)>, tolerance_m: f64
     sum / f64::max(weight, 1.0)
 }
 
-/// Runs of observed sectors; single gaps are bridged.
+/// Start and end angles of the runs of observed sectors, radians; gaps of one sector are bridged.
 fn arcs(seen: &[bool; PARTS]) -> Vec<(f64, f64)> {
     let is_seen = |k: usize| seen[k % PARTS] || (seen[(k + 1) % PARTS] && seen[(k + PARTS - 1) % PARTS]);
     let Some(gap) = (0..PARTS).find(|k| !is_seen(*k)) else { return vec![(0.0, TAU)] };

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry2;
 
-/// Options or poses that cannot be used.
+/// Reason why options or poses cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MappingError {
     /// Option out of range.
@@ -12,27 +12,27 @@ pub enum MappingError {
         name: &'static str,
         /// Given value.
         value: f64,
-        /// The least that can be.
+        /// Smallest permitted value.
         least: f64,
-        /// The greatest that can be.
+        /// Greatest permitted value.
         most: f64,
     },
-    /// Pose that is not finite or too far out.
+    /// Pose that is not finite, not normalised or too far out.
     #[error(
         "the pose of {what} {index} is not finite, or farther out than {FARTHEST_M} m: mend the localisation that it came from"
     )]
     Pose {
-        /// `station`.
+        /// Owner of the pose: `station` or `start`.
         what: &'static str,
-        /// Index of the station.
+        /// Index of the station; 0 for a start.
         index: usize,
     },
 }
 
-/// Farthest that a station may be from the origin, metres.
+/// Maximum coordinate of a pose, metres.
 pub(super) const FARTHEST_M: f64 = 1e5;
 
-/// Checks that options lie within bounds.
+/// Checks options, given as name, value, least and greatest permitted value.
 pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), MappingError> {
     for &(name, value, least, most) in options {
         if !(value >= least && value <= most) {
@@ -42,7 +42,7 @@ pub(super) fn check(options: &[(&'static str, f64, f64, f64)]) -> Result<(), Map
     Ok(())
 }
 
-/// Checks that a pose is finite.
+/// Checks that a pose is finite, normalised and not too far out.
 pub(super) fn check_pose(
     what: &'static str,
     index: usize,

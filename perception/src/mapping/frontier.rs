@@ -16,15 +16,14 @@ pub struct ExploreOptions {
     pub field: FieldOfView,
     /// Clearance of the body's centre from occupied cells, metres.
     pub radius_m: f64,
-    /// Frontiers with fewer squares are left alone.
+    /// Minimum number of cells of a frontier; smaller ones are ignored.
     pub least_squares: usize,
-    /// Time per metre of route, per radian of the final turn, and per look, seconds.
+    /// Cost in seconds: per metre of route, per radian of the final turn, and per observation.
     pub seconds: (f64, f64, f64),
-    /// Probability that an unknown cell is occupied, which limits the expected view behind many of
-    /// them.
+    /// Probability that an unknown cell is occupied; it lowers the expected view of the cells behind.
     pub occupied: f64,
-    /// Probability that the next look shows a cell that an earlier look should have shown but did
-    /// not, such as a bare wall.
+    /// Probability that the next observation shows a cell that an earlier one should have shown but did not, such as a
+    /// cell at a bare wall.
     pub again: f64,
 }
 
@@ -41,30 +40,30 @@ impl Default for ExploreOptions {
     }
 }
 
-/// Connected open cells that border on unknown ones.
+/// Connected free cells, each beside an unknown cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frontier {
-    /// Cell centres, metres.
+    /// Cell centres in the map frame, metres.
     pub squares: Vec<Point2<f64>>,
-    /// Cell nearest to the frontier's centre.
+    /// Centre of the cell nearest to the frontier's centroid, map frame, metres.
     pub middle: Point2<f64>,
 }
 
-/// A pose that may be next.
+/// Candidate for the next pose to observe from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NextPose {
     /// Pose in the map.
     pub pose: Isometry2<f64>,
     /// Floor that is unknown now and expected to be seen, square metres.
     pub gain_m2: f64,
-    /// Length of the route, metres.
+    /// Length of the shortest route to the pose, metres.
     pub way_m: f64,
-    /// Cost of route and look, seconds.
+    /// Cost of route, final turn and observation, seconds.
     pub cost_s: f64,
 }
 
 impl NextPose {
-    /// Expected newly seen area per second.
+    /// Expected newly seen area per second of cost, square metres per second.
     pub fn rate(&self) -> f64 {
         self.gain_m2 / self.cost_s
     }
@@ -72,7 +71,7 @@ impl NextPose {
 
 /// Number of headings tried at a place.
 const HEADINGS: usize = 12;
-/// Maximum number of squares along a ray.
+/// Maximum number of cells along a ray.
 const MOST_STEPS: usize = 2000;
 /// Number of rays around a place.
 pub(super) const RAYS: usize = 180;
@@ -80,20 +79,20 @@ pub(super) const RAYS: usize = 180;
 const PLACES_M: f64 = 0.6;
 /// Radius around a frontier in which places are tried, metres.
 const AROUND_M: f64 = 2.0;
-/// Minimum gain of a pose that is worth a look, square metres.
+/// Minimum gain for a pose to be worth an observation, square metres.
 pub(super) const LEAST_M2: f64 = 0.2;
-/// Steps to neighbouring cells, with lengths in cells.
+/// Steps to the eight neighbouring cells: columns, rows, and length in cells.
 const STEPS: [(i64, i64, f64); 8] = {
     const D: f64 = std::f64::consts::SQRT_2;
     [(1, 0, 1.0), (-1, 0, 1.0), (0, 1, 1.0), (0, -1, 1.0), (1, 1, D), (1, -1, D), (-1, 1, D), (-1, -1, D)]
 };
 
-/// A grid, read by columns and rows.
+/// Occupancy grid, accessed by column and row.
 pub(super) struct Floor<'a> {
     pub(super) grid: &'a Occupancy,
     width: i64,
     height: i64,
-    /// Squares beyond the grid on each side that a look may reach.
+    /// Number of cells beyond each side of the grid that an observation may still reach.
     margin: i64,
 }
 
@@ -104,7 +103,7 @@ impl<'a> Floor<'a> {
         Floor { grid, width: width as i64, height: (grid.cells.len() / width) as i64, margin }
     }
 
-    /// Index of a cell of the grid or its margin.
+    /// Index of a cell within the grid extended by its margin; `None` if the cell lies outside.
     pub(super) fn index_beyond(&self, (column, row): (i64, i64)) -> Option<usize> {
         let (column, row) = (column + self.margin, row + self.margin);
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
@@ -135,7 +134,7 @@ impl<'a> Floor<'a> {
         (0..self.height).flat_map(move |row| (0..width).map(move |column| (column, row)))
     }
 
-    /// True, by cell, if the body's centre may be there: open, and clear of occupied cells.
+    /// For each cell, true if the body's centre may be there: free, and no occupied cell within `radius_m`.
     fn standable(&self, radius_m: f64) -> Vec<bool> {
         let mut free: Vec<bool> = self.squares().map(|s| self.space(s) == Space::Free).collect();
         let reach = (radius_m / self.grid.cell_m).ceil() as i64;
@@ -152,7 +151,7 @@ impl<'a> Floor<'a> {
         free
     }
 
-    /// Length of the shortest route to each free cell, metres; infinite if unreachable.
+    /// Length of the shortest route from `from` to each cell, metres; infinite if unreachable.
     pub(super) fn ways_m(&self, from: &Point2<f64>, stand: &[bool], radius_m: f64) -> Vec<f64> {
         let may_stand = |index: usize| stand.get(index).copied().unwrap_or(false);
         let mut ways = vec![f64::INFINITY; (self.width * self.height) as usize];
@@ -188,7 +187,8 @@ impl<'a> Floor<'a> {
         ways
     }
 
-    /// Calls `found` with range, index and unoccluded probability of each unknown cell along a ray.
+    /// Calls `found` for each unknown cell along a ray: range in metres, index within the extended grid, and the
+    /// probability that all unknown cells before it are free.
     pub(super) fn ray(
         &self,
         from: &Vector2<f64>,
@@ -215,7 +215,8 @@ impl<'a> Floor<'a> {
         }
     }
 
-    /// Probability that another look shows each cell, given the looks that should have shown it.
+    /// For each cell of the extended grid, the probability that another observation shows the cell; each pose of
+    /// `looked` that should have shown the cell lowers it from 1.
     pub(super) fn missed(&self, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<f64> {
         let (width, height) = (self.width + 2 * self.margin, self.height + 2 * self.margin);
         let mut missed = vec![1.0; (width * height) as usize];
@@ -233,7 +234,7 @@ impl<'a> Floor<'a> {
         missed
     }
 
-    /// Unknown floor that each ray from a place is expected to show, square metres.
+    /// Unknown floor that each of the [`RAYS`] rays from a place is expected to show, square metres.
     fn gains_m2(&self, place: &Point2<f64>, missed: &[f64], options: &ExploreOptions) -> Vec<f64> {
         let width = TAU / RAYS as f64 * self.grid.cell_m;
         let gain = |ray: usize| {
@@ -252,13 +253,13 @@ pub(super) fn bearing_rad(ray: usize) -> f64 {
     TAU * (ray as f64 + 0.5) / RAYS as f64
 }
 
-/// True if a camera with a heading sees along a ray.
+/// True if a ray lies in the horizontal field of view of a camera with the given heading.
 pub(super) fn is_ahead(ray: usize, heading_rad: f64, field: &FieldOfView) -> bool {
     let off = (bearing_rad(ray) - heading_rad + PI).rem_euclid(TAU) - PI;
     off >= field.right_rad && off <= field.left_rad
 }
 
-/// True, by cell, if the body's centre may be there: open, with no occupied cell within `radius_m`.
+/// For each cell, true if the body's centre may be there: free, and no occupied cell within `radius_m`.
 pub fn standable(grid: &Occupancy, radius_m: f64) -> Vec<bool> {
     Floor::of(grid, 0.0).standable(radius_m)
 }
@@ -273,8 +274,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Reachability over the cells where the body's centre may be: those of [`standable`], adjusted
-    /// by other knowledge.
+    /// Computes the routes from a pose over the free cells for which `stand` is true, usually those of [`standable`].
     pub fn over(grid: &Occupancy, from: &Isometry2<f64>, stand: &[bool], options: &ExploreOptions) -> Reach {
         let start = Point2::from(from.translation.vector);
         let ways_m = Floor::of(grid, options.field.far_m).ways_m(&start, stand, options.radius_m);
@@ -282,7 +282,7 @@ impl Reach {
     }
 }
 
-/// Frontiers of a grid, the longest first.
+/// Frontiers of a grid, those with most cells first.
 pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
     let floor = Floor::of(grid, options.field.far_m);
     let borders = |s: (i64, i64)| {
@@ -316,15 +316,16 @@ pub fn frontiers(grid: &Occupancy, options: &ExploreOptions) -> Vec<Frontier> {
     found
 }
 
-/// Exploration poses by expected gain per cost, best first; empty if everything reachable is known.
+/// Candidate poses by expected gain per cost, best first; empty if everything reachable is known.
 ///
-/// `looked`: the poses looked from so far; the body stands at the last. What they should have shown and did not is expected less.
+/// `looked`: the poses of all observations so far; the body stands at the last one. Less gain is expected of cells that
+/// these should have shown but did not.
 pub fn next_poses(grid: &Occupancy, looked: &[Isometry2<f64>], options: &ExploreOptions) -> Vec<NextPose> {
     let Some(from) = looked.last() else { return Vec::new() };
     next_within(grid, &Reach::over(grid, from, &standable(grid, options.radius_m), options), looked, options)
 }
 
-/// Exploration poses for known reachability.
+/// Candidate poses as of [`next_poses`], over the given reachable floor.
 pub(super) fn next_within(
     grid: &Occupancy,
     reach: &Reach,
@@ -360,7 +361,7 @@ pub(super) fn next_within(
     found
 }
 
-/// True if a look was taken from the same position and heading, so that another would add nothing.
+/// True if an observation was made from nearly the same position and heading.
 pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) -> bool {
     let (apart_m, turned_rad) = (0.5 * PLACES_M, 0.5 * TAU / HEADINGS as f64);
     looked.iter().any(|look| {
@@ -369,7 +370,7 @@ pub(super) fn was_looked_from(pose: &Isometry2<f64>, looked: &[Isometry2<f64>]) 
     })
 }
 
-/// Reachable places around frontiers, and the pose of the body.
+/// The body's position, then reachable positions on a coarse grid around all frontiers.
 fn places(floor: &Floor, ways: &[f64], start: &Point2<f64>, options: &ExploreOptions) -> Vec<Point2<f64>> {
     let stride = (PLACES_M / floor.grid.cell_m).ceil().max(1.0) as i64;
     let around = (AROUND_M / floor.grid.cell_m).ceil() as i64;

@@ -8,8 +8,8 @@ use nalgebra::Point3;
 /// Conditions under which two patches belong to one wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FuseOptions {
-    /// Maximum gap between the patches' limits (U_d), metres: more than the growing distance of
-    /// patches, less than a door.
+    /// Maximum gap between the patches' limits (U_d), metres; it should exceed the distance at which patches grow, and
+    /// be less than a door.
     pub gap_m: f64,
     /// Maximum distance of each patch from the other's plane, metres.
     pub across_m: f64,
@@ -23,10 +23,10 @@ impl Default for FuseOptions {
     }
 }
 
-/// Number of passes over all patches; each joins touching ones.
+/// Maximum number of passes over all patches; each joins matching ones.
 const ROUNDS: usize = 8;
 
-/// Joins patches of one wall until none is left, largest first.
+/// Joins patches of one wall, the largest first, until no two match or the passes are used up.
 pub(super) fn fuse(
     facets: &[Facet],
     mut patches: Vec<Patch>,

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 /// Relative pose of two stations, with its information.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Edge {
-    /// Number of a station.
+    /// Index of the first station.
     pub from: usize,
-    /// Number of the second station.
+    /// Index of the second station.
     pub to: usize,
-    /// Pose of the second in the frame of the first.
+    /// Pose of the second station in the frame of the first, metres.
     pub from_from_to: Isometry2<f64>,
     /// Information matrix of the relative pose: shift in the frame of `from` (metres), and rotation
     /// (radians).
@@ -21,31 +21,31 @@ pub struct Edge {
     pub doubtful: bool,
 }
 
-/// Stations and the edges between them.
+/// Pose graph: stations and the relative poses between them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseGraph {
-    /// Initial poses; the first is fixed.
+    /// Initial poses of the stations; the first is fixed.
     pub poses: Vec<Isometry2<f64>>,
-    /// Edges.
+    /// Relative poses between stations.
     pub edges: Vec<Edge>,
 }
 
-/// Result of the optimisation.
+/// Result of optimising a pose graph.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settled {
-    /// The poses.
+    /// Optimised poses, one per station.
     pub poses: Vec<Isometry2<f64>>,
-    /// Squared error of each edge, in spreads: about three if spreads are right.
+    /// Squared Mahalanobis error of each edge; about three if its information matrix is right.
     pub squares: Vec<f64>,
     /// Weight of each edge, from 0 (rejected) to 1.
     pub weights: Vec<f64>,
     /// Number of iterations.
     pub rounds: usize,
-    /// False if the last step still moved poses.
+    /// False if the iteration limit was reached while poses still moved.
     pub converged: bool,
 }
 
-/// A graph that cannot be solved.
+/// Reason why a pose graph cannot be optimised.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GraphError {
     /// An edge names a missing station, or connects a station with itself.
@@ -55,22 +55,22 @@ pub enum GraphError {
     Station {
         /// Index of the edge.
         edge: usize,
-        /// First node of the edge.
+        /// Index of the edge's first station.
         from: usize,
-        /// The second node of the edge.
+        /// Index of the edge's second station.
         to: usize,
         /// Number of stations.
         stations: usize,
     },
-    /// Non-finite poses or edges.
+    /// A pose or an edge is not finite.
     #[error("{what} {index} is not finite: mend the fit that it came from")]
     NotFinite {
-        /// `pose` or `edge`.
+        /// Kind of the element: `pose` or `edge`.
         what: &'static str,
-        /// Index of the edge.
+        /// Index of the pose or edge.
         index: usize,
     },
-    /// Station without an edge.
+    /// A station whose pose the edges do not determine.
     #[error("station {station} is held by no edge: give each the step from the one before it")]
     Loose {
         /// Index of the station.
@@ -79,17 +79,17 @@ pub enum GraphError {
 }
 
 const MOST_ROUNDS: usize = 60;
-/// Motion of all poses below which the optimisation ends, metres and radians.
+/// Motion of all poses, metres and radians, below which the optimisation ends.
 const SETTLED: f64 = 1e-4;
-/// Residual, in standard deviations, beyond which doubtful edges lose weight; decreases over the
-/// iterations, as drift on a long route is large at first.
+/// Residual, in standard deviations, beyond which doubtful edges lose weight: start value, factor per iteration, and
+/// end value. It decreases because drift on a long route is large at first.
 const DOUBT: (f64, f64, f64) = (1e4, 0.5, 3.0);
 
 impl PoseGraph {
     /// Optimises the poses.
     ///
     /// # Errors
-    /// If an edge names no station, a number is not finite, or a station is held by nothing.
+    /// If an edge names a missing station, a number is not finite, or the edges do not determine a pose.
     pub fn settle(&self) -> Result<Settled, GraphError> {
         let _span =
             tracing::debug_span!("pose graph", poses = self.poses.len(), edges = self.edges.len()).entered();
@@ -139,7 +139,8 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Squared errors and weights of the edges.
+    /// Squared Mahalanobis errors and weights of the edges; doubtful edges lose weight beyond `doubt` standard
+    /// deviations.
     fn weighed(&self, poses: &[Isometry2<f64>], doubt: f64) -> (Vec<f64>, Vec<f64>) {
         let weigh = |edge: &Edge| {
             let error = edge.error(poses);
@@ -149,7 +150,7 @@ impl PoseGraph {
         self.edges.iter().map(weigh).unzip()
     }
 
-    /// Gauss-Newton step; returns the largest motion of a pose.
+    /// Applies a Gauss-Newton step; returns the largest motion of a pose, metres or radians.
     fn step(&self, poses: &mut [Isometry2<f64>], weights: &[f64]) -> Result<f64, GraphError> {
         let mut normal = Envelope::of(poses.len(), &self.edges);
         let mut right = vec![0.0; 3 * poses.len()];
@@ -179,7 +180,7 @@ impl PoseGraph {
 }
 
 impl Edge {
-    /// Shift and rotation error of the edge.
+    /// Error of the edge at the given poses: shift in the frame of `from` (metres), and rotation (radians).
     fn error(&self, poses: &[Isometry2<f64>]) -> Vector3<f64> {
         let (from, to) = (&poses[self.from], &poses[self.to]);
         let seen = from.inv_mul(to);
@@ -187,7 +188,7 @@ impl Edge {
         shift.push(self.from_from_to.rotation.angle_to(&seen.rotation))
     }
 
-    /// Jacobians of the error with respect to both poses.
+    /// Jacobians of the error with respect to both poses, each with the index of its station.
     fn slopes(&self, poses: &[Isometry2<f64>]) -> [(usize, Matrix3<f64>); 2] {
         let (from, to) = (&poses[self.from], &poses[self.to]);
         let back = from.rotation.inverse().to_rotation_matrix().into_inner();
@@ -206,8 +207,8 @@ impl Edge {
     }
 }
 
-/// Symmetric matrix in envelope storage: each row from its first entry to the diagonal, which also
-/// holds the Cholesky factor.
+/// Symmetric matrix in envelope storage: the lower triangle, each row from its first non-zero column to the diagonal.
+/// Solving overwrites it with its Cholesky factor.
 struct Envelope {
     first: Vec<usize>,
     rows: Vec<Vec<f64>>,
@@ -225,7 +226,7 @@ impl Envelope {
         Envelope { first, rows }
     }
 
-    /// Adds the lower triangular part of a block.
+    /// Adds a 3x3 block at a row and column; entries above the diagonal are dropped.
     fn add(&mut self, row: usize, column: usize, block: &Matrix3<f64>) {
         for i in 0..3 {
             for j in 0..3 {
@@ -237,13 +238,13 @@ impl Envelope {
         }
     }
 
-    /// Fixes an unknown near zero.
+    /// Fixes an unknown at zero by a large diagonal entry.
     fn hold(&mut self, row: usize) {
         let at = row - self.first[row];
         self.rows[row][at] += 1e12;
     }
 
-    /// Solves in place; `Err` with the row that is unconstrained.
+    /// Solves the system in place for a right-hand side; `Err` with the row of an undetermined unknown.
     fn solve(&mut self, right: &mut [f64]) -> Result<(), usize> {
         for row in 0..self.rows.len() {
             let (above, rest) = self.rows.split_at_mut(row);

@@ -1,4 +1,4 @@
-//! Occupancy grid from above, from lines of sight through cells and end points in them.
+//! Occupancy grid of the floor plan, from the cells that lines of sight cross and the cells in which they end.
 
 use super::station::Station;
 use crate::cloud::is_finite;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
-/// Number of stations that looked through each cell, and that saw an end point in it.
+/// For each cell, the number of stations with a line of sight through it and the number with an end point in it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Vec<(i32, i32, u32, u32)>", into = "Vec<(i32, i32, u32, u32)>")]
 pub(super) struct Sightlines {
@@ -37,20 +37,20 @@ impl From<Sightlines> for Vec<(i32, i32, u32, u32)> {
 const BEARINGS: usize = 720;
 /// Maximum length of followed lines of sight, metres.
 const FARTHEST_M: f64 = 100.0;
-/// Maximum number of squares of a grid.
+/// Maximum number of cells of a grid.
 const MOST_SQUARES: usize = 1 << 28;
-/// Maximum share of a bearing's points nearer than its end point; nearer ones are mismatches.
+/// Share of a bearing's nearest points that are discarded as mismatches; the next point ends the line of sight.
 const STRAY: f64 = 0.1;
-/// Points of a station in a square that are something.
+/// Minimum number of a station's points in a cell for an end point there.
 const SOMETHING: u32 = 3;
-/// Points lower than this are of the floor, metres.
+/// Maximum distance of floor points from floor height, metres.
 const FLOOR_M: f64 = 0.1;
-/// Minimum number of stations, and minimum share of the stations that observed a cell, with an end
-/// point in it for the cell to be occupied.
+/// Minimum number of stations with an end point in an occupied cell, and their minimum share of the stations that
+/// observed the cell.
 const OCCUPIED: (u32, f64) = (2, 0.35);
 
 impl Sightlines {
-    /// Adds a station's points in the height band of the body.
+    /// Adds a station's lines of sight, which end at its points in the height band `band_m`.
     pub(super) fn add(
         &mut self,
         station: &Station,
@@ -100,7 +100,7 @@ impl Sightlines {
             .for_each(|key| self.squares.entry(*key).or_default().0 += 1);
     }
 
-    /// Grid with a border of unknown cells; `None` if nothing was seen.
+    /// Grid with a border of unknown cells; `None` if nothing was seen or the grid would be too large.
     pub(super) fn occupancy(&self, edge_m: f64) -> Option<Occupancy> {
         let (first, _) = self.squares.iter().next()?;
         let (low, high) = self

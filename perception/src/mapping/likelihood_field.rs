@@ -1,29 +1,28 @@
-//! Likelihood field: the mixture of Gaussians around the spots of a plan, as a picture.
+//! Likelihood field: log density of a mixture of Gaussians around the points of a plan, on a grid.
 
 use super::station::Spot;
 use nalgebra::{Isometry2, Point2, Vector2};
 
-/// Maximum distance of an inlier from its spot, in standard deviations.
+/// Maximum distance of an inlier from its plan point, in standard deviations.
 pub(super) const REACH: f64 = 3.0;
-/// Density of outliers relative to that of a spot of usual weight: a Gaussian at `REACH` standard
-/// deviations.
+/// Density of outliers relative to that of a plan point of mean weight: a Gaussian at `REACH` standard deviations.
 pub(super) const OUTLIERS: f64 = 0.011;
 
-/// Logarithms of densities at the corners of squares.
+/// Log densities at the corners of grid cells.
 pub(super) struct Field {
     low: Point2<f64>,
     per_m: f64,
     width: usize,
     height: usize,
     logs: Vec<f32>,
-    /// Observed cells; empty if not recorded.
+    /// For each corner, true if observed; empty if not recorded.
     seen: Vec<bool>,
-    /// Log density far from all spots.
+    /// Log density far from all plan points.
     nothing: f64,
 }
 
 impl Field {
-    /// The field around spots with a spread; `None` without spots.
+    /// Computes the field around plan points with a standard deviation, metres; `None` without points.
     pub fn of(spots: &[Spot], sigma_m: f64) -> Option<Field> {
         let first = spots.first()?.at;
         let (low, high) = spots.iter().fold((first, first), |(l, h), s| (l.inf(&s.at), h.sup(&s.at)));
@@ -51,7 +50,7 @@ impl Field {
         Some(Field { low, per_m, width, height, logs: sums, seen: Vec::new(), nothing: OUTLIERS.ln() })
     }
 
-    /// Bilinear log density at a place.
+    /// Bilinearly interpolated log density at a place.
     fn at(&self, place: &Point2<f64>) -> f64 {
         let (x, y) = ((place.x - self.low.x) * self.per_m, (place.y - self.low.y) * self.per_m);
         if !(x >= 0.0 && y >= 0.0 && x < (self.width - 1) as f64 && y < (self.height - 1) as f64) {
@@ -65,7 +64,7 @@ impl Field {
         (a * (1.0 - u) + b * u) * (1.0 - v) + (c * (1.0 - u) + d * u) * v
     }
 
-    /// Mean log density over transformed spots: match with the field.
+    /// Weighted mean log density at plan points transformed by `pose`: how well they match the field.
     pub fn mean(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
         let (sum, weight) = spots.iter().fold((0.0, 0.0), |(sum, weight), s| {
             (sum + s.weight * self.at(&(pose * s.at)), weight + s.weight)
@@ -73,7 +72,7 @@ impl Field {
         sum / weight.max(f64::MIN_POSITIVE)
     }
 
-    /// Marks the observed part of the field; elsewhere nothing is known.
+    /// Records which part of the field was observed; [`Field::mean_of_seen`] ignores the rest.
     pub fn look(&mut self, is_seen: impl Fn(&Point2<f64>) -> bool) {
         self.seen = (0..self.logs.len())
             .map(|i| {
@@ -83,7 +82,8 @@ impl Field {
             .collect();
     }
 
-    /// Mean log density over spots in the observed part; `None` if fewer than half are.
+    /// Weighted mean log density at the transformed plan points in the observed part; `None` if these have at most half
+    /// of the weight.
     pub fn mean_of_seen(&self, spots: &[Spot], pose: &Isometry2<f64>) -> Option<f64> {
         let (mut sum, mut weight, mut all) = (0.0, 0.0, 0.0);
         for spot in spots {
@@ -104,7 +104,7 @@ impl Field {
         (weight > 0.5 * all).then(|| sum / weight)
     }
 
-    /// Share of transformed spots within two standard deviations of a field's spot.
+    /// Share, by weight, of transformed plan points within two standard deviations of a point of the field.
     pub fn explained(&self, spots: &[Spot], pose: &Isometry2<f64>) -> f64 {
         let limit = (OUTLIERS + (-2.0_f64).exp()).ln();
         let (near, all) = spots.iter().fold((0.0, 0.0), |(near, all), s| {

@@ -1,16 +1,17 @@
-//! The orientations of walls: k-means of the directions of upright normals (section 4.2), as many as the histogram has peaks.
+//! Orientations of walls: k-means of the directions of horizontal normals (section 4.2), as many as the histogram has
+//! peaks.
 
 use nalgebra::Vector2;
 use std::f64::consts::{PI, TAU};
 
-/// Options for orientations.
+/// Options for the orientations of walls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrientationOptions {
-    /// Number of orientations (the paper: two); `None`: as many as stand out.
+    /// Number of orientations (the paper: two), at most eight; `None`: as many as stand out.
     pub count: Option<usize>,
-    /// Maximum angle of a direction from its orientation, radians.
+    /// Maximum angle between a direction and its orientation, radians.
     pub within_rad: f64,
-    /// An orientation holds at least this share of all.
+    /// Minimum share of all directions near an orientation.
     pub least_share: f64,
 }
 
@@ -20,16 +21,16 @@ impl Default for OrientationOptions {
     }
 }
 
-/// Orientations, and the assignment of directions to them.
+/// Orientations of walls, and the orientation of each given direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Orientations {
-    /// Direction of the normal, modulo half a turn, radians from 0 to π.
+    /// Direction of each orientation's normal, modulo half a turn, radians from 0 to π.
     pub centres_rad: Vec<f64>,
-    /// Orientation index of each given direction, if any.
+    /// Index of the orientation of each given direction; `None` if the direction is far from all.
     pub of: Vec<Option<u32>>,
 }
 
-/// Bins of the histogram over half a turn.
+/// Number of histogram bins over half a turn.
 const BINS: usize = 90;
 /// Standard deviation of histogram smoothing, bins.
 const SMOOTH: f64 = 2.0;
@@ -38,7 +39,7 @@ const STANDS_OUT: f64 = 1.7;
 const MOST: usize = 8;
 const ROUNDS: usize = 30;
 
-/// Groups directions of horizontal normals (radians); opposite ones are equal.
+/// Groups directions of horizontal normals (radians) into orientations; opposite directions are equal.
 pub fn orientations(directions_rad: &[f64], options: &OrientationOptions) -> Orientations {
     let mut starts = peaks(directions_rad, options);
     starts.truncate(options.count.unwrap_or(MOST).min(MOST));

@@ -1,5 +1,5 @@
-//! Joint gain of several poses, for a plan to weigh: a few poses from which all visible unknown
-//! floor would be seen. And the usual alternative: the nearest frontier.
+//! Joint gain of several viewpoints, for a planner to weigh: a few poses from which all visible unknown floor would be
+//! seen. Also the usual alternative, the nearest frontier.
 
 use super::frontier::{
     ExploreOptions, Floor, LEAST_M2, NextPose, RAYS, Reach, bearing_rad, frontiers, is_ahead, next_within,
@@ -9,34 +9,34 @@ use crate::occupancy::{Occupancy, Space};
 use nalgebra::{Isometry2, Point2};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Pose with the expected view of a look from there.
+/// Viewpoint with the floor that an observation from there is expected to show.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Pose in the map.
+    /// Pose of the body in the map.
     pub pose: Isometry2<f64>,
     /// Length of the route from the body, metres.
     pub way_m: f64,
-    /// Unknown floor cells with the probability that a look shows each.
+    /// Indices of unknown floor cells, each with the probability that an observation shows the cell.
     shows: Vec<(usize, f64)>,
-    /// Area of a square, square metres.
+    /// Area of a cell, square metres.
     square_m2: f64,
 }
 
-/// Floor that is expected to be still unknown after some planned looks.
+/// Floor that is expected to be still unknown after some planned observations.
 #[derive(Clone, Debug, Default)]
 pub struct Unseen {
-    /// Probability that a square is still unknown; squares without an entry surely are.
+    /// Probability that a cell is still unknown; 1 for cells without an entry.
     left: FxHashMap<usize, f64>,
 }
 
 impl Unseen {
-    /// Floor that a look is expected to show beyond the earlier ones, square metres.
+    /// Floor that an observation is expected to show beyond the earlier ones, square metres.
     pub fn gain_m2(&self, look: &Outlook) -> f64 {
         let left = |index: &usize| self.left.get(index).copied().unwrap_or(1.0);
         look.shows.iter().map(|(index, likely)| left(index) * likely).sum::<f64>() * look.square_m2
     }
 
-    /// Accounts for a look as taken.
+    /// Accounts for an observation as made.
     pub fn look(&mut self, look: &Outlook) {
         for (index, likely) in &look.shows {
             *self.left.entry(*index).or_insert(1.0) *= 1.0 - likely;
@@ -44,13 +44,13 @@ impl Unseen {
     }
 }
 
-/// Number of compared poses, those with the best gain per cost.
+/// Number of candidate poses with the best gain per cost that are compared; of the others, a sample.
 const COMPARED: usize = 240;
 
-/// At most `most` poses that jointly show most of the visible unknown floor: first the poses to
-/// keep while still useful, then greedily by additional gain per cost.
+/// At most `most` viewpoints that jointly show most of the visible unknown floor: first those of `keep` that are still
+/// useful, then greedily by additional gain per cost.
 ///
-/// `looked`: the poses looked from so far; none is looked from twice.
+/// `looked`: the poses of all observations so far; none of them is chosen again.
 pub fn outlooks(
     grid: &Occupancy,
     reach: &Reach,
@@ -126,13 +126,14 @@ impl Floor<'_> {
 
 /// Maximum viewing distance of a frontier, as a share of the camera's range.
 const IN_RANGE: f64 = 0.9;
-/// Minimum probability that another look shows a cell after two looks should have shown it; below
-/// it, the cell is given up.
+/// Cells that another observation shows with at most this probability are given up: by default after two observations
+/// that should have shown them.
 const LEFT: f64 = 0.2;
 
-/// Viewpoint of the nearest reachable frontier: first point on the route with the frontier in range
-/// and unoccluded, facing it (Yamauchi 1997). If none is reachable, as the camera does not see the
-/// floor at the body's feet, the body turns to the nearest. `None` without frontiers.
+/// Viewpoint of the nearest reachable frontier: the first place towards it, by route length, that has the frontier in
+/// range and unoccluded, facing it (Yamauchi 1997).
+///
+/// If none is reachable, the body turns to the nearest frontier where it stands. `None` if no frontier promises gain.
 pub fn nearest_frontier(
     grid: &Occupancy,
     looked: &[Isometry2<f64>],
@@ -178,8 +179,8 @@ impl Floor<'_> {
         unknown.filter_map(|s| self.index_beyond(s)).collect()
     }
 
-    /// Pose on the route to a place from which the place is first in range and unoccluded, with the
-    /// share of the route.
+    /// Position with the shortest route, at most `most_m`, that has `goal` in range and unoccluded; with the length of
+    /// that route, metres. `None` if there is none.
     fn seen_from(
         &self,
         goal: &Point2<f64>,
@@ -196,7 +197,7 @@ impl Floor<'_> {
         on_way.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Shortest route to within the body's radius plus one cell of a cell, metres.
+    /// Length of the shortest route to any free cell within the body's radius plus one cell of the given cell, metres.
     fn nearest_way_m(&self, ways: &[f64], (column, row): (i64, i64), radius_m: f64) -> f64 {
         let reach = (radius_m / self.grid.cell_m).ceil() as i64 + 1;
         let around = (-reach..=reach).flat_map(|x| (-reach..=reach).map(move |y| (column + x, row + y)));
@@ -204,7 +205,7 @@ impl Floor<'_> {
         there.map(|s| ways[self.index(s)]).fold(f64::INFINITY, f64::min)
     }
 
-    /// True if all cells on the line between two places are open.
+    /// True if all cells on the line between two places are free.
     fn is_clear(&self, from: &Point2<f64>, to: &Point2<f64>) -> bool {
         let steps = ((to - from).norm() / (0.5 * self.grid.cell_m)).ceil().max(1.0) as usize;
         (0..=steps).all(|k| {

@@ -25,7 +25,7 @@ pub struct Constraints {
     /// Direction of most walls' normals, modulo a quarter turn, radians; nearly parallel or
     /// perpendicular walls are snapped to it.
     pub main_rad: Option<f64>,
-    /// Tolerance, radians.
+    /// Maximum angle from `main_rad`, modulo a quarter turn, at which a wall is snapped to it, radians.
     pub within_rad: f64,
 }
 
@@ -35,29 +35,29 @@ pub(super) struct Patch {
     pub plane: Plane,
     /// Centroid on the plane.
     pub middle: Point3<f64>,
-    /// Level unit vector in the plane.
+    /// Horizontal unit vector in the plane.
     pub along: Vector3<f64>,
-    /// Limits of the patch from its centre, metres: along, and up.
+    /// Minimum and maximum extent of the patch from its centre, metres: along `along`, then up.
     pub limits_m: [(f64, f64); 2],
     pub area_m2: f64,
-    /// Ascending.
+    /// Indices of the facets, ascending.
     pub facets: Vec<u32>,
 }
 
 /// Conditions under which two facets belong to one patch.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Growth {
-    /// Maximum distance between the facets, metres (λ).
+    /// Maximum distance between neighbouring facets, metres (λ).
     pub within_m: f64,
-    /// Maximum distance along the normal, metres.
+    /// Maximum distance between neighbouring facets along the normal, metres.
     pub across_m: f64,
-    /// Maximum angle between a facet's normal and that of the patch's orientation (or first facet),
-    /// radians.
+    /// Maximum angle, radians, between a facet's normal and that of the patch's orientation, or of its first facet if
+    /// no orientation is given.
     pub turned_rad: f64,
 }
 
-/// Groups adjacent facets. `normal`: normal of the orientation; without it, a patch uses that of
-/// its first facet.
+/// Groups adjacent facets of `members` whose normals are near `normal`; without it, near that of the group's first
+/// facet. Returns the indices of each group's facets.
 pub(super) fn grow(
     facets: &[Facet],
     members: &[u32],
@@ -118,7 +118,7 @@ impl Constraints {
     }
 }
 
-/// Plane through facets, with its limits.
+/// Patch with the best plane through its facets; `edge_m` is the edge of the squares that measure its area.
 pub(super) fn through(
     facets: &[Facet],
     members: Vec<u32>,
@@ -142,7 +142,7 @@ pub(super) fn through(
     placed(facets, members, Plane::through(&middle, normal), middle, edge_m)
 }
 
-/// Patch on a given plane, with centre, limits and area.
+/// Patch on a given plane, with extent and area; its centre is the projection of `near`.
 pub(super) fn placed(
     facets: &[Facet],
     members: Vec<u32>,
@@ -167,13 +167,13 @@ pub(super) fn placed(
     Patch { plane, middle, along, limits_m, area_m2, facets: members }
 }
 
-/// Median of each coordinate, as a direction.
+/// Unit vector of the median of each coordinate of the normals; `None` if the medians are nearly zero.
 fn median_direction(members: &[u32], normal: impl Fn(u32) -> Vector3<f64>) -> Option<Vector3<f64>> {
     let axis = |k: usize| median(members.iter().map(|&m| normal(m)[k]));
     Vector3::new(axis(0), axis(1), axis(2)).try_normalize(1e-6)
 }
 
-/// Horizontal direction of least spread of the facets.
+/// Horizontal direction of least spread of the facets; `None` if the spread is similar in all directions, as of a post.
 fn least_upright<'a>(facets: impl Iterator<Item = &'a Facet>, middle: &Point3<f64>) -> Option<Vector3<f64>> {
     let mut spread = Matrix2::zeros();
     for facet in facets {
@@ -186,8 +186,8 @@ fn least_upright<'a>(facets: impl Iterator<Item = &'a Facet>, middle: &Point3<f6
     (least < 0.5 * most).then(|| eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned().push(0.0))
 }
 
-/// Dominant direction of the normals, area-weighted, modulo a quarter turn; `None` if there is
-/// none.
+/// Direction of most wall normals by area, modulo a quarter turn, radians; `None` unless 60 % of the area lies within
+/// `within_rad` of it.
 pub(super) fn main_direction(patches: &[Patch], within_rad: f64) -> Option<f64> {
     const BINS: usize = 90;
     let direction = |p: &Patch| p.plane.normal.y.atan2(p.plane.normal.x).rem_euclid(FRAC_PI_2);

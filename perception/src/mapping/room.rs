@@ -1,4 +1,4 @@
-//! Map: walls with their openings, level surfaces, and the occupancy grid.
+//! Map of a building: walls with their openings, level surfaces, and the occupancy grid.
 
 use super::cells::{Cells, CellsError, Facet, NormalOptions, Region};
 use super::cylinder::{CylinderOptions, UprightCylinder, cylinders};
@@ -27,38 +27,38 @@ pub struct Survey {
     lines: Sightlines,
 }
 
-/// Minimum number of points of a cell that is used for locating a station; and distance from all
-/// such cells beyond which a point is new, metres.
+/// Minimum number of points of a cell that is used for localising a station.
 const LEAST_KNOWN: u32 = 4;
+/// Edge of the squares around such cells, metres; points outside them and their neighbours are new.
 const NEAR_M: f64 = 0.3;
 
-/// Options for making a map of a survey.
+/// Options for making a map from a survey.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapOptions {
-    /// Options for normals.
+    /// Options for normals by regions.
     pub normals: NormalOptions,
-    /// Options for orientations.
+    /// Options for the orientations of walls.
     pub orientations: OrientationOptions,
     /// Maximum distance between neighbouring facets of one patch (λ), metres.
     pub grow_m: f64,
     /// Maximum tilt of wall normals from horizontal, and of level surfaces' normals from vertical,
     /// radians.
     pub tilt_rad: f64,
-    /// Method for fitting planes.
+    /// Method for fitting planes to patches.
     pub fit: PlaneEstimator,
-    /// True: walls are made upright, and parallel or perpendicular to the majority if nearly so.
+    /// True if walls are made upright, and parallel or perpendicular to the majority if nearly so.
     pub constrained: bool,
-    /// Options for joining patches; `None`: no joining.
+    /// Options for joining patches of one wall; `None` to leave them apart.
     pub fuse: Option<FuseOptions>,
-    /// Options for pillars and round walls; `None`: not detected.
+    /// Options for pillars and round walls; `None` to leave them undetected.
     pub cylinders: Option<CylinderOptions>,
-    /// Smaller walls are left out, square metres …
+    /// Minimum area of a wall, square metres.
     pub least_area_m2: f64,
-    /// Minimum height of a wall, metres; lower ones are objects.
+    /// Minimum height of a wall, metres; lower upright surfaces are objects.
     pub least_height_m: f64,
-    /// Smaller level surfaces are left out, square metres.
+    /// Minimum area of a level surface, square metres.
     pub least_level_m2: f64,
-    /// Height band in which openings of walls must be free, metres.
+    /// Height band, metres, in which a wall must be unseen at its openings.
     pub opening_band_m: RangeInclusive<f64>,
     /// Minimum width of an opening, metres.
     pub opening_m: f64,
@@ -88,48 +88,48 @@ impl Default for MapOptions {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Wall {
-    /// Plane of the wall, with its normal towards the observer.
+    /// Plane of the wall, in the map; its normal points towards the camera.
     pub plane: Plane,
     /// One end of the wall's ground line, metres.
     pub from: Point2<f64>,
     /// Other end of the wall's ground line, metres.
     pub to: Point2<f64>,
-    /// Observed height range, metres.
+    /// Minimum and maximum observed height, metres.
     pub heights_m: (f64, f64),
-    /// Area that was seen, square metres.
+    /// Observed area, square metres.
     pub area_m2: f64,
-    /// Stretches of wall, metres from `from`; the gaps are openings.
+    /// Start and end of each solid section of the wall, metres from `from`; the gaps are openings.
     pub stretches_m: Vec<(f64, f64)>,
 }
 
 impl Wall {
-    /// Ground lines of the stretches.
+    /// Start and end points of the wall's solid sections on the floor, metres.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> {
         let along = (self.to - self.from).try_normalize(0.0).unwrap_or_else(Vector2::x);
         self.stretches_m.iter().map(move |(a, b)| (self.from + along * *a, self.from + along * *b))
     }
 
-    /// Length from end to end, metres.
+    /// Length of the wall from end to end, metres.
     pub fn length_m(&self) -> f64 {
         (self.to - self.from).norm()
     }
 }
 
-/// A level surface: the floor, a table, the ceiling.
+/// Level surface: the floor, a table top, the ceiling.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Level {
-    /// The height, metres.
+    /// Height above the floor, metres.
     pub height_m: f64,
     /// True if seen from above.
     pub faces_up: bool,
     /// Corners of the convex hull, anticlockwise, metres.
     pub outline: Vec<Point2<f64>>,
-    /// Area that was seen, square metres.
+    /// Observed area, square metres.
     pub area_m2: f64,
 }
 
-/// The map of a building.
+/// Map of a building.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomMap {
@@ -139,22 +139,22 @@ pub struct RoomMap {
     pub cylinders: Vec<UprightCylinder>,
     /// Level surfaces, the largest first.
     pub levels: Vec<Level>,
-    /// Direction of the normals of most walls, modulo a quarter turn, radians.
+    /// Direction of the normals of most walls, modulo a quarter turn, radians; `None` if there is no such direction.
     pub main_rad: Option<f64>,
-    /// Occupancy grid; walls fill cells that no line of sight has decided.
+    /// Occupancy grid, in which walls fill only unknown cells; `None` if nothing was seen or the map is too large for a
+    /// grid.
     pub grid: Option<Occupancy>,
 }
 
 impl RoomMap {
-    /// The feet of all that is upright, as straight lines.
+    /// Start and end points of walls and cylinders on the floor, as straight lines, metres.
     pub fn feet(&self) -> impl Iterator<Item = (Point2<f64>, Point2<f64>)> + '_ {
         let of_walls = self.walls.iter().flat_map(Wall::feet);
         of_walls.chain(self.cylinders.iter().flat_map(UprightCylinder::feet))
     }
 
-    /// Occupancy for a body of height `height_m`: open where seen open or where the body has been
-    /// (discs of `radius_m` around poses), occupied at walls and under level surfaces that are too
-    /// low.
+    /// Occupancy for a body of height `height_m`, metres: like `grid`, but occupied at level surfaces too low for the
+    /// body, and free within `radius_m` of the poses `stood`, where the body has been. `None` without a grid.
     pub fn floor(&self, stood: &[Isometry2<f64>], radius_m: f64, height_m: f64) -> Option<Occupancy> {
         let mut grid = self.grid.clone()?;
         let tables =
@@ -176,28 +176,28 @@ impl RoomMap {
     }
 }
 
-/// Maximum height of the floor, metres.
+/// Maximum height of level surfaces that count as floor, metres.
 const STEP_M: f64 = 0.1;
 
 impl Survey {
-    /// An empty survey, with cells of `edge_m` metres.
+    /// Creates an empty survey with cells of `edge_m` metres.
     ///
     /// # Errors
-    /// If the edge is no positive length.
+    /// If the edge is not positive and finite.
     pub fn new(edge_m: f64) -> Result<Survey, CellsError> {
         Ok(Survey { cells: Cells::new(edge_m)?, lines: Sightlines::default() })
     }
 
-    /// Cells of the survey.
+    /// Cells that hold the points of all stations.
     pub fn cells(&self) -> &Cells {
         &self.cells
     }
 
-    /// Adds a station's points at a pose, from a camera `height_m` above the floor, up to depth
-    /// `far_m`; `band_m`: height range of obstacles to the body.
+    /// Adds a station at a pose, seen by a camera `height_m` above the floor, up to depth `far_m`; `band_m`: height
+    /// range of obstacles to the body, metres.
     ///
     /// # Errors
-    /// If the pose is none; nothing is added then.
+    /// If the pose or the height is out of range; nothing is added then.
     pub fn add(
         &mut self,
         station: &Station,
@@ -213,17 +213,16 @@ impl Survey {
         Ok(())
     }
 
-    /// Open floor from lines of sight alone, without walls; `None` if nothing was seen, or the
-    /// extent exceeds one grid.
+    /// Occupancy from lines of sight alone, without walls; `None` if nothing was seen, or the extent exceeds one grid.
     pub fn grid(&self) -> Option<Occupancy> {
         self.lines.occupancy(self.cells.edge_m())
     }
 
-    /// Localises a station in earlier observations from the stated pose, which is kept if the
-    /// station is not informative.
+    /// Localises a station in the earlier observations, starting from the pose `believed`, which is returned if the
+    /// station does not determine a better one.
     ///
     /// # Errors
-    /// If an option or the pose cannot be used.
+    /// If an option or the pose is out of range.
     pub fn locate(
         &self,
         station: &Station,
@@ -244,10 +243,10 @@ impl Survey {
         Ok(fit_cut(&shared(&known, &believed.inverse(), &options.field), &moved, believed, options))
     }
 
-    /// Map from all observations so far.
+    /// Makes the map from all observations so far.
     ///
     /// # Errors
-    /// If an option cannot be used.
+    /// If an option is out of range.
     pub fn map(&self, options: &MapOptions) -> Result<RoomMap, MappingError> {
         let _span = tracing::debug_span!("map", cells = self.cells.len()).entered();
         check(&[
@@ -276,7 +275,7 @@ impl Survey {
     }
 }
 
-/// Patches of upright facets, joined, and the direction that most have.
+/// Patches of upright facets, joined, and the direction of most of their normals, modulo a quarter turn, radians.
 fn upright(facets: &[Facet], options: &MapOptions, edge_m: f64) -> (Vec<Patch>, Option<f64>) {
     let members: Vec<u32> = (0u32..)
         .zip(facets)
@@ -325,7 +324,7 @@ fn upright(facets: &[Facet], options: &MapOptions, edge_m: f64) -> (Vec<Patch>, 
     (patches, constraints.main_rad)
 }
 
-/// Patch as a wall with its openings; `None` if too small.
+/// Patch as a wall with its openings; `None` if its area or height is too small.
 fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> Option<Wall> {
     let [(left, right), (low, high)] = patch.limits_m;
     if patch.area_m2 < options.least_area_m2 || high - low < options.least_height_m {
@@ -359,7 +358,7 @@ fn wall(patch: &Patch, facets: &[Facet], options: &MapOptions, edge_m: f64) -> O
     })
 }
 
-/// Marks the cells under a wall's ground line, except where lines of sight passed.
+/// Marks the unknown cells under a line on the floor as occupied.
 fn draw((from, to): (Point2<f64>, Point2<f64>), grid: &mut Occupancy) {
     let steps = ((to - from).norm() / (0.5 * grid.cell_m)).ceil() as usize;
     for i in 0..=steps {
@@ -376,7 +375,7 @@ fn draw((from, to): (Point2<f64>, Point2<f64>), grid: &mut Occupancy) {
     }
 }
 
-/// Level surfaces.
+/// Level surfaces seen from above or from below, the largest first.
 fn levels(facets: &[Facet], options: &MapOptions, edge_m: f64) -> Vec<Level> {
     let growth = Growth { within_m: options.grow_m, across_m: 0.5 * edge_m, turned_rad: options.tilt_rad };
     let mut found: Vec<Level> = Vec::new();

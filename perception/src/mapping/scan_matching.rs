@@ -1,12 +1,13 @@
-//! Registration of two stops in a row (section 3).
+//! Registration of two consecutive stations of a drive (section 3).
 //!
-//! Both plans are cut to what both fields of view see and share one centroid, about which the rotation is found by ICP-EM: every spot of one plan is
-//! expected to be each of the other's with a probability (Eq. 3), computed anew after each turn. The translation is where, around odometry, the
-//! error is least. Spots that fit none are outliers, as likely as one three spreads off, and odometry counts as a measurement, so that a bare corridor,
-//! along which nothing is seen to move, leaves the way to it.
+//! Both plans are cut to the part that both fields of view cover. In the paper they share one centroid, about which
+//! ICP-EM finds the rotation: each point of one plan corresponds to each of the other's with a probability (Eq. 3),
+//! computed anew after each rotation. The translation is the one near odometry with the least error. Points without a
+//! match are outliers, as likely as points at three standard deviations. Odometry counts as a measurement, so that it
+//! determines the position along a bare corridor, where the plans do not.
 //!
-//! A wrong heading moves what is seen ahead sideways, about the camera and not about a centroid. [`Matcher::IcpEm`] therefore looks for the best
-//! heading first and then finds rotation and translation together for the same expectations.
+//! A wrong heading shifts what is ahead sideways, about the camera and not about a centroid. [`Matcher::IcpEm`]
+//! therefore searches the best heading first and then estimates rotation and translation jointly.
 
 use super::error::{MappingError, check, check_pose};
 use super::likelihood_field::{Field, OUTLIERS, REACH};
@@ -21,12 +22,12 @@ use std::ops::RangeInclusive;
 pub enum Matcher {
     /// Odometry alone.
     Odometry,
-    /// Iterative closest point (Besl and McKay 1992) on all that was seen within the band of heights: the paper's peer.
+    /// Iterative closest point (Besl and McKay 1992) on all points of the height band: the paper's baseline.
     Icp,
-    /// ICP on the jointly visible spots.
+    /// Iterative closest point on the jointly visible plan points.
     IcpShared,
-    /// The paper's method: EM over all correspondences, with rotation about a common centroid, then
-    /// translation around odometry.
+    /// The paper's method: EM over all correspondences, with rotation about a common centroid, then translation near
+    /// odometry.
     IcpEmSplit,
     /// EM with rotation and translation estimated jointly, from the best heading.
     #[default]
@@ -36,26 +37,24 @@ pub enum Matcher {
 /// Options for rectifying a drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RectifyOptions {
-    /// Matcher.
+    /// Method for matching consecutive plans.
     pub matcher: Matcher,
-    /// Height band of used points between floor and ceiling, metres.
+    /// Height band of the points used, between floor and ceiling, metres.
     pub band_m: RangeInclusive<f64>,
     /// The camera's field of view.
     pub field: FieldOfView,
     /// Cell size for thinning the plan, metres.
     pub thin_m: f64,
-    /// Standard deviation of spots around their partners in the first and the last iteration,
-    /// metres.
+    /// Standard deviation of plan points around their partners in the first and the last iteration, metres.
     pub sigma_m: (f64, f64),
-    /// Standard deviation of odometry: a share of the step, and an absolute part in metres.
+    /// Standard deviation of odometry's shift per step: a share of the step's length, and an absolute part in metres.
     pub way_sigma: (f64, f64),
-    /// Standard deviation of odometry's turn a step, radians.
+    /// Standard deviation of odometry's rotation per step, radians.
     pub turn_sigma_rad: f64,
-    /// Minimum share of the second plan that must match the first for [`Matcher::IcpEm`] to be
-    /// accepted; else odometry is used.
+    /// Minimum share of the second plan that must match the first for a result of [`Matcher::IcpEm`] to be accepted;
+    /// otherwise odometry is used.
     pub explained: f64,
-    /// Number of independent points that one plan counts for, because neighbouring errors are
-    /// correlated.
+    /// Number of independent points that a whole plan counts for, because errors of neighbouring points are correlated.
     pub looks: f64,
 }
 
@@ -76,10 +75,10 @@ impl Default for RectifyOptions {
 }
 
 impl RectifyOptions {
-    /// Checks that all options are usable.
+    /// Checks that all options are within their ranges.
     ///
     /// # Errors
-    /// Names the first that cannot.
+    /// Names the first option out of range.
     pub fn check(&self) -> Result<(), MappingError> {
         check(&[
             ("the nearest depth of the field of view (m)", self.field.near_m, 0.0, 1e3),
@@ -95,29 +94,31 @@ impl RectifyOptions {
     }
 }
 
-/// Pose of the second of two stations in the frame of the first, with information.
+/// Pose of the second of two stations in the frame of the first, with its information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairFit {
-    /// Pose found.
+    /// Estimated pose of the second station in the frame of the first, metres.
     pub before_from_after: Isometry2<f64>,
-    /// Matching share of the jointly visible part of the second plan.
+    /// Share of the second plan's jointly visible points that match the first plan.
     pub explained: f64,
-    /// Spots of the two plans that both fields of view see.
+    /// Numbers of jointly visible plan points, of the first and of the second plan.
     pub shared: (usize, usize),
-    /// Inverse covariance of the pose, by shift (metres, in the frame of the first) and turn (radians) about the second's origin.
+    /// Inverse covariance of the pose: shift in the frame of the first station (metres), and rotation about the
+    /// second's origin (radians).
     pub information: Matrix3<f64>,
 }
 
-/// Minimum number of spots of a plan for the camera to influence odometry.
+/// Minimum number of jointly visible points of each plan; with fewer, odometry is used.
 const FEWEST: usize = 12;
-/// Expectations at each spread.
+/// Number of EM iterations at each standard deviation.
 const EXPECTATIONS: usize = 3;
-/// Number of final alternations between translation and full pose.
+/// Number of final alternations between the translation search and joint EM.
 const ROUNDS: usize = 2;
-/// Step of the heading search, radians, and standard deviation of its likelihood field, metres.
+/// Step of the heading search, radians.
 const HEADING_STEP_RAD: f64 = 0.01;
+/// Maximum standard deviation of the likelihood field of the heading search, metres.
 const HEADING_SIGMA_M: f64 = 0.12;
-/// Ratio of consecutive standard deviations (annealing).
+/// Factor from one standard deviation to the next (annealing).
 const COOLING: f64 = 0.7;
 /// Coarse and fine step of the translation search, metres.
 const STEPS_M: [f64; 2] = [0.03, 0.006];
@@ -125,13 +126,13 @@ const STEPS_M: [f64; 2] = [0.03, 0.006];
 const WINDOW: f64 = 3.0;
 /// Maximum distance of an accepted fit from odometry, in standard deviations.
 const STRAYED: f64 = 4.0;
-/// Steps for the numerical curvature at the result: metres, radians.
+/// Steps for the numerical curvature of the cost at the result: metres, radians.
 const PROBE: (f64, f64) = (0.03, 0.015);
 
-/// Rectifies the step between two stations in a row.
+/// Estimates the relative pose of two consecutive stations.
 ///
 /// # Errors
-/// If an option or a pose of odometry cannot be used.
+/// If an option or an odometry pose is out of range.
 pub fn rectify_pair(
     before: &Station,
     after: &Station,
@@ -143,10 +144,10 @@ pub fn rectify_pair(
     Ok(step(before, after, options))
 }
 
-/// Corrects each step of a drive; one fit fewer than stations.
+/// Estimates the relative pose of each two consecutive stations of a drive: one fewer than stations.
 ///
 /// # Errors
-/// If an option or a pose of odometry cannot be used.
+/// If an option or an odometry pose is out of range.
 pub fn rectify_drive(stations: &[Station], options: &RectifyOptions) -> Result<Vec<PairFit>, MappingError> {
     let _span = tracing::debug_span!("rectify", stations = stations.len()).entered();
     options.check()?;
@@ -160,7 +161,7 @@ fn step(before: &Station, after: &Station, options: &RectifyOptions) -> PairFit 
     fit(&plan(before), &plan(after), &odometry, options)
 }
 
-/// Station poses in the frame of the first, chained from pairwise fits.
+/// Station poses in the frame of the first station, chained from pairwise fits.
 pub fn chained(pairs: &[PairFit]) -> Vec<Isometry2<f64>> {
     let mut poses = vec![Isometry2::identity()];
     for pair in pairs {
@@ -182,7 +183,7 @@ fn fit(before: &[Spot], after: &[Spot], odometry: &Isometry2<f64>, options: &Rec
     }
 }
 
-/// Registers two plans already cut to their common field of view.
+/// Registers two plans already cut to their common field of view; `moved` is the second one.
 pub(super) fn fit_cut(
     seen: &[Spot],
     moved: &[Spot],
@@ -234,7 +235,7 @@ impl Prior {
         Matrix3::from_diagonal(&Vector3::new(way, way, self.turn_sigma_rad.powi(-2)))
     }
 
-    /// Half the squared Mahalanobis distance from odometry.
+    /// Half the squared Mahalanobis distance of a pose from odometry.
     fn cost(&self, pose: &Isometry2<f64>) -> f64 {
         let way = (pose.translation.vector - self.pose.translation.vector).norm() / self.way_sigma_m;
         let turn = self.pose.rotation.angle_to(&pose.rotation) / self.turn_sigma_rad;
@@ -243,15 +244,15 @@ impl Prior {
 }
 
 struct Problem<'a> {
-    /// Sorted by x.
+    /// Plan points of the first station, sorted by x.
     before: Vec<Spot>,
     after: &'a [Spot],
     field: &'a Field,
     prior: &'a Prior,
     options: &'a RectifyOptions,
-    /// Common centroid of both plans, in the frame of the first.
+    /// Common centroid of both plans, in the frame of the first station.
     centroid: Point2<f64>,
-    /// Density of outliers.
+    /// Density of outliers, in the units of the plan points' weights.
     outliers: f64,
 }
 
@@ -281,14 +282,14 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Rotation, then translation (section 3).
+    /// Pose from the paper's method: rotation first, then translation (section 3).
     fn split(&self) -> Isometry2<f64> {
         let turned = self.annealed(self.prior.pose, |pose, sigma_m| self.turned(pose, sigma_m));
         // The rotation is applied to the plan as it was, which turns about the camera.
         self.shifted(&Isometry2::from_parts(self.prior.pose.translation, turned.rotation))
     }
 
-    /// Pose from rotation and translation together, starting at the best heading.
+    /// Pose from joint EM of rotation and translation, starting at the best heading.
     fn joint(&self) -> Isometry2<f64> {
         let mut pose = self.annealed(self.headed(), |pose, sigma_m| self.moved(pose, sigma_m));
         for _ in 0..ROUNDS {
@@ -298,7 +299,7 @@ impl<'a> Problem<'a> {
         pose
     }
 
-    /// Expectations at ever smaller spreads.
+    /// Pose after EM steps at ever smaller standard deviations.
     fn annealed(
         &self,
         start: Isometry2<f64>,
@@ -315,7 +316,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The heading around odometry's under which the plans fit best, roughly.
+    /// Odometry's pose with the heading nearby at which the plans match best, on a coarse grid.
     fn headed(&self) -> Isometry2<f64> {
         let start = self.prior.pose;
         let Some(field) = Field::of(&self.before, self.options.sigma_m.0.min(HEADING_SIGMA_M)) else {
@@ -330,8 +331,8 @@ impl<'a> Problem<'a> {
         headings.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(start, |best| best.1)
     }
 
-    /// Calls `found` with the probability and position of each partner of a spot of the second plan
-    /// (z of Eq. 3).
+    /// Calls `found` with the probability and position of each possible partner, in the first plan, of a point of the
+    /// second (z of Eq. 3).
     fn expected(&self, at: &Point2<f64>, sigma_m: f64, mut found: impl FnMut(f64, &Point2<f64>)) {
         let (reach_m, per) = (REACH * sigma_m, 0.5 / (sigma_m * sigma_m));
         let from = self.before.partition_point(|b| b.at.x < at.x - reach_m);
@@ -349,8 +350,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Weight of one unit of the second plan, so that the whole plan counts as a given number of
-    /// looks.
+    /// Factor on the weights of the second plan's points, so that the whole plan counts as `looks` independent points.
     fn worth(&self, sigma_m: f64) -> f64 {
         let all: f64 = self.after.iter().map(|s| s.weight).sum();
         self.options.looks / (all * sigma_m * sigma_m)
@@ -411,7 +411,7 @@ impl<'a> Problem<'a> {
         Isometry2::from_parts(shift.into(), UnitComplex::new(pose.rotation.angle() + turn))
     }
 
-    /// Translation around odometry with minimum error.
+    /// Pose with the translation of least cost near odometry, by grid search; the rotation is kept.
     fn shifted(&self, pose: &Isometry2<f64>) -> Isometry2<f64> {
         let at = |shift: Vector2<f64>| Isometry2::from_parts(shift.into(), pose.rotation);
         let mut best = (self.cost(pose), pose.translation.vector);
@@ -436,7 +436,7 @@ impl<'a> Problem<'a> {
         self.prior.cost(pose) - self.options.looks * self.field.mean(self.after, pose)
     }
 
-    /// Curvature of the cost, at least that of odometry.
+    /// Curvature of the matching cost at a pose plus the information of odometry.
     fn information(&self, pose: &Isometry2<f64>) -> Matrix3<f64> {
         let cost = |by: Vector3<f64>| {
             let at = Isometry2::new(pose.translation.vector + by.xy(), pose.rotation.angle() + by.z);
@@ -462,7 +462,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Iterative closest point from odometry.
+/// Pose from iterative closest point, started at odometry; odometry's pose if that fails.
 fn icp(
     before: &[Spot],
     after: &[Spot],

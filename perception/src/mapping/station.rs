@@ -1,4 +1,4 @@
-//! Station of a drive and its plan: floor and ceiling removed, heights dropped.
+//! Station of a drive, and its plan: the points without floor and ceiling, projected onto the floor.
 
 use crate::cloud::is_finite;
 use crate::view::View;
@@ -7,23 +7,23 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 
-/// Station of a drive. The *level* frame has its origin on the floor under the camera, x forward, y
+/// View at one stop of a drive, levelled. The *level* frame has its origin on the floor under the camera, x forward, y
 /// left, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Station {
     /// Points in the level frame, metres; non-finite ones are ignored.
     pub points: Vec<Point3<f32>>,
-    /// Odometry pose; only steps between stations are used.
+    /// Odometry pose of the level frame; only differences between stations are used.
     pub odom_from_level: Isometry2<f64>,
 }
 
-/// The view cannot serve as a station.
+/// Reason why a view cannot serve as a station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StationError {
-    /// Non-finite pose.
+    /// The camera pose is not finite.
     #[error("the pose of the camera is not finite: give metres and a unit quaternion")]
     Pose,
-    /// The camera looks along the plumb line.
+    /// The camera looks straight up or down.
     #[error(
         "the camera looks straight up or down, so that nothing is ahead: give a view whose optical axis is not upright"
     )]
@@ -31,7 +31,7 @@ pub enum StationError {
 }
 
 impl Station {
-    /// A view whose world has z up and the floor at zero.
+    /// Converts a view whose world frame has z up and the floor at zero.
     ///
     /// # Errors
     /// If the pose is not finite or the camera looks straight up or down.
@@ -58,7 +58,8 @@ impl Station {
         })
     }
 
-    /// The plan: points of the heights in `band_m` and of the field of view, thinned to squares of `thin_m`.
+    /// Plan of the points with heights in `band_m` and inside the field of view, thinned to squares of `thin_m`;
+    /// squares with too few points are left out.
     pub(super) fn plan(&self, band_m: &RangeInclusive<f64>, field: &FieldOfView, thin_m: f64) -> Vec<Spot> {
         let kept = self.points.iter().filter(|p| is_finite(p) && band_m.contains(&f64::from(p.z)));
         let places = kept.map(|p| Spot { at: Point2::new(f64::from(p.x), f64::from(p.y)), weight: 1.0 });
@@ -69,7 +70,7 @@ impl Station {
     }
 }
 
-/// Spots thinned to one per cell, at the weighted centroid, in cell order.
+/// Plan points thinned to one per square, at the weighted centroid, ordered by square.
 pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spot> {
     let mut squares: FxHashMap<(i32, i32), (Vector2<f64>, f64)> = FxHashMap::default();
     for spot in spots {
@@ -83,28 +84,28 @@ pub(super) fn thinned(spots: impl Iterator<Item = Spot>, edge_m: f64) -> Vec<Spo
     keyed.into_iter().map(|(_, (sum, weight))| Spot { at: (sum / weight).into(), weight }).collect()
 }
 
-/// Minimum number of points in a square that are more than noise.
+/// Minimum number of points in a square; fewer are noise.
 const FEWEST: f64 = 2.0;
-/// Maximum weight of a cell, points; further points are of the same place.
+/// Maximum weight of a plan point, in measured points.
 const MOST: f64 = 8.0;
 
-/// A square of the plan that holds points.
+/// Plan point: the points in one square of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spot {
-    /// Centroid of the points, metres.
+    /// Centroid of the points on the floor plane, metres.
     pub at: Point2<f64>,
-    /// Weight.
+    /// Number of points.
     pub weight: f64,
 }
 
-/// Field of view in the plan: a sector around the direction ahead.
+/// Horizontal field of view: a sector around the forward direction of the level frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
-    /// Right limit of the field of view, anticlockwise from ahead (negative), radians.
+    /// Right limit, radians, anticlockwise from ahead; negative.
     pub right_rad: f64,
-    /// Left limit of the field of view, radians.
+    /// Left limit, radians, anticlockwise from ahead.
     pub left_rad: f64,
-    /// The nearest depth, metres; of more than half a turn, the nearest range.
+    /// Minimum depth, metres; a range instead if the field of view exceeds half a turn.
     pub near_m: f64,
     /// Maximum depth used, metres; noise grows with its square.
     pub far_m: f64,
@@ -117,7 +118,7 @@ impl Default for FieldOfView {
 }
 
 impl FieldOfView {
-    /// True for places of the level frame inside the field of view.
+    /// True if a place (level frame, metres) is inside the field of view.
     pub fn sees(&self, place: &Point2<f64>) -> bool {
         let bearing = place.y.atan2(place.x);
         let depth = if self.left_rad - self.right_rad > PI { place.coords.norm() } else { place.x };
@@ -125,7 +126,7 @@ impl FieldOfView {
     }
 }
 
-/// Spots that the other field of view also covers, after transformation into its frame.
+/// Plan points that the other station's field of view also covers.
 pub(super) fn shared(spots: &[Spot], other_from_here: &Isometry2<f64>, field: &FieldOfView) -> Vec<Spot> {
     spots.iter().filter(|s| field.sees(&(other_from_here * s.at))).copied().collect()
 }

@@ -4,10 +4,11 @@ use super::{Column, mean_m2};
 use nalgebra::{Point2, Rotation2, Vector2};
 use std::f64::consts::FRAC_PI_2;
 
-/// Number of tried rotations, and iterations of fitting the sides.
+/// Number of rotations tried within a quarter turn.
 const TURNS: usize = 22;
+/// Number of iterations that fit the four sides.
 const ROUNDS: usize = 5;
-/// Maximum distance of columns that influence a side, in tolerances.
+/// Maximum distance of a column from a side that the column influences, in tolerances.
 const PULLS: f64 = 1.5;
 
 /// A column in the frame of the post.
@@ -17,7 +18,7 @@ struct Local<'a> {
     towards: Vector2<f64>,
 }
 
-/// Mean squared distance of columns from the best-fitting post, each limited to the squared
+/// Mean squared distance of columns from the best-fitting post, square metres; each distance is limited to the
 /// tolerance.
 pub(super) fn misses_m2(columns: &[Column], tolerance_m: f64) -> f64 {
     let turned = |k: usize| {
@@ -28,7 +29,7 @@ pub(super) fn misses_m2(columns: &[Column], tolerance_m: f64) -> f64 {
     (0..TURNS).map(turned).fold(f64::INFINITY, f64::min)
 }
 
-/// Mean squared distance of columns from the best axis-parallel post.
+/// Mean squared distance of columns from the best axis-parallel post, square metres.
 fn upright_m2(columns: &[Local], tolerance_m: f64) -> f64 {
     let end = |axis: usize, share: f64| {
         let mut values: Vec<f64> = columns.iter().map(|c| c.at[axis]).collect();
@@ -53,7 +54,8 @@ fn upright_m2(columns: &[Local], tolerance_m: f64) -> f64 {
     mean_m2(columns.iter().map(|c| (c.of, from_post_m(c, &sides))), tolerance_m)
 }
 
-/// Nearest side of the post that faces the laser, and the column's distance to it, metres.
+/// Index of the nearest side of the post that faces the camera (0 left, 1 right, 2 lower, 3 upper), and the column's
+/// distance to that side, metres; infinite if no side faces the camera.
 fn nearest(column: &Local, sides: &[f64; 4]) -> (usize, f64) {
     let away_m = |side: usize| {
         let outward =
@@ -63,7 +65,7 @@ fn nearest(column: &Local, sides: &[f64; 4]) -> (usize, f64) {
     (0..4).map(|side| (side, away_m(side))).fold((0, f64::INFINITY), |a, b| if b.1 < a.1 { b } else { a })
 }
 
-/// Distance from a post; beyond a corner that from the corner.
+/// Distance of a column from a post, metres; measured from the corner if the column lies beyond one.
 fn from_post_m(column: &Local, sides: &[f64; 4]) -> f64 {
     let [left, right, low, high] = *sides;
     let beyond = |c: f64, from: f64, to: f64| (from - c).max(c - to).max(0.0);

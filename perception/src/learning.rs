@@ -1,10 +1,14 @@
 //! Unsupervised learning of object models (Fäulhammer et al., *Autonomous Learning of Object Models
 //! on a Mobile Robot*).
 //!
-//! The pipeline, a file a step: what differs from the static structure of a place ([`MetaRoom`], Eq. 1, 2); where to stand around it
-//! ([`stands`], [`trajectories`]); the looks that are far enough apart ([`keyframes`]) brought together ([`register`]); in each look the object is
-//! cleaned of its edge, supervoxels and planes (Eq. 3, 4), carried over from the looks before and grown ([`learn`]); all are fused by their noise
-//! ([`LearnedModel`]); and known again, with a pose and a confidence ([`Library`]). What a later meeting shows is added ([`united`]).
+//! The steps, in order:
+//! - [`MetaRoom`]: what differs from the static structure of a place (Eq. 1, 2).
+//! - [`stands`], [`trajectories`]: positions around the object from which to view it.
+//! - [`keyframes`], [`register`]: the views that differ enough, and their alignment.
+//! - [`learn`]: the object in each view, without edges, supervoxels and planes that are not its own (Eq. 3, 4),
+//!   propagated from view to view and grown; [`LearnedModel`]: the views fused by their noise.
+//! - [`Library`]: recognition of learned models, with a pose and a confidence.
+//! - [`united`]: a model extended by what a later encounter shows.
 
 mod around;
 mod change_detection;

@@ -1,4 +1,4 @@
-//! Viewpoints around an object, and their order (section IV-A).
+//! Viewing positions around an object, and their order (section IV-A).
 
 use super::error::LearningError;
 use crate::cloud::is_finite;
@@ -6,22 +6,22 @@ use crate::neighbours::Neighbours;
 use nalgebra::{Point2, Point3, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// Options for choosing stands.
+/// Options for choosing viewing positions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AroundOptions {
-    /// Radial lines from the object (paper: 20).
+    /// Number of radial lines from the object (paper: 20).
     pub lines: usize,
-    /// Farthest stand from the middle of the object, metres (d_max; paper: 2 m).
+    /// Maximum distance of a position from the object's centre, metres (d_max; paper: 2 m).
     pub most_m: f64,
-    /// Minimum distance from the object, metres, for the camera to have it in view.
+    /// Minimum distance from the object's centre, metres, for the camera to have the object in view.
     pub least_m: f64,
     /// Radius of the robot's base plus clearance, metres.
     pub footprint_m: f64,
-    /// Minimum and maximum height of possible obstacles, metres.
+    /// Minimum and maximum height of obstacles, metres.
     pub band_m: (f64, f64),
-    /// Detour factor: a route longer than the straight line times this factor interrupts the tour
-    /// around the object.
+    /// Detour factor: a route longer than the straight line by more than this factor interrupts the tour around the
+    /// object.
     pub detour: f64,
 }
 
@@ -38,16 +38,16 @@ impl Default for AroundOptions {
     }
 }
 
-/// Steps along a line, metres.
+/// Spacing of the positions tried along a line, metres.
 const STEP_M: f64 = 0.05;
 
-/// Nearest position on each line where the body fits, in line order.
+/// Positions on each line where the body fits, nearest to the object first, in line order.
 ///
-/// `obstacles` is what was seen (world, z up, metres). A place counts as free if nothing seen is within the footprint; which of them can be reached
-/// is asked of the ways: a body may keep farther away from what its map shows than it must.
+/// `obstacles`: observed points (world, z up, metres). A position is free if none of them is within the footprint.
+/// Whether it can be reached is left to the route planner, which may keep the body farther away from obstacles.
 ///
 /// # Errors
-/// If an option is no positive number, or there are more points than can be indexed.
+/// If an option is not positive, or there are more points than can be indexed.
 pub fn stands(
     object: &Point3<f64>,
     obstacles: &[Point3<f32>],
@@ -81,8 +81,9 @@ pub fn stands(
     Ok((0..options.lines).map(on_line).collect())
 }
 
-/// Sequences of neighbouring poses that are reachable without a detour, in the order of the lines.
-/// `way_m`: length of the route between two places, metres, if there is one.
+/// Sequences of neighbouring positions that are reachable from one to the next without a detour, in the order of the
+/// lines. `stands`: the position on each line, if any; `way_m`: length of the route between two positions, metres, or
+/// `None` if there is none.
 pub fn trajectories(
     stands: &[Option<Point2<f64>>],
     detour: f64,
@@ -110,8 +111,8 @@ pub fn trajectories(
     strings
 }
 
-/// Sequence with an end nearest to the body, reversed if that end is its last; among ties the
-/// longest, as the others cost camera tracking before they begin (section IV-A).
+/// Sequence with an end nearest to the body by route, reversed if that end is its last; among ties the longest, as each
+/// sequence costs camera tracking anew (section IV-A). `None` if no sequence is reachable.
 pub fn nearest(
     strings: &[Vec<Point2<f64>>],
     here: &Point2<f64>,

@@ -19,9 +19,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NoticeOptions {
-    /// Distance from every point of the other cloud beyond which a point differs, metres (δ of Eq.
-    /// 1; paper: 1 cm). Where the camera's standard deviation exceeds a third of this value, three
-    /// standard deviations count.
+    /// Distance from every point of the other cloud beyond which a point differs, metres (δ of Eq. 1; paper: 1 cm).
+    /// Three standard deviations of the camera are used instead where they are larger.
     pub delta_m: f64,
     /// Maximum range of changes, metres; farther points are background.
     pub range_m: f64,
@@ -31,7 +30,7 @@ pub struct NoticeOptions {
     pub cluster_step_m: f32,
     /// Minimum number of pixels of a dynamic cluster in its best view.
     pub least_pixels: usize,
-    /// Maximum error of localisation between two visits, metres.
+    /// Maximum localisation error between two visits, metres.
     pub search_m: f32,
 }
 
@@ -51,47 +50,48 @@ impl Default for NoticeOptions {
 /// Static structure of a place, refined by each visit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MetaRoom {
-    /// World frame, one point per voxel.
+    /// Points in the world frame, metres, one per voxel.
     pub cloud: Cloud,
-    /// Number of visits in the model.
+    /// Number of visits so far.
     pub visits: usize,
     /// Options of change detection.
     pub options: NoticeOptions,
 }
 
-/// Appeared cluster.
+/// Object that appeared: a cluster of points in front of the former structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appeared {
     /// Points of the object, world frame, from all views of the visit.
     pub cloud: Cloud,
-    /// Index of the view that shows most of the object: the first training view.
+    /// Index of the view that shows most of the object, preferably not cut off by the image border; learning starts
+    /// from it.
     pub view: usize,
     /// Pixels of the object in that view, row by row (O_0).
     pub mask: Vec<bool>,
-    /// True if most of the cluster is well in front of the former structure, also to either side
-    /// within the cameras' rotation error; otherwise it may be an edge of static structure.
+    /// True if most of the object lies well in front of the former structure, even if the camera were rotated by its
+    /// heading error; otherwise it may be an edge of static structure.
     pub apart: bool,
 }
 
 impl Appeared {
-    /// Centre of the bounds, world, metres.
+    /// Centre of the bounding box, world frame, metres.
     pub fn centre(&self) -> Point3<f64> {
         self.cloud.bounds().map_or(Point3::origin(), |(low, high)| nalgebra::center(&low, &high).cast())
     }
 }
 
-/// Result of a visit.
+/// Result of comparing a visit with the static structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visit {
     /// Objects that appeared, the largest first.
     pub appeared: Vec<Appeared>,
     /// Objects that disappeared, the largest first, world frame.
     pub gone: Vec<Cloud>,
-    /// Camera poses, after the views of the visit were aligned together with the static structure.
+    /// Camera poses after the visit's views were aligned, as one rigid body, with the static structure.
     pub poses: Vec<Isometry3<f64>>,
-    /// Number of points added to the static structure: formerly hidden or unseen.
+    /// Number of points added to the static structure, formerly hidden or unseen.
     pub added: usize,
-    /// Number of points removed from the static structure: this visit looked through them.
+    /// Number of points removed from the static structure, which this visit looked through.
     pub removed: usize,
 }
 
@@ -100,18 +100,17 @@ const COVER: f64 = 0.75;
 /// Multiple of the tolerance beyond which a point is certainly seen through: two measurements of
 /// one surface differ by less even at twice the stated noise.
 const FAR: f64 = 2.5;
-/// Factor on the localisation's heading error that covers a rotated camera.
+/// Factor on the heading error of localisation within which the camera may be rotated.
 const TURNED: f64 = 2.0;
-/// Maximum range of background points kept, metres: having seen them proves that the space before
-/// them was free.
+/// Maximum range of background points kept, metres; observing them proves that the space before them is free.
 const BACKGROUND_M: f32 = 8.0;
 
 impl MetaRoom {
-    /// Model from the first visit: everything is static until it changes. The views must be
-    /// mutually consistent.
+    /// Creates the model from the first visit: everything is static until it changes. The views must be mutually
+    /// consistent.
     ///
     /// # Errors
-    /// If there is no view, one is no depth image, or an option means nothing.
+    /// If there is no view, one is no depth image, or an option is not positive.
     pub fn new(views: &[View], options: NoticeOptions) -> Result<MetaRoom, LearningError> {
         for (field, value) in [
             ("delta_m", options.delta_m),
@@ -146,8 +145,8 @@ impl MetaRoom {
         Ok(Visit { appeared, gone, poses, added, removed })
     }
 
-    /// Poses of the views after rigid alignment with the static structure. Points beyond `range_m`
-    /// are excluded: a distant wall, measured to decimetres, fits anywhere and outvotes points
+    /// Poses of the views after rigid alignment with the static structure; the stated poses if that does not converge.
+    /// Points beyond `range_m` are excluded: a distant wall, measured to decimetres, fits anywhere and outvotes points
     /// known to millimetres.
     fn localised(&self, views: &[View]) -> Result<Vec<Isometry3<f64>>, LearningError> {
         /// Pixel stride that thins views for alignment. Voxel grids are unsuitable: their points
@@ -187,7 +186,7 @@ impl MetaRoom {
         Ok(stated.iter().map(|pose| by_world * pose).collect())
     }
 
-    /// Static structure rendered from a camera: minimum depth per pixel.
+    /// Static structure rendered from a camera: minimum depth of each pixel, metres; infinite where there is none.
     fn seen_by(&self, map: &DepthMap) -> Vec<f32> {
         let camera = map.intrinsics;
         let mut depths_m = vec![f32::INFINITY; camera.width * camera.height];
@@ -209,7 +208,7 @@ impl MetaRoom {
         depths_m
     }
 
-    /// Part of a view outside the static structure, and the view's alignment with the structure.
+    /// Differences of a view from the static structure.
     fn compare(&self, view: &View, map: &DepthMap, tree: &Neighbours) -> Change {
         let known = self.seen_by(map);
         let grid = Grid { width: map.intrinsics.width, height: map.intrinsics.height };
@@ -253,7 +252,7 @@ impl MetaRoom {
         (self.options.delta_m as f32).max(3.0 * frontal_sigma_m(z_m))
     }
 
-    /// Connected components of the appeared points, each with its best view.
+    /// Clusters of the appeared points of all views, each with its best view.
     fn clusters(
         &self,
         views: &[View],
@@ -292,10 +291,10 @@ impl MetaRoom {
         Ok(clusters.iter().filter_map(of_cluster).collect())
     }
 
-    /// Removes the points that the visit looked through (D_2 without hidden ones); returns the
-    /// vanished clusters and the number of removed points. A cluster vanished if most of it is seen
-    /// through by a wide margin, also to either side within the camera's rotation error, so that
-    /// doubly measured walls and edges of standing objects do not count.
+    /// Removes the points that the visit looked through (D_2 without hidden ones); returns the vanished clusters and
+    /// the number of removed points. A cluster vanished if the views look through most of it by a wide margin, even if
+    /// the camera were rotated by its heading error, so that doubly measured walls and edges of standing objects do not
+    /// count.
     fn remove(&mut self, views: &[View], maps: &[DepthMap]) -> Result<(Vec<Cloud>, usize), LearningError> {
         let through = |p: &Point3<f32>, times: f64, turned: f64| {
             maps.iter().zip(views).any(|(map, view)| {
@@ -321,8 +320,8 @@ impl MetaRoom {
         Ok((clusters.iter().filter(went).map(|c| lost.select(c)).collect(), lost.len()))
     }
 
-    /// Adds formerly hidden and unseen points; returns their number. Unseen points connected with
-    /// an appeared cluster may belong to it.
+    /// Adds formerly hidden and unseen points; returns their number. Unseen points connected with an appeared cluster
+    /// are not added, as they may belong to it.
     fn add(
         &mut self,
         views: &[View],
@@ -355,12 +354,11 @@ impl MetaRoom {
 struct Change {
     /// Pixels in front of the static structure.
     before: Mask,
-    /// Pixels far before the static structure, to either side as well, as far as the camera may be
-    /// turned.
+    /// Pixels far in front of the static structure, even if the camera were rotated by its heading error.
     apart: Mask,
     /// Pixels behind the static structure, which may always have been there.
     revealed: Vec<u32>,
-    /// Pixels without prior knowledge.
+    /// Pixels where the static structure has no points.
     unknown: Vec<u32>,
 }
 
@@ -375,7 +373,7 @@ fn maps(views: &[View], poses: &[Isometry3<f64>]) -> Result<Vec<DepthMap>, Learn
     views.iter().zip(poses).enumerate().map(map).collect()
 }
 
-/// Keeps every `step`th pixel along rows and columns.
+/// Cloud of every `step`th pixel along rows and columns.
 fn every(cloud: &Cloud, step: usize) -> Cloud {
     let width = cloud.grid.map_or(1, |grid| grid.width.max(1));
     let kept =
@@ -388,12 +386,12 @@ fn near(cloud: &Cloud, range_m: f64) -> Cloud {
     cloud.filter(|p| is_finite(p) && f64::from(p.z) <= range_m)
 }
 
-/// Points alone; the static structure has no colours and labels.
+/// Cloud of the points alone; the static structure has no colours and labels.
 fn bare(cloud: &Cloud) -> Cloud {
     Cloud::from_points(cloud.points.clone())
 }
 
-/// Points of some views, world frame.
+/// Points of several views together, world frame, up to [`BACKGROUND_M`] from the camera.
 fn together(views: &[View], poses: &[Isometry3<f64>]) -> Cloud {
     let mut all = Cloud::default();
     for (view, pose) in views.iter().zip(poses) {

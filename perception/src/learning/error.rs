@@ -6,43 +6,43 @@ use crate::merge::MergeError;
 use crate::register::RegisterError;
 use crate::voxel::VoxelError;
 
-/// Views, masks or options that cannot be learned from.
+/// Reason why nothing can be learned from views, masks or options.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LearningError {
     /// The list of views is empty.
     #[error("no view to learn from: give at least one")]
     NoViews,
-    /// A view whose pixels are not known.
+    /// A view is no depth image.
     #[error("view {view} is no depth image: give an organised cloud, or one with its camera's intrinsics")]
     NotOrganised {
         /// Index of the view.
         view: usize,
     },
-    /// Mask size and first view differ.
+    /// The mask does not have one entry per pixel of the first view.
     #[error("the mask has {found} pixels where the first view has {expected}: give one entry a pixel")]
     Mask {
-        /// Number of entries given.
+        /// Number of entries in the mask.
         found: usize,
-        /// Pixels of the view.
+        /// Number of pixels of the first view.
         expected: usize,
     },
-    /// The view with the mask does not fit the others.
+    /// The first view, which has the mask, does not fit the others.
     #[error(
         "the first view was left out ({why}): what it shows of the object cannot be carried over to the others"
     )]
     FirstLeftOut {
-        /// Reason.
+        /// Reason for leaving the view out.
         why: String,
     },
-    /// Cleaning left no points of the object.
+    /// Filtering left too few points of the object.
     #[error(
         "{points} points of the object are left in the first view after its edge, outliers and planes were removed: go nearer"
     )]
     NothingLeft {
-        /// Number of points.
+        /// Number of points that are left.
         points: usize,
     },
-    /// The models do not match as one object.
+    /// Two models do not match as one object.
     #[error(
         "both lie on each other in {:.0} % only, {:.1} mm off, after one was moved by {:.0} mm: they are not one surface",
         1e2 * shared, 1e3 * off_m, 1e3 * moved_m
@@ -52,17 +52,17 @@ pub enum LearningError {
         shared: f64,
         /// Root mean square distance in the overlap, metres.
         off_m: f64,
-        /// Motion that was needed to fit, metres.
+        /// Shift by which registration moved one of the models, metres.
         moved_m: f64,
     },
-    /// Invalid options.
+    /// An option is out of range.
     #[error("learning option `{field}` is {value}: expected {expected}")]
     Option {
-        /// The option.
+        /// Name of the option.
         field: &'static str,
         /// Given value.
         value: f64,
-        /// Expected values.
+        /// Description of permitted values.
         expected: &'static str,
     },
     /// Registration of the views failed.
@@ -71,7 +71,7 @@ pub enum LearningError {
     /// Registration of a cloud failed.
     #[error(transparent)]
     Register(#[from] RegisterError),
-    /// Too many points.
+    /// There are too many points to index.
     #[error(transparent)]
     Cloud(#[from] CloudError),
     /// Downsampling failed.

@@ -1,4 +1,4 @@
-//! Prepared keyframe: the points near the object in the world, with normals.
+//! Prepared view: the points near the object in the world frame, with normals.
 
 use super::mask::Mask;
 use crate::cloud::{Cloud, Grid, is_finite};
@@ -7,13 +7,13 @@ use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-/// A look at the object.
+/// View of the object, prepared for learning.
 pub(super) struct Frame {
     pub map: DepthMap,
     pub grid: Grid,
     /// Points in the world frame, row by row; NaN where no point near the object was measured.
     pub points: Vec<Point3<f32>>,
-    /// World frame, towards the camera.
+    /// Unit normals in the world frame, towards the camera.
     pub normals: Vec<Vector3<f32>>,
     pub colours: Option<Vec<[u8; 3]>>,
     /// Pixels with a point and a normal near the object.
@@ -24,12 +24,11 @@ pub(super) struct Frame {
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
-/// Maximum half width of a pixel neighbourhood, pixels: a larger one means an object too near to
-/// measure.
+/// Maximum half width of a pixel neighbourhood, pixels; more would mean an object too near to measure.
 const WIDEST_PX: f64 = 32.0;
 
 impl Frame {
-    /// Pixels of a view within `reach_m` of `centre` (world, metres); `None` without a depth image.
+    /// Prepares the pixels of a view within `reach_m` of `centre` (world, metres); `None` without a depth image.
     pub fn new(
         view: &View,
         world_from_camera: &Isometry3<f64>,
@@ -63,14 +62,14 @@ impl Frame {
         f64::from(self.map.depths_m[pixel])
     }
 
-    /// Angle between the ray of a pixel and the surface's normal, radians.
+    /// Angle between the surface normal at a pixel and the direction to the camera, radians, 0 to π/2.
     pub fn angle_rad(&self, pixel: usize) -> f64 {
         let ray = self.map.viewpoint() - self.points[pixel].cast::<f64>();
         let cosine = self.normals[pixel].cast::<f64>().dot(&ray.normalize());
         cosine.clamp(0.0, 1.0).acos()
     }
 
-    /// Pixels of a mask as a cloud of the world, with normals and colours.
+    /// Pixels of a mask as a cloud in the world frame, with normals and colours.
     pub fn cloud(&self, mask: &Mask) -> Cloud {
         Cloud {
             points: mask.pixels().map(|i| self.points[i]).collect(),
@@ -80,8 +79,8 @@ impl Frame {
         }
     }
 
-    /// Calls `found` with the pixels of a square that contains all points within `radius_m` of the
-    /// given one, itself included, up to [`WIDEST_PX`].
+    /// Calls `found` with each pixel of a square around the given one that contains all points within `radius_m`; the
+    /// square reaches at most [`WIDEST_PX`] to each side.
     pub fn around(&self, pixel: usize, radius_m: f32, mut found: impl FnMut(usize)) {
         let Grid { width, height } = self.grid;
         let (u, v) = (pixel % width, pixel / width);

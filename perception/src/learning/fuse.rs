@@ -1,5 +1,4 @@
-//! Fusion of all views into one cloud, with each point from its most certain measurement (section
-//! V-C).
+//! Fusion of all views into one cloud, in which each point is the most certain measurement of its cube (section V-C).
 
 use super::error::LearningError;
 use super::frame::Frame;
@@ -12,33 +11,33 @@ use crate::pool;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
 
-/// Additional standard deviation beside a depth edge: σ_e = k·exp(−d²/D²), with k and D in metres.
+/// Additional standard deviation at distance d from a depth edge: σ_e = k·exp(−d²/D²), with k and D in metres.
 const EDGE_M: (f64, f64) = (1.0, 0.002);
-/// Relative depth difference of neighbouring pixels that is an edge.
+/// Relative depth difference of neighbouring pixels above which there is an edge between them.
 const EDGE_SHARE: f32 = 0.015;
-/// Maximum distance of an edge with a relevant effect, metres.
+/// Distance from an edge beyond which its effect is neglected, metres.
 const EDGE_REACH_M: f32 = 0.008;
-/// Radius along the surface, metres, within which measurements determine a point; beyond that
-/// distance along the normal, they belong to another surface.
+/// Length scale along the surface, metres, with which measurements around a point lose weight when smoothing.
 const SMOOTH_M: f32 = 0.004;
+/// Radius around a point, metres, within which measurements smooth it.
 const DEEP_M: f32 = 0.01;
-/// Maximum number of measurements used for determining points; more do not improve the result.
+/// Maximum number of measurements used for smoothing; more do not improve the result.
 const ASKED: usize = 60_000;
 /// Standard deviation of a model from one encounter, metres.
 const MADE_M: f64 = 0.001;
 /// Minimum cosine between normals of one surface.
 const SAME_SIDE: f32 = 0.6;
 
-/// Object as measured by one view.
+/// Measured points of the object, from all views so far.
 #[derive(Default)]
 pub(super) struct Measured {
     cloud: Cloud,
-    /// σ_z² + σ_L² + σ_e², square metres.
+    /// Variance of each point, σ_z² + σ_L² + σ_e², square metres.
     variances: Vec<f64>,
 }
 
 impl Measured {
-    /// Adds the pixels of a look.
+    /// Adds a view's pixels in the mask, with their variances.
     pub fn add(&mut self, frame: &Frame, mask: &Mask) {
         let edges = edges(frame);
         let focal = frame.map.intrinsics.fx;
@@ -66,8 +65,8 @@ impl Measured {
         self.variances.extend(std::iter::repeat_n(variance, part.len()));
     }
 
-    /// Point of least variance in each cube, then, if `smooth`, moved along its normal to the mean
-    /// of the surrounding measurements; without outliers.
+    /// Fused cloud: the point of least variance in each cube; if `smooth`, each point is first moved along its normal
+    /// to the mean of the surrounding measurements. Outliers are removed.
     pub fn fused(&self, cube_m: f32, smooth: bool) -> Result<Cloud, LearningError> {
         let mut chosen = self.least(&self.cloud, &self.variances, cube_m)?;
         if smooth {
@@ -95,9 +94,8 @@ impl Measured {
         Ok(best)
     }
 
-    /// Chosen points, each moved along its normal to the variance-weighted mean of the surrounding
-    /// measurements, so that two views misaligned by less than the sensor noise give one surface
-    /// instead of two.
+    /// Chosen points, each moved along its normal to the variance-weighted mean of the surrounding measurements. Two
+    /// views misaligned by less than the sensor noise thus give one surface instead of two.
     fn smoothed(&self, chosen: &[u32]) -> Result<Cloud, LearningError> {
         let mut cloud = self.cloud.select(chosen);
         let Some(normals) = &self.cloud.normals else { return Ok(cloud) };
@@ -144,7 +142,7 @@ fn edges(frame: &Frame) -> Mask {
     Mask::of(frame.grid, frame.near.iter().map(|&i| i as usize).filter(step))
 }
 
-/// Squared distance to the nearest edge, square metres; infinite if none is near.
+/// Squared distance from a pixel's point to the nearest edge, square metres; infinite if none is near.
 fn edge_distance_sq(frame: &Frame, edges: &Mask, pixel: usize) -> f64 {
     let at = frame.points[pixel];
     let mut nearest = f32::INFINITY;

@@ -8,14 +8,14 @@ use crate::neighbours::Neighbours;
 use crate::outliers;
 use nalgebra::Point3;
 
-/// Usable pixels within `radius_m` of points of the object (world).
+/// Usable pixels within `radius_m` of the object's points (world frame).
 pub(super) fn transferred(frame: &Frame, usable: &Mask, object: &Neighbours, radius_m: f32) -> Mask {
     let near = usable.pixels().filter(|&i| object.nearest(&frame.points[i], radius_m).is_some());
     Mask::of(frame.grid, near)
 }
 
-/// Region growing: adds usable pixels within `radius_m` of the mask with normals within
-/// `angle_rad`, until none is left.
+/// Region growing: adds to the mask usable pixels within `radius_m` of its points whose normals differ by less than
+/// `angle_rad` from their neighbour's, until there are none.
 pub(super) fn grown(frame: &Frame, usable: &Mask, mut mask: Mask, radius_m: f32, angle_rad: f64) -> Mask {
     let along = angle_rad.cos() as f32;
     let mut open: Vec<usize> = mask.pixels().collect();
@@ -35,11 +35,11 @@ pub(super) fn grown(frame: &Frame, usable: &Mask, mut mask: Mask, radius_m: f32,
     mask
 }
 
-/// Outlier filter: number of neighbours for the mean distance, and threshold in standard deviations
+/// Parameters of the outlier filter: number of neighbours for the mean distance, and threshold in standard deviations
 /// (Rusu et al. 2008).
 const STRAY: (usize, f64) = (20, 2.5);
 
-/// The mask without statistical outliers (section V-A, a).
+/// Mask without the pixels whose points are statistical outliers (section V-A, a).
 pub(super) fn without_outliers(frame: &Frame, mask: &Mask) -> Result<Mask, LearningError> {
     let pixels: Vec<usize> = mask.pixels().collect();
     let points: Vec<Point3<f32>> = pixels.iter().map(|&i| frame.points[i]).collect();

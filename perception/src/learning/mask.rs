@@ -2,7 +2,7 @@
 
 use crate::cloud::Grid;
 
-/// Pixel mask, row by row.
+/// Set of pixels of an image, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     pub grid: Grid,
@@ -20,7 +20,7 @@ impl Mask {
         mask
     }
 
-    /// Indices of the pixels.
+    /// Indices of the set pixels, ascending.
     pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.set.len()).filter(|&i| self.set[i])
     }
@@ -49,7 +49,7 @@ impl Mask {
         Mask { grid: self.grid, set: out.set.into_iter().map(|s| !s).collect() }
     }
 
-    /// Closing by a square of `reach` pixels; the image border is no side of a gap.
+    /// Closing by a square of `reach` pixels to each side; gaps at the image border stay open.
     pub fn closed(&self, reach: usize) -> Mask {
         let Grid { width, height } = self.grid;
         let wide = Grid { width: width + 2 * reach, height: height + 2 * reach };
@@ -58,7 +58,7 @@ impl Mask {
         Mask { grid: self.grid, set: (0..self.set.len()).map(|i| closed.set[there(i)]).collect() }
     }
 
-    /// Drops slivers narrower than the square.
+    /// Opening by a square of `reach` pixels to each side: removes parts narrower than the square.
     pub fn opened(&self, reach: usize) -> Mask {
         self.eroded(reach).dilated(reach)
     }

@@ -1,4 +1,4 @@
-//! A model grown over looks, from the pixels that the object has in the first (section V).
+//! Learning of a model: the object's pixels of the first view are propagated over the other views (section V).
 
 use super::error::LearningError;
 use super::frame::Frame;
@@ -17,15 +17,15 @@ use crate::voxel;
 use nalgebra::{Isometry3, Point3, Translation3};
 use serde::{Deserialize, Serialize};
 
-/// Options of modelling, with the paper's values where stated.
+/// Options of learning, with the paper's values where stated.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LearnOptions {
-    /// Maximum distance of the object's points from the middle of the first view's points, metres.
+    /// Maximum distance of the object's points from the centre of its points in the first view, metres.
     pub reach_m: f64,
     /// Side of a supervoxel, metres (paper: 5 mm).
     pub supervoxel_m: f32,
-    /// Minimum share of a supervoxel in the object for the supervoxel to stay (paper: 25 %).
+    /// Minimum share of a supervoxel's pixels in the object for the supervoxel to stay in it (paper: 25 %).
     pub supervoxel_share: f64,
     /// Minimum share of a plane in the object for the plane to stay (ϑ_obj of Eq. 3).
     pub plane_object_share: f64,
@@ -34,14 +34,14 @@ pub struct LearnOptions {
     pub plane_hidden_share: f64,
     /// Radius around the object within which points are added, metres (paper: 1 cm).
     pub radius_m: f32,
-    /// Maximum angle between normals of one surface, radians (paper: 20 degrees).
+    /// Maximum angle between neighbouring normals of one surface, radians (paper: 20 degrees).
     pub angle_rad: f64,
-    /// Side of the cubes of the model, metres (paper: 2 mm).
+    /// Side of the cubes that hold one model point each, metres (paper: 2 mm).
     pub cube_m: f32,
     /// True: each model point is the mean of the measurements around it, instead of the single best
     /// one (beyond the paper).
     pub smooth: bool,
-    /// Maximum seen-through share of the known object in a view; views above it are left out.
+    /// Maximum share of the known object that a view may see through; views above it are left out.
     pub through_share: f64,
 }
 
@@ -67,26 +67,27 @@ impl Default for LearnOptions {
 pub struct Used {
     /// Number of object pixels; 0 if the view was left out.
     pub pixels: usize,
-    /// Reason for which the look was left out.
+    /// Reason why the view was left out; `None` if it was used.
     pub left_out: Option<String>,
 }
 
 /// Learned model of a rigid object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LearnedModel {
-    /// Points about the object's centre, with normals, and with colours if the views had them,
-    /// metres.
+    /// Points relative to the object's centre, metres, with normals, and with colours if the views had them.
     pub cloud: Cloud,
-    /// Pose of the model's centre when learned; the axes are the world's.
+    /// Pose of the model when learned: the object's centre, with the axes of the world.
     pub world_from_model: Isometry3<f64>,
-    /// Contribution of each look.
+    /// Contribution of each view, in order.
     pub looks: Vec<Used>,
 }
 
-/// Learns a model: propagates `mask` from the first view over the keyframes, in order.
+/// Learns a model: propagates the object's pixels `mask` from the first view over the others, in order. Views whose
+/// keyframe is not used are left out.
 ///
 /// # Errors
-/// If there is no view, one is no depth image, the mask has another size, the first view was left out, nothing is left of the object, or an option means nothing.
+/// If there is no view, one is no depth image, the mask has another size, the first view was left out, nothing is left
+/// of the object, or an option is not positive.
 pub fn learn(
     views: &[View],
     keyframes: &[Keyframe],
@@ -135,30 +136,30 @@ fn check(options: &LearnOptions) -> Result<(), LearningError> {
     Ok(())
 }
 
-/// A model half made.
+/// Model under construction.
 struct Growing<'a> {
     options: &'a LearnOptions,
     rules: PlaneRules,
     removed: Removed,
     first: Option<First>,
-    /// Object so far, world frame, thinned.
+    /// Points of the object so far, world frame, thinned.
     object: Cloud,
     measured: Measured,
 }
 
-/// First view, in which the object was detected; its surroundings there are no part of the object,
-/// however smoothly they continue the surface.
+/// First view, in which the object was detected; what surrounds it there is no part of the object, however smoothly it
+/// continues the surface.
 struct First {
     map: DepthMap,
-    /// Pixels of the object, and those that noise may assign to it.
+    /// Pixels of the object, with a margin.
     own: Mask,
 }
 
-/// Margin around the detected pixels that may belong to the object, pixels.
+/// Margin around the detected pixels that may still belong to the object, pixels.
 const BESIDE_PX: usize = 8;
 
 impl First {
-    /// True if a world point is on a surface that the first view shows beside the object.
+    /// True if a world point lies on a surface that the first view shows outside the object's pixels.
     fn shows_beside(&self, p: &Point3<f32>) -> bool {
         let q = self.map.camera_from_world * p.cast::<f64>();
         let camera = &self.map.intrinsics;
@@ -167,14 +168,14 @@ impl First {
     }
 }
 
-/// Maximum distance between two views' measurements of one point, metres.
+/// Maximum distance between two views' measurements of one point, metres; `q`: the point in the camera frame.
 fn tolerance_m(q: &Point3<f64>) -> f64 {
     0.01_f64.max(3.0 * f64::from(frontal_sigma_m(q.z as f32)))
 }
 
-/// Minimum number of pixels that an object is learned from.
+/// Minimum number of object pixels in a view.
 const LEAST_PIXELS: usize = 50;
-/// Spacing to which points carried from view to view are thinned, metres.
+/// Spacing to which the object's points are thinned for propagation to the next view, metres.
 const CARRIED_M: f32 = 0.004;
 
 impl<'a> Growing<'a> {
@@ -192,7 +193,8 @@ impl<'a> Growing<'a> {
         }
     }
 
-    /// Processes one view: labelled, filtered (section V-A), grown (V-B), kept for fusion (V-C).
+    /// Processes one view: finds the object's pixels (`given` in the first view), filters (section V-A) and grows them
+    /// (V-B), and keeps them for fusion (V-C).
     fn look(&mut self, mut frame: Frame, given: Option<&[bool]>) -> Result<Used, LearningError> {
         let options = self.options;
         let pieces = Supervoxels::of(&mut frame, options.supervoxel_m)?;
@@ -230,7 +232,7 @@ impl<'a> Growing<'a> {
         Ok(Used { pixels, left_out: None })
     }
 
-    /// Reason why a view contradicts the object known so far: the view sees through it.
+    /// Reason why a view contradicts the object known so far, as it sees through too much of it; `None` if it does not.
     fn contradiction(&self, frame: &Frame) -> Option<String> {
         let (mut through, mut seen) = (0, 0);
         for p in &self.object.points {

@@ -1,9 +1,10 @@
 //! Photometric alignment of keyframes, where geometry alone lets them slide: a round table can
 //! turn, a tin has no distinctive side.
 //!
-//! The paper refines its keyframes by patches of the image and adjusts all of them together in the end. Here both are one least-squares problem over
-//! all poses, from blurred to sharp images: marks of one image have the lightness that the other shows there (Park, Zhou, Koltun 2017 do so for two
-//! clouds), and points keep to the planes that the other measured.
+//! The paper refines its keyframes by image patches and adjusts all of them together in the end. Here both are one
+//! least-squares problem over all poses, from blurred to sharp images: texture features of one image have the lightness
+//! that the other shows there (as in Park, Zhou, Koltun 2017 for two clouds), and points keep to the planes that the
+//! other measured.
 
 use crate::cloud::{Grid, is_finite};
 use crate::noise::frontal_sigma_m;
@@ -14,21 +15,20 @@ use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::{DMatrix, DVector, Isometry3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3};
 
-/// Half sides of the boxes that images are blurred with, pixels, from far to near.
+/// Half sides of the squares over which images are averaged, pixels, coarse to fine.
 const BLURS: [usize; 3] = [5, 2, 1];
-/// Rounds of moving at each.
+/// Maximum number of Gauss-Newton steps at each blur.
 const ROUNDS: usize = 5;
 /// Side of the squares from which one texture feature and one surface point each are taken, pixels.
 const CELL_PX: usize = 12;
-/// Minimum change of lightness a pixel at a mark, of 255.
+/// Minimum lightness gradient at a texture feature, per pixel, where lightness ranges to 255.
 const CONTRAST: f32 = 3.0;
-/// Scale of lightness differences between views; larger ones get little weight.
+/// Scale of lightness differences between views, of 255; larger ones get little weight.
 const LIGHTNESS: f32 = 8.0;
-/// Minimum tolerance between a feature's predicted depth and the depth measured in the other view,
-/// metres; beyond it the feature is occluded or on another surface.
+/// Minimum tolerance between a feature's predicted depth and the depth measured in the other view, metres; a feature
+/// beyond the tolerance is occluded or on another surface.
 const NEAR_M: f32 = 0.015;
-/// Minimum depth difference between neighbouring pixels of two surfaces beyond the camera's error,
-/// metres.
+/// Minimum depth difference between neighbouring pixels of two surfaces, beyond the camera's error, metres.
 const STEP_M: f32 = 0.01;
 /// Number of correlated measurements (neighbouring pixels) that count as one independent one.
 const SHARED: f32 = 12.0;
@@ -43,8 +43,8 @@ const FARTHEST: (f64, f64) = (0.03, 0.03);
 const WIDE: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
 
-/// Poses after photometric alignment of the `used` views; unchanged if fewer than two have colours.
-/// The first used view is fixed.
+/// Poses after photometric alignment of the `used` views; unchanged if fewer than two of these have colours. The first
+/// view with colours is fixed.
 pub(super) fn refined(
     views: &[View],
     poses: &[Isometry3<f64>],
@@ -90,9 +90,9 @@ struct Look {
     light: Vec<f32>,
     /// True for pixels far enough inside a surface that blur from a depth edge does not reach them.
     inner: Vec<bool>,
-    /// Pixels inside a surface with the strongest gradients; the next field holds evenly spread
-    /// surface pixels.
+    /// Pixels of texture features: the strongest gradient inside a surface in each square.
     marks: Vec<u32>,
+    /// Pixels of evenly spread surface points.
     spread: Vec<u32>,
 }
 
@@ -130,8 +130,8 @@ impl Look {
         Some(Look { map, grid, points, normals, light, inner, marks, spread })
     }
 
-    /// Pixel coordinates and index of a camera-frame point, if the point lies on the measured
-    /// surface.
+    /// Pixel coordinates (column, row) and pixel index of a camera-frame point; `None` unless the point lies on the
+    /// measured surface.
     fn place(&self, q: &Point3<f32>) -> Option<(f32, f32, usize)> {
         let (u, v) = self.map.intrinsics.project(&q.cast())?;
         let at = self.map.intrinsics.pixel(u, v)?;
@@ -142,8 +142,8 @@ impl Look {
     }
 }
 
-/// True for pixels without a depth edge within the blur radius; the background at such an edge
-/// changes between views.
+/// For each pixel, true if no depth edge is within the blur radius; the background at such an edge changes between
+/// views.
 fn inner(depths_m: &[f32], grid: Grid) -> Vec<bool> {
     let goes_on = |a: f32, b: f32| (a - b).abs() < STEP_M + 6.0 * frontal_sigma_m(a);
     let ends = |i: usize| {
@@ -155,7 +155,7 @@ fn inner(depths_m: &[f32], grid: Grid) -> Vec<bool> {
     blurred(&steps, grid, BLURS[0]).into_iter().map(|near| near == 0.0).collect()
 }
 
-/// Means over squares of `half` pixels to each side.
+/// Image averaged over squares that reach `half` pixels to each side.
 fn blurred(image: &[f32], grid: Grid, half: usize) -> Vec<f32> {
     let Grid { width, height } = grid;
     let mut rows = vec![0.0; image.len()];
@@ -176,7 +176,7 @@ fn blurred(image: &[f32], grid: Grid, half: usize) -> Vec<f32> {
     out
 }
 
-/// Value and slopes along rows and columns between pixels.
+/// Bilinearly interpolated value at column `u` and row `v`, with its slopes along rows and along columns.
 fn sampled(image: &[f32], width: usize, u: f32, v: f32) -> (f32, f32, f32) {
     let (i, j) = (u as usize, v as usize);
     let (a, b) = (u - i as f32, v - j as f32);
@@ -186,8 +186,8 @@ fn sampled(image: &[f32], width: usize, u: f32, v: f32) -> (f32, f32, f32) {
     (value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q))
 }
 
-/// Constraints from texture and surface of one view on its pose in another, as motions of the first
-/// in the frame of the second.
+/// Constraints from texture and surface of view `a` on its pose in view `b`, as motions of `a` in the camera frame of
+/// `b`.
 fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isometry3<f64>) -> Sums {
     let (turn, shift) =
         (b_from_a.rotation.to_rotation_matrix().cast::<f32>(), b_from_a.translation.vector.cast::<f32>());
@@ -227,7 +227,7 @@ fn link((a, of_a): (&Look, &[f32]), (b, of_b): (&Look, &[f32]), b_from_a: &Isome
     sums
 }
 
-/// Adds a residual with its gradient at a point, with Cauchy weight.
+/// Adds a residual with Cauchy weight; `slope` is its gradient with respect to the point `q`.
 fn add(sums: &mut Sums, q: &Point3<f32>, slope: &Vector3<f32>, residual: f32, sigma: f32) {
     let along = q.coords.cross(slope);
     let derivative = [along.x, along.y, along.z, slope.x, slope.y, slope.z].map(f64::from);
@@ -235,7 +235,7 @@ fn add(sums: &mut Sums, q: &Point3<f32>, slope: &Vector3<f32>, residual: f32, si
     sums.add_scalar(derivative, f64::from(residual), f64::from(weight));
 }
 
-/// Pairs of each view with the views of most similar direction.
+/// Pairs of each view with the [`PARTNERS`] views of most similar orientation.
 fn pairs(active: &[usize], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for &i in active {
@@ -247,7 +247,7 @@ fn pairs(active: &[usize], poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// Gauss-Newton step of all poses but the first; false if none moved.
+/// Applies a Gauss-Newton step to all poses but the first; false if no pose moved.
 fn step(active: &[usize], pairs: &[(usize, usize)], links: &[Sums], poses: &mut [Isometry3<f64>]) -> bool {
     let mut slots = vec![None; poses.len()];
     active.iter().skip(1).enumerate().for_each(|(slot, &i)| slots[i] = Some(6 * slot));

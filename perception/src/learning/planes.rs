@@ -8,35 +8,36 @@ use crate::plane::{self, Plane, PlaneOptions};
 use crate::visibility::{DepthMap, Seen};
 use nalgebra::Point3;
 
-/// Rules for planes.
+/// Rules for keeping planes as part of the object.
 #[derive(Clone, Debug)]
 pub(super) struct PlaneRules {
-    /// Minimum share of a plane in the object for the plane to stay (ϑ_obj).
+    /// Minimum share of a plane's pixels in the object for the plane to stay (ϑ_obj).
     pub object_share: f64,
-    /// Share of a plane that must be invisible in the first view for the plane to stay (ϑ_vis).
+    /// Minimum share of a plane's pixels that were invisible in the first view for the plane to stay (ϑ_vis).
     pub hidden_share: f64,
 }
 
-/// Maximum number of planes looked for in a frame.
+/// Maximum number of planes detected in a frame.
 const MOST: usize = 8;
-/// Minimum number of pixels of a plane, as a share of the nearby pixels, and absolute.
+/// Minimum number of pixels of a plane, as a share of the nearby pixels, and as an absolute number.
 const LEAST: (f64, usize) = (0.015, 200);
-/// Pixels that planes are looked for in, at most.
+/// Maximum number of pixels used for detecting a plane.
 const SAMPLE: usize = 20_000;
-/// Maximum angle between a pixel's normal and its plane's, and between planes of a group, radians.
+/// Maximum angle between a pixel's normal and its plane's, radians.
 const TILT_RAD: f64 = 0.5;
+/// Maximum angle between planes that count as one, radians.
 const GROUP_RAD: f64 = 0.12;
-/// Maximum distance between planes of one group, metres.
+/// Maximum distance between planes that count as one, metres.
 const GROUP_M: f64 = 0.01;
 
-/// Planes removed so far, world frame.
+/// Planes removed so far, each with the centroid of its pixels, world frame.
 #[derive(Default)]
 pub(super) struct Removed {
     planes: Vec<(Plane, Point3<f64>)>,
 }
 
 impl Removed {
-    /// Pixels near the object on no removed plane (S_t^f).
+    /// Pixels near the object on no removed plane (S_t^f); detects and removes the frame's planes first.
     pub fn filtered(&mut self, frame: &Frame, object: &Mask, first: &DepthMap, rules: &PlaneRules) -> Mask {
         let mut left = Mask::of(frame.grid, frame.near.iter().map(|&i| i as usize));
         let mut open = left.clone();
@@ -97,7 +98,7 @@ struct Found {
     pixels: Vec<usize>,
 }
 
-/// The largest plane of some pixels.
+/// Plane with the most pixels of a mask; `None` if it has too few.
 fn find(frame: &Frame, open: &Mask, draws: &mut Draws) -> Option<Found> {
     let pixels: Vec<usize> = open.pixels().collect();
     let least = LEAST.1.max((LEAST.0 * frame.near.len() as f64) as usize);
@@ -123,14 +124,14 @@ fn find(frame: &Frame, open: &Mask, draws: &mut Draws) -> Option<Found> {
     Some(Found { plane, middle, pixels })
 }
 
-/// Maximum distance of a pixel from its plane: three standard deviations of the camera at the
-/// median depth, metres.
+/// Maximum distance of a pixel from its plane, metres: 2.5 standard deviations of the camera at the depth of the middle
+/// one of the pixels, at least 6 mm.
 fn tolerance_m(frame: &Frame, pixels: &[usize]) -> f64 {
     let depth_m = frame.depth_m(pixels[pixels.len() / 2]);
     (2.5 * f64::from(frontal_sigma_m(depth_m as f32))).max(0.006)
 }
 
-/// Pixels of a mask on a plane: near with a similar normal, or very near.
+/// Pixels of a mask on a plane: near the plane with a similar normal, or very near.
 fn pixels_of(frame: &Frame, mask: &Mask, plane: &Plane) -> Vec<usize> {
     let pixels: Vec<usize> = mask.pixels().collect();
     if pixels.is_empty() {

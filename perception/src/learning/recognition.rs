@@ -1,7 +1,9 @@
 //! Recognition of learned objects (section VI; Aldoma et al. 2013).
 //!
-//! Local features of shape and of pattern are matched by nearest neighbour, matches grouped by the pose that they share, where up is known also by how a
-//! thing stands; poses are refined on the scene's surface, and what is left is judged by rays and chosen together: no part of the scene is explained twice.
+//! Local features of shape and pattern are matched by nearest neighbour. Matches are grouped by the pose that they
+//! share, where the up direction is known also by the object's usual standing pose. Poses are refined on the scene's
+//! surface; the remaining ones are judged by their visibility in the view and chosen together, so that no part of the
+//! scene is explained twice.
 
 mod error;
 pub mod evidence;
@@ -35,19 +37,19 @@ pub use surfels::outward;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KnowOptions {
-    /// Maximum range of used returns, metres.
+    /// Maximum range of the points used, metres.
     pub range_m: f64,
     /// Spacing of the keypoints that get a descriptor, metres (paper: 1.5 cm).
     pub keypoint_m: f32,
     /// Minimum confidence of a reported object.
     pub least_confidence: f64,
-    /// Upper bound of the probability, from a few model points, below which a candidate is dropped;
-    /// far below any reported probability, so only time is saved.
+    /// Candidates are dropped if an upper bound of their probability, from a few model points, is below this; far below
+    /// any reported probability, so that only time is saved.
     pub hopeless: f64,
     /// Judge that turns evidence into a probability.
     pub judge: Judge,
-    /// Up direction in the frames of the models and of the views, if common to all: objects mostly
-    /// stand as they stood when learned.
+    /// Up direction in the frames of the models and of the world, if both share one: objects mostly stand as they stood
+    /// when learned. `None` if unknown.
     pub up: Option<Unit<Vector3<f64>>>,
 }
 
@@ -69,7 +71,7 @@ impl Default for KnowOptions {
 pub struct Recognised {
     /// Index of the model in the library, in order of addition.
     pub model: usize,
-    /// Pose, by the stated pose of the view.
+    /// Pose of the model in the world, from the stated camera pose of the view, metres.
     pub world_from_model: Isometry3<f64>,
     /// Probability of this object at this pose.
     pub confidence: f64,
@@ -77,7 +79,7 @@ pub struct Recognised {
     pub evidence: PoseEvidence,
 }
 
-/// Learned models, made ready.
+/// Learned models, prepared for recognition.
 #[derive(Default)]
 pub struct Library {
     models: Vec<Known>,
@@ -85,7 +87,7 @@ pub struct Library {
 
 struct Known {
     surfels: Surfels,
-    /// Stride through the points for a first, coarse check.
+    /// Few of the points, about [`COARSE_M`] apart, for a first check of candidates.
     coarse: Surfels,
     features: [Descriptors; 2],
     /// Largest extent, metres.
@@ -93,27 +95,29 @@ struct Known {
 }
 
 const KINDS: [DescriptorKind; 2] = [DescriptorKind::Shape, DescriptorKind::Pattern];
-/// Distance of the points that a first sight looks at, metres.
+/// Spacing of the model points used for a first check of candidates, metres.
 const COARSE_M: f32 = 0.01;
-/// Minimum number of points of a model.
+/// Minimum number of points of a model, at surfel spacing.
 const LEAST_POINTS: usize = 60;
-/// Votes of a model that are looked at, refined, and judged.
+/// Maximum number of voted poses of a model that are checked.
 const LOOKED_AT: usize = 60;
+/// Maximum number of voted poses of a model that are refined and judged.
 const REFINED: usize = 6;
-/// Difference below which two poses are one, metres and radians; the second pair is for poses
-/// refined with a few points.
+/// Difference below which two voted poses count as one, metres and radians.
 const SAME: (f64, f64) = (0.02, 0.26);
+/// Difference below which two poses refined with a few points count as one, metres and radians.
 const SETTLED: (f64, f64) = (0.005, 0.07);
-/// Correspondence distances for refining a voted pose, coarse to fine, metres; and for a pose
-/// already refined with a few points.
+/// Maximum correspondence distances for refining a voted pose, coarse to fine, metres.
 const WITHIN_M: [f32; 2] = [0.025, 0.01];
+/// Maximum correspondence distances for refining a pose already refined with a few points, metres.
 const SETTLED_WITHIN_M: [f32; 1] = [0.01];
-/// Odds of lying or hanging against standing as when learned; an assumption: nine in ten stand.
+/// Prior probability ratio of an object that lies or hangs to one that stands as when learned; an assumption: nine in
+/// ten stand.
 const LYING: f64 = 0.1;
-/// Maximum shared part of the explained points of two answers, relative to the smaller one.
+/// Maximum share of the points explained by two reported objects, relative to the one with fewer points.
 const SHARED: f64 = 0.2;
 
-/// The twelve corners of an icosahedron: directions that a model is described from.
+/// Vertices of an icosahedron, as unit vectors: the viewing directions from which a model is described.
 fn directions() -> Vec<Vector3<f32>> {
     let golden = 0.5 * (1.0 + 5_f32.sqrt());
     let mut all = Vec::new();
@@ -124,11 +128,10 @@ fn directions() -> Vec<Vector3<f32>> {
 }
 
 impl Library {
-    /// Adds a model, a cloud with outward normals about any origin, optionally coloured; returns
-    /// its index.
+    /// Adds a model and returns its index. `cloud`: points with outward normals about any origin, optionally coloured.
     ///
     /// # Errors
-    /// If it has next to no points with normals.
+    /// If the cloud has too few points with normals.
     pub fn add(&mut self, cloud: &Cloud, options: &KnowOptions) -> Result<usize, KnowError> {
         let surfels = Surfels::of(cloud)?;
         if surfels.points.len() < LEAST_POINTS {
@@ -167,7 +170,7 @@ impl Library {
         Ok(choose(self.judged(view, options)?, options.least_confidence))
     }
 
-    /// All plausible candidates judged in isolation, possibly overlapping: input of [`choose`], and
+    /// Hypotheses of all models in a view, each judged in isolation and possibly overlapping: input of [`choose`] and
     /// for fitting a [`Judge`].
     ///
     /// # Errors
@@ -177,7 +180,7 @@ impl Library {
         self.candidates_in(&self.scene(view, options)?, &view.world_from_camera, options)
     }
 
-    /// A look made ready.
+    /// View prepared for recognition.
     fn scene(&self, view: &View, options: &KnowOptions) -> Result<SceneView, KnowError> {
         let widest_m = self.models.iter().map(|m| m.size_m).fold(0.0, f64::max);
         SceneView::new(view, options.range_m, widest_m * widest_m)
@@ -201,23 +204,23 @@ impl Library {
     }
 }
 
-/// Model at a pose, judged in isolation.
+/// Model at a pose in a view, judged in isolation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hypothesis {
-    /// Candidate.
+    /// Recognised object, were it the only one.
     pub recognised: Recognised,
     /// Indices of the view's surface points that the model explains, ascending.
     explained: Vec<u32>,
 }
 
 impl Hypothesis {
-    /// True if both explain largely the same points.
+    /// True if both explain too many of the same points to hold together.
     fn conflicts(&self, other: &Hypothesis) -> bool {
         let shared = self.explained.iter().filter(|c| other.explained.binary_search(c).is_ok()).count();
         shared as f64 > SHARED * self.explained.len().min(other.explained.len()) as f64
     }
 
-    /// Gain of an explanation of the scene by this candidate.
+    /// Contribution to the explanation of the scene: explained points, weighted by confidence above one half.
     fn worth(&self) -> f64 {
         self.explained.len() as f64 * (self.recognised.confidence - 0.5)
     }
@@ -251,8 +254,8 @@ impl Known {
         Ok(judged)
     }
 
-    /// Poses that matches vote for, refined on the scene with a few model points and kept if
-    /// promising; duplicates are merged. `up`: up direction in model and scene.
+    /// Poses that feature matches vote for, refined on the scene with a few model points and kept if promising;
+    /// duplicates are merged. `up`: up direction in the model and in the scene.
     fn promising(
         &self,
         described: &[Descriptors; 2],
@@ -290,8 +293,7 @@ impl Known {
         Ok(promising)
     }
 
-    /// Upper bound of the confidence over some poses, from a few model points; 1 if too few are
-    /// visible.
+    /// Upper bound of the confidence over some poses, from a few model points; 1 if too few of these are in open view.
     fn at_most(&self, poses: &[Isometry3<f64>], votes: usize, scene: &SceneView, judge: &Judge) -> f64 {
         let by_points = self.surfels.points.len() as f64 / self.coarse.points.len().max(1) as f64;
         let mut most = 0.0_f64;
@@ -307,16 +309,15 @@ impl Known {
 }
 
 impl KnowOptions {
-    /// Probability that a model with this evidence is at its pose, given whether it stands as when
-    /// learned.
+    /// Probability that a model with this evidence is at its pose. `stands`: true if it stands as when learned.
     fn confidence(&self, evidence: &PoseEvidence, stands: bool) -> f64 {
         let p = self.judge.confidence(evidence);
         if stands { p } else { LYING * p / (1.0 - p + LYING * p) }
     }
 }
 
-/// Pose of surfels after ICP of their visible side with the scene, with decreasing search radii,
-/// metres.
+/// Pose of surfels after ICP of their visible side with the scene, at decreasing correspondence distances, metres;
+/// steps that move the pose too far are dropped.
 fn refined(
     surfels: &Surfels,
     start: &Isometry3<f64>,
@@ -355,10 +356,10 @@ fn same(a: &Isometry3<f64>, b: &Isometry3<f64>, (within_m, within_rad): (f64, f6
         && a.rotation.angle_to(&b.rotation) < within_rad
 }
 
-/// Candidates that together explain the scene best without explaining any point twice, most
-/// confident first: greedy from each single best candidate, with single improving exchanges (add
-/// one, drop its conflicts). Competing explanations share confidence by their odds; candidates
-/// below `least_confidence` are dropped.
+/// Recognised objects that together explain the scene best without explaining any point twice, most confident first.
+///
+/// Greedy: adds the hypothesis of greatest gain, dropping those that conflict with it, until none improves the
+/// explanation. Competing models share confidence by their odds; objects below `least_confidence` are dropped.
 pub fn choose(mut found: Vec<Hypothesis>, least_confidence: f64) -> Vec<Recognised> {
     found.sort_by(|a, b| b.worth().total_cmp(&a.worth()));
     let n = found.len();

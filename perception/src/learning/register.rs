@@ -1,8 +1,9 @@
 //! Keyframes: selection of sufficiently different views, and their registration (section IV-C).
 //!
-//! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned together against each
-//! other and against where localisation had them, as [`crate::merge`] does; one that contradicts the others is left out and says why. Then what is
-//! printed on things brings together what surfaces leave loose, and they are aligned once more from there.
+//! The paper tracks the camera from frame to frame and adjusts all keyframes in the end. Here all keyframes are aligned
+//! together, with each other and with the localised poses, as [`crate::merge`] does; one that contradicts the others is
+//! left out with a reason. Then texture aligns what surfaces leave undetermined, and surfaces are aligned once more
+//! from there.
 
 use super::error::LearningError;
 use super::photometric;
@@ -10,14 +11,14 @@ use crate::merge::{self, MergeOptions};
 use crate::view::View;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
-/// View with its camera pose.
+/// Registered pose of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keyframe {
-    /// The corrected pose.
+    /// Corrected pose of the camera, metres.
     pub world_from_camera: Isometry3<f64>,
     /// False if the view does not fit the others.
     pub used: bool,
-    /// Reason for convergence or exclusion.
+    /// Reason why the view was used or left out.
     pub why: String,
 }
 
@@ -34,7 +35,7 @@ pub fn keyframes(poses: &[Isometry3<f64>], centre: &Point3<f64>, step_rad: f64) 
     kept
 }
 
-/// Registers views; `up`: up direction in the world, `range_m`: maximum range of used returns.
+/// Registers views. `up`: up direction in the world; `range_m`: maximum range of the points used, metres.
 ///
 /// # Errors
 /// If there is no view, no usable point, or a pose that is not finite.

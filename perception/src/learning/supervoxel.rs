@@ -1,8 +1,8 @@
 //! Supervoxels: small surface patches, whose mean normal is more reliable than a pixel's (section
 //! V-A, b).
 //!
-//! Seeded by cubes, then each pixel goes to the best of the pieces beside it by place and normal, as superpixels do (Achanta et al. 2012;
-//! Papon et al. 2013).
+//! Seeded by cubes; then each pixel joins the best of its own and the adjacent supervoxels by position and normal, as
+//! superpixels do (Achanta et al. 2012; Papon et al. 2013).
 
 use super::error::LearningError;
 use super::frame::Frame;
@@ -10,7 +10,7 @@ use super::mask::Mask;
 use crate::voxel;
 use nalgebra::{Point3, Vector3};
 
-/// Supervoxel of each pixel.
+/// Division of a frame's nearby pixels into supervoxels.
 pub(super) struct Supervoxels {
     /// Supervoxel index by pixel; [`voxel::NONE`] for none.
     of: Vec<u32>,
@@ -18,7 +18,7 @@ pub(super) struct Supervoxels {
 }
 
 const ROUNDS: usize = 2;
-/// Weight of the normal in the distance: a right angle counts as this many voxel sides.
+/// Weight of the normal in the squared distance: a right angle adds this many squared supervoxel sides.
 const NORMAL_WEIGHT: f32 = 2.0;
 
 #[derive(Clone, Default)]
@@ -29,8 +29,8 @@ struct Piece {
 }
 
 impl Supervoxels {
-    /// Supervoxels of the nearby points, about `side_m` wide; also replaces the frame's normals by
-    /// their supervoxels' normals.
+    /// Divides the nearby points into supervoxels about `side_m` metres wide; replaces the frame's normals by the mean
+    /// normals of their supervoxels.
     pub fn of(frame: &mut Frame, side_m: f32) -> Result<Supervoxels, LearningError> {
         let points: Vec<Point3<f32>> = frame.near.iter().map(|&i| frame.points[i as usize]).collect();
         let seeds = voxel::assign(&points, side_m)?;
@@ -87,7 +87,7 @@ impl Supervoxels {
         }
     }
 
-    /// Removes from a mask the supervoxels of which it holds less than `share`.
+    /// Removes from a mask the supervoxels of which it holds less than `share` of the pixels.
     pub fn drop_unsupported(&self, mask: &mut Mask, share: f64) {
         let (mut all, mut held) = (vec![0_u32; self.count], vec![0_u32; self.count]);
         for (piece, set) in self.of.iter().zip(&mask.set).filter(|(p, _)| **p != voxel::NONE) {

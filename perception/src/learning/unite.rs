@@ -7,16 +7,16 @@ use crate::cloud::Cloud;
 use crate::register::{Method, Prepared, RegisterOptions, align};
 use nalgebra::Isometry3;
 
-/// Neighbours that a normal is made of for registration.
+/// Number of neighbours from which a normal is estimated for registration.
 const NEIGHBOURS: usize = 20;
-/// Match distances, from far to near, metres.
+/// Maximum correspondence distances of the registration, coarse to fine, metres.
 const WITHIN_M: [f32; 2] = [0.02, 0.006];
 /// Maximum correction of a recognised pose, metres and radians; beyond it, the recognition was
 /// wrong.
 const MOST_MOVED: (f64, f64) = (0.03, 0.3);
-/// Minimum overlap of the smaller model with the other, and maximum distance in the overlap,
-/// metres; models are accurate to two millimetres.
+/// Minimum overlapping share of the smaller model.
 const LEAST_SHARED: f64 = 0.35;
+/// Maximum root mean square distance in the overlap, metres; models are accurate to two millimetres.
 const MOST_OFF_M: f64 = 0.003;
 
 /// Union of two models of one object.
@@ -25,7 +25,7 @@ pub struct United {
     /// Points with normals, and with colours if both models had them, in the known model's frame,
     /// metres.
     pub cloud: Cloud,
-    /// Pose of the new model in the known one.
+    /// Pose of the new model in the frame of the known one.
     pub known_from_more: Isometry3<f64>,
     /// Overlapping share of the smaller model.
     pub shared: f64,
@@ -33,12 +33,12 @@ pub struct United {
     pub off_m: f64,
 }
 
-/// Registers the model of a later encounter, from the initial pose `known_from_more`, to the
-/// `known` one of `meetings` encounters, and fuses both in cubes of `cube_m` metres, each encounter
-/// with equal weight.
+/// Registers the model `more` of a later encounter, from the initial pose `known_from_more`, to the `known` model of
+/// `meetings` encounters, and fuses both in cubes of `cube_m` metres, each encounter with equal weight.
 ///
 /// # Errors
-/// [`LearningError::Disagree`] if they are not one surface where both have some; as registration and fusing have them.
+/// [`LearningError::Disagree`] if the overlap is too small or inexact, or the pose moved too far; errors of
+/// registration and fusion.
 pub fn united(
     known: &Cloud,
     meetings: u32,

@@ -4,24 +4,24 @@ use crate::cloud::CloudError;
 use crate::register::RegisterError;
 use crate::voxel::VoxelError;
 
-/// Models or views that cannot be used.
+/// Reason why a model or a view cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum KnowError {
-    /// A model without normals or with next to no points.
+    /// A model has too few points with normals.
     #[error("the model has {points} points with a normal: learn it, or estimate normals that point outwards")]
     Model {
-        /// Number of points.
+        /// Number of points with normals.
         points: usize,
     },
-    /// A view whose pixels are not known.
+    /// A view is no depth image, and its camera is unknown.
     #[error(
         "the view shows no pixels in front of a camera: give an organised cloud in the optical frame (z forward), or intrinsics"
     )]
     NoCamera,
-    /// Too many points.
+    /// There are too many points to index.
     #[error(transparent)]
     Cloud(#[from] CloudError),
-    /// Points too far out.
+    /// Points are too far out for voxels.
     #[error(transparent)]
     Voxel(#[from] VoxelError),
     /// A pose could not be refined.

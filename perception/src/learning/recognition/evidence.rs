@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PoseEvidence {
-    /// Model points facing the camera, plus back-facing ones without a front: points of a visible
+    /// Number of model points facing the camera, plus back-facing ones with no front before them: points of a visible
     /// side that was never learned.
     pub facing: usize,
     /// Number of these points with a measured surface of similar normal.
@@ -31,17 +31,17 @@ pub struct PoseEvidence {
     /// Share of border positions just beyond the model where the scene surface continues, so that
     /// the model may be part of something larger.
     pub beyond: f64,
-    /// Features that voted for the pose.
+    /// Number of feature matches that voted for the pose.
     pub votes: usize,
 }
 
-/// Number of weights of a [`Judge`].
+/// Number of weights of a [`Judge`], including the constant.
 pub const WEIGHTS: usize = 9;
 
-/// Judge: logistic regression from evidence to probability.
+/// Logistic regression from evidence to probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Judge {
-    /// The last is the constant.
+    /// Weights of [`PoseEvidence::measures`]; the last is the constant term.
     pub weights: [f64; WEIGHTS],
 }
 
@@ -56,9 +56,9 @@ impl Default for Judge {
 }
 
 impl PoseEvidence {
-    /// Features of a [`Judge`]: explained share of visible points; colour likeness, and its
-    /// absence; continuation beyond the border; votes; hidden share of the model's side;
-    /// seen-through share of visible points; normal deviation; and a constant one.
+    /// Inputs of a [`Judge`]: explained share of the unoccluded points; colour similarity; 1 if there is no colour;
+    /// continuation beyond the border; logarithm of votes; hidden share of the facing points; seen-through share of the
+    /// unoccluded points; normal deviation, radians; and 1 for the constant term.
     pub fn measures(&self) -> [f64; WEIGHTS] {
         [
             self.explained_share(),
@@ -78,7 +78,7 @@ impl PoseEvidence {
         self.explained as f64 / self.open().max(1) as f64
     }
 
-    /// Number of unoccluded points.
+    /// Number of facing points that are not hidden.
     pub(super) fn open(&self) -> usize {
         self.facing.saturating_sub(self.hidden)
     }
@@ -106,27 +106,27 @@ impl Judge {
 
 /// Minimum cosine between model and scene normals at an explained point.
 const TURNED_AS: f32 = 0.6;
-/// Farthest scene point that a point of the model explains, metres.
+/// Maximum distance of a scene point from the model point that explains it, metres.
 pub(super) const NEAR_M: f32 = 0.012;
-/// Colour difference (CIE 1976, lightness at half weight) from which colours are no evidence for a
-/// match.
+/// Colour difference (CIE 1976, lightness at half weight) at which similarity falls to 1/e.
 const UNLIKE: f32 = 14.0;
-/// Distance beyond explained points at which continuation of the scene is tested, metres, where no
-/// model point is that near; and minimum cosine between the normals for continuation.
+/// Distance beyond explained points at which continuation of the scene is tested, metres.
 const BEYOND_M: f32 = 0.018;
+/// Minimum distance of a tested position from all model points, metres.
 const WITHIN_M: f32 = 0.010;
+/// Minimum cosine between the normals of an explained point and of the surface that continues it.
 const SMOOTH: f32 = 0.94;
-/// Number of neutral border points added, so that a short border has little weight.
+/// Number of border positions without continuation that are added, so that a short border has little weight.
 const LEAST_BORDER: usize = 10;
 
-/// Evidence, and the scene's points that are explained.
+/// Evidence for a pose, and the scene's points that the model explains there.
 pub struct Verified {
     pub evidence: PoseEvidence,
-    /// Indices in the scene's surfels, ascending.
+    /// Indices of the explained surfels of the scene, ascending.
     pub claims: Vec<u32>,
 }
 
-/// Verifies the pose of a model's surfels against a scene.
+/// Gathers the evidence for a pose of a model's surfels in a scene; `votes`: number of matches that voted for the pose.
 pub fn verify(
     model: &Surfels,
     camera_from_model: &Isometry3<f64>,
@@ -143,8 +143,7 @@ pub fn verify(
     Verified { evidence, claims }
 }
 
-/// Evidence as if the scene did not continue beyond the model and each side of the model had been
-/// learned.
+/// Optimistic evidence: as if the scene did not continue beyond the model and each side of the model had been learned.
 pub(super) fn unbounded(
     model: &Surfels,
     camera_from_model: &Isometry3<f64>,
@@ -154,35 +153,37 @@ pub(super) fn unbounded(
     PoseEvidence { votes, ..rays(model, camera_from_model, scene).evidence }
 }
 
-/// First score of a pose: share of the visible points that are explained, and similarity of colour.
+/// Score of an unrefined pose: explained share of the unoccluded points, times a factor for colour similarity.
 pub(super) fn first_sight(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView) -> f64 {
     let evidence = rays(model, camera_from_model, scene).evidence;
     evidence.explained_share() * (0.5 + evidence.colour.unwrap_or(0.5))
 }
 
-/// Evidence of the rays alone, which points of the model (first) explain which of the scene, and which face the camera.
+/// Evidence of the rays alone; explaining pairs of model and scene point, by index; and the model points that face the
+/// camera, by index.
 struct Rays {
     evidence: PoseEvidence,
     pairs: Vec<(usize, usize)>,
     seen: Vec<u32>,
 }
 
-/// Maximum distance along a ray at which a measurement is still of a surface at that depth, metres.
+/// Maximum difference between a measured depth and a surface's depth `z_m` at which both are one surface, metres.
 pub(super) fn tolerance_m(z_m: f32) -> f32 {
     (3.0 * frontal_sigma_m(z_m)).max(0.006)
 }
 
-/// Direction from a model towards the camera.
+/// Unit vector from the model's origin towards the camera, model frame.
 fn towards_camera(camera_from_model: &Isometry3<f64>) -> Vector3<f32> {
     (camera_from_model.inverse() * Point3::origin()).coords.cast::<f32>().normalize()
 }
 
-/// True if a ray through a point met nothing up to it and ended farther than the measurement error.
+/// True if a camera looks through a point at depth `z_m`: all depths around its pixel, `nearest_m` the least, lie
+/// behind it by more than the measurement error.
 fn sees_through(z_m: f32, nearest_m: f32) -> bool {
     nearest_m > z_m + tolerance_m(z_m).max(0.01)
 }
 
-/// Adds the evidence of visible but never learned sides: seen through, or without information.
+/// Adds the evidence of visible sides that were never learned: each of their points is seen through, or hidden.
 fn add_backs(
     evidence: &mut PoseEvidence,
     model: &Surfels,
@@ -233,7 +234,7 @@ fn rays(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView) 
     Rays { evidence: e, pairs, seen }
 }
 
-/// Mean colour similarity of pairs (model, scene), after equalising lightness.
+/// Mean colour similarity of pairs (model, scene), 0 to 1, after equalising lightness; `None` without colours.
 fn likeness(model: &Surfels, scene: &Surfels, pairs: &[(usize, usize)]) -> Option<f64> {
     let (a, b) = (model.lab.as_ref()?, scene.lab.as_ref()?);
     if pairs.is_empty() {
@@ -250,8 +251,8 @@ fn likeness(model: &Surfels, scene: &Surfels, pairs: &[(usize, usize)]) -> Optio
     Some(pairs.iter().map(alike).sum::<f64>() / pairs.len() as f64)
 }
 
-/// Share of border positions where the scene continues the model's surface, without occluded
-/// positions and missing returns. Any patch fits a larger wall, so wide planes count too.
+/// Share of border positions where the scene continues the model's surface; occluded positions and missing measurements
+/// do not count. Any patch fits a larger wall, so wide planes count too.
 pub fn beyond(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &SceneView, claims: &[u32]) -> f64 {
     let model_from_camera = camera_from_model.inverse();
     let (mut carried, mut asked) = (0_usize, 0_usize);
@@ -272,7 +273,8 @@ pub fn beyond(model: &Surfels, camera_from_model: &Isometry3<f64>, scene: &Scene
     carried as f64 / (asked + LEAST_BORDER) as f64
 }
 
-/// True if a surface of the given normal is measured at a point; `None` if the point is invisible.
+/// True if a surface of the given normal is measured at a camera-frame point; `None` if the point is occluded or
+/// outside the image.
 fn carries_on(scene: &SceneView, q: &Point3<f64>, normal: &Vector3<f32>) -> Option<bool> {
     let off = scene.around(q)?.0 - q.z as f32;
     let tolerance = tolerance_m(q.z as f32);

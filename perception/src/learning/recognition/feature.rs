@@ -1,35 +1,36 @@
-//! Local features: shape where the surface bends (SHOT: Tombari, Salti, Di Stefano 2010), and
-//! printed pattern where it is coloured.
+//! Local features: shape where the surface is curved (SHOT: Tombari, Salti, Di Stefano 2010), and printed pattern where
+//! it is coloured.
 
 use super::surfels::{Surfels, across};
 use crate::pool;
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Vector3};
 
-/// Keypoint with its descriptor's source.
+/// Keypoint at which a descriptor is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Feature {
     pub at: Point3<f32>,
     pub normal: Vector3<f32>,
 }
 
-/// Number of descriptor or code bytes compared at once.
+/// Number of descriptor bytes compared at once.
 const BLOCK: usize = 32;
+/// Number of code bytes compared at once.
 const CODE: usize = 16;
-/// Quantisation step of the descriptor's group sums in a code.
+/// Divisor of a group's sum of descriptor bytes that gives a code byte.
 const COARSE: u16 = 4;
 
-/// Features of one kind, with contiguous byte descriptors for fast distances.
+/// Features of one kind, with their descriptors in contiguous bytes for fast distances.
 #[derive(Clone, Debug)]
 pub struct Descriptors {
     pub all: Vec<Feature>,
     kind: DescriptorKind,
     pub blocks: Vec<[u8; BLOCK]>,
-    /// Quantised sums of groups of descriptor bytes: similar descriptors have similar codes, of a
-    /// quarter of the size or less.
+    /// Codes: quantised sums of groups of descriptor bytes. Similar descriptors have similar codes, of a quarter of the
+    /// size or less.
     pub codes: Vec<[u8; CODE]>,
 }
 
-/// Feature of one set, its most similar one of another set, and their descriptor distance.
+/// Feature of one set, the most similar feature of another set (both by index), and their descriptor distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alike {
     pub own: usize,
@@ -55,8 +56,8 @@ impl DescriptorKind {
         }
     }
 
-    /// Code byte that a descriptor byte contributes to: by sector for shapes, by squares of four
-    /// cells for patterns.
+    /// Index of the code byte to which a descriptor byte contributes: by sector for shapes, by squares of four cells
+    /// for patterns.
     const fn sum_of(self, byte: usize) -> usize {
         match self {
             DescriptorKind::Shape => byte / SECTORS[3],
@@ -74,7 +75,8 @@ impl Descriptors {
         Descriptors { all: Vec::new(), kind, blocks: Vec::new(), codes: Vec::new() }
     }
 
-    /// Features at keypoints of a surfel cloud; points without enough neighbours are skipped.
+    /// Computes the features at keypoints, given as indices of surfels; keypoints without a distinctive descriptor are
+    /// skipped.
     pub fn of(surfels: &Surfels, keypoints: &[u32], kind: DescriptorKind) -> Descriptors {
         let describe = |&i: &u32| {
             let descriptor = match kind {
@@ -109,7 +111,7 @@ impl Descriptors {
         self.codes.extend((0..sums.len() / CODE).map(|n| std::array::from_fn(|k| byte(n * CODE + k))));
     }
 
-    /// The descriptor of a feature.
+    /// Descriptor of a feature, in blocks.
     pub fn descriptor(&self, k: usize) -> &[[u8; BLOCK]] {
         let each = self.kind.lengths().0.div_ceil(BLOCK);
         &self.blocks[k * each..(k + 1) * each]
@@ -120,8 +122,8 @@ impl Descriptors {
         &self.codes[k * each..(k + 1) * each]
     }
 
-    /// Adds another view's features of the same object that are new: at another place, or with
-    /// another descriptor.
+    /// Adds those features of another view of the same object that are new: at another place, or with another
+    /// descriptor.
     pub fn add_new(&mut self, more: &Descriptors) {
         let before = self.all.len();
         for (k, feature) in more.all.iter().enumerate() {
@@ -138,15 +140,15 @@ impl Descriptors {
         }
     }
 
-    /// At most `most` features with the most similar partners of the same kind, best first, and the
-    /// median distance of all features to their best partners. Codes preselect the compared pairs.
+    /// At most `most` features with their most similar partners in another set of the same kind, best first, and the
+    /// estimated median distance of all features to their best partners. Codes preselect the compared pairs.
     pub fn most_alike(&self, others: &Descriptors, most: usize) -> (Vec<Alike>, u32) {
-        /// Number of candidates with full comparison, in multiples of the wanted number, and number
-        /// of partners compared with each. In generated scenes recognition then equals that of full
-        /// comparison; a factor of two gave more false answers.
+        /// Number of features whose full descriptors are compared, in multiples of `most`. In generated scenes
+        /// recognition then equals that of full comparison; a factor of two gave more false answers.
         const LIKELY: usize = 6;
+        /// Number of partners whose full descriptors are compared with each feature.
         const CLOSE: usize = 24;
-        /// Number of features, central by their codes, that determine the median.
+        /// Number of features, around the median by their codes, that determine the median distance.
         const MIDDLE: usize = 15;
         let codes = |own: usize| {
             let code = self.code(own);
@@ -181,7 +183,7 @@ impl Descriptors {
     }
 }
 
-/// Sum of absolute differences of the bytes of two descriptors, or of two codes.
+/// Sum of absolute byte differences of two descriptors, or of two codes.
 #[inline(always)]
 pub fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
     let of = |(a, b): (&[u8; N], &[u8; N])| -> u32 {
@@ -194,17 +196,16 @@ pub fn distance<const N: usize>(a: &[[u8; N]], b: &[[u8; N]]) -> u32 {
     a.iter().zip(b).map(of).sum()
 }
 
-/// Maximum distance of features of a model, metres, and of their descriptors, at which they are
-/// one.
+/// Maximum distance between features of a model that count as one, metres.
 const SAME_PLACE_M: f32 = 0.004;
+/// Maximum descriptor distance between features of a model that count as one.
 const SAME_OFF: u32 = 256;
 
-/// Radius that a shape is described in, metres.
+/// Radius of the neighbourhood that a shape descriptor covers, metres.
 const SHAPE_M: f32 = 0.04;
-/// Sectors of azimuth, elevation and radius, and bins of the angle between normals.
+/// Number of sectors of azimuth, elevation and radius, and of bins of the cosine between normals.
 const SECTORS: [usize; 4] = [8, 2, 2, 11];
-/// Flatness threshold: one minus the length of the mean normal; neighbourhoods below it have no
-/// distinctive shape.
+/// Minimum curvature: one minus the length of the mean normal; flatter neighbourhoods have no distinctive shape.
 const FLAT: f32 = 0.04;
 const FEWEST: usize = 20;
 
@@ -234,7 +235,8 @@ fn shape(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
     (length > 0.0).then(|| bins.iter().map(|b| (510.0 * b / length).min(255.0) as u8).collect())
 }
 
-/// Adds a unit to the bins around a position by interpolation; azimuth wraps, the others end.
+/// Adds a total of one to the bins around a position, by linear interpolation; azimuth wraps around, the other axes are
+/// clamped.
 fn spread(bins: &mut [f32], places: [f32; 4]) {
     for corner in 0..16_usize {
         let (mut index, mut weight) = (0, 1.0);
@@ -251,8 +253,8 @@ fn spread(bins: &mut [f32], places: [f32; 4]) {
     }
 }
 
-/// Local reference frame as rows: axes from the distance-weighted scatter of the neighbours, z
-/// towards the normal, x towards the majority.
+/// Local reference frame with its axes as rows, from the distance-weighted scatter of the neighbours: z towards the
+/// normal, x towards the majority of the neighbours. `None` if degenerate.
 fn local_frame(
     surfels: &Surfels,
     at: &Point3<f32>,
@@ -277,19 +279,19 @@ fn local_frame(
     frame.iter().all(|v| v.is_finite()).then_some(frame)
 }
 
-/// A colour pattern is sampled on a square of this many cells a side, and this side length, metres.
+/// Number of cells per side of the square on which a colour pattern is sampled.
 const CELLS: usize = 8;
+/// Side of a pattern cell, metres.
 const CELL_M: f32 = 0.006;
-/// Minimum lightness difference between centre and border of a pattern that defines its direction,
-/// in L* units.
+/// Minimum lightness difference between centre and border of a pattern, in L* units; less does not define a direction.
 const CONTRAST: f32 = 4.0;
-/// Minimum share of the cells that must have been seen.
+/// Minimum share of a pattern's cells that hold surfels.
 const COVERED: f32 = 0.75;
-/// Bytes a unit: of lightness after normalising, and of a* and b*.
+/// Descriptor bytes per unit: of normalised lightness, and of a* and b*.
 const SCALES: [f32; 2] = [40.0, 2.0];
 
-/// Contrast-normalised lightness and colour on a square of the tangent plane, oriented by the
-/// lightness gradient, as in Brown, Szeliski and Winder (2005).
+/// Pattern descriptor: contrast-normalised lightness and colour on a square of the tangent plane, oriented by the
+/// lightness gradient, as in Brown, Szeliski and Winder (2005). `None` without colour or contrast.
 fn pattern(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
     let lab = surfels.lab.as_ref()?;
     let (at, normal) = (surfels.points[centre], surfels.normals[centre]);
@@ -323,7 +325,7 @@ fn pattern(surfels: &Surfels, centre: usize) -> Option<Box<[u8]>> {
     described(&cells)
 }
 
-/// Gradient of lightness along both axes, per metre, by least squares.
+/// Gradient of lightness along both axes, L* units per metre, by least squares; `None` if not determined.
 fn slope<'a>(points: impl Iterator<Item = &'a (f32, f32, [f32; 3])>) -> Option<(f32, f32)> {
     let mut normal = Matrix3::<f32>::zeros();
     let mut right = Vector3::zeros();

@@ -5,29 +5,31 @@ use super::feature::{Descriptors, Feature};
 use crate::register::rigid;
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 
-/// Keypoint of the model and similar keypoint of the scene.
+/// Feature of the model and a similar feature of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Correspondence<'a> {
     pub model: &'a Feature,
     pub scene: &'a Feature,
-    /// Descriptor distance in units of the median of all matches of the same kind.
+    /// Descriptor distance, in units of the median distance of the scene's features of this kind.
     pub off: f32,
 }
 
-/// Maximum number of matches of one kind that are grouped, and of groups begun.
+/// Maximum number of matches of one kind that are grouped.
 const MATCHES: usize = 300;
+/// Maximum number of matches from which a group is started.
 const SEEDS: usize = 120;
-/// Matches of a group agree in distances to this, metres, and in cosines between normals to this.
+/// Maximum difference of distances in model and scene between two matches of a group, metres.
 const AGREE_M: f32 = 0.01;
+/// Maximum difference of the cosines between normals in model and scene for two matches of a group.
 const AGREE_COS: f32 = 0.25;
-/// Minimum distance between matches in a group, metres; nearer ones are redundant.
+/// Minimum distance between two matches of a group in the model, metres; nearer ones are redundant.
 const APART_M: f32 = 0.012;
 /// Minimum number of matches of a group.
 const FEWEST: usize = 3;
-/// Distance along the normal of the second point that each match contributes to the pose, metres.
+/// Offset along the normal at which each match contributes a second point to the pose, metres.
 const OUT_M: f64 = 0.02;
 
-/// Features of the scene with the most alike of the model's, best first.
+/// Features of the scene with the most similar features of the model, best first.
 pub fn matches<'a>(scene: &'a Descriptors, model: &'a Descriptors) -> Vec<Correspondence<'a>> {
     let (alike, median) = scene.most_alike(model, MATCHES);
     let median = median.max(1) as f32;
@@ -46,7 +48,7 @@ pub struct Vote {
     pub matches: usize,
 }
 
-/// Poses of consistent groups of matches, by decreasing number of matches.
+/// Poses of consistent groups of matches, most matches first.
 pub(super) fn votes(matches: &mut [Correspondence]) -> Vec<Vote> {
     matches.sort_by(|a, b| a.off.total_cmp(&b.off));
     let n = matches.len();
@@ -73,14 +75,14 @@ pub(super) fn votes(matches: &mut [Correspondence]) -> Vec<Vote> {
     votes
 }
 
-/// Minimum horizontal component of a normal that determines the heading of a standing object.
+/// Minimum horizontal component of a normal for the normal to determine the heading of a standing object.
 const LEVEL: f64 = 0.4;
-/// Tolerance within which standing poses of two matches are one, metres and radians.
+/// Difference below which the upright poses of two matches count as one, metres and radians.
 const ONE: (f64, f64) = (0.02, 0.26);
 
-/// Upright poses of an object, by decreasing number of supporting matches. With a known up
-/// direction, place and normal of one match determine the pose, so that small smooth objects get
-/// poses without consistent groups. `up`: up direction in model and scene.
+/// At most `most` upright poses of an object, most supporting matches first. With a known up direction, position and
+/// normal of one match determine the pose, so that small smooth objects get poses without consistent groups. `up`: up
+/// direction in model and scene.
 pub fn standing(matches: &[Correspondence], up: &[Vector3<f64>; 2], most: usize) -> Vec<Vote> {
     let poses: Vec<Isometry3<f64>> = matches.iter().filter_map(|m| stood(m, up)).collect();
     let is_one = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
@@ -102,7 +104,7 @@ pub fn standing(matches: &[Correspondence], up: &[Vector3<f64>; 2], most: usize)
     apart
 }
 
-/// Upright pose from one match; `None` if the normal is steep, or has another slope in the scene.
+/// Upright pose from one match; `None` if the normal is nearly vertical, or slopes differently in the scene.
 fn stood(m: &Correspondence, up: &[Vector3<f64>; 2]) -> Option<Isometry3<f64>> {
     let (of_model, of_scene) = (m.model.normal.cast::<f64>(), m.scene.normal.cast::<f64>());
     let rises = (of_model.dot(&up[0]), of_scene.dot(&up[1]));
@@ -128,7 +130,8 @@ fn agree(a: &Correspondence, b: &Correspondence) -> bool {
         && (a.model.normal.dot(&b.model.normal) - a.scene.normal.dot(&b.scene.normal)).abs() < AGREE_COS
 }
 
-/// Least-squares pose from points and points offset along the normals.
+/// Least-squares pose of the model in the scene, from the matched points and points offset along their normals; `None`
+/// if not determined.
 pub fn pose(group: &[Correspondence]) -> Option<Isometry3<f64>> {
     let out = |f: &Feature| -> [Point3<f64>; 2] {
         let at = f.at.cast::<f64>();

@@ -6,26 +6,26 @@ use super::surfels::{Surfels, across};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f32::consts::TAU;
 
-/// Tilt from the vertical above which an object lies, radians.
+/// Tilt from upright above which an object does not stand, radians.
 const TILTED_RAD: f64 = 0.35;
-/// Maximum height above the lowest point of foot points, metres.
+/// Maximum height of a model's foot points above its lowest point, metres.
 const FOOT_M: f32 = 0.015;
-/// Number of directions around the foot, and distance from it in metres, in which a support is
-/// sought.
+/// Number of directions around the foot in which a support is sought.
 const AROUND: u16 = 24;
+/// Distance from the foot at which a support is sought, metres.
 const BESIDE_M: f32 = 0.02;
-/// Maximum height difference between a level surface and the supported foot, metres; a model may
-/// lack the lowest centimetre.
+/// Maximum height difference between the foot and a level surface that supports it, metres; a model may lack the lowest
+/// centimetre.
 const STEP_M: f64 = 0.03;
-/// Minimum cosine between up and the normal of a level surface.
+/// Minimum cosine between the up direction and the normal of a level surface.
 const LEVEL: f64 = 0.8;
-/// Minimum number of places with evidence.
+/// Minimum number of places around the foot with evidence; with fewer, the object is assumed to stand.
 const LEAST: usize = 6;
-/// Ratio of places seen past to supporting places, from which the model floats.
+/// Maximum ratio of places where the camera looks past the foot to supporting places; above it, the model floats.
 const FLOATS: usize = 2;
 
-/// False if a model is tilted, or hardly supported: the camera saw past the support height all
-/// around its foot. `up`: up direction in the model and in the camera frame.
+/// True if a model at a pose is upright and not seen to float: the camera does not look past its foot nearly all
+/// around. `up`: up direction in the model and in the camera frame.
 pub fn stands(
     model: &Surfels,
     camera_from_model: &Isometry3<f64>,
@@ -53,7 +53,7 @@ pub fn stands(
     carried + past < LEAST || past <= FLOATS * carried
 }
 
-/// Points around the foot of a model, at its height.
+/// Points beside the foot of a model, all around and at the height of its lowest point, model frame.
 fn beside_foot(model: &Surfels, up: &Vector3<f32>) -> Vec<Point3<f32>> {
     let height = |p: &Point3<f32>| up.dot(&p.coords);
     let low = model.points.iter().map(height).fold(f32::INFINITY, f32::min);

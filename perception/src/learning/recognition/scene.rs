@@ -1,4 +1,4 @@
-//! A look made ready to be recognised in.
+//! View of a scene, prepared for recognition.
 
 use super::error::KnowError;
 use super::surfels::{STEP_M, Surfels};
@@ -12,28 +12,30 @@ use crate::view::View;
 use crate::visibility::DepthMap;
 use nalgebra::{Isometry3, Point3};
 
-/// A camera's view of a scene, in the camera frame.
+/// View of a scene in the camera frame, as surfels.
 pub struct SceneView {
     pub surfels: Surfels,
     /// True for points of planes that are wider than any model.
     pub wide: Vec<bool>,
-    /// The surfels, to be registered to.
+    /// The surfels, prepared as the target of registration.
     pub target: Prepared,
     map: DepthMap,
 }
 
 const NORMALS: OrganisedOptions =
     OrganisedOptions { reach: 3, depth_step_share: 0.015, base_m: 0.006, least: 12 };
-/// Number of neighbours for normals of unorganised clouds and for registration.
+/// Number of neighbours from which normals are estimated, for unorganised clouds and for registration.
 const NEIGHBOURS: usize = 20;
-/// Maximum number of wide planes, and maximum distance of a point from its plane, metres.
+/// Maximum number of wide planes.
 const PLANES: usize = 6;
+/// Maximum distance of a point from its wide plane, metres.
 const PLANE_M: f32 = 0.012;
 /// Minimum cosine between the normals of a point and of its wide plane.
 const LEVEL: f32 = 0.85;
 
 impl SceneView {
-    /// Prepares the returns within `range_m`; planes larger than `widest_m2` belong to no object.
+    /// Prepares the points within `range_m` of the camera; planes of more than `widest_m2` square metres belong to no
+    /// object.
     pub fn new(view: &View, range_m: f64, widest_m2: f64) -> Result<SceneView, KnowError> {
         let map = DepthMap::from_view(view, &Isometry3::identity()).ok_or(KnowError::NoCamera)?;
         let near = |p: &Point3<f32>| is_finite(p) && f64::from(p.z) <= range_m;
@@ -50,8 +52,8 @@ impl SceneView {
         Ok(SceneView { surfels, wide, target, map })
     }
 
-    /// Depth at the pixel of a point, and the minimum around it, metres; `None` outside the image
-    /// or without any return.
+    /// Depth at the pixel of a camera-frame point, and minimum depth around that pixel, metres; `None` outside the
+    /// image or where nothing was measured.
     pub fn around(&self, p: &Point3<f64>) -> Option<(f32, f32)> {
         let (u, v) = self.map.intrinsics.project(p)?;
         let pixel = self.map.intrinsics.pixel(u, v)?;

@@ -8,42 +8,41 @@ use super::{KnowOptions, Library, Recognised, WITHIN_M, refined};
 use crate::view::View;
 use nalgebra::Isometry3;
 
-/// Minimum confidence of a guess.
+/// Minimum confidence of a candidate by its own view.
 const LEAST: f64 = 0.02;
-/// Minimum number of points of a model that a look could have shown for the look to say anything of
-/// the model.
+/// Minimum number of unoccluded model points in a view for the view to count as evidence.
 const FEWEST: usize = 40;
 
 /// Prepared view, with its recognition candidates.
 pub struct Glance {
     scene: SceneView,
-    /// Candidate models, most confident first, possibly overlapping.
+    /// Candidates, most confident first, possibly overlapping.
     pub guesses: Vec<Guess>,
 }
 
-/// A model that may be somewhere.
+/// Candidate for a model in a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Guess {
     /// Index of the model in the library.
     pub model: usize,
-    /// Pose in the look.
+    /// Pose in the camera frame of the view, metres.
     pub camera_from_model: Isometry3<f64>,
-    /// Probability, by this look alone.
+    /// Probability, from this view alone.
     pub confidence: f64,
-    /// Number of features that voted for the candidate.
+    /// Number of feature matches that voted for the candidate.
     pub votes: usize,
 }
 
-/// Model at a pose, judged by several views.
+/// Model at a pose, judged from several views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
     /// Pose in the world, from the view that shows most of the model.
     pub world_from_model: Isometry3<f64>,
-    /// Evidence of all looks.
+    /// Combined evidence of all views.
     pub evidence: PoseEvidence,
     /// Probability of this object at this pose.
     pub confidence: f64,
-    /// Number of views in which the model could be visible.
+    /// Number of views in which enough of the model could be visible.
     pub looks: usize,
 }
 
@@ -69,7 +68,7 @@ impl Library {
         Ok(Glance { scene, guesses })
     }
 
-    /// Judges a candidate (world pose) by several views with their camera poses; `None` if it could
+    /// Judges a candidate at a world pose from several views, each with its camera pose; `None` if enough of it could
     /// be visible in none.
     ///
     /// # Errors
@@ -111,8 +110,8 @@ impl Library {
 }
 
 impl PoseEvidence {
-    /// Combines the evidence of several views: free space in one counts against matches in others.
-    /// Errors of views are correlated, so n views count as √n.
+    /// Combines the evidence of several views: free space in one view counts against matches in others. Errors of views
+    /// are correlated, so n views count as √n.
     fn of_several(all: &[PoseEvidence]) -> PoseEvidence {
         let root = (all.len().max(1) as f64).sqrt();
         let sum = |of: fn(&PoseEvidence) -> usize| {

@@ -1,4 +1,4 @@
-//! Surface at a fixed resolution, the form in which models and scenes are compared.
+//! Surfels: a surface sampled at a fixed resolution, the form in which models and scenes are compared.
 
 use crate::cloud::{Cloud, CloudError, is_finite};
 use crate::neighbours::Neighbours;
@@ -7,31 +7,32 @@ use crate::voxel;
 use nalgebra::{Point3, Vector3};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-/// Spacing of the points, metres.
+/// Spacing of the surfels, metres.
 pub(super) const STEP_M: f32 = 0.004;
-/// Cell size for occlusion tests, and minimum distance behind the front, metres.
+/// Cell size for occlusion tests, metres.
 const CELL_M: f32 = 0.008;
+/// Minimum distance behind the foremost point of a cell at which a point is occluded, metres.
 const BEHIND_M: f32 = 0.012;
-/// Minimum cosine between a normal and its viewing direction.
+/// Minimum cosine between a normal and the direction to the viewer at which a point is visible.
 const FACING: f32 = 0.2;
 
-/// A direction across another, unit lengths.
+/// Unit vector perpendicular to another unit vector.
 pub fn across(along: &Vector3<f32>) -> Vector3<f32> {
     let aside = if along.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
     along.cross(&aside).normalize()
 }
 
-/// Points about `STEP_M` apart, with normals towards the viewers.
+/// Surfels: points about `STEP_M` apart, with normals on the visible side.
 pub struct Surfels {
     pub points: Vec<Point3<f32>>,
     pub normals: Vec<Vector3<f32>>,
-    /// CIE L*, a*, b*; `None` without colours.
+    /// Colours as CIE L*, a*, b*; `None` without colours.
     pub lab: Option<Vec<[f32; 3]>>,
     pub tree: Neighbours,
 }
 
 impl Surfels {
-    /// The surfels of a cloud with normals.
+    /// Samples a cloud with normals; points without a finite normal are left out.
     pub fn of(cloud: &Cloud) -> Result<Surfels, super::error::KnowError> {
         Ok(Surfels::gathered(&voxel::downsample(cloud, STEP_M)?)?)
     }
@@ -49,7 +50,7 @@ impl Surfels {
         Ok(Surfels { points: kept.points, normals: kept.normals.unwrap_or_default(), lab, tree })
     }
 
-    /// Indices of the points that can be seen from far away in a direction (unit length, from the object).
+    /// Indices of the points visible to a distant viewer in direction `away` (unit length, from the object).
     pub fn seen_from(&self, away: &Vector3<f32>) -> Vec<u32> {
         let front = Front::of(self, away);
         let seen = |&i: &u32| {
@@ -59,8 +60,8 @@ impl Surfels {
         (0..self.points.len() as u32).filter(seen).collect()
     }
 
-    /// Foremost back-facing points in a direction, in cells without a visible point: a solid body
-    /// has an unknown side there that hides them.
+    /// Indices of the foremost points that face away from a viewer in direction `away`, in cells without a point of
+    /// `seen`: a solid body has an unknown side there that hides them.
     pub fn backs_from(&self, away: &Vector3<f32>, seen: &[u32]) -> Vec<u32> {
         let front = Front::of(self, away);
         let shown: FxHashSet<_> = seen.iter().map(|&i| front.cell(&self.points[i as usize])).collect();
@@ -71,7 +72,7 @@ impl Surfels {
         (0..self.points.len() as u32).filter(back).collect()
     }
 
-    /// The surfels of some of the points.
+    /// Surfels of the given points.
     pub fn part(&self, indices: &[u32]) -> Result<Surfels, CloudError> {
         let points: Vec<Point3<f32>> = indices.iter().map(|&i| self.points[i as usize]).collect();
         Ok(Surfels {
@@ -105,7 +106,7 @@ impl Surfels {
     }
 }
 
-/// The foremost points in a direction, in cells across the direction.
+/// Height of the foremost point in a direction, for each cell across the direction.
 struct Front {
     away: Vector3<f32>,
     axes: [Vector3<f32>; 2],
@@ -130,17 +131,17 @@ impl Front {
         (at(&self.axes[0]), at(&self.axes[1]))
     }
 
-    /// True if no part of the surfels occludes the point.
+    /// True if no surfel occludes the point.
     fn has(&self, p: &Point3<f32>) -> bool {
         self.away.dot(&p.coords) > self.heights[&self.cell(p)] - BEHIND_M
     }
 }
 
-/// Neighbours that a normal is made of.
+/// Number of neighbours from which a normal is estimated.
 const NEIGHBOURS: usize = 20;
 
-/// Cloud of a body seen from all around, with outward normals, away from the centre of its bounds;
-/// valid for convex-like bodies.
+/// Cloud with outward normals, pointing away from the centre of its bounds. For a body seen from all around that is
+/// nearly convex.
 ///
 /// # Errors
 /// If there are more points than 32-bit indices can name.
@@ -152,7 +153,7 @@ pub fn outward(cloud: &Cloud) -> Result<Cloud, CloudError> {
     Ok(Cloud { normals: Some(towards.into_iter().map(|n| -n).collect()), ..cloud })
 }
 
-/// CIE L*a*b* of an sRGB colour (white D65).
+/// CIE L*a*b* colour of an sRGB colour (white point D65).
 pub fn lab(rgb: [u8; 3]) -> [f32; 3] {
     let linear = rgb.map(|c| {
         let c = f32::from(c) / 255.0;

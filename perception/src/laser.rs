@@ -1,10 +1,15 @@
 //! Shape models from a planar laser: scans of one object, aligned by their bounding angles (Modayil
 //! and Kuipers, *Autonomous Shape Model Learning for Object Localization and Recognition*).
 //!
-//! The pipeline, a file a step: a [`Scan`]; what of it is no background ([`observe`]); what it says of the thing ([`ObjectScan`]); how far poses violate
-//! the angular constraints between scans ([`Violation`]: Eq. 1 to 3); poses that do so least ([`align`], or [`align_consistent`] where some scans may be
-//! wrong), which make a [`ShapeModel`]; models brought onto each other and single scans onto models ([`fit`], [`localise`]: Eq. 4); what the thing is
-//! ([`nearest`] by features, [`recognise`], and [`recognise_scan`] from one scan); where to scan from next ([`next_scan`]).
+//! The steps, in order:
+//! - [`Scan`], [`observe`]: a scan, and its foreground.
+//! - [`ObjectScan`]: one object in a scan.
+//! - [`Violation`]: how far poses violate the angular constraints between scans (Eq. 1 to 3).
+//! - [`align`], [`align_consistent`] (if some scans may be wrong): the poses with the least violation, which make a
+//!   [`ShapeModel`].
+//! - [`fit`], [`localise`]: models aligned with each other, and single scans with models (Eq. 4).
+//! - [`nearest`] (by features), [`recognise`], [`recognise_scan`] (from one scan): the object's identity.
+//! - [`next_scan`]: where to scan from next.
 
 mod align;
 mod background;

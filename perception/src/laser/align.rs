@@ -1,5 +1,4 @@
-//! Scan alignment: poses of all scans with minimum violation of their angular constraints (section
-//! III).
+//! Scan alignment: poses of all scans with the least violation of their angular constraints (section III).
 
 use super::shape::{PosedScan, ShapeError, ShapeModel};
 use super::solve::{Objective, Problem, SolverOptions, solve};
@@ -15,47 +14,44 @@ pub struct Alignment {
     pub model: ShapeModel,
     /// Violation at the given poses.
     pub before: Violation,
-    /// Violation after.
+    /// Violation at the aligned poses.
     pub after: Violation,
-    /// Minimised objective after alignment, square metres: boundary violation, plus the tie-breaker
-    /// among poses without violation.
+    /// Objective after alignment, square metres: boundary violation, plus the tie-breaker among poses without
+    /// violation.
     pub objective_m2: f64,
     /// True if the solver converged; false at the iteration limit.
     pub converged: bool,
-    /// Iterations of the solver.
+    /// Number of iterations of the solver.
     pub iterations: usize,
-    /// Times that the violation was computed.
+    /// Number of evaluations of the violation.
     pub evaluations: usize,
     /// Motion of each scan of the model: metres, and radians anticlockwise.
     pub moved: Vec<(f64, f64)>,
-    /// Indices of contradicting scans outside the model; only [`align_consistent`] leaves scans
-    /// out.
+    /// Indices of contradicting scans left out of the model; only by [`align_consistent`].
     pub left_out: Vec<usize>,
-    /// Ends that contradict other scans, with the index of the scan; in the model, the scan is open
-    /// on that side. Set by [`align_consistent`] only.
+    /// False ends, which contradict other scans, with the index of the scan; in the model, the scan's bound on that
+    /// side lies far from the object. Set by [`align_consistent`] only.
     pub opened: Vec<(usize, ScanEnd)>,
 }
 
 impl Alignment {
-    /// Longest error after alignment, metres; above twice the laser's precision, the scans
-    /// contradict each other.
+    /// Largest error after alignment, metres; above twice the laser's precision, the scans contradict each other.
     pub fn longest_m(&self) -> f64 {
         self.after.exterior_m.max(self.after.interior_m)
     }
 
-    /// True if a scan ended too far from its stated pose; false if the accuracy of stated poses is
-    /// unknown.
+    /// True if a scan ended too far from its stated pose; false also if the accuracy of stated poses is unknown.
     fn strays(&self, options: &SolverOptions) -> bool {
         let Objective::Centred { pose_sigma_m, pose_sigma_rad } = options.objective else { return false };
         self.moved.iter().any(|(m, rad)| *m > FAR * pose_sigma_m || rad.abs() > FAR * pose_sigma_rad)
     }
 }
 
-/// Minimises the boundary violation over the poses of all scans, from the given poses; a single
-/// scan keeps its pose.
+/// Minimises the boundary violation over the poses of all scans, starting from the given poses; a single scan keeps its
+/// pose.
 ///
 /// # Errors
-/// If there is no scan, or one is unsound.
+/// If there is no scan, or one is invalid.
 pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, ShapeError> {
     let _span = tracing::debug_span!("align", scans = scans.len()).entered();
     let model = ShapeModel::new(scans.to_vec())?;
@@ -89,22 +85,22 @@ pub fn align(scans: &[PosedScan], options: &SolverOptions) -> Result<Alignment, 
     })
 }
 
-/// Minimum number of scans that can identify a wrong one: two contradict each other, a third
-/// decides.
+/// Minimum number of scans for finding a wrong one: two contradict each other, a third decides.
 const FEWEST: usize = 3;
 /// Maximum displacement of a scan from its stated pose, in standard deviations; beyond it, the
 /// stated pose was wrong.
 const FAR: f64 = 4.0;
-/// Angle by which an end is opened, radians: the bound then lies far beside the object and
-/// constrains nothing.
+/// Angle from the object to which the bound of a false end is moved, radians; it then constrains nothing.
 const OPEN_RAD: f64 = 0.5;
 
 /// Aligns scans of which some may have false ends: if an end of the object was taken for
 /// background, the bound lies on the object and contradicts other scans.
 ///
-/// While an error is longer than `longest_m`, scans are aligned with such errors as outliers ([`SolverOptions::outlier_m`]); ends that two or more of the
-/// others contradict are opened, and scans that contradict two or more ends are left out. If fewer than three scans, or no more than half of all scans or
-/// of their ends, agree, or these only far from their stated poses, nothing is left out, and [`Alignment::longest_m`] says that they do not go together.
+/// While an error exceeds `longest_m`, scans are aligned with such errors as outliers ([`SolverOptions::outlier_m`]).
+/// Ends that at least two other scans contradict are opened (see [`Alignment::opened`]), and scans that contradict at
+/// least two ends are left out. All scans are kept, unchanged, if fewer than three scans or no more than half of the
+/// scans or ends agree, or if they agree only far from their stated poses; [`Alignment::longest_m`] then shows the
+/// contradiction.
 ///
 /// # Errors
 /// As [`align`].
@@ -144,7 +140,7 @@ pub fn align_consistent(
     Ok(best)
 }
 
-/// Moves the bound of a scan far away from the object on one side.
+/// Moves the bound of a scan on one side away from the object, so that it constrains nothing.
 fn open(posed: &mut PosedScan, side: ScanEnd) {
     let scan = &mut posed.scan;
     let most = |other: f64| (other.abs() - 1e-3).min(OPEN_RAD);
@@ -160,7 +156,7 @@ fn open(posed: &mut PosedScan, side: ScanEnd) {
     }
 }
 
-/// Contradicting scans, by index.
+/// False ends and wrong scans, by index of the scan.
 #[derive(Default)]
 struct Contradictions {
     ends: BTreeSet<(usize, ScanEnd)>,
@@ -173,8 +169,8 @@ impl Contradictions {
     }
 }
 
-/// Majority vote on contradictions: an end contradicted by two other scans is false; a scan that
-/// alone contradicts two ends has false points or lacks some.
+/// Finds contradictions by majority: an end contradicted by two other scans is false; a scan that alone contradicts two
+/// ends has false points or lacks some. Without a majority, all contradicted ends are false.
 fn contradictions(
     scans: &[PosedScan],
     longest_m: f64,

@@ -11,15 +11,14 @@ use std::f64::consts::{PI, TAU};
 /// Options for background subtraction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObserveOptions {
-    /// Maximum gap between readings of one object, metres; wider than the gap between a chair's
-    /// legs.
+    /// Maximum gap between neighbouring readings of one object, metres; wider than the gap between a chair's legs.
     pub step_m: f32,
     /// Minimum number of readings of an object.
     pub least: usize,
     /// Maximum distance of the readings' centre from the expected position, metres.
     pub within_m: f64,
-    /// Minimum depth difference to the object's last reading, metres: a reading that much farther
-    /// bounds the object; a reading that much nearer occludes it.
+    /// Depth difference to the object's outermost reading, metres: a reading farther by more bounds the object; a
+    /// reading nearer by more occludes it.
     pub clear_m: f64,
 }
 
@@ -29,7 +28,7 @@ impl Default for ObserveOptions {
     }
 }
 
-/// Reason why a scan is not usable.
+/// Reason why a scan does not bound the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ignored {
     /// No cluster of readings is near the expected position.
@@ -59,7 +58,7 @@ impl std::fmt::Display for Ignored {
     }
 }
 
-/// Observation of an object by several scans.
+/// Scans of one object, as far as they bound it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Observation {
     /// Scans that bound the object on both sides, posed in the map.
@@ -68,10 +67,10 @@ pub struct Observation {
     pub ignored: Vec<(usize, Ignored)>,
 }
 
-/// Observations that cannot be made.
+/// Reason why objects cannot be extracted from scans.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObserveError {
-    /// A scan is unsound.
+    /// A scan is invalid.
     #[error("scan {index}: {why}")]
     Scan {
         /// Index of the scan.
@@ -79,18 +78,17 @@ pub enum ObserveError {
         /// Fault of the scan.
         why: ScanError,
     },
-    /// Readings cannot be clustered.
+    /// The readings cannot be clustered.
     #[error(transparent)]
     Cluster(#[from] ClusterError),
 }
 
-/// Extracts the object near a map position from each scan: foreground readings, the cluster nearest
-/// to `near`, and its bounding angles.
-///
-/// `is_background` is asked with places of the map; see [`crate::occupancy::Occupancy::is_background`].
+/// Extracts the object near a map position from each scan: the cluster of foreground readings nearest to `near`, and
+/// its bounding angles. `is_background`: true for background positions of the map, as by
+/// [`crate::occupancy::Occupancy::is_background`].
 ///
 /// # Errors
-/// If a scan is unsound, or `step_m` is no length.
+/// If a scan is invalid, or `step_m` is not a positive length.
 pub fn observe(
     scans: &[Scan],
     near: &Point2<f64>,
@@ -117,14 +115,14 @@ pub fn observe(
 pub struct Cluster {
     /// Indices of the readings, ascending.
     pub readings: Vec<usize>,
-    /// Mean end point of the readings, in the map.
+    /// Mean end point of the readings, map frame, metres.
     pub middle: Point2<f64>,
 }
 
-/// All foreground clusters of a scan, in the order of their first readings.
+/// Foreground clusters of a scan, in the order of their first readings.
 ///
 /// # Errors
-/// If the scan is unsound, or `step_m` is no length.
+/// If the scan is invalid, or `step_m` is not a positive length.
 pub fn things(
     scan: &Scan,
     is_background: impl Fn(&Point2<f64>) -> bool,
@@ -162,7 +160,7 @@ fn clusters(
     Ok(found)
 }
 
-/// Foreground cluster nearest to a position.
+/// Indices of the readings in the foreground cluster nearest to a position; `None` if no cluster is within `within_m`.
 fn readings_near(
     scan: &Scan,
     near: &Point2<f64>,
@@ -175,7 +173,7 @@ fn readings_near(
     Ok(nearest.map(|(_, cluster)| cluster.readings))
 }
 
-/// Object of these readings with its bounding angles.
+/// Object with the given readings (by index) and its bounding angles.
 fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<ObjectScan, Ignored> {
     let points: Vec<Point2<f64>> = readings.iter().filter_map(|&i| scan.endpoint(i)).collect();
     let middle: Vector2<f64> = points.iter().map(|p| p.coords).sum();
@@ -214,8 +212,8 @@ fn bounded(scan: &Scan, readings: &[usize], options: &ObserveOptions) -> Result<
     })
 }
 
-/// Compares a neighbouring reading with the object's own: beyond (greater), in front (less), or
-/// level; `None` without a reading.
+/// Compares a neighbouring range with the object's own: `Greater` if beyond, `Less` if in front, `Equal` within
+/// `clear_m`; `None` without a reading.
 fn past(own_m: f64, reading_m: f64, clear_m: f64) -> Option<Ordering> {
     if reading_m.is_nan() || reading_m <= 0.0 {
         return None;

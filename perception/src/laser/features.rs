@@ -1,4 +1,4 @@
-//! Recognition without alignment: area and perimeter of the hull (section IV), with the spread that each class shows.
+//! Recognition without alignment: area and perimeter of the hull (section IV), with the spread of each class.
 
 use super::shape::ShapeModel;
 use nalgebra::{Matrix2, Point2, Vector2};
@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 /// Pose-invariant features of a shape's convex hull, and its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HullFeatures {
-    /// Square metres.
+    /// Area of the hull, square metres.
     pub area_m2: f64,
-    /// Metres.
+    /// Perimeter of the hull, metres.
     pub perimeter_m: f64,
-    /// Centre of mass, in the model's frame.
+    /// Centre of mass of the hull in the model's frame, metres.
     pub centre: Point2<f64>,
 }
 
@@ -22,14 +22,14 @@ impl HullFeatures {
     }
 }
 
-/// Standard deviations of area (square metres) and perimeter (metres) between models of one object
-/// from seven scans: the middle of the paper's Fig. 7.
+/// Standard deviations of area (square metres) and perimeter (metres) between models of one object from seven scans:
+/// the middle of the paper's Fig. 7.
 pub(super) const USUAL_SPREAD: (f64, f64) = (0.0044, 0.017);
 
 /// Feature distribution of a class of shapes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FeatureClass {
-    /// Name.
+    /// Name of the class.
     pub name: String,
     /// Number of training instances.
     pub instances: usize,
@@ -48,18 +48,18 @@ impl FeatureClass {
     }
 }
 
-/// Class that features are nearest to.
+/// Nearest class to some features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nearest<'a> {
-    /// The class.
+    /// Nearest class.
     pub class: &'a FeatureClass,
-    /// Mahalanobis distance from the class mean.
+    /// Mahalanobis distance from the mean of the nearest class.
     pub distance: f64,
-    /// Distance to the second-nearest class in the same units; infinite if there is none.
+    /// Mahalanobis distance from the mean of the second-nearest class; infinite if there is none.
     pub second: f64,
 }
 
-/// Learns classes from named models; sorted by name.
+/// Learns a class for each name from the models of that name; sorted by name.
 pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -> Vec<FeatureClass> {
     let mut instances: BTreeMap<&str, Vec<Vector2<f64>>> = BTreeMap::new();
     for (name, model) in named {
@@ -86,8 +86,7 @@ pub fn classes<'a>(named: impl IntoIterator<Item = (&'a str, &'a ShapeModel)>) -
         .collect()
 }
 
-/// Class with the smallest Mahalanobis distance; `None` without classes. The caller decides on
-/// acceptance.
+/// Class with the smallest Mahalanobis distance, however far; `None` without classes.
 pub fn nearest<'a>(classes: &'a [FeatureClass], features: &HullFeatures) -> Option<Nearest<'a>> {
     let mut ranked: Vec<(f64, &FeatureClass)> = classes.iter().map(|c| (c.distance(features), c)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -95,8 +94,8 @@ pub fn nearest<'a>(classes: &'a [FeatureClass], features: &HullFeatures) -> Opti
     ranked.first().map(|&(distance, class)| Nearest { class, distance, second })
 }
 
-/// Unnamed categories: models with mean features closer than `apart` usual deviations are joined,
-/// nearest first (average linkage). Indices ascend, categories by first index.
+/// Indices of models grouped into unnamed categories: groups with a mean distance below `apart` usual deviations are
+/// joined, nearest first (average linkage). Indices ascend, categories by first index.
 pub fn groups(models: &[HullFeatures], apart: f64) -> Vec<Vec<usize>> {
     let scaled: Vec<Vector2<f64>> = models
         .iter()

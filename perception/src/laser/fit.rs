@@ -1,5 +1,4 @@
-//! Model alignment and localisation: motion of one model that minimises the mutual violation of two
-//! (Eq. 4).
+//! Model alignment and localisation: pose of one model relative to another with the least mutual violation (Eq. 4).
 
 use super::scan::{direction, origin};
 use super::shape::{ObjectScan, PosedScan, ShapeModel};
@@ -11,14 +10,13 @@ use std::f64::consts::TAU;
 /// Options for aligning two models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
-    /// The solver.
+    /// Options of the solver.
     pub solver: SolverOptions,
-    /// Angles to start from, evenly around.
+    /// Number of headings to start from, evenly spaced.
     pub starts: usize,
-    /// Number of starts, local minima of the violation, that are optimised to the end.
+    /// Maximum number of starts, local minima of the violation, that are optimised.
     pub followed: usize,
-    /// Violation of the best coarse start above which the fit is given up, metres as
-    /// [`Violation::per_pair_m`].
+    /// Violation of the best coarse solution above which it is not refined, metres as [`Violation::per_pair_m`].
     pub hopeless_m: f64,
 }
 
@@ -28,40 +26,40 @@ impl Default for FitOptions {
     }
 }
 
-/// Start of a search for a pose.
+/// Initial pose of the laser in localisation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
-    /// Near a known pose.
+    /// Known approximate pose.
     Near(Isometry2<f64>),
-    /// Multi-start over headings of the laser, with the scan on the side of the model that faces
-    /// the laser.
+    /// Unknown pose: all headings of the laser are tried, at the distance of the scan's nearest reading from the
+    /// model's hull.
     AllAngles,
 }
 
-/// Pose of a model, or of a scan, on a model.
+/// Pose of another model, or of a laser, relative to a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelFit {
-    /// Pose of the other model's frame, or of the laser.
+    /// Pose of the other model's frame, or of the laser, in the model's frame.
     pub model_from_other: Isometry2<f64>,
-    /// f_C: BV of all scans of both together, square metres (Eq. 4).
+    /// Boundary violation of all scans of both together, square metres (f_C of Eq. 4).
     pub f_c_m2: f64,
-    /// Part of `f_c_m2` between scans of the one model and of the other.
+    /// Violation between scans of the one model and of the other, part of `f_c_m2`.
     pub between: Violation,
     /// True if the solver converged; false at the iteration limit.
     pub converged: bool,
-    /// Iterations of the solver, over all starts that were followed.
+    /// Number of iterations of the solver, over all optimised starts.
     pub iterations: usize,
-    /// Times that the violation was computed, starts included.
+    /// Number of evaluations of the violation, starts included.
     pub evaluations: usize,
-    /// Rival minima, best first: pose and mutual violation, square metres; symmetric shapes have
-    /// several.
+    /// Other local minima, best first: pose as `model_from_other`, and mutual violation, square metres. Symmetric
+    /// shapes have several.
     pub rivals: Vec<(Isometry2<f64>, f64)>,
 }
 
-/// Difference below which two minima are one, metres and radians.
+/// Difference below which two minima count as one, metres and radians.
 const SAME: (f64, f64) = (0.01, 0.05);
 
-/// Aligns a model with another, by multi-start over headings with the hull centres together.
+/// Aligns a model with another, starting from several headings with coinciding hull centres.
 pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> ModelFit {
     let _span = tracing::debug_span!("fit").entered();
     let (to, from) = (model.features().centre, other.features().centre);
@@ -74,7 +72,8 @@ pub fn fit(model: &ShapeModel, other: &ShapeModel, options: &FitOptions) -> Mode
 /// Localises a scan relative to the model of the object it shows: pose of the laser in the model's
 /// frame.
 ///
-/// Without a start every angle is tried, the scan's nearest reading put on the side of the hull that faces it.
+/// With [`Start::AllAngles`], several headings are tried, each with the scan's nearest reading on the side of the hull
+/// that faces the laser.
 pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &FitOptions) -> ModelFit {
     let _span = tracing::debug_span!("localise").entered();
     let starts = match start {
@@ -85,8 +84,8 @@ pub fn localise(model: &ShapeModel, scan: &ObjectScan, start: Start, options: &F
     follow(model, std::slice::from_ref(&posed), &starts, options)
 }
 
-/// Registers scans of one object, possibly from one side, to a complete model: multi-start over
-/// headings, with the scan's nearest reading on the facing side of the hull.
+/// Registers scans of one object, possibly from one side only, to a complete model, starting from several headings,
+/// each with the nearest reading of the fullest scan on the facing side of the hull.
 pub fn fit_scans(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> ModelFit {
     let _span = tracing::debug_span!("fit_scans", scans = scans.scans().len()).entered();
     let most = scans.scans().iter().max_by_key(|s| s.scan.points.len());
@@ -101,8 +100,7 @@ fn turns(count: usize) -> impl Iterator<Item = f64> {
     (0..count.max(1)).map(move |i| TAU * i as f64 / count.max(1) as f64)
 }
 
-/// Poses of a laser all around a model, with the scan's nearest reading on the facing side of the
-/// hull.
+/// Poses of a laser all around a model, facing it, with the scan's nearest reading on the facing side of the hull.
 fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<f64>> {
     let hull = model.hull();
     let centre = hull.centre();
@@ -119,10 +117,10 @@ fn facing(model: &ShapeModel, scan: &ObjectScan, count: usize) -> Vec<Isometry2<
         .collect()
 }
 
-/// Number of roughly settled minima that are settled in full.
+/// Number of coarse solutions that are refined.
 const SETTLED: usize = 2;
 
-/// Optimises the most promising starts.
+/// Optimises the most promising starts coarsely and refines the best results.
 fn follow(
     model: &ShapeModel,
     other: &[PosedScan],
@@ -171,7 +169,7 @@ fn within(scans: &[PosedScan]) -> f64 {
     assembly.violation(&vec![Isometry2::identity(); scans.len()]).boundary_m2
 }
 
-/// Local minima of a ring of starts, by increasing violation; the first start if there are none.
+/// Indices of at most `most` local minima in a ring of violations, lowest first; the first index if there are none.
 fn promising(violations: &[f64], most: usize) -> impl Iterator<Item = usize> {
     let n = violations.len();
     let (before, after) = (|i: usize| violations[(i + n - 1) % n], |i: usize| violations[(i + 1) % n]);

@@ -7,25 +7,25 @@ use super::shape::{ObjectScan, ShapeModel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Multiple of the rejection threshold at which a coarse fit is given up.
+/// Violation at which a coarse fit is given up, in multiples of `other_m`.
 const HOPELESS: f64 = 3.0;
 /// Number of directions for measuring a shape's width.
 const WIDTHS: usize = 18;
 
-/// A shape with a name.
+/// Shape model with a name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Named")]
 pub struct KnownShape {
-    /// Name; several may share one.
+    /// Name; several shapes may share one.
     pub name: String,
-    /// Model.
+    /// Model of the shape.
     pub model: ShapeModel,
-    /// Cached features of the model's hull.
+    /// Features of the model's hull, computed once.
     #[serde(skip)]
     features: HullFeatures,
 }
 
-/// Known shape in file form.
+/// Serialised form of [`KnownShape`].
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Named {
@@ -40,12 +40,12 @@ impl From<Named> for KnownShape {
 }
 
 impl KnownShape {
-    /// A model under a name.
+    /// Creates a known shape from a model and a name.
     pub fn new(name: impl Into<String>, model: ShapeModel) -> KnownShape {
         KnownShape { name: name.into(), features: model.features(), model }
     }
 
-    /// Features of the hull.
+    /// Features of the model's hull.
     pub fn features(&self) -> &HullFeatures {
         &self.features
     }
@@ -54,21 +54,21 @@ impl KnownShape {
 /// Options of recognition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecogniseOptions {
-    /// Maximum distance of features or width, in standard deviations, up to which a shape is
-    /// aligned: measured at most 5.8 for the same object, scanned from three to nine sides; see
+    /// Maximum distance of features or width, in standard deviations, at which a shape is aligned with the scans:
+    /// measured at most 5.8 for the same object, scanned from three to nine sides; see
     /// `experiments/measure/src/shapes`.
     pub gate: f64,
-    /// Accuracy of the outline from which hull features are used, metres.
+    /// Maximum looseness of the outline, metres, at which hull features are compared; see [`recognise_scans`].
     pub tight_m: f64,
-    /// Outline accuracy from which on the scans fix each other's poses, metres; otherwise each scan
-    /// is matched with a shape separately.
+    /// Maximum looseness of the outline, metres, at which the scans determine each other's poses and are fitted
+    /// together; above it, each scan is fitted to a shape separately.
     pub rigid_m: f64,
     /// Maximum root boundary violation per pair of scans at which a shape fits, metres: reached by
     /// 97 % of scans of the same object.
     pub same_m: f64,
-    /// Minimum root boundary violation that rules a shape out, metres, the precision of the paper's
-    /// laser: measured at most 5.5 mm for the same object, at least 8.9 mm for another of the
-    /// paper's. In between, the shape remains possible.
+    /// Minimum root boundary violation per pair of scans that rules a shape out, metres, the precision of the paper's
+    /// laser: measured at most 5.5 mm for the same object, at least 8.9 mm for another of the paper's. Between `same_m`
+    /// and this, the shape remains possible.
     pub other_m: f64,
     /// Options for aligning models.
     pub fit: FitOptions,
@@ -88,41 +88,40 @@ impl Default for RecogniseOptions {
 }
 
 impl RecogniseOptions {
-    /// Options for aligning models, stopped as soon as a misfit is certain.
+    /// Options for aligning models, given up as soon as a misfit is certain.
     fn fits(&self) -> FitOptions {
         FitOptions { hopeless_m: self.fit.hopeless_m.min(HOPELESS * self.other_m), ..self.fit }
     }
 }
 
-/// Known shape not ruled out by features or width.
+/// Known shape that neither features nor width rule out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapeCandidate {
     /// Index in the list of known shapes.
     pub index: usize,
-    /// Distance of features or width from the class, in standard deviations.
+    /// Distance of features or width from those of the known shape, in standard deviations.
     pub distance: f64,
-    /// Fit of the instance on the model.
+    /// Fit of the scans on the known shape's model.
     pub fit: ModelFit,
 }
 
-/// Result of recognition.
+/// Identity of a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// Exactly one name fits.
     Is(String),
-    /// Several names fit, or none fits and these are not ruled out; more scans or other features
-    /// must decide.
+    /// Several names fit, or none fits and these are not ruled out; more scans or other features are needed to decide.
     OneOf(Vec<String>),
     /// Every known shape is ruled out.
     Unknown,
 }
 
-/// Recognition verdict, with the compared classes.
+/// Result of recognition: the verdict, with the compared shapes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recognition {
-    /// Verdict.
+    /// Identity of the shape.
     pub verdict: Verdict,
-    /// The known shapes that were aligned, the best fit first.
+    /// Known shapes that were aligned, the best fit first.
     pub candidates: Vec<ShapeCandidate>,
     /// Number of known shapes that features or width ruled out.
     pub ruled_out: usize,
@@ -130,7 +129,7 @@ pub struct Recognition {
     pub may_be: Vec<String>,
 }
 
-/// Classifies a shape against the known ones.
+/// Recognises a shape among the known ones.
 pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise", known = known.len()).entered();
     let features = instance.features();
@@ -148,10 +147,11 @@ pub fn recognise(instance: &ShapeModel, known: &[KnownShape], options: &Recognis
     decide(candidates, known, options)
 }
 
-/// Classifies one scan against the known shapes; candidates hold the laser's pose on the shape. A
+/// Recognises the object of one scan among known shapes; candidates hold the laser's pose in the frame of the shape. A
 /// single scan rarely determines the name.
 ///
-/// Shapes that are too wide for the bounds of the scan, or too narrow for its readings, are not aligned; the features of a hull need more than one scan.
+/// Shapes too wide for the bounds of the scan, or too narrow for its readings, are not aligned. Hull features are not
+/// compared, as they need more than one scan.
 pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &RecogniseOptions) -> Recognition {
     let _span = tracing::debug_span!("recognise_scan", known = known.len()).entered();
     let mut candidates: Vec<ShapeCandidate> = Vec::new();
@@ -165,9 +165,9 @@ pub fn recognise_scan(scan: &ObjectScan, known: &[KnownShape], options: &Recogni
     decide(candidates, known, options)
 }
 
-/// Classifies several scans, possibly from one side. `loose_m`: mean distance by which the object
-/// may extend beyond the measured hull ([`super::ScanGain::looseness_m`]); if small, hull features
-/// are compared, else only the width in each scan.
+/// Recognises the object of several scans, possibly from one side only. `loose_m`: mean distance by which the object
+/// may extend beyond the measured hull ([`super::ScanGain::looseness_m`]). If it is small, hull features are compared,
+/// else only the width in each scan.
 pub fn recognise_scans(
     scans: &ShapeModel,
     loose_m: f64,
@@ -202,8 +202,8 @@ fn worst_fit(model: &ShapeModel, scans: &ShapeModel, options: &FitOptions) -> Mo
     worst.unwrap_or_else(|| fit_scans(model, scans, options))
 }
 
-/// Width by which a shape exceeds a scan's bounds, or falls short of its readings, minimised over
-/// viewing directions, metres.
+/// Width by which a shape exceeds a scan's bounds or falls short of its readings, whatever the viewing direction,
+/// metres; zero if it may fit.
 fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     let corners = model.hull().corners;
     let widths = (0..WIDTHS).map(|i| {
@@ -221,7 +221,7 @@ fn width_apart_m(scan: &ObjectScan, model: &ShapeModel) -> f64 {
     (apart_m.fold(0.0, f64::max) - most_m).max(least_m - room_m).max(0.0)
 }
 
-/// Names of the shapes that fit, and of those not ruled out.
+/// Decides by the violation of the candidates which names fit and which are not ruled out.
 fn decide(
     mut candidates: Vec<ShapeCandidate>,
     known: &[KnownShape],
@@ -250,8 +250,8 @@ fn decide(
     Recognition { verdict, candidates, ruled_out, may_be }
 }
 
-/// Distance between the features of two models, in standard deviations of such a difference: the
-/// larger of area's and perimeter's.
+/// Distance between the features of two models, in standard deviations of such a difference: the larger of the
+/// distances in area and in perimeter.
 fn apart(a: &HullFeatures, b: &HullFeatures) -> f64 {
     let area = (a.area_m2 - b.area_m2) / USUAL_SPREAD.0;
     let perimeter = (a.perimeter_m - b.perimeter_m) / USUAL_SPREAD.1;

@@ -1,21 +1,20 @@
-//! Levenberg-Marquardt on the violated constraints (Levenberg 1944, Marquardt 1963); the active
-//! constraints and their points are recomputed in each iteration.
+//! Levenberg-Marquardt on the violated constraints (Levenberg 1944, Marquardt 1963). The active constraints and their
+//! points are recomputed in each iteration.
 
 use super::solve::{Problem, Solved, SolverOptions};
 use nalgebra::{DMatrix, DVector, Isometry2, Point2, Vector3};
 
-/// Annealing of the solver: smoothing of farthest points, metres, and scale of the outlier length;
-/// the last round is the objective itself.
+/// Rounds of annealing: smoothing of farthest points, metres, and factor on the outlier length; the last round
+/// minimises the objective itself.
 const ROUNDS: [(f64, f64); 3] = [(0.03, 10.0), (0.006, 3.0), (0.0, 1.0)];
-/// Length equivalent of a rotation by one radian about an object's centre, metres: about its
-/// radius.
+/// Length equivalent of a rotation by one radian about an object's centre, metres: about the object's radius.
 const RADIUS_M: f64 = 0.3;
 /// Objective below which the violation counts as zero, square metres.
 const NOTHING_M2: f64 = 1e-12;
-/// Initial damping, and the damping at which steps are too short to help.
+/// Initial damping, and the damping above which steps are too short to help.
 const DAMPING: (f64, f64) = (1e-3, 1e1);
 
-/// Runs the first, softest round alone.
+/// Runs only the first round, with the most smoothing.
 pub(super) fn roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     rounds(problem, options, &ROUNDS[..1])
 }
@@ -46,7 +45,7 @@ fn rounds(problem: &Problem, options: &SolverOptions, rounds: &[(f64, f64)]) -> 
     solved
 }
 
-/// Iterates until steps change nothing; false at the iteration limit.
+/// Minimises one round's smoothed objective; true if converged, false at the iteration limit.
 fn descend(
     problem: &Problem,
     options: &SolverOptions,
@@ -83,7 +82,7 @@ fn descend(
     false
 }
 
-/// Normal equations at poses.
+/// Normal equations of the objective at some poses.
 pub struct Linear {
     pub cost: f64,
     normal: DMatrix<f64>,
@@ -126,7 +125,7 @@ pub fn linearise(problem: &Problem, poses: &[Isometry2<f64>], (soft_m, wider): (
     linear
 }
 
-/// The step that the damped equations ask for.
+/// Solution of the damped normal equations; `None` if they are singular.
 pub fn step(linear: &Linear, damping: f64) -> Option<DVector<f64>> {
     let mut damped = linear.normal.clone();
     for i in 0..damped.nrows() {

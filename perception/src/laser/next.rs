@@ -1,8 +1,8 @@
-//! Next-best scan: the pose from which a scan is expected to settle most of the undetermined
-//! outline.
+//! Next-best scan: the pose from which a scan is expected to decide most of the undetermined outline.
 //!
-//! A place may belong to the thing if no scan looked past it on either side and none looked through it. What of these places lies outside the hull of the
-//! readings is undetermined: constraints that the thing may still violate. A scan from elsewhere, if the thing is as its hull, looks past or through some of them.
+//! A cell may belong to the object if no scan looked past or through it. Such cells outside the hull of the readings
+//! are undetermined. A scan from another pose is expected to look past or through some of them; the expectation takes
+//! the object to be its hull.
 
 use super::scan::{direction, origin};
 use super::shape::ShapeModel;
@@ -12,11 +12,11 @@ use nalgebra::{Isometry2, Point2, Point3};
 /// Options for undetermined cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NextOptions {
-    /// Edge of the square around the hull's centre that contains the object, metres.
+    /// Edge of the square around the hull's centre in which undetermined cells are counted, metres.
     pub within_m: f64,
     /// Edge of a cell, metres.
     pub cell_m: f64,
-    /// Angular resolution of the laser, radians: spacing of a bound from the object.
+    /// Angular resolution of the laser, radians; a bound is this far from the object.
     pub step_rad: f64,
     /// Depth resolution of readings, metres.
     pub depth_m: f64,
@@ -28,7 +28,7 @@ impl Default for NextOptions {
     }
 }
 
-/// Cells along the square's edge, at the most.
+/// Maximum number of cells along the square's edge.
 const MOST_ACROSS: f64 = 2000.0;
 
 /// Expected gain of a scan from a pose.
@@ -36,13 +36,13 @@ const MOST_ACROSS: f64 = 2000.0;
 pub struct NextScan {
     /// Index of the pose.
     pub index: usize,
-    /// Undetermined area that the scan is expected to settle, square metres.
+    /// Undetermined area that the scan is expected to decide, square metres.
     pub settles_m2: f64,
-    /// Undetermined area that is expected to stay, square metres.
+    /// Undetermined area that is expected to remain, square metres.
     pub leaves_m2: f64,
 }
 
-/// Area beyond the hull of the readings that may belong to the object, square metres.
+/// Area outside the hull of the readings that may still belong to the object, square metres.
 pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
     undetermined(model, &model.hull(), options).len() as f64 * options.cell_m * options.cell_m
 }
@@ -50,17 +50,17 @@ pub fn undetermined_m2(model: &ShapeModel, options: &NextOptions) -> f64 {
 /// Expected gain of scans from several poses, jointly and separately.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanGain {
-    /// Perimeter of the hull of all hits, metres.
+    /// Perimeter of the hull of all readings, metres.
     pub perimeter_m: f64,
     cell_m2: f64,
     open: usize,
-    /// The undetermined cells that a scan from each pose is expected to settle, by pose.
+    /// Indices of the undetermined cells that a scan is expected to decide, for each pose.
     settles: Vec<Vec<u32>>,
 }
 
 impl ScanGain {
-    /// Undetermined cells of a model, and those that scans from the given laser poses (model frame)
-    /// would settle.
+    /// Computes the undetermined cells of a model, and which of them scans from the given laser poses (model frame) are
+    /// expected to decide.
     pub fn new(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> ScanGain {
         let _span = tracing::debug_span!("outlook", poses = poses.len()).entered();
         let hull = model.hull();
@@ -78,7 +78,7 @@ impl ScanGain {
         }
     }
 
-    /// The undetermined area after scans from some of the poses, square metres.
+    /// Undetermined area that is expected to remain after scans from some of the poses (by index), square metres.
     pub fn leaves_m2(&self, poses: &[usize]) -> f64 {
         let mut settled = vec![false; self.open];
         for &cell in poses.iter().flat_map(|&pose| &self.settles[pose]) {
@@ -87,17 +87,16 @@ impl ScanGain {
         settled.iter().filter(|is| !**is).count() as f64 * self.cell_m2
     }
 
-    /// Mean distance by which the object may exceed its measured outline after scans from the given
-    /// poses, metres.
+    /// Mean distance by which the object may exceed its measured outline after scans from some of the poses (by index),
+    /// metres.
     pub fn looseness_m(&self, poses: &[usize]) -> f64 {
         self.leaves_m2(poses) / self.perimeter_m
     }
 }
 
-/// Ranks laser poses (model frame) by the expected settled area of a scan, best first, ties in list
-/// order.
+/// Ranks laser poses (model frame) by the area that a scan is expected to decide, best first, ties in the given order.
 ///
-/// Whether a pose can be reached, and what that costs, is for the caller to weigh.
+/// Reachability and cost of the poses are left to the caller.
 pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOptions) -> Vec<NextScan> {
     let outlook = ScanGain::new(model, poses, options);
     let all_m2 = outlook.leaves_m2(&[]);
@@ -110,7 +109,7 @@ pub fn next_scan(model: &ShapeModel, poses: &[Isometry2<f64>], options: &NextOpt
     ranked
 }
 
-/// Centres of the cells outside the hull that no scan looked past or through.
+/// Centres of the undetermined cells: outside the hull, and no scan looked past or through them.
 fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<Point2<f64>> {
     let centre = hull.centre();
     let across = (options.within_m / options.cell_m).ceil().clamp(0.0, MOST_ACROSS) as usize;
@@ -131,7 +130,7 @@ fn undetermined(model: &ShapeModel, hull: &Hull, options: &NextOptions) -> Vec<P
         .collect()
 }
 
-/// True if a reading next to a cell's direction ended beyond the cell.
+/// True if a reading in about the direction of a cell (laser frame) ended beyond the cell.
 fn through(points: &[Point2<f64>], place: &Point2<f64>, options: &NextOptions) -> bool {
     let range_m = place.coords.norm();
     points.iter().any(|p| {
@@ -140,7 +139,7 @@ fn through(points: &[Point2<f64>], place: &Point2<f64>, options: &NextOptions) -
     })
 }
 
-/// True if a scan from here would look past or through the cell, if the object were its hull.
+/// True if a scan from `laser` would look past or through a cell, if the object were its hull.
 fn settles(laser: &Point2<f64>, place: &Point2<f64>, hull: &Hull, options: &NextOptions) -> bool {
     let towards = place - laser;
     let middle = hull.centre() - laser;

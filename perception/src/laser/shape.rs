@@ -7,8 +7,8 @@ use crate::plane::Plane;
 use nalgebra::{Isometry2, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// One scan's readings of an object with their bounding angles (section III of the paper). Angles
-/// are from the laser's x axis, anticlockwise.
+/// One scan's readings of an object with their bounding angles (section III of the paper). Angles are anticlockwise
+/// from the laser's x axis, radians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectScan {
@@ -28,9 +28,9 @@ pub struct ObjectScan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PosedScan {
-    /// The readings.
+    /// Readings of the object, with their bounding angles.
     pub scan: ObjectScan,
-    /// Pose of the laser: in the map before scans are aligned, in the model's own frame after.
+    /// Pose of the laser, metres: in the map before scans are aligned, in the model's own frame after.
     pub model_from_laser: Isometry2<f64>,
 }
 
@@ -42,7 +42,7 @@ pub struct ShapeModel {
     scans: Vec<PosedScan>,
 }
 
-/// Model in file form, not yet validated.
+/// Serialised form of [`ShapeModel`], not yet validated.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -63,7 +63,7 @@ pub enum ShapeError {
     /// The list of scans is empty.
     #[error("a shape model of no scans: give at least one scan in which the thing is bounded on both sides")]
     NoScans,
-    /// A scan without points, or with a point that is nowhere.
+    /// A scan has no points, or one that is not finite.
     #[error(
         "scan {index} has no point, or one that is not finite: give the places where readings met the thing"
     )]
@@ -71,7 +71,7 @@ pub enum ShapeError {
         /// Index of the scan.
         index: usize,
     },
-    /// The angles are not in order, so that they bound nothing.
+    /// The angles of a scan are not in order, or span half a turn or more.
     #[error(
         "the angles of scan {index} are {angles_rad:?} rad: expected right bound < right object <= left object < left bound, over less than half a turn"
     )]
@@ -81,7 +81,7 @@ pub enum ShapeError {
         /// The angles, from right to left, radians.
         angles_rad: [f64; 4],
     },
-    /// Non-finite pose.
+    /// The pose of a scan is not finite, or its rotation is invalid.
     #[error("the pose of scan {index} is not finite, or its rotation is no unit complex number")]
     Pose {
         /// Index of the scan.
@@ -90,10 +90,10 @@ pub enum ShapeError {
 }
 
 impl ShapeModel {
-    /// Model of the given scans at their poses.
+    /// Creates a model from scans at their poses.
     ///
     /// # Errors
-    /// If there is none, or one of them is unsound.
+    /// If there is no scan, or one is invalid.
     pub fn new(scans: Vec<PosedScan>) -> Result<ShapeModel, ShapeError> {
         if scans.is_empty() {
             return Err(ShapeError::NoScans);
@@ -107,12 +107,12 @@ impl ShapeModel {
         Ok(ShapeModel { scans })
     }
 
-    /// The scans.
+    /// Scans of the model, with their poses.
     pub fn scans(&self) -> &[PosedScan] {
         &self.scans
     }
 
-    /// End points of the object's readings, model frame, metres.
+    /// End points of all scans' readings of the object, model frame, metres.
     pub fn points(&self) -> impl Iterator<Item = Point2<f64>> {
         self.scans.iter().flat_map(|s| s.scan.points.iter().map(|p| s.model_from_laser * p))
     }
@@ -128,14 +128,14 @@ impl ShapeModel {
         HullFeatures { area_m2: hull.area_m2(), perimeter_m: hull.perimeter_m(), centre: hull.centre() }
     }
 
-    /// Model with its frame transformed: `t(N, p)` of Eq. 4.
+    /// Model moved by a transformation of its frame: `t(N, p)` of Eq. 4.
     pub fn moved(&self, by: &Isometry2<f64>) -> ShapeModel {
         let moved =
             |s: &PosedScan| PosedScan { scan: s.scan.clone(), model_from_laser: by * s.model_from_laser };
         ShapeModel { scans: self.scans.iter().map(moved).collect() }
     }
 
-    /// Union of both models' scans in this model's frame.
+    /// Model with the scans of both, in this model's frame.
     pub fn joined(&self, other: &ShapeModel, self_from_other: &Isometry2<f64>) -> ShapeModel {
         let scans = [self.scans.clone(), other.moved(self_from_other).scans].concat();
         ShapeModel { scans }
@@ -159,7 +159,7 @@ impl ObjectScan {
     }
 }
 
-/// The convex hull of points of the plane z = 0.
+/// Convex hull of points in the plane z = 0.
 pub(super) fn hull_of(points: impl Iterator<Item = Point2<f64>>) -> Hull {
     Hull {
         plane: Plane { normal: Vector3::z(), offset_m: 0.0 },

@@ -1,22 +1,22 @@
-//! The downhill simplex method (Nelder and Mead 1965) with coefficients that suit many dimensions (Gao and Han 2012).
+//! Downhill simplex method (Nelder and Mead 1965) with coefficients for many dimensions (Gao and Han 2012).
 
 /// Result of the simplex search.
 pub struct Found {
-    /// Best point.
+    /// Best point found.
     pub at: Vec<f64>,
-    /// Value of the function at the corner.
+    /// Value of the function at the best point.
     pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
     pub evaluations: usize,
 }
 
-/// Convergence limit of the simplex, as a fraction of the first steps.
+/// Size of the simplex at which it has converged, as a fraction of the initial steps.
 const FINEST: f64 = 1e-4;
 
-/// Minimises a function near the origin by the Nelder-Mead simplex with the given initial steps.
-/// Converged once the corners lie within a ten-thousandth of these steps, or their values differ by
-/// a share less than `settle`.
+/// Minimises a function near the origin by the Nelder-Mead simplex with the given initial steps and about `most`
+/// evaluations. Converged once the corners lie within a ten-thousandth of these steps, or their values differ by a
+/// share of at most `settle`.
 pub fn simplex(cost: impl Fn(&[f64]) -> f64, steps: &[f64], most: usize, settle: f64) -> Found {
     let n = steps.len();
     let mut corners: Vec<(f64, Vec<f64>)> = (0..=n)

@@ -1,28 +1,28 @@
-//! Poses of groups of scans with minimum violation of their angular constraints.
+//! Poses of groups of scans with the least violation of their angular constraints.
 
 use super::least_squares::{least_squares, roughly};
 use super::simplex::simplex;
 use super::violation::{Assembly, Kind, Residual};
 use nalgebra::{Isometry2, Rotation2, Translation2, UnitComplex, Vector2};
 
-/// Minimiser.
+/// Method of minimisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Solver {
-    /// Levenberg's and Marquardt's method on the errors, whose derivatives are known.
+    /// Levenberg-Marquardt on the separate errors and their derivatives.
     #[default]
     LeastSquares,
-    /// The downhill simplex of Nelder and Mead (the paper's choice), on the sum alone.
+    /// Nelder-Mead downhill simplex (the paper's choice) on the objective's value alone.
     Simplex,
 }
 
-/// Objective.
+/// Objective to minimise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Objective {
-    /// Boundary violation alone (Eq. 3). Many poses have none, because readings one degree apart
-    /// bound an object loosely; the result among these is arbitrary, and models come out too large.
+    /// Boundary violation alone (Eq. 3). Many poses have none, because readings one degree apart bound an object
+    /// loosely; which of these poses results is arbitrary, and models come out too large.
     Violation,
-    /// Boundary violation, plus with a tenth of its weight a tie-breaker: silhouettes lie midway
-    /// between the last hit and the first miss, and poses stay near the given ones.
+    /// Boundary violation plus a tie-breaker with a tenth of its weight: silhouettes lie midway between the last hit
+    /// and the first miss, and poses stay near the given ones.
     Centred {
         /// Standard deviation of the given positions, metres.
         pose_sigma_m: f64,
@@ -46,17 +46,17 @@ const GAP_SIGMA_M: f64 = 0.0075;
 /// Options of the solver: objective, minimiser, limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolverOptions {
-    /// Minimiser.
+    /// Method of minimisation.
     pub solver: Solver,
-    /// Objective.
+    /// Objective to minimise.
     pub objective: Objective,
-    /// Maximum iterations of least squares per round.
+    /// Maximum number of iterations of least squares per round of annealing.
     pub most_iterations: usize,
-    /// Maximum number of evaluations of the simplex, for each of three numbers a pose.
+    /// Maximum number of evaluations of the simplex per unknown; each movable pose has three.
     pub most_evaluations: usize,
     /// Relative decrease of the objective below which the solver has converged.
     pub settle: f64,
-    /// First steps of the simplex: metres, and radians.
+    /// Initial steps of the simplex: metres, and radians.
     pub simplex_steps: (f64, f64),
     /// Error length beyond which errors gain no further weight, metres (Geman and McClure 1987), so
     /// that a few false ends do not shift the other scans. Infinite: plain squares, as in Eq. 3.
@@ -85,25 +85,25 @@ pub struct Solved {
     pub cost: f64,
     pub converged: bool,
     pub iterations: usize,
-    /// Times the errors were computed.
+    /// Number of evaluations of the errors.
     pub evaluations: usize,
 }
 
-/// Groups of scans with their poses and movability.
+/// Minimisation problem: groups of scans, their initial poses, and the groups that may move.
 pub struct Problem<'a> {
     assembly: &'a Assembly,
     start: &'a [Isometry2<f64>],
     movable: Vec<usize>,
-    /// Weight of [`Kind::Slack`].
+    /// Weight of squared errors of [`Kind::Slack`].
     slack: f64,
-    /// Prior weights of a group's shift (two components) and rotation from its start.
+    /// Weights of the squared shift (two components) and rotation of a group from its start.
     prior: [f64; 3],
     /// See [`SolverOptions::outlier_m`].
     outlier_m: f64,
 }
 
 impl<'a> Problem<'a> {
-    /// All scans free to move, from their localised poses.
+    /// Problem in which all groups may move.
     pub fn free(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = (0..start.len()).collect();
         let (slack, prior) = match options.objective {
@@ -116,7 +116,7 @@ impl<'a> Problem<'a> {
         Problem { assembly, start, movable, slack, prior, outlier_m: options.outlier_m }
     }
 
-    /// Last group free to move onto the fixed others, without a prior on its pose.
+    /// Problem in which only the last group may move, without a prior on its pose.
     pub fn onto(assembly: &'a Assembly, start: &'a [Isometry2<f64>], options: &SolverOptions) -> Problem<'a> {
         let movable = vec![start.len() - 1];
         Problem { movable, prior: [0.0; 3], ..Problem::free(assembly, start, options) }
@@ -134,15 +134,16 @@ impl<'a> Problem<'a> {
         &self.movable
     }
 
-    /// Cost of an error, square metres, and the weight of its square with the same slope; the
-    /// outlier length is scaled by `wider`.
+    /// Cost of an error, square metres, and the weight with which its square has the same slope; `wider`: factor on the
+    /// outlier length.
     pub fn costs(&self, r: &Residual, wider: f64) -> (f64, f64) {
         let weight = if r.kind == Kind::Slack { self.slack } else { 1.0 };
         let share = 1.0 / (1.0 + (r.value_m / (wider * self.outlier_m)).powi(2));
         (weight * share * r.value_m * r.value_m, weight * share * share)
     }
 
-    /// Shift and rotation of a group from its start, each with the weight of its square.
+    /// Shift (two components, metres) and rotation (radians) of a group from its start, each with the weight of its
+    /// square.
     pub fn strayed(&self, poses: &[Isometry2<f64>], group: usize) -> impl Iterator<Item = (f64, f64)> {
         let pivot = self.assembly.pivot(group);
         let (from, to) = (&self.start[group], &poses[group]);
@@ -150,7 +151,7 @@ impl<'a> Problem<'a> {
         [shift.x, shift.y, from.rotation.angle_to(&to.rotation)].into_iter().zip(self.prior)
     }
 
-    /// Poses after a shift (metres) and rotation (radians) of each movable group about its pivot.
+    /// Poses after moving each movable group by a shift (metres) and a rotation (radians) about its pivot.
     pub fn moved(&self, poses: &[Isometry2<f64>], by: &[f64]) -> Vec<Isometry2<f64>> {
         let mut moved = poses.to_vec();
         for (&group, by) in self.movable.iter().zip(by.chunks_exact(3)) {
@@ -185,7 +186,7 @@ pub(super) fn solve(problem: &Problem, options: &SolverOptions) -> Solved {
     }
 }
 
-/// Solves the problem coarsely, to decide if refinement pays.
+/// Solves the problem coarsely, to decide whether refinement pays.
 pub(super) fn solve_roughly(problem: &Problem, options: &SolverOptions) -> Solved {
     let rough = SolverOptions { settle: options.settle.max(ROUGH), ..*options };
     match options.solver {

@@ -1,6 +1,7 @@
 //! Angular constraints between scans, and their violation by poses (Eq. 1 to 3).
 //!
-//! All errors are distances of points from lines, the worst or the best of a scan's points: only corners of its convex hull can be either.
+//! All errors are distances of points from lines, for the worst or the best point of a scan; either is always a corner
+//! of the scan's convex hull.
 
 use super::scan::direction;
 use super::shape::PosedScan;
@@ -8,22 +9,21 @@ use crate::hull::convex;
 use nalgebra::{Isometry2, Point2, Vector2};
 use serde::Serialize;
 
-/// Violation of the angular constraints by poses.
+/// Amount by which poses of scans violate the angular constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Violation {
-    /// BV: the sum of the squared errors over ordered pairs of scans (Eq. 3), square metres.
+    /// Boundary violation (BV): sum of the squared errors over ordered pairs of scans (Eq. 3), square metres.
     pub boundary_m2: f64,
-    /// Length of the longest exterior error (Eq. 1), metres.
+    /// Largest exterior error (Eq. 1), metres.
     pub exterior_m: f64,
-    /// Length of the longest interior error (Eq. 2), metres.
+    /// Largest interior error (Eq. 2), metres.
     pub interior_m: f64,
     /// Number of ordered pairs of compared scans.
     pub pairs: usize,
 }
 
 impl Violation {
-    /// Root of the boundary violation per pair of scans, metres; comparable across numbers of
-    /// scans.
+    /// Root of the boundary violation per pair of scans, metres; comparable between different numbers of scans.
     pub fn per_pair_m(&self) -> f64 {
         (self.boundary_m2 / self.pairs.max(1) as f64).sqrt()
     }
@@ -32,31 +32,31 @@ impl Violation {
 /// Scan prepared for comparison.
 #[derive(Clone, Debug)]
 struct Part {
-    /// Index of the group of scans that move together.
+    /// Index of the group of rigidly connected scans.
     group: usize,
-    /// Start of the scan's corners in `Assembly::corners`.
+    /// Index of the scan's first corner in `Assembly::corners`; the next field is the end.
     begin: usize,
     end: usize,
-    /// False if the laser looked past the object only far beside it on some side; the scan may have
-    /// missed an end, and need not reach the extent seen by others.
+    /// True if both bounds are near the object; otherwise the scan may have missed an end, and its points need not
+    /// reach the extent seen by others.
     is_whole: bool,
 }
 
-/// Angle between a bound and the object's last reading beyond which the bound says nothing about
-/// the end, radians.
+/// Angle between a bound and the object's last reading beyond which the bound does not constrain the end, radians.
 const FAR_RAD: f64 = 0.2;
 
 /// End of the object in a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ScanEnd {
-    /// The left.
+    /// Left end, as seen from the laser.
     Left,
-    /// The right.
+    /// Right end, as seen from the laser.
     Right,
 }
 
-/// Origin of a scan, and unit normals of its bounding lines, pointing away from the object.
+/// Position of a scan's laser, direction of the middle between its bounds, and unit normals of its bounding lines,
+/// pointing away from the object.
 #[derive(Clone, Copy, Debug)]
 struct Rays {
     laser: Point2<f64>,
@@ -83,8 +83,8 @@ impl Rays {
         }
     }
 
-    /// Object ray on the side of `other` that its scan must reach (Eq. 2), with the bound beside
-    /// it; `None` if `other` is between the bounds and need not see either end.
+    /// End of the object that the scan of a laser at `other` must reach (Eq. 2), with the normals of the object ray and
+    /// of the bound on that side; `None` if `other` lies between the bounds and need not see either end.
     fn facing(&self, other: &Point2<f64>) -> Option<(ScanEnd, Vector2<f64>, Vector2<f64>)> {
         let towards = other - self.laser;
         let side = self.middle.perp(&towards);
@@ -98,7 +98,7 @@ impl Rays {
     }
 }
 
-/// Groups of rigidly connected scans.
+/// Scans in groups; those of a group are rigidly connected.
 #[derive(Clone, Debug)]
 pub struct Assembly {
     parts: Vec<Part>,
@@ -106,18 +106,18 @@ pub struct Assembly {
     rays: Vec<Rays>,
     /// Pivot of each group in its own frame: mean of its corners.
     pivots: Vec<Point2<f64>>,
-    /// Number of compared pairs of scans in different groups.
+    /// Number of ordered pairs of scans in different groups.
     pairs: usize,
 }
 
-/// Assembly with its group poses.
+/// Assembly with its groups moved to given poses.
 pub struct Placed {
     corners: Vec<Point2<f64>>,
     rays: Vec<Rays>,
 }
 
-/// Kind of error: exterior (Eq. 1), interior (Eq. 2), or signed distance of an end of the object
-/// from the midpoint between the last hit and the first miss.
+/// Kind of error: exterior (Eq. 1), interior (Eq. 2), or slack, the signed distance of an end of the object from the
+/// midpoint between the last hit and the first miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Exterior,
@@ -125,23 +125,23 @@ pub enum Kind {
     Slack,
 }
 
-/// Violated constraint: `value_m = normal · (at - a point of the line)`, to be minimised.
+/// Violated constraint, or slack: `value_m = normal · (at - a point of the line)`.
 #[derive(Clone, Copy, Debug)]
 pub struct Residual {
     pub kind: Kind,
-    /// Side of the scan with the line.
+    /// End of the object that the line bounds.
     pub side: ScanEnd,
     pub value_m: f64,
     pub normal: Vector2<f64>,
     pub at: Point2<f64>,
-    /// Group of the scan with the line.
+    /// Index of the group of the scan with the line.
     pub line: usize,
-    /// Group of the scan with the point.
+    /// Index of the group of the scan with the point.
     pub point: usize,
 }
 
 impl Assembly {
-    /// Groups of scans, each with poses in a frame of the group's own.
+    /// Assembles groups of scans; the poses of each group are in a frame of its own.
     pub fn new<'a>(groups: impl IntoIterator<Item = &'a [PosedScan]>) -> Assembly {
         let mut assembly = Assembly {
             parts: Vec::new(),
@@ -186,7 +186,7 @@ impl Assembly {
         self.pivots[group]
     }
 
-    /// All scans placed at their groups' poses.
+    /// Moves all scans to the poses of their groups.
     pub fn placed(&self, poses: &[Isometry2<f64>]) -> Placed {
         let mut placed = Placed {
             corners: Vec::with_capacity(self.corners.len()),
@@ -201,7 +201,8 @@ impl Assembly {
         placed
     }
 
-    /// Every violated constraint between scans of different groups; see [`farthest`] for `soft_m`.
+    /// Calls `each` for every violated constraint and every slack between scans of different groups; see [`farthest`]
+    /// for `soft_m`.
     pub fn residuals(&self, placed: &Placed, soft_m: f64, mut each: impl FnMut(Residual)) {
         for (of_line, rays) in self.parts.iter().zip(&placed.rays) {
             for (of_points, other) in self.parts.iter().zip(&placed.rays) {
@@ -224,7 +225,7 @@ impl Assembly {
         }
     }
 
-    /// The violation at poses of the groups.
+    /// Violation at poses of the groups.
     pub fn violation(&self, poses: &[Isometry2<f64>]) -> Violation {
         let mut violation = Violation { pairs: self.pairs, ..Violation::default() };
         self.residuals(&self.placed(poses), 0.0, |r| {
@@ -240,8 +241,8 @@ impl Assembly {
     }
 }
 
-/// Errors of points against a scan's lines, zeros omitted. `whole`: the points come from a scan
-/// that saw both ends.
+/// Calls `each` for the errors of points against a scan's lines, without zeros. `whole`: laser position of the points'
+/// scan if that scan saw both ends, else `None`.
 #[inline(always)]
 fn errors(
     rays: &Rays,
@@ -271,8 +272,9 @@ fn errors(
 
 /// Farthest point along a normal from `from`, and its distance.
 ///
-/// With a softness it is a mean of points, the weight of each falling to nothing where it is nearer by as much: which point is farthest then changes
-/// without a jump, so that derivatives tell where to go when two points are as far.
+/// If `soft_m` is positive: mean of points, each with a weight that falls to zero where it is nearer than the farthest
+/// point by `soft_m`. The result then changes continuously when another point becomes the farthest, as derivatives
+/// require.
 #[inline(always)]
 fn farthest(
     normal: &Vector2<f64>,

@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-/// Stated probability, and true if the claim was right.
+/// Claim: stated probability, and true if the claim was right.
 pub type Claim = (f64, bool);
 
-/// Bin of a reliability diagram.
+/// Bin of a reliability diagram: claims of similar stated probability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bin {
-    /// Minimum stated probability (inclusive).
+    /// Lower edge of the bin (inclusive).
     pub low: f64,
     /// Upper edge of the bin (exclusive except in the last bin).
     pub high: f64,
@@ -16,27 +16,29 @@ pub struct Bin {
     pub count: usize,
     /// Mean stated probability of the claims.
     pub stated: f64,
-    /// Share that came true.
+    /// Share of the claims that were right.
     pub came_true: f64,
 }
 
-/// Reliability of a set of claims.
+/// Reliability of the stated probabilities of some claims.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reliability {
-    /// Mean squared difference between statement and truth (Brier 1950): 0 is perfect, always saying the base rate gives `base × (1 − base)`.
+    /// Mean squared difference between stated probability and truth (Brier 1950): 0 is perfect, always stating the base
+    /// rate gives `base × (1 − base)`.
     pub brier: f64,
-    /// The Brier score of always saying the base rate.
+    /// Brier score of always stating the base rate.
     pub brier_of_base_rate: f64,
-    /// Expected calibration error: mean gap between stated and true share, weighted by the bins' counts.
+    /// Expected calibration error: mean difference between stated probability and true share, weighted by the bins'
+    /// counts.
     pub expected_error: f64,
     /// Number of claims.
     pub count: usize,
-    /// Bins of equal width.
+    /// Bins of equal width, ascending.
     pub bins: Vec<Bin>,
 }
 
-/// Scores claims in `bins` (at least one) bins of equal width; non-finite probabilities are
-/// skipped, others clamped to [0, 1].
+/// Scores claims in `bins` (at least one) bins of equal width; probabilities that are not finite are skipped, others
+/// clamped to [0, 1].
 pub fn reliability(claims: &[Claim], bins: usize) -> Reliability {
     let bins = bins.max(1);
     let sound: Vec<Claim> =

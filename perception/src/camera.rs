@@ -1,15 +1,15 @@
-//! The pinhole camera. Optical frame: x right, y down, z forward; pixel centres at whole coordinates.
+//! Pinhole camera. Optical frame: x right, y down, z forward; pixel centres at whole coordinates.
 
 use crate::cloud::{Cloud, Grid};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera without distortion.
+/// Intrinsics of a pinhole camera without distortion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {
-    /// Columns of the image.
+    /// Number of columns of the image.
     pub width: usize,
-    /// Rows of the image.
+    /// Number of rows of the image.
     pub height: usize,
     /// Focal length along x, pixels.
     pub fx: f64,
@@ -21,43 +21,43 @@ pub struct Intrinsics {
     pub cy: f64,
 }
 
-/// A camera or a depth image that cannot be used.
+/// Reason why a camera or a depth image cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// Depth image and camera differ in size.
+    /// The depth image has another size than the camera.
     #[error("the depth image has {found} pixels where a {width} x {height} camera has {}: check the intrinsics", width * height)]
     Size {
         /// Number of pixels given.
         found: usize,
-        /// Columns.
+        /// Number of columns of the camera.
         width: usize,
-        /// Rows.
+        /// Number of rows of the camera.
         height: usize,
     },
-    /// Focal length that is not positive.
+    /// A focal length is not positive.
     #[error("{name} is {value}: a focal length is a positive number of pixels")]
     Focal {
-        /// `fx` or `fy`.
+        /// Name of the focal length: `fx` or `fy`.
         name: &'static str,
-        /// Value that was given.
+        /// Given value.
         value: f64,
     },
 }
 
 impl Intrinsics {
-    /// Pixel (column, row) of a point in the optical frame, metres, possibly outside the image;
-    /// `None` behind the camera.
+    /// Projects a point of the optical frame, metres, to a pixel (column, row), possibly outside the image; `None`
+    /// behind the camera.
     #[inline]
     pub fn project(&self, p: &Point3<f64>) -> Option<(f64, f64)> {
         (p.z > 0.0).then(|| (self.fx * p.x / p.z + self.cx, self.fy * p.y / p.z + self.cy))
     }
 
-    /// The point seen at pixel (column, row) at `depth_m` along z, in the optical frame, metres.
+    /// Point of the optical frame, metres, at a pixel (column, row) and depth along z.
     pub fn unproject(&self, column: f64, row: f64, depth_m: f64) -> Point3<f64> {
         Point3::new((column - self.cx) / self.fx * depth_m, (row - self.cy) / self.fy * depth_m, depth_m)
     }
 
-    /// Index of the pixel nearest to (column, row) in row order; `None` outside the image.
+    /// Index, row by row, of the pixel nearest to (column, row); `None` outside the image.
     #[inline]
     pub fn pixel(&self, column: f64, row: f64) -> Option<usize> {
         let (u, v) = (column + 0.5, row + 0.5);
@@ -67,8 +67,8 @@ impl Intrinsics {
         inside.then(|| v as u32 as usize * self.width + u as u32 as usize)
     }
 
-    /// Organised cloud in the optical frame from depths along z, metres, row by row; non-finite and
-    /// non-positive depths are missing returns.
+    /// Organised cloud in the optical frame from depths along z, metres, row by row. Depths that are not finite or not
+    /// positive are missing returns (NaN).
     ///
     /// # Errors
     /// If the image has another size than the camera, or a focal length is not positive.

@@ -1,49 +1,49 @@
-//! Point clouds, the data type that all steps of perception share.
+//! Point clouds, the data type shared by all of perception.
 
 use crate::quantile::median;
 use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Rows and columns of an organised cloud (one point per pixel, row by row).
+/// Size of an organised cloud (one point per pixel, row by row).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Grid {
-    /// Columns (pixels a row).
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
 }
 
-/// Upper bound of the range of depth cameras and of room scanners, metres. From: chosen.
+/// Upper bound of the range of depth cameras and room scanners, metres. From: chosen.
 const FARTHEST_TYPICAL_M: f64 = 100.0;
-/// Upper bound of the coordinates of a map, metres. From: derived, the width of the earth.
+/// Upper bound of map coordinates, metres. From: derived, the width of the earth.
 const FARTHEST_ON_EARTH_M: f64 = 1.3e7;
-/// Maximum median distance of points from their centre in a cloud that is in metres though far from
-/// the origin, metres. From: chosen.
+/// Maximum median distance of points from their median, metres, in a cloud that is in metres though far from the
+/// origin. From: chosen.
 const WIDEST_PLACE_M: f64 = 20.0;
 /// Extent relative to the distance from the origin, below which a cloud counts as far away rather
 /// than in other units. From: chosen.
 const NARROW: f64 = 0.01;
-/// Median distances, in the cloud's unit, between which a cloud may be in millimetres or in
-/// centimetres: below, it is too near for a depth camera in millimetres; above, too far for one in
-/// centimetres. From: chosen.
+/// Minimum median distance, in the cloud's unit, of a cloud that may be in millimetres; nearer would be too near for a
+/// depth camera. From: chosen.
 const LEAST_MILLIMETRES: f64 = 300.0;
+/// Maximum median distance, in the cloud's unit, of a cloud that may be in centimetres; farther would be too far for a
+/// depth camera. From: chosen.
 const MOST_CENTIMETRES: f64 = 800.0;
-/// Resolution of single-precision coordinates above which objects are blurred, metres.
-/// From: chosen.
+/// Spacing of single-precision coordinates, metres, above which objects are blurred. From: chosen.
 const COARSEST_M: f64 = 1e-4;
 
 /// Points with optional attributes; each attribute that is present has one entry per point.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cloud {
-    /// Positions, metres; NaN is a missing return (organised clouds only).
+    /// Positions, metres; NaN for a missing return (organised clouds only).
     pub points: Vec<Point3<f32>>,
-    /// Present if the points are the pixels of an image, row by row.
+    /// Image size if the points are the pixels of an image, row by row; `None` otherwise.
     pub grid: Option<Grid>,
-    /// Red, green, blue.
+    /// Red, green and blue.
     pub colours: Option<Vec<[u8; 3]>>,
     /// Unit normals; NaN where undefined.
     pub normals: Option<Vec<Vector3<f32>>>,
-    /// A number a point whose meaning the maker of the cloud states (segment, object, truth).
+    /// Label of each point, with a meaning defined by the maker of the cloud (segment, object, truth).
     pub labels: Option<Vec<u32>>,
 }
 
@@ -57,37 +57,37 @@ pub enum CloudError {
         attribute: &'static str,
         /// Number of entries of the attribute.
         found: usize,
-        /// Points in the cloud.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// Grid size and number of points differ.
+    /// The size of the grid does not match the number of points.
     #[error("a grid of {width} x {height} does not hold {points} points: drop the grid or mend its size")]
     Grid {
-        /// Columns.
+        /// Number of columns.
         width: usize,
-        /// Rows.
+        /// Number of rows.
         height: usize,
-        /// Points in the cloud.
+        /// Number of points in the cloud.
         points: usize,
     },
-    /// More points than 32-bit indices can name.
+    /// There are more points than 32-bit indices can name.
     #[error(
         "{points} points are more than indices of 32 bits can name ({}): split the cloud or thin it by voxels",
         u32::MAX
     )]
     TooMany {
-        /// Points in the cloud.
+        /// Number of points in the cloud.
         points: usize,
     },
 }
 
 impl Cloud {
-    /// A cloud of bare points without a grid.
+    /// Creates a cloud of bare points without a grid.
     pub fn from_points(points: Vec<Point3<f32>>) -> Self {
         Cloud { points, ..Cloud::default() }
     }
 
-    /// Number of points, pixels without a return included.
+    /// Number of points, including pixels without a return.
     pub fn len(&self) -> usize {
         self.points.len()
     }
@@ -127,8 +127,7 @@ impl Cloud {
         self.points.iter().filter(|p| is_finite(p)).count()
     }
 
-    /// Points at `indices` (out-of-range ones skipped), in that order, with attributes, without
-    /// grid.
+    /// Points at `indices` in that order, with attributes, without grid; indices out of range are skipped.
     pub fn select(&self, indices: &[u32]) -> Cloud {
         fn pick<T: Copy>(from: &[T], indices: &[u32]) -> Vec<T> {
             indices.iter().filter_map(|&i| from.get(i as usize).copied()).collect()
@@ -153,7 +152,7 @@ impl Cloud {
         self.filter(is_finite)
     }
 
-    /// Cloud in another frame; grid and other attributes stay. Computed in `f64`.
+    /// Cloud in another frame, with grid and attributes. Computed in `f64`.
     pub fn transformed(&self, to_from_here: &Isometry3<f64>) -> Cloud {
         let rotation = to_from_here.rotation.to_rotation_matrix();
         let shift = to_from_here.translation.vector;
@@ -200,9 +199,9 @@ impl Cloud {
         Some(finite.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p))))
     }
 
-    /// Warning if a typical return is farther from the sensor (the origin) than depth cameras and
-    /// room scanners measure, with the probable cause. [`Cloud::scaled`] converts other units; map
-    /// coordinates need an offset subtracted before writing.
+    /// Warning if most points are farther from the sensor (the origin) than depth cameras and room scanners measure,
+    /// with the probable cause. [`Cloud::scaled`] converts other units; map coordinates need an offset subtracted
+    /// before the file is written.
     pub fn unit_warning(&self) -> Option<String> {
         if self.is_surely_near() {
             return None;
@@ -238,10 +237,9 @@ impl Cloud {
         })
     }
 
-    /// True if more than half of the points lie well within typical range; avoids a square root per
-    /// point.
+    /// True if more than half of the finite points lie within typical range; avoids a square root per point.
     fn is_surely_near(&self) -> bool {
-        /// Fraction of the squared range below which single precision is safe. From: rounding.
+        /// Fraction of the squared range that single precision surely does not round beyond it. From: rounding.
         const SURE: f32 = 0.999;
         let sure_sq = (FARTHEST_TYPICAL_M * FARTHEST_TYPICAL_M) as f32 * SURE;
         let count = |(near, finite): (u32, u32), p: &Point3<f32>| {
@@ -262,8 +260,8 @@ impl Cloud {
         Some(median(finite().map(|p| (p - middle).norm())))
     }
 
-    /// Note on coordinates so far from the origin that single precision blurs them; `None` if near
-    /// enough.
+    /// Note that coordinates are so far from the origin that single precision blurs them; `None` if they are near
+    /// enough. `far_m`: typical distance from the origin, metres.
     fn far_from_origin(&self, far_m: f64) -> Option<String> {
         let (low, high) = self.bounds()?;
         let greatest = low.coords.amax().max(high.coords.amax());
@@ -277,7 +275,7 @@ impl Cloud {
         })
     }
 
-    /// The cloud with every coordinate multiplied by `factor` (0.001 takes millimetres to metres).
+    /// Cloud with every coordinate multiplied by `factor` (0.001 converts millimetres to metres).
     pub fn scaled(&self, factor: f32) -> Cloud {
         Cloud { points: self.points.iter().map(|p| p * factor).collect(), ..self.clone() }
     }

@@ -1,34 +1,34 @@
-//! Euclidean clustering: points are connected by steps up to a given length.
+//! Euclidean clustering: points are connected if they are at most a given step apart.
 
 use crate::cloud::is_finite;
 use nalgebra::Point3;
 
-/// Clusters that cannot be made.
+/// Reason why points cannot be clustered.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ClusterError {
-    /// Step that is not positive.
+    /// The step is not positive.
     #[error("a step of {step_m} m: give a positive length, such as 0.02")]
     Step {
-        /// Value that was given.
+        /// Given step, metres.
         step_m: f32,
     },
-    /// Point beyond the countable range of cells.
+    /// A point lies too far from the first to be assigned to a cell.
     #[error(
         "a point lies more than a million steps of {step_m} m from the first: are these millimetres (scale by 0.001), or a stray return?"
     )]
     TooFar {
-        /// The step asked for.
+        /// Given step, metres.
         step_m: f32,
     },
 }
 
-/// Clusters of points connected by steps up to `step_m`, with at least `least` points: by size,
-/// ties by first point. Indices ascend within a cluster; missing returns belong to none.
+/// Indices of the points of each cluster: connected by steps up to `step_m`, with at least `least` points. Largest
+/// first, ties by first point; indices ascend within a cluster. Missing returns belong to no cluster.
 ///
-/// Every pair within the step counts, whatever the order of the points: single linkage, as DBSCAN with one point a core.
+/// Points within the step are connected whatever their order: single linkage, as DBSCAN with every point a core point.
 ///
 /// # Errors
-/// If the step is not positive, or a point lies absurdly far from the others.
+/// If the step is not positive, or a point lies more than about a million steps from the first.
 pub fn euclidean(points: &[Point3<f32>], step_m: f32, least: usize) -> Result<Vec<Vec<u32>>, ClusterError> {
     let _span = tracing::debug_span!("clusters", points = points.len()).entered();
     if !(step_m > 0.0 && step_m.is_finite()) {
@@ -44,12 +44,12 @@ pub fn euclidean(points: &[Point3<f32>], step_m: f32, least: usize) -> Result<Ve
 struct Cells {
     /// Cell coordinates, ascending by (z, y, x).
     key: Vec<[i32; 3]>,
-    /// Start of each cell's points in `items`, plus the total.
+    /// Index of each cell's first item, and the number of items at the end.
     begin: Vec<u32>,
     items: Vec<(Point3<f32>, u32)>,
 }
 
-/// Cells to either side that a step can reach: the edge is the step over the square root of three.
+/// Number of cells to either side that a step can reach: a cell's edge is the step over the square root of three.
 const REACH: i32 = 2;
 
 impl Cells {
@@ -87,8 +87,8 @@ impl Cells {
         &self.items[self.begin[cell] as usize..self.begin[cell + 1] as usize]
     }
 
-    /// Joins all cells with points within a step of each other. A cursor per preceding row of cells
-    /// advances with the current cell, so that no search is needed.
+    /// Joins all cells that have points within a step of each other. One cursor per preceding row of cells advances
+    /// with the current cell, so that no search is needed.
     fn join(&self, sets: &mut Sets, step_m: f32) {
         let limit = step_m * step_m;
         let rows: Vec<(i32, i32)> = (-REACH..=0)
@@ -121,7 +121,7 @@ impl Cells {
     }
 }
 
-/// True if two points of the two cells lie within a step.
+/// True if a point of each cell are within a step of each other; `limit`: square of the step, square metres.
 fn near(a: &[(Point3<f32>, u32)], b: &[(Point3<f32>, u32)], limit: f32) -> bool {
     a.iter().any(|(p, _)| b.iter().any(|(q, _)| (p - q).norm_squared() <= limit))
 }

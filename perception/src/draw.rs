@@ -41,7 +41,7 @@ impl Draws {
         Some(drawn)
     }
 
-    /// The numbers below `end` in random order (Fisher and Yates).
+    /// Numbers below `end` in random order (Fisher and Yates).
     pub(crate) fn order(&mut self, end: usize) -> Vec<u32> {
         let mut order: Vec<u32> = (0..end as u32).collect();
         for i in (1..end).rev() {

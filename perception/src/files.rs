@@ -15,11 +15,10 @@ mod text;
 pub use error::{FileError, Place};
 pub use loaded::Loaded;
 
-/// Reads a cloud (PCD, PLY, NPY, LAS, or text: XYZ, CSV, PTS); the format follows from the first
-/// bytes.
+/// Reads a point cloud (PCD, PLY, NPY, LAS, or text: XYZ, CSV, PTS); the format is detected from the first bytes.
 ///
 /// # Errors
-/// If it is none of these, or broken.
+/// If the format is none of these, or the file is damaged.
 pub fn read_cloud(bytes: &[u8]) -> Result<Loaded, FileError> {
     if bytes.starts_with(b"ply") {
         return ply::read(bytes);

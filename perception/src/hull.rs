@@ -1,28 +1,28 @@
-//! The convex hull of points in a plane.
+//! Convex hull of points in a plane.
 
 use crate::plane::Plane;
 use crate::polygon::convex_hull;
 use crate::spread::tangents;
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
-/// A convex region of a plane.
+/// Convex polygon in a plane in space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hull {
-    /// The plane.
+    /// Plane of the polygon.
     pub plane: Plane,
-    /// Origin of the plane's own coordinates.
+    /// Origin of the plane's coordinates.
     pub origin: Point3<f64>,
-    /// First axis, a unit vector.
+    /// First axis of the plane's coordinates, a unit vector.
     pub u: Vector3<f64>,
-    /// Second axis; `u`, `v`, normal are right-handed.
+    /// Second axis, a unit vector; `u`, `v` and the normal are right-handed.
     pub v: Vector3<f64>,
-    /// Corners in plane coordinates, anticlockwise seen against the normal, metres; two for
+    /// Corners in the plane's coordinates, metres, anticlockwise as seen from the side the normal points to; two for
     /// collinear points, one for coincident points.
     pub corners: Vec<Point2<f64>>,
 }
 
 impl Hull {
-    /// Convex hull of the finite points projected along the normal; `None` without finite points.
+    /// Creates the convex hull of the finite points, projected along the normal; `None` without finite points.
     pub fn around<'a>(plane: Plane, points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Hull> {
         let (u, v) = tangents(&plane.normal);
         let origin = Point3::from(plane.normal * plane.offset_m);
@@ -35,23 +35,23 @@ impl Hull {
         (!flat.is_empty()).then(|| Hull { plane, origin, u, v, corners: convex(flat) })
     }
 
-    /// A point's foot in the plane's coordinates, metres.
+    /// Projection of a point onto the plane, in the plane's coordinates, metres.
     pub fn flatten(&self, p: &Point3<f64>) -> Point2<f64> {
         let d = p - self.origin;
         Point2::new(d.dot(&self.u), d.dot(&self.v))
     }
 
-    /// Point in space from plane coordinates.
+    /// Point in space with the given plane coordinates, metres.
     pub fn lift(&self, q: &Point2<f64>) -> Point3<f64> {
         self.origin + self.u * q.x + self.v * q.y
     }
 
-    /// The corners in space.
+    /// Corners of the polygon as points in space, metres.
     pub fn corners_in_space(&self) -> Vec<Point3<f64>> {
         self.corners.iter().map(|c| self.lift(c)).collect()
     }
 
-    /// Distance from the foot of `p` to the border, metres: negative inside, positive outside.
+    /// Distance of the projection of `p` from the border, metres: negative inside, positive outside.
     pub fn distance_m(&self, p: &Point3<f64>) -> f64 {
         let q = self.flatten(p);
         let mut inside = self.corners.len() > 2;
@@ -66,12 +66,12 @@ impl Hull {
         if inside { -nearest } else { nearest }
     }
 
-    /// True if the projection of `p` lies in the hull widened by `margin_m` (negative: shrunk).
+    /// True if the projection of `p` lies in the polygon widened by `margin_m` (negative: shrunk).
     pub fn contains(&self, p: &Point3<f64>, margin_m: f64) -> bool {
         self.distance_m(p) <= margin_m
     }
 
-    /// Area, square metres.
+    /// Area of the polygon, square metres.
     pub fn area_m2(&self) -> f64 {
         self.edges().map(|(a, b)| a.coords.perp(&b.coords)).sum::<f64>() / 2.0
     }
@@ -81,7 +81,7 @@ impl Hull {
         self.edges().map(|(a, b)| (b - a).norm()).sum()
     }
 
-    /// Centroid of the hull in plane coordinates; mean of the corners if the area is zero.
+    /// Centroid of the polygon in plane coordinates, metres; mean of the corners if the area is zero.
     pub fn centre(&self) -> Point2<f64> {
         let first = self.corners.first().map_or(Vector2::zeros(), |c| c.coords);
         let (mut sum, mut twice_area) = (Vector2::zeros(), 0.0);
@@ -103,7 +103,7 @@ impl Hull {
     }
 }
 
-/// Corners of the convex hull of the finite points, anticlockwise, without points on its edges.
+/// Corners of the convex hull of the finite points, anticlockwise, without points inside its edges.
 pub fn convex(points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
     let finite = points.iter().filter(|p| p.x.is_finite() && p.y.is_finite());
     convex_hull(finite.map(|p| [p.x, p.y]).collect()).into_iter().map(Point2::from).collect()

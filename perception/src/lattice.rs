@@ -2,21 +2,20 @@
 
 use nalgebra::{Point3, Vector3};
 
-/// Numbers voxels, with x most significant, then y, then z. The lattice is anchored at the world's
+/// Numbering of voxels by integer keys, with x most significant, then y, then z. The lattice is anchored at the world's
 /// origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice {
     pub per_m: f64,
-    /// Lowest voxel, with a layer of margin.
+    /// Integer coordinates of the lowest voxel, with a margin of one voxel.
     low: [f64; 3],
-    /// The bit shifts of x and y in a key.
+    /// Bit shifts of x and y in a key.
     shift: [u32; 2],
     pub bits: u32,
 }
 
 impl Lattice {
-    /// Lattice over a box, with voxels at least `voxel_m` wide, and wider if their numbers would
-    /// exceed 64 bits.
+    /// Creates a lattice over a box, with voxels at least `voxel_m` wide, and wider if keys would exceed 64 bits.
     pub fn over(low: &Point3<f64>, high: &Point3<f64>, mut voxel_m: f64) -> Lattice {
         loop {
             let per_m = 1.0 / voxel_m;
@@ -32,21 +31,21 @@ impl Lattice {
         }
     }
 
-    /// Key of the voxel that holds a point of the box.
+    /// Key of the voxel that contains a point of the box.
     #[inline(always)]
     pub fn key(&self, p: &Vector3<f64>) -> u64 {
         let [i, j, k] = [0, 1, 2].map(|axis| (p[axis] * self.per_m - self.low[axis]) as u64);
         i << self.shift[0] | j << self.shift[1] | k
     }
 
-    /// Key offsets of the nine voxel columns around a voxel; added to a key, each gives the first
-    /// of three consecutive voxels.
+    /// Key offsets of the nine columns of voxels around a voxel; added to the voxel's key, each gives the first of
+    /// three consecutive voxels.
     fn columns(&self) -> [i64; 9] {
         let (x, y) = (1_i64 << self.shift[0], 1_i64 << self.shift[1]);
         std::array::from_fn(|c| (c as i64 / 3 - 1) * x + (c as i64 % 3 - 1) * y - 1)
     }
 
-    /// Stable sort of keys with payload; overwrites `spare`.
+    /// Sorts keys with their payload, stably; overwrites `spare`.
     pub fn sort(&self, entries: &mut Vec<(u64, u32)>, spare: &mut Vec<(u64, u32)>) {
         const DIGIT: u32 = 11;
         const SMALL: usize = 2048;
@@ -76,7 +75,7 @@ impl Lattice {
     }
 }
 
-/// Walks along sorted keys and keeps track of the occupied voxels around.
+/// Traversal of sorted keys that keeps track of the occupied voxels around.
 pub struct NeighbourSweep<'a> {
     keys: &'a [u64],
     columns: [i64; 9],
@@ -84,7 +83,7 @@ pub struct NeighbourSweep<'a> {
 }
 
 impl<'a> NeighbourSweep<'a> {
-    /// A walk that begins at the key number `first`.
+    /// Starts a traversal at the key with index `first`.
     pub fn from(lattice: &Lattice, keys: &'a [u64], first: usize) -> NeighbourSweep<'a> {
         let columns = lattice.columns();
         let starts = columns.map(|c| {
@@ -93,8 +92,8 @@ impl<'a> NeighbourSweep<'a> {
         NeighbourSweep { keys, columns, starts }
     }
 
-    /// Calls `found` with the indices of the occupied voxels among the 27 around a key, including
-    /// its own. Keys must not decrease from call to call.
+    /// Calls `found` with the indices of the occupied voxels among the 27 around and at a key. Keys must not decrease
+    /// from call to call.
     #[inline(always)]
     pub fn visit(&mut self, key: u64, mut found: impl FnMut(usize)) {
         for (start, column) in self.starts.iter_mut().zip(&self.columns) {

@@ -1,7 +1,7 @@
-//! Localisation of a seen surface on the map: alignment against the outline of a known table.
+//! Localisation of an observed surface on the map: alignment with the outline of a known table.
 //!
-//! Localisation errs by centimetres and degrees, and so does a merged cloud as a whole. A table whose outline the map
-//! knows tells by how much: the ends that were seen are laid on the edges of the outline.
+//! Localisation errs by centimetres and degrees, and so does a merged cloud as a whole. A table whose outline is in the
+//! map shows the error: the observed ends of the surface are aligned with the edges of the outline.
 
 #[doc(hidden)]
 pub mod endings;
@@ -13,29 +13,28 @@ use nalgebra::{
     UnitQuaternion, Vector2, Vector3,
 };
 
-/// Length of an edge per sample, metres.
+/// Length of outline edge that gives one sample, metres.
 const BIN_M: f64 = 0.02;
-/// Minimum number of endings for a sample.
+/// Minimum number of endings that give a sample.
 const FEWEST: usize = 2;
-/// Maximum distance of a sample from its edge, iteration by iteration: where the view cuts the surface off or
-/// an object hides its end, samples lie farther in than the edge.
+/// Maximum distance of a sample from its edge in each iteration, metres: where the view cuts the surface off or an
+/// object hides its end, samples lie farther inside.
 const GATES_M: [f64; 7] = [0.15, 0.12, 0.08, 0.05, 0.03, 0.02, 0.02];
-/// Standard deviation of a sample; centimetres, because neighbouring samples share their errors.
+/// Standard deviation of a sample, metres; centimetres, because neighbouring samples share their errors.
 const SAMPLE_SIGMA_M: f64 = 0.03;
-/// Minimum number of end samples on either of two opposite sides; with fewer, the observed extent
-/// is used.
+/// Minimum number of samples on each of two opposite sides; with fewer, the observed extent is used.
 const FEW: usize = 5;
-/// Standard deviation of the observed extent between opposite sides, and maximum shortfall of that
-/// extent, metres.
+/// Standard deviation of centring the observed extent between opposite sides, metres.
 const REACH_SIGMA_M: f64 = 0.01;
+/// Maximum difference between the observed extent and the distance of opposite sides for it to be centred, metres.
 const SHORT_M: f64 = 0.10;
 
-/// Alignment of a surface with its outline.
+/// Alignment of an observed surface with its outline in the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Located {
-    /// The transform from the cloud's frame to the map.
+    /// Correction from the cloud's frame to the map.
     pub map_from_world: Isometry3<f64>,
-    /// Samples of seen edges that found an edge of the outline.
+    /// Number of samples of observed ends that match an edge of the outline.
     pub matched: usize,
     /// Root mean square distance of the samples from the aligned outline, metres; 0 without
     /// samples.
@@ -44,7 +43,7 @@ pub struct Located {
     pub certainty: Option<Certainty>,
 }
 
-/// Certainty of a surface's place on the map.
+/// Certainty of a surface's position and heading on the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty {
     frame: Frame,
@@ -54,8 +53,8 @@ pub struct Certainty {
 }
 
 impl Certainty {
-    /// Least certain direction of a point along the surface, and the standard deviation in that
-    /// direction, metres.
+    /// Least certain direction in which a point may be shifted along the surface (unit vector), and the standard
+    /// deviation of that shift, metres.
     pub fn worst(&self, at: &Point3<f64>) -> (Unit<Vector3<f64>>, f64) {
         let p = self.frame.flat(at);
         let moved = Matrix2x3::new(1.0, 0.0, -p.y, 0.0, 1.0, p.x);
@@ -67,12 +66,12 @@ impl Certainty {
     }
 }
 
-/// Aligns the observed edges of a surface with the map's outline (in order, metres). Between
-/// opposite sides without an observed edge, the extent of `hull` is used if hardly shorter: a board
-/// between uprights shows no edge.
+/// Aligns the observed ends of a surface with its outline in the map (corners in order, metres). Between opposite sides
+/// without observed ends, the extent of `hull` is centred if it is hardly shorter: a board between uprights shows no
+/// ends.
 ///
-/// `sigma_m` and `sigma_rad` say how well the place in the map of what was seen is known before: where no ending tells otherwise,
-/// it stays. Moves along the surface and turns about `up`; heights are left as they are.
+/// `sigma_m`, `sigma_rad`: prior standard deviations of the cloud's position and heading in the map; the prior holds
+/// where no end says otherwise. The correction shifts along the surface and rotates about `up`; heights do not change.
 pub fn locate(
     endings: &[Ending],
     hull: &[Point3<f64>],
@@ -105,7 +104,7 @@ pub fn locate(
     located
 }
 
-/// An edge of the outline.
+/// Edge of the outline.
 struct Edge {
     from: Point2<f64>,
     along: Vector2<f64>,
@@ -113,7 +112,7 @@ struct Edge {
     length_m: f64,
 }
 
-/// An [`Ending`] in the plane of the outline.
+/// [`Ending`] projected onto the plane of the outline.
 struct End {
     on: Point2<f64>,
     past: Point2<f64>,
@@ -127,8 +126,8 @@ impl End {
         End { on: frame.flat(&ending.on), past: frame.flat(&ending.past), side, eye: frame.flat(&ending.eye) }
     }
 
-    /// Distance of an ending outside an edge, and half its uncertainty, metres; `None` if the
-    /// ending belongs to another side.
+    /// Distance of an ending beyond an edge (outward positive), and half its uncertainty, metres; `None` if the ending
+    /// belongs to another side.
     fn beyond(&self, edge: &Edge, moved: &Isometry2<f64>) -> Option<(f64, f64)> {
         let out = |p: &Point2<f64>| edge.outward.dot(&(moved * p - edge.from));
         let (on, past) = (out(&self.on), out(&self.past));
@@ -142,10 +141,10 @@ impl End {
 
 /// Sample matched with an edge of the outline.
 pub struct Match {
-    /// Sample at the current pose estimate.
+    /// Position of the sample at the current correction.
     at: Point2<f64>,
     normal: Vector2<f64>,
-    /// Signed, along the normal.
+    /// Signed distance of the sample from the edge along the normal, metres.
     distance_m: f64,
     variance_m2: f64,
 }
@@ -172,7 +171,7 @@ impl Frame {
         Point2::new(self.right.dot(&d), self.ahead.dot(&d))
     }
 
-    /// Planar motion as a motion in space.
+    /// Motion in space that corresponds to a motion in the plane.
     fn lift(&self, moved: &Isometry2<f64>) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&self.up, moved.rotation.angle());
         let shift = self.right * moved.translation.x + self.ahead * moved.translation.y;
@@ -194,8 +193,8 @@ fn edges(outline: &[Point2<f64>]) -> Vec<Edge> {
     (0..outline.len()).filter_map(edge).collect()
 }
 
-/// Samples of the surface's ends, one every [`BIN_M`] along each edge: mean of the endings nearest
-/// to that edge.
+/// Samples of the surface's ends, at most one per [`BIN_M`] along each edge: the mean of the endings that belong to
+/// this piece of the edge.
 fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) -> Vec<Match> {
     let mut bins: Vec<Vec<Bin>> =
         edges.iter().map(|edge| vec![Bin::default(); (edge.length_m / BIN_M) as usize]).collect();
@@ -220,8 +219,8 @@ fn samples(edges: &[Edge], ends: &[End], moved: &Isometry2<f64>, gate_m: f64) ->
     each.collect()
 }
 
-/// Matches between opposite sides of the outline without observed ends: an extent that nearly fills
-/// the distance is centred.
+/// Matches between opposite sides of the outline without observed ends: an extent that nearly equals their distance is
+/// centred.
 fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2<f64>) -> Vec<Match> {
     let is_open = |edge: &&Edge| ends.iter().filter(|m| m.normal == edge.outward).count() < FEW;
     let open: Vec<&Edge> = edges.iter().filter(is_open).collect();
@@ -245,7 +244,7 @@ fn spans(edges: &[Edge], hull: &[Point2<f64>], ends: &[Match], moved: &Isometry2
 /// Maximum cosine between the normals of opposite sides.
 const OPPOSITE: f64 = -0.98;
 
-/// Endings along a piece of an edge: count, sum of outward distances, and sum of half widths.
+/// Endings along a piece of an edge: number, sum of outward distances, and sum of half uncertainties, metres.
 #[derive(Clone, Default)]
 struct Bin {
     count: usize,
@@ -262,7 +261,7 @@ impl Bin {
     }
 }
 
-/// Gauss-Newton step towards the edges with the prior; returns the covariance as well.
+/// Pose after a Gauss-Newton step towards the edges and the prior, and its covariance.
 pub fn step(
     matches: &[Match],
     moved: &Isometry2<f64>,

@@ -1,7 +1,7 @@
-//! Nearest neighbours: a balanced tree of tight boxes over leaves of 32 points, stored by coordinate.
+//! Nearest neighbours: a balanced tree of tight boxes over leaves of 32 points, with one array per coordinate.
 //!
 //! The tree has no pointers: the node that covers leaves `a..b` has its left child next to it and its right child
-//! `2·(mid − a)` places on. Neighbours of all points are found leaf by leaf, so that 32 queries share one walk.
+//! `2·(mid − a)` places on. Neighbours of all points are found leaf by leaf, so that 32 queries share one traversal.
 
 mod all;
 mod nearby;
@@ -12,15 +12,15 @@ use nalgebra::Point3;
 
 pub(crate) use nearby::{Nearby, least};
 
-/// Points per leaf; the last leaf is padded with infinity, which is near nothing.
+/// Number of points per leaf; the last leaf is padded with infinite coordinates, which are near nothing.
 pub(crate) const LEAF: usize = 32;
 
-/// A neighbour of a query.
+/// Neighbour of a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
     /// Index in the points that the tree was built from.
     pub index: u32,
-    /// Squared distance, square metres.
+    /// Squared distance from the query point, square metres.
     pub distance_sq: f32,
 }
 
@@ -66,12 +66,13 @@ impl Bounds {
     }
 }
 
-/// [`f32::min`] and [`f32::max`] for numbers that are not NaN: a single instruction each.
+/// Minimum of numbers that are not NaN: a single instruction, unlike [`f32::min`].
 #[inline(always)]
 fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+/// Maximum of numbers that are not NaN: a single instruction, unlike [`f32::max`].
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -85,7 +86,7 @@ struct Item {
 
 /// Search tree over the finite points of a cloud.
 pub struct Neighbours {
-    /// Coordinates by slot; `LEAF` slots a leaf.
+    /// Coordinates by slot, of which each leaf has `LEAF`; the next two fields too.
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
@@ -97,7 +98,7 @@ pub struct Neighbours {
     given: usize,
 }
 
-/// Node with its range of leaves.
+/// Node of the tree with its range of leaves.
 #[derive(Clone, Copy)]
 struct Span {
     node: usize,
@@ -165,8 +166,8 @@ impl Neighbours {
         self.given
     }
 
-    /// Nearest point within `within_m`, the first in the tree among ties; `None` also for a
-    /// non-finite query.
+    /// Nearest point within `within_m`, the first in tree order among ties; `None` if there is none or the query is not
+    /// finite.
     pub fn nearest(&self, query: &Point3<f32>, within_m: f32) -> Option<Neighbour> {
         let mut best = Neighbour { index: u32::MAX, distance_sq: next_up(within_m * within_m) };
         if !self.is_empty() && is_finite(query) {
@@ -175,7 +176,7 @@ impl Neighbours {
         (best.index != u32::MAX).then_some(best)
     }
 
-    /// `k` nearest points, nearest first; all if there are fewer.
+    /// The `k` nearest points, nearest first; all if there are fewer, none if the query is not finite.
     pub fn k_nearest(&self, query: &Point3<f32>, k: usize) -> Vec<Neighbour> {
         let mut found = Vec::with_capacity(k.min(self.len) + 1);
         if k > 0 && !self.is_empty() && is_finite(query) {
@@ -184,7 +185,7 @@ impl Neighbours {
         found
     }
 
-    /// Calls `found` with every point within `radius_m`, in tree order.
+    /// Calls `found` with every point within `radius_m`, in tree order; with none if the query is not finite.
     pub fn within(&self, query: &Point3<f32>, radius_m: f32, mut found: impl FnMut(Neighbour)) {
         if self.is_empty() || !is_finite(query) {
             return;
@@ -211,7 +212,7 @@ impl Neighbours {
         }
     }
 
-    /// Indices of the points by slot.
+    /// Index of the point in each slot, without padding.
     pub(crate) fn indices(&self) -> &[u32] {
         &self.index[..self.len]
     }
@@ -301,13 +302,13 @@ impl Neighbours {
     }
 }
 
-/// Next larger number of a finite non-negative one.
+/// Next larger number of a finite number; other numbers are returned unchanged.
 fn next_up(value: f32) -> f32 {
     if value.is_finite() { value.next_up() } else { value }
 }
 
-/// Splits items at the median of the widest axis so that the left part fills whole leaves; the
-/// halves may be built in parallel.
+/// Builds the nodes: splits items at the median of the widest axis so that the left part fills whole leaves; the halves
+/// may be built in parallel.
 fn build(items: &mut [Item], nodes: &mut [Bounds], leaves: usize) {
     const PARALLEL_FROM: usize = 1 << 14;
     let bounds = Bounds::around(items);

@@ -1,4 +1,4 @@
-//! Surface normals, turned towards the sensor.
+//! Surface normals, pointing towards the sensor.
 
 mod organised;
 
@@ -9,20 +9,20 @@ use nalgebra::{Point3, Vector3};
 pub(crate) use organised::organised_where;
 pub use organised::{OrganisedOptions, organised};
 
-/// Surface at each point.
+/// Normal and curvature of the surface at each point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normals {
-    /// Unit normals towards the viewpoint; NaN where the neighbourhood is not a surface (collinear,
-    /// coincident, no return).
+    /// Unit normals towards the viewpoint; NaN where the neighbourhood is no surface (collinear or coincident points,
+    /// no return).
     pub normals: Vec<Vector3<f32>>,
-    /// Surface variation (Pauly, Gross, Kobbelt 2002, eq. 3): least eigenvalue over the sum, 0 flat to 1/3 round; NaN as above.
+    /// Surface variation (Pauly, Gross, Kobbelt 2002, eq. 3): least eigenvalue over the eigenvalues' sum, from 0 (flat)
+    /// to 1/3 (round); NaN where the normal is NaN.
     pub variation: Vec<f32>,
 }
 
-/// Normals from the `k` nearest points (itself included), towards `viewpoint` (metres, in the
-/// points' frame).
+/// Estimates normals from the `k` nearest points (itself included), towards `viewpoint` (metres, in the points' frame).
 ///
-/// `tree` must be built from `points`. Needs three points or more that do not lie on a line; elsewhere the normal is NaN.
+/// Where fewer than three neighbours exist or all lie on a line, the normal is NaN.
 pub fn estimate(tree: &Neighbours, k: usize, viewpoint: &Point3<f32>) -> Normals {
     let _span = tracing::debug_span!("normals", points = tree.len(), k).entered();
     let none = [f32::NAN; 4];
@@ -33,7 +33,8 @@ pub fn estimate(tree: &Neighbours, k: usize, viewpoint: &Point3<f32>) -> Normals
     }
 }
 
-/// Normal and variation from the neighbours of a slot.
+/// Normal (three numbers) and variation from the neighbours of a point; NaN if they form no surface. `slot`: position
+/// of the point in the tree.
 #[inline(always)]
 fn surface(tree: &Neighbours, slot: usize, near: &Nearby, viewpoint: &Point3<f32>) -> [f32; 4] {
     let at = tree.at(slot);

@@ -1,13 +1,13 @@
-//! A map as cells that are open, occupied or unknown.
+//! Occupancy grid: a map as cells that are free, occupied or unknown.
 
 use nalgebra::{Point2, Vector2};
 use serde::{Deserialize, Serialize};
 
-/// The content of a cell of a map.
+/// Content of a cell of a map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Space {
-    /// Unknown cell.
+    /// Not reliably observed.
     #[default]
     Unknown,
     /// Reliably empty.
@@ -19,18 +19,18 @@ pub enum Space {
 /// Occupancy grid of the static environment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Occupancy {
-    /// The corner of the first cell that has the least coordinates, in the map.
+    /// Corner of the grid with the least coordinates, in the map, metres.
     pub origin: Point2<f64>,
     /// Edge of a cell, metres.
     pub cell_m: f64,
-    /// Cells along x.
+    /// Number of cells along x.
     pub width: usize,
-    /// Cells along x, row by row in ascending y. Cells that are missing are unknown.
+    /// Cells along x, row by row in ascending y; missing cells are unknown.
     pub cells: Vec<Space>,
 }
 
 impl Occupancy {
-    /// Content of the map at a place.
+    /// Content of the cell at a place (map, metres); unknown outside the grid.
     pub fn at(&self, place: &Point2<f64>) -> Space {
         let cell = (place - self.origin) / self.cell_m;
         self.cell(cell.x.floor(), cell.y.floor())
@@ -44,8 +44,8 @@ impl Occupancy {
         Space::Unknown
     }
 
-    /// False if the place is free and farther than `margin_m` from occupied cells; otherwise a
-    /// reading there may be of the environment.
+    /// True if a reading at a place may be of the environment: the place is not free, or an occupied cell is within
+    /// `margin_m`.
     pub fn is_background(&self, place: &Point2<f64>, margin_m: f64) -> bool {
         if self.at(place) != Space::Free {
             return true;

@@ -1,23 +1,23 @@
-//! Stray points.
+//! Removal of stray points.
 
 use crate::neighbours::Neighbours;
 
-/// Result of [`statistical`].
+/// Result of the outlier filter [`statistical`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
     /// Indices of the kept points, ascending; missing returns are dropped.
     pub indices: Vec<u32>,
-    /// Mean over the cloud of the mean distance to the neighbours, metres.
+    /// Mean over all points of the mean distance to their neighbours, metres.
     pub mean_m: f64,
-    /// Standard deviation, metres.
+    /// Standard deviation of that mean distance over all points, metres.
     pub sigma_m: f64,
-    /// Points whose neighbours are on average farther than this were dropped, metres.
+    /// Mean distance to the neighbours beyond which points are dropped, metres.
     pub limit_m: f64,
 }
 
-/// Keeps the points whose mean distance to their `k` nearest (themselves included) is below the
-/// cloud's mean plus `sigmas` standard deviations (Rusu et al. 2008, section 4.1). With fewer than
-/// `k` points, all of them count.
+/// Keeps the points whose mean distance to their `k` nearest points (themselves included) is below the cloud's mean
+/// plus `sigmas` standard deviations (Rusu et al. 2008, section 4.1). In a cloud of fewer than `k` points, all of them
+/// count as neighbours.
 pub fn statistical(tree: &Neighbours, k: usize, sigmas: f64) -> Kept {
     let _span = tracing::debug_span!("statistical outliers", points = tree.len(), k).entered();
     let means = tree.map_all(k, f32::NAN, |_, near| {

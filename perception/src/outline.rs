@@ -1,42 +1,43 @@
-//! The rectangle that best explains the outline of an object seen from above.
+//! Rectangle that best explains the outline of an object seen from above.
 
 use nalgebra::Point3;
 
-/// An upright box in the surface's frame.
+/// Rectangle in the horizontal plane of the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectangle {
-    /// Middle, metres.
+    /// x of the centre, metres.
     pub x: f64,
-    /// Middle, metres.
+    /// y of the centre, metres.
     pub y: f64,
     /// Longer and shorter side, metres.
     pub sides_m: [f64; 2],
-    /// Sine and cosine of the rectangle's rotation, and its sides along the rotated axes, metres.
+    /// Sine and cosine of the rectangle's rotation.
     pub turn: (f64, f64),
+    /// Sides along the rotated x axis and the rotated y axis, metres.
     pub along_m: [f64; 2],
-    /// Root mean square distance of the side points from the nearest edge, metres.
+    /// Root mean square distance of the points from the nearest edge, metres.
     pub residual_m: f64,
 }
 
 impl Rectangle {
-    /// Rectangle of no points. From: mark.
+    /// Empty rectangle, for no points. From: mark.
     pub const NONE: Rectangle =
         Rectangle { x: 0.0, y: 0.0, sides_m: [0.0; 2], turn: (0.0, 1.0), along_m: [0.0; 2], residual_m: 0.0 };
 }
 
-/// Number of orientations over a quarter turn, and stride of the coarse search before the best is
-/// refined.
+/// Number of orientations over a quarter turn.
 const TURNS: usize = 30;
+/// Stride of the coarse search over the orientations.
 const APART: usize = 3;
-/// Maximum number of points used for the fit, and for the rotation search.
+/// Maximum number of points used for the fit.
 const MOST: usize = 800;
+/// Maximum number of points used for the coarse search.
 const SCOUTS: usize = 300;
-/// Points that are looked at together.
+/// Number of points processed together.
 const BLOCK: usize = 16;
 
-/// Fits a rectangle to points by rotation: the extents bound nearly all points, then each edge
-/// moves to the mean of the points nearest to it. The residual is the misfit of the points to the
-/// edges.
+/// Fits a rectangle to points by rotation: its sides bound nearly all points, then each edge moves to the mean of the
+/// points nearest to it. `None` for fewer than eight points.
 pub fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.len() < 8 {
         return None;
@@ -53,7 +54,7 @@ pub fn fit(points: &[Point3<f64>]) -> Option<Rectangle> {
     Some(turned.rectangle(turner.origin, (squares / turner.len as f64).sqrt()))
 }
 
-/// True if some rectangle fits the points, as [`fit`] does, with a lesser residual.
+/// True if the best rectangle by rotation has at most the given residual, metres.
 pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     if points.len() < 8 {
         return false;
@@ -72,7 +73,7 @@ pub(crate) fn fits(points: &[Point3<f64>], residual_m: f64) -> bool {
     best.is_some_and(|(squares, _)| squares <= bound_of(&turner))
 }
 
-/// Bounding rectangle of least area around nearly all points; without a residual.
+/// Bounding rectangle of least area around nearly all points, with residual 0; `None` without points.
 pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     if points.is_empty() {
         return None;
@@ -86,8 +87,8 @@ pub(crate) fn bounding(points: &[Point3<f64>]) -> Option<Rectangle> {
     Some(turner.turned(turn).rectangle(turner.origin, 0.0))
 }
 
-/// Rotation of least cost, with the cost: the best of a few candidates on some points, or one
-/// beside it. `cost` gets the minimum so far and may return `None` above it.
+/// Rotation of least cost, with the cost first: the best of a coarse search on the points of `scouts`, or a rotation
+/// beside it. `cost` gets the least cost so far and may return `None` above it.
 fn best_turn(
     scouts: &mut Turner,
     all: &mut Turner,
@@ -108,24 +109,25 @@ fn best_turn(
     best_of(all, &mut std::iter::once(0).chain(aside).map(|aside| (among + aside) % TURNS))
 }
 
-/// Points seen from above, with coordinates along the sides at the last rotation.
+/// Points seen from above, and their coordinates along the sides at the last rotation.
 struct Turner {
-    /// Number of points. Coordinates are relative to the first point, so that single precision
-    /// suffices, and padded to whole blocks with points inside every side.
+    /// Number of points. Coordinates are relative to the first point, so that single precision suffices, and padded
+    /// with NaN to whole blocks.
     len: usize,
     origin: [f64; 2],
     xs: Vec<f32>,
     ys: Vec<f32>,
     us: Vec<f32>,
     vs: Vec<f32>,
-    /// The outward reach of each block of points across each side: a lesser value is farther out.
+    /// For each block and side, the outermost coordinate of the block's points across the side, as a number that is
+    /// less the farther out it lies.
     reaches: Vec<[f32; 4]>,
-    /// Sides across the ends of `us`, then of `vs`.
+    /// Sides across the lower and upper end of `us`, then of `vs`.
     sides: [Side; 4],
 }
 
 impl Turner {
-    /// Prepares at most `most` of the points.
+    /// Prepares at most `most` of the points, evenly chosen.
     fn of(points: &[Point3<f64>], most: usize) -> Turner {
         let stride = points.len().div_ceil(most).max(1);
         let origin = points.first().map_or([0.0; 2], |p| [p.x, p.y]);
@@ -159,11 +161,11 @@ impl Turner {
         Turned { sin, cos, u: u.map(f64::from), v: v.map(f64::from) }
     }
 
-    /// Moves each edge to the mean of its nearest points; the bounding rectangle is too large by
+    /// Rectangle with each edge moved to the mean of the points nearest to it; the bounding rectangle is too large by
     /// the noise.
     fn settled(&self, mut turned: Turned) -> Turned {
         const ROUNDS: usize = 5;
-        /// Minimum share of the points that moves an edge.
+        /// Minimum share of the points that an edge moves to.
         const LEAST_SHARE: f64 = 0.03;
         for _ in 0..ROUNDS {
             let ([u0, u1], [v0, v1]) = (turned.u, turned.v);
@@ -179,7 +181,7 @@ impl Turner {
         turned
     }
 
-    /// Sum of the squared distances of the points from their nearest edges; `None` above the bound.
+    /// Sum of the squared distances of the points from their nearest edges, square metres; `None` above the bound.
     fn squares_within(&self, turned: &Turned, bound: f64) -> Option<f64> {
         let ([u0, u1], [v0, v1]) = (turned.u.map(|u| u as f32), turned.v.map(|v| v as f32));
         let lesser = |a: f32, b: f32| if a < b { a } else { b };
@@ -203,8 +205,8 @@ impl Turner {
     }
 }
 
-/// Adds the points of a block to the sums of their nearest edges: coordinate across the edge, and
-/// count.
+/// Adds the points of a block to the sums of their nearest edges: sum of the coordinate across the edge, and number of
+/// points.
 #[inline(always)]
 fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32; 4]) -> [(f64, f64); 4] {
     let mut own = [([0.0; BLOCK], [0.0; BLOCK]); 4];
@@ -227,17 +229,17 @@ fn add_nearest(sums: [(f64, f64); 4], [us, vs]: [&[f32; BLOCK]; 2], edges: [f32;
     std::array::from_fn(|n| (sums[n].0 + sum(&own[n].0), sums[n].1 + sum(&own[n].1)))
 }
 
-/// Side of the rectangle, with the points outside it.
+/// Side of the rectangle, with the points on and outside it.
 struct Side {
-    /// Points outside and on the side, outermost at the last rotation.
+    /// Indices of the points that were on or outside the side at the last rotation.
     outermost: Vec<usize>,
-    /// The outermost values, [`ranked`].
+    /// Sort keys of the outermost points, as of [`ranked`].
     found: Vec<u64>,
 }
 
 impl Side {
-    /// Position of the side when turned, from the points' positions across the side and the outward
-    /// reach of each block: less is farther out.
+    /// Position of the side at a new rotation, from the points' positions across the side and the outermost position in
+    /// each block; less is farther out.
     fn turn(&mut self, places: &[f32], reaches: impl Iterator<Item = f32>, way: impl Fn(f32) -> f32) -> f32 {
         // The side lies no farther in than the points that were outermost before.
         let before = self.outermost.iter().map(|&i| way(places[i]));
@@ -275,15 +277,14 @@ fn ranked(place: f32, number: u32) -> u64 {
     u64::from(order) << 32 | u64::from(number)
 }
 
-/// Rotates the points of a block, and returns their coordinates across each side; NaN does not
-/// count.
+/// Rotates the points of a block, and returns their outermost coordinates across each side; NaN is ignored.
 #[inline(always)]
 fn turn_block(
     [xs, ys]: [&[f32; BLOCK]; 2],
     [us, vs]: [&mut [f32; BLOCK]; 2],
     (sin, cos): (f32, f32),
 ) -> [f32; 4] {
-    /// Points that are turned side by side. From: work.
+    /// Number of points rotated at a time. From: work.
     const LANES: usize = 4;
     let lesser = |a: f32, b: f32| if a < b { a } else { b };
     let greater = |a: f32, b: f32| if a > b { a } else { b };
@@ -302,7 +303,8 @@ fn turn_block(
     [left, -right, front, -back]
 }
 
-/// The sides that bound nearly all points, the rectangle turned.
+/// Rotated rectangle whose sides bound nearly all points: sine and cosine of the rotation, and the limits along both
+/// rotated axes, metres.
 struct Turned {
     sin: f64,
     cos: f64,
@@ -311,12 +313,12 @@ struct Turned {
 }
 
 impl Turned {
-    /// The sides along the axes that are turned, metres.
+    /// Sides along both rotated axes, metres.
     fn along_m(&self) -> [f64; 2] {
         [self.u, self.v].map(|[low, high]| high - low)
     }
 
-    /// The rectangle of points that were relative to an origin.
+    /// Rectangle in the frame in which the points' origin has the given coordinates.
     fn rectangle(&self, origin: [f64; 2], residual_m: f64) -> Rectangle {
         let ([u0, u1], [v0, v1]) = (self.u, self.v);
         let (u, v) = (0.5 * (u0 + u1), 0.5 * (v0 + v1));

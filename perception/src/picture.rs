@@ -1,26 +1,26 @@
-//! Pictures of clouds: depth-shaded PNG images with a colour a label.
+//! Pictures of clouds: PNG images shaded by depth, with one colour per label.
 
 use crate::cloud::{Cloud, is_finite};
 use image::{ImageEncoder, Rgb, RgbImage};
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::io::Cursor;
 
-/// The viewpoint and the size of a picture.
+/// Viewpoint and size of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureOptions {
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Position of the eye, metres.
+    /// Position of the camera, metres.
     pub eye: Point3<f64>,
-    /// The target of the camera, metres.
+    /// Point that the camera looks at, metres.
     pub target: Point3<f64>,
-    /// The up direction in the picture.
+    /// Up direction in the picture.
     pub up: Vector3<f64>,
-    /// Vertical opening angle, radians.
+    /// Vertical opening angle of the camera, radians.
     pub opening_rad: f64,
-    /// Side of a point, metres.
+    /// Side of the square drawn for a point, metres.
     pub point_m: f64,
 }
 
@@ -38,32 +38,32 @@ impl Default for PictureOptions {
     }
 }
 
-/// A picture that cannot be made.
+/// Reason why a picture cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PictureError {
-    /// The eye is at the target, or looks along `up`, or the size is zero.
+    /// The camera is at the target or looks along `up`, or the size or the opening angle is zero.
     #[error(
         "eye {eye:?} and target {target:?} give no view of {width} x {height} pixels: move the eye, or give a size"
     )]
     View {
-        /// The eye.
+        /// Position of the camera, metres.
         eye: [f64; 3],
-        /// The target.
+        /// Point that the camera looks at, metres.
         target: [f64; 3],
-        /// Columns.
+        /// Number of columns.
         width: u32,
-        /// Rows.
+        /// Number of rows.
         height: u32,
     },
-    /// The numbers of labels and of points differ.
+    /// There is not one label per point.
     #[error("{labels} labels for {points} points: give one a point")]
     Labels {
-        /// Number of labels given.
+        /// Number of labels.
         labels: usize,
-        /// Needed.
+        /// Number of points.
         points: usize,
     },
-    /// PNG encoding failed.
+    /// Encoding as PNG failed, for the given reason.
     #[error("the picture could not be encoded: {0}")]
     Encode(String),
 }
@@ -81,11 +81,11 @@ const COLOURS: [[f32; 3]; 9] = [
     [120.0, 200.0, 60.0],
 ];
 
-/// Renders a cloud as PNG. `labels` select colours (0 is grey); nearer points are lighter, and
-/// normals shade.
+/// Renders a cloud as PNG. `labels` select colours (0 is grey); nearer points are lighter, and points whose normals
+/// face the camera too.
 ///
 /// # Errors
-/// If the view is none, or labels and points differ in number.
+/// If the options give no view, or labels and points differ in number.
 pub fn png(cloud: &Cloud, labels: &[u32], options: &PictureOptions) -> Result<Vec<u8>, PictureError> {
     if labels.len() != cloud.len() {
         return Err(PictureError::Labels { labels: labels.len(), points: cloud.len() });
@@ -132,7 +132,7 @@ impl Canvas {
         }
     }
 
-    /// Draws one point as a square, in a camera frame that looks along −z.
+    /// Draws a point as a square; `q`: the point in a camera frame that looks along −z, metres.
     fn put(&mut self, q: &Point3<f64>, label: u32, shade: f32) {
         let depth = -q.z;
         if depth < 0.05 {

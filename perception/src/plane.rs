@@ -1,4 +1,4 @@
-//! Dominant plane of a cloud.
+//! Planes, and the dominant plane of a cloud.
 
 mod search;
 
@@ -8,22 +8,22 @@ use std::ops::RangeInclusive;
 
 pub use search::{find, refit};
 
-/// All points `p` with `normal · p = offset_m`.
+/// Plane: all points `p` with `normal · p = offset_m`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Unit normal.
     pub normal: Vector3<f64>,
-    /// Distance from the origin along the normal, metres.
+    /// Signed distance of the plane from the origin along the normal, metres.
     pub offset_m: f64,
 }
 
 impl Plane {
-    /// Plane through `at` with a unit `normal`.
+    /// Creates the plane through `at` with a unit `normal`.
     pub fn through(at: &Point3<f64>, normal: Vector3<f64>) -> Plane {
         Plane { normal, offset_m: normal.dot(&at.coords) }
     }
 
-    /// Signed distance, metres; positive on the normal's side.
+    /// Signed distance of a point from the plane, metres; positive on the normal's side.
     pub fn height_m(&self, p: &Point3<f64>) -> f64 {
         self.normal.dot(&p.coords) - self.offset_m
     }
@@ -33,26 +33,26 @@ impl Plane {
         Plane { normal: -self.normal, offset_m: -self.offset_m }
     }
 
-    /// Plane with its normal towards `p`.
+    /// Same plane with its normal pointing to the side of `p`.
     pub fn facing(&self, p: &Point3<f64>) -> Plane {
         if self.height_m(p) < 0.0 { self.flipped() } else { *self }
     }
 }
 
-/// Plane to look for, and the effort of the search.
+/// Requirements on the plane to find, and effort of the search.
 #[derive(Clone, Debug)]
 pub struct PlaneOptions {
     /// Maximum distance of an inlier from the plane, metres.
     pub tolerance_m: f32,
-    /// Rounds of random sampling.
+    /// Number of random samples.
     pub rounds: usize,
-    /// Fixes the sampling.
+    /// Seed of the random sampling.
     pub seed: u64,
-    /// Direction and maximum angle (radians) of the normal; the result's normal points along the
-    /// direction.
+    /// Required direction of the normal and maximum angle from it, radians; the result's normal points along the
+    /// direction. `None`: any normal.
     pub tilt: Option<(Unit<Vector3<f64>>, f64)>,
-    /// With `tilt`: range of the plane's offset along its normal, metres, such as the height of a
-    /// table for an up direction and a frame on the floor.
+    /// Required offset of the plane along its normal, metres, such as the height of a table for an up direction and a
+    /// frame on the floor; used only with `tilt`. `None`: any offset.
     pub offset_m: Option<RangeInclusive<f64>>,
 }
 
@@ -62,7 +62,7 @@ impl Default for PlaneOptions {
     }
 }
 
-/// Plane with its support.
+/// Plane with the points that support it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaneFit {
     /// Plane with its normal along the requested direction, or else towards the origin (the
@@ -70,24 +70,24 @@ pub struct PlaneFit {
     pub plane: Plane,
     /// Indices of the points within the tolerance, ascending.
     pub inliers: Vec<u32>,
-    /// Finite points that were looked at.
+    /// Number of finite points among those given.
     pub of: usize,
     /// Root mean square distance of the inliers, metres.
     pub rms_m: f64,
-    /// Number of sampling iterations that gave a plane as requested.
+    /// Number of samples that gave a plane as required.
     pub rounds_used: usize,
 }
 
 /// Reason why no plane was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneError {
-    /// Fewer than three points are finite.
+    /// There are fewer than three finite points.
     #[error("{found} finite points: a plane needs three")]
     TooFew {
-        /// Number that was found.
+        /// Number of finite points.
         found: usize,
     },
-    /// No sample gave a plane as requested.
+    /// No sample gave a plane as required.
     #[error(
         "none of {rounds} samples gave a plane of the asked tilt and height: do the points lie on one line? widen the band, or sample more"
     )]
@@ -95,10 +95,10 @@ pub enum PlaneError {
         /// Number of samples taken.
         rounds: usize,
     },
-    /// Tolerance that is not positive.
+    /// The tolerance is not positive.
     #[error("a tolerance of {tolerance_m} m: give a positive length, such as 0.01")]
     Tolerance {
-        /// Value that was given.
+        /// Given tolerance, metres.
         tolerance_m: f32,
     },
 }

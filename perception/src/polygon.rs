@@ -1,4 +1,4 @@
-//! Convex polygons in a plane: hull, area, common part, and what lies inside.
+//! Convex polygons in a plane: hull, area, intersection, and point-in-polygon test.
 
 /// Area of a polygon with anticlockwise corners.
 pub(crate) fn area(corners: &[[f64; 2]]) -> f64 {
@@ -6,8 +6,8 @@ pub(crate) fn area(corners: &[[f64; 2]]) -> f64 {
     0.5 * corners.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
 }
 
-/// Intersection of a convex polygon with another, widened by a margin (Sutherland and Hodgman
-/// 1974).
+/// Intersection of a convex polygon with the polygon `by`, the latter widened by a margin (Sutherland and Hodgman
+/// 1974); empty if `by` has fewer than three corners.
 pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<[f64; 2]> {
     if by.len() < 3 {
         return Vec::new();
@@ -32,7 +32,8 @@ pub(crate) fn clip(polygon: Vec<[f64; 2]>, by: &[[f64; 2]], margin: f64) -> Vec<
     })
 }
 
-/// Corners of the convex hull, anticlockwise (Andrew's monotone chain).
+/// Corners of the convex hull, anticlockwise (Andrew's monotone chain). Fewer than three different points are returned
+/// as they are.
 pub fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     drop_inner(&mut points);
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
@@ -60,7 +61,7 @@ pub fn convex_hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     hull
 }
 
-/// Extreme points in the given directions.
+/// Farthest point in each of the given directions.
 fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 2]; N] {
     let mut far = [(f64::NEG_INFINITY, [0.0; 2]); N];
     for p in points {
@@ -77,9 +78,9 @@ fn farthest<const N: usize>(points: &[[f64; 2]], ways: [[f64; 2]; N]) -> [[f64; 
 /// Drops points well inside the octagon of extreme points, which are no hull corners (Akl and
 /// Toussaint 1978).
 fn drop_inner(points: &mut Vec<[f64; 2]>) {
-    /// Number of points below which they are sorted directly. From: work.
+    /// Number of points below which none are dropped. From: work.
     const WORTH_IT: usize = 64;
-    /// Directions of the corners of a box. From: derived, the four diagonals.
+    /// Directions towards the corners of a box. From: derived, the four diagonals.
     const SLANTS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
     /// Minimum doubled area between a point and an edge for the point to be inside, square metres.
     /// From: rounding.
@@ -108,7 +109,7 @@ fn drop_inner(points: &mut Vec<[f64; 2]>) {
     });
 }
 
-/// True if a convex outline, anticlockwise, holds a place.
+/// True if a convex polygon (corners anticlockwise) contains a point; the border counts as inside.
 pub fn holds<P: Copy + Into<[f64; 2]>>(outline: &[P], place: P) -> bool {
     let (n, p) = (outline.len(), place.into());
     n >= 3

@@ -1,5 +1,5 @@
-//! Thread pool. Work is passed as a reference to a closure, so that the scheduling code is compiled
-//! once rather than per use. Results are in index order, whatever the number of threads.
+//! Thread pool. Work is passed as a reference to a closure, so that the scheduling code is compiled once instead of for
+//! every use. Results are in index order, whatever the number of threads.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use tracing::Span;
 
-/// Number of chunks per thread, for load balancing.
+/// Number of chunks of work per thread, for load balancing.
 const SHARES: usize = 8;
 
 type Work<'a> = &'a mut (dyn FnMut() + Send);
@@ -27,7 +27,7 @@ pub(crate) fn join<A: Send, B: Send>(
     (first.expect("the first was done"), second.expect("the second was done"))
 }
 
-/// Runs work on chunks of a range of at least `least` items.
+/// Runs work on chunks of a range; a range of fewer than twice `least` items is not split.
 fn share(range: Range<usize>, least: usize, work: &(dyn Fn(Range<usize>) + Sync)) {
     if range.len() < 2 * least {
         return work(range);
@@ -41,8 +41,8 @@ fn length(count: usize, least: usize) -> usize {
     count.div_ceil(SHARES * rayon::current_num_threads()).max(least).max(1)
 }
 
-/// Collects the results (if any) for each index below `count`; a chunk has at least `least`
-/// indices. `state` belongs to one chunk.
+/// Collects the results other than `None` for the indices below `count`; a chunk has at least `least` indices, and a
+/// `state` of its own.
 pub(crate) fn filter_with<S, R: Send>(
     count: usize,
     least: usize,
@@ -62,7 +62,7 @@ pub(crate) fn filter_with<S, R: Send>(
     all
 }
 
-/// Collects the results, if any, of each number below `count`.
+/// Collects the results other than `None` for the indices below `count`; a chunk has at least `least` indices.
 pub(crate) fn filter<R: Send>(
     count: usize,
     least: usize,
@@ -71,17 +71,17 @@ pub(crate) fn filter<R: Send>(
     filter_with(count, least, || (), |(), n| result(n))
 }
 
-/// Collects the result of each number below `count`.
+/// Collects the results for the indices below `count`; a chunk has at least `least` indices.
 pub(crate) fn each<R: Send>(count: usize, least: usize, result: impl Fn(usize) -> R + Sync) -> Vec<R> {
     filter(count, least, |n| Some(result(n)))
 }
 
-/// Collects the result of each item of a slice.
+/// Collects the results for the items of a slice; a chunk has at least `least` items.
 pub(crate) fn map<T: Sync, R: Send>(all: &[T], least: usize, result: impl Fn(&T) -> R + Sync) -> Vec<R> {
     each(all.len(), least, |n| result(&all[n]))
 }
 
-/// Calls a function for each element with its index; `state` belongs to one chunk.
+/// Calls `work` for each element with its index; a chunk has at least `least` elements, and a `state` of its own.
 pub(crate) fn for_each<T: Send, S>(
     all: &mut [T],
     least: usize,
@@ -100,7 +100,7 @@ pub(crate) fn for_each<T: Send, S>(
     slices.clear();
 }
 
-/// Result of the first number in the range that has any.
+/// Result for the first number of the range whose result is not `None`.
 pub(crate) fn find_first<R: Send>(
     range: Range<usize>,
     result: impl Fn(usize) -> Option<R> + Sync,
@@ -117,13 +117,12 @@ pub(crate) fn find_first<R: Send>(
     found.into_iter().next()
 }
 
-/// Runs work inside a thread of the pool, so that nested parallel steps need not wake the pool each
-/// time.
+/// Runs work inside a thread of the pool, so that nested parallel steps need not wake the pool each time.
 pub(crate) fn within<R: Send>(span: Span, work: impl FnOnce() -> R + Send) -> R {
     rayon::scope(|_| span.in_scope(work))
 }
 
-/// Collects the result of each item in order; the heaviest items start first for load balancing.
+/// Collects the results for the items of a slice, in order; items of greatest weight start first, for load balancing.
 pub fn heaviest_first<T: Sync, R: Send>(
     all: &[T],
     weight: impl Fn(&T) -> usize,

@@ -1,12 +1,11 @@
 //! Quantiles.
 
-/// Quantiles of a segment's point heights that define its lower edge and its top, excluding noise.
-/// From: chosen.
+/// Quantiles of a segment's point heights that define its lower edge and its top, excluding noise. From: chosen.
 pub const POINT_ENDS: (f64, f64) = (0.01, 0.99);
-/// Quantiles for the voxels of a part, and for protrusions of a body. From: chosen.
+/// Lower and upper quantile that bound the voxels of a part, and protrusions of a body. From: chosen.
 pub(crate) const VOXEL_ENDS: (f64, f64) = (0.03, 0.97);
 
-/// Quantile of the values; 0 if empty. Reorders them.
+/// Value at the given share of the sorted values; 0 if there are none. Reorders the values.
 pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -14,7 +13,7 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
     *values.select_nth_unstable_by(rank(values.len(), share), f64::total_cmp).1
 }
 
-/// Value in the middle; 0 for none.
+/// Median of the values; 0 if there are none.
 pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     quantile(&mut values.collect::<Vec<f64>>(), 0.5)
 }
@@ -23,11 +22,12 @@ fn rank(count: usize, share: f64) -> usize {
     ((count - 1) as f64 * share).round() as usize
 }
 
-/// Size of the sample for choosing a limit, and minimum number of values for sampling. From: work.
+/// Size of the sample that estimates a limit. From: work.
 const SAMPLE: usize = 64;
+/// Minimum number of values for estimating a limit from a sample. From: work.
 const WORTH_IT: usize = 4 * SAMPLE;
 
-/// [`quantile`] for shares near 0 and 1, without reordering all values.
+/// [`quantile`], fast for shares near 0 and 1, without reordering the values.
 pub fn end(values: &[f64], share: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -36,9 +36,9 @@ pub fn end(values: &[f64], share: f64) -> f64 {
     if share < 0.5 { lowest(values, rank, |v| v) } else { -lowest(values, values.len() - 1 - rank, |v| -v) }
 }
 
-/// Value of a rank (0 is the minimum) among mapped values; sorts only those up to a sampled limit.
+/// Value of a rank (0 is the minimum) among the values mapped by `way`; sorts only those up to an estimated limit.
 fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
-    /// Values that are passed over together. From: work.
+    /// Number of values that are skipped together. From: work.
     const BLOCK: usize = 16;
     let mut kept: Vec<f64> = Vec::new();
     if values.len() >= WORTH_IT {
@@ -57,9 +57,9 @@ fn lowest(values: &[f64], rank: usize, way: impl Fn(f64) -> f64) -> f64 {
     *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// Upper limit from a sample, below which at least about `rank` of the values lie.
+/// Estimate from a sample of a limit that more than `rank` of the mapped values do not exceed.
 fn limit(values: &[f64], rank: usize, way: &impl Fn(f64) -> f64) -> f64 {
-    /// Standard deviations added to a sampled rank as a safety margin. From: work.
+    /// Number of standard deviations added to a sampled rank as a safety margin. From: work.
     const SAFE: f64 = 3.0;
     let stride = values.len() / SAMPLE;
     let mut sample: [f64; SAMPLE] = std::array::from_fn(|i| way(values[i * stride]));

@@ -1,7 +1,7 @@
 //! Shared length scales: accuracy of positions, edges and shapes in merged views.
 
-/// Position accuracy in merged views: closer points count as one place, metres. From: chosen, what
-/// is left of poses that err by centimetres; most uses bear half of it and twice as much.
+/// Position accuracy in merged views, metres: closer points count as one place. From: chosen, what is left of poses
+/// that err by centimetres; most uses bear half of it and twice as much.
 pub(crate) const PLACE_M: f64 = 0.008;
 /// Distance from which two positions are distinct, whatever their errors, metres. From: derived,
 /// two of them.
@@ -10,14 +10,14 @@ pub const APART_M: f64 = 2.0 * PLACE_M;
 pub const EDGE_M: f64 = 0.5 * PLACE_M;
 /// Deviation of real objects from the ideal forms, metres. From: derived, half of an edge.
 pub(crate) const SHAPE_M: f64 = 0.5 * EDGE_M;
-/// Number of spreads of a measurement beyond which a deviation is more than noise. From: chosen.
+/// Number of standard deviations beyond which a deviation is more than noise. From: chosen.
 pub(crate) const SPREADS: f64 = 3.0;
-/// Minimum and maximum reach of a handle from the body, and its maximum width, metres.
-/// From: chosen.
+/// Minimum and maximum distance that a handle reaches from the body, metres. From: chosen.
 pub(crate) const HANDLE_M: (f64, f64) = (0.014, 0.06);
+/// Maximum width of a handle, metres. From: chosen.
 pub(crate) const HANDLE_WIDTH_M: f64 = 0.035;
 
-/// [`f64::floor`], which is a call on some processors.
+/// Floor as an integer; [`f64::floor`] is a function call on some processors.
 #[inline(always)]
 pub(crate) fn floor(value: f64) -> i32 {
     let whole = value as i32;

@@ -1,14 +1,14 @@
-//! Second moments of points, and their direction of least spread.
+//! Second moments of points, and the direction of their least spread.
 
 use nalgebra::{Point3, Vector3};
 
-/// Sums for mean and covariance relative to a reference point, which avoids cancellation.
+/// Sums for mean and covariance of points, relative to a reference point, which avoids cancellation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Moments {
     about: [f64; 3],
     count: f64,
     sum: [f64; 3],
-    /// xx xy xz yy yz zz.
+    /// Sums of products: xx xy xz yy yz zz.
     products: [f64; 6],
 }
 
@@ -32,13 +32,13 @@ impl Moments {
         Point3::new(x, y, z)
     }
 
-    /// xx xy xz yy yz zz about the mean.
+    /// Covariance of the points: xx xy xz yy yz zz.
     pub(crate) fn covariance(&self) -> [f64; 6] {
         covariance(self.count, self.sum, self.products)
     }
 }
 
-/// Covariance (xx xy xz yy yz zz) from count, sum and sum of products about a common reference.
+/// Covariance (xx xy xz yy yz zz) from the count, sum and sums of products relative to a reference point.
 #[inline(always)]
 pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64; 6] {
     let per = 1.0 / count;
@@ -53,22 +53,20 @@ pub(crate) fn covariance(count: f64, sum: [f64; 3], products: [f64; 6]) -> [f64;
     ]
 }
 
-/// Direction of least spread.
+/// Direction of least spread of points, a unit vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
     pub normal: [f64; 3],
-    /// Minimum eigenvalue as a share of the sum: 0 is flat, 1/3 isotropic.
+    /// Least eigenvalue as a share of the eigenvalues' sum: 0 is flat, 1/3 isotropic.
     pub share: f64,
 }
 
-/// Minimum ratio of spreads across and along a line; below, the spread across is rounding of
-/// coordinates.
+/// Minimum ratio of the eigenvalues across and along a line; below it, the spread across is rounding of coordinates.
 const COLLINEAR: f64 = 1e-9;
 
-/// Maximum number of Newton steps towards the least eigenvalue; a few suffice, unless two
-/// eigenvalues nearly coincide.
+/// Maximum number of Newton steps towards the least eigenvalue; fewer suffice, unless two eigenvalues nearly coincide.
 const MOST_STEPS: usize = 40;
-/// Minimum step of the iteration; the remaining error is about its square and negligible.
+/// Step at which the iteration ends; the remaining error is about its square and negligible.
 const LAST_STEP: f64 = 1e-8;
 
 /// Direction of least spread of a covariance (xx xy xz yy yz zz); `None` for collinear or
@@ -79,9 +77,10 @@ pub fn least(c: &[f64; 6]) -> Option<Least> {
     least
 }
 
-/// Minimum eigenvalues of several covariances side by side.
+/// Directions of least spread of several covariances, computed side by side; `None` for collinear or coincident points.
 ///
-/// The characteristic polynomial falls and is convex from 0 to its least root: Newton's method rises to it and does not pass it.
+/// The characteristic polynomial falls and is convex from 0 to its least root, so that Newton's method rises to the
+/// root and does not pass it.
 #[inline(always)]
 pub fn least_of<const N: usize>(c: &[[f64; N]; 6]) -> [Option<Least>; N] {
     let scale = lanes::<N>(|i| c[0][i].max(c[3][i]).max(c[5][i]));

@@ -1,20 +1,20 @@
-//! View: cloud, camera pose and its uncertainty.
+//! View: cloud, camera pose and uncertainty of the pose.
 
 use crate::camera::Intrinsics;
 use crate::cloud::Cloud;
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
-/// View: cloud and camera pose.
+/// Cloud with the pose of the camera that measured it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct View {
     /// Time of the view, nanoseconds in the clock of the recording.
     pub stamp_ns: i64,
-    /// The cloud in the camera's optical frame (x right, y down, z forward), metres.
+    /// Cloud in the camera's optical frame (x right, y down, z forward), metres.
     pub cloud: Cloud,
-    /// Camera, if known; enables the distinction of free and unobserved space.
+    /// Camera intrinsics, if known; they allow free space to be told from unobserved space.
     pub intrinsics: Option<Intrinsics>,
-    /// Pose of the camera as stated by localisation.
+    /// Pose of the camera as stated by localisation, metres.
     pub world_from_camera: Isometry3<f64>,
     /// Standard deviation of the camera's position along each axis, metres.
     pub pose_sigma_m: f64,
@@ -23,7 +23,7 @@ pub struct View {
 }
 
 impl View {
-    /// View of a bare cloud, with the world as the camera's frame.
+    /// Creates a view of a bare cloud, with the world frame as the camera's optical frame.
     pub fn alone(cloud: Cloud) -> View {
         View {
             stamp_ns: 0,

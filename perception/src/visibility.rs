@@ -1,6 +1,6 @@
-//! Visibility of points: free, surface, hidden, or never observed.
+//! Visibility of points: free, on a surface, hidden, or never observed.
 //!
-//! A recogniser may only count something as absent (a handle, a lid) where a camera looked *through* the place.
+//! A recogniser may count something as absent (a handle, a lid) only where a camera looked *through* its place.
 
 use crate::camera::Intrinsics;
 use crate::cloud::{Cloud, is_finite};
@@ -10,16 +10,16 @@ use crate::view::View;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
-/// State of a point in one camera's view, or in the best of several.
+/// State of a point in one camera's view, or the best state in several views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Seen {
-    /// Outside all views, or a pixel without return.
+    /// Outside all views, or at a pixel without a return.
     Never,
     /// Behind a measured surface.
     Hidden,
-    /// A surface was measured here.
+    /// On a measured surface.
     Surface,
-    /// Seen through by a camera.
+    /// In free space that a camera looked through.
     Free,
 }
 
@@ -28,25 +28,25 @@ pub enum Seen {
 pub struct DepthMap {
     /// Camera intrinsics; the image has their size.
     pub intrinsics: Intrinsics,
-    /// World to optical frame.
+    /// Transformation from the world frame to the camera's optical frame.
     pub camera_from_world: Isometry3<f64>,
-    /// Depth along z, metres, row by row; NaN for missing returns.
+    /// Depths along the optical axis, metres, row by row; NaN for missing returns.
     pub depths_m: Arc<[f32]>,
-    /// Red, green and blue of the same pixels, if the camera gives them.
+    /// Red, green and blue of the same pixels; `None` without colours.
     pub colours: Option<Arc<[[u8; 3]]>>,
 }
 
-/// All that the cameras of a scene saw.
+/// Depth maps of all views of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
     /// One depth map per view.
     pub maps: Vec<DepthMap>,
-    /// True if the maps are original camera images, so that their rows show the cameras' attitude.
+    /// True if the maps are original camera images, so that their rows show how the cameras are held.
     pub held: bool,
 }
 
 impl DepthMap {
-    /// Depth map of a view; `None` if its cloud is not organised and has no camera.
+    /// Creates the depth map of a view; `None` if its cloud has neither a grid nor a known camera.
     ///
     /// An organised cloud without intrinsics gets them by least squares from its own pixels.
     pub fn from_view(view: &View, world_from_camera: &Isometry3<f64>) -> Option<DepthMap> {
@@ -63,7 +63,7 @@ impl DepthMap {
         Some(DepthMap { intrinsics, camera_from_world: world_from_camera.inverse(), depths_m, colours })
     }
 
-    /// Depth map from projecting a cloud (minimum depth per pixel); holes stay missing returns.
+    /// Creates a depth map by projecting a cloud (minimum depth per pixel); pixels without points are missing returns.
     fn project(
         cloud: &Cloud,
         camera_from_cloud: &Isometry3<f64>,
@@ -94,15 +94,15 @@ impl DepthMap {
         Point3::from(self.camera_from_world.inverse().translation.vector)
     }
 
-    /// State of a point of the world in this camera's view. A point within `tolerance_m` of the
-    /// measured surface counts as surface.
+    /// State of a world point in this camera's view. A point within `tolerance_m` of the measured surface counts as on
+    /// the surface.
     ///
-    /// Free needs every return in the 3×3 pixels around to lie beyond the point: a depth edge is no proof.
+    /// A point is free only if every return in the 3×3 pixels around lies beyond it: a depth edge is no proof.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
         self.look_from(&(self.camera_from_world * p), tolerance_m)
     }
 
-    /// [`DepthMap::look`] for a point in the camera's optical frame.
+    /// State of a point in the camera's optical frame, as of [`DepthMap::look`].
     pub(crate) fn look_from(&self, q: &Point3<f64>, tolerance_m: f64) -> Seen {
         let Some((u, v)) = self.intrinsics.project(q) else { return Seen::Never };
         let Some(middle) = self.intrinsics.pixel(u, v) else { return Seen::Never };
@@ -120,7 +120,7 @@ impl DepthMap {
         }
     }
 
-    /// Minimum depth in the 3×3 pixels around one; infinite without returns.
+    /// Minimum depth in the 3×3 pixels around a pixel, metres; infinite without returns.
     pub(crate) fn nearest_around(&self, pixel: usize) -> f32 {
         let (width, height) = (self.intrinsics.width, self.intrinsics.height);
         let (column, row) = (pixel % width, pixel / width);
@@ -135,7 +135,7 @@ impl DepthMap {
     }
 }
 
-/// A depth map made ready to be asked about many points.
+/// Depth map prepared for queries about many points.
 pub struct Gaze<'a> {
     map: &'a DepthMap,
     turn: Matrix3<f32>,
@@ -156,8 +156,8 @@ impl Gaze<'_> {
         }
     }
 
-    /// Marks the points (world) that the camera looked through: [`DepthMap::look`] gives free, and
-    /// the very pixel has a return. Faster if most points are not.
+    /// Sets `through` for each world point that the camera looked through: [`DepthMap::look`] gives [`Seen::Free`], and
+    /// the point's own pixel has a return. Fast if most points are not.
     pub fn pass(&self, points: &[Point3<f32>], tolerance_m: f64, through: &mut [bool]) {
         const LANES: usize = 16;
         /// Column mark of a point outside the image. From: mark.
@@ -190,19 +190,19 @@ impl Gaze<'_> {
 }
 
 impl Visibility {
-    /// Visibility of views at their stated poses; views without camera or grid are left out.
+    /// Depth maps of views at their stated poses; views with neither camera nor grid are left out.
     pub fn from_views(views: &[View]) -> Visibility {
         let map = |v: &View| DepthMap::from_view(v, &v.world_from_camera);
         Visibility { maps: views.iter().filter_map(map).collect(), held: true }
     }
 
-    /// Visibility of a bare cloud (world frame) seen from `viewpoints`, by projection onto a
-    /// virtual camera at each; the cameras' attitude is unknown.
+    /// Depth maps of a bare cloud (world frame) seen from `viewpoints`, by projection onto a virtual camera at each;
+    /// how real cameras were held is unknown.
     pub fn from_viewpoints(cloud: &Cloud, viewpoints: &[Point3<f64>]) -> Visibility {
         Visibility { maps: viewpoints.iter().filter_map(|v| virtual_map(cloud, v)).collect(), held: false }
     }
 
-    /// Best knowledge of a point: free in any look outweighs surface, hidden and never.
+    /// Best state of a world point in all views: free outweighs surface, surface hidden, and hidden never observed.
     pub fn look(&self, p: &Point3<f64>, tolerance_m: f64) -> Seen {
         let mut best = Seen::Never;
         for map in &self.maps {
@@ -214,7 +214,7 @@ impl Visibility {
         best
     }
 
-    /// The cameras made ready to be asked about many points.
+    /// Depth maps, each prepared for queries about many points.
     pub fn gazes(&self) -> Vec<Gaze<'_>> {
         self.maps.iter().map(Gaze::of).collect()
     }
@@ -225,13 +225,14 @@ impl Visibility {
     }
 }
 
-/// Virtual camera at `viewpoint`, centred on the median of the cloud and wide enough for nearly all
-/// of it, so that stray returns have no effect; its axes depend on the cloud alone, not on the
-/// frame.
+/// Depth map of a virtual camera at `viewpoint`, centred on the median of the cloud and wide enough for nearly all of
+/// it, so that stray returns have no effect. The camera's axes depend on the cloud alone, not on the frame. `None`
+/// without points in front of it.
 fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
     const SIDE: usize = 320;
-    /// Share of the points in view, and maximum half angle, as a slope.
+    /// Share of the points that lie in view.
     const IN_VIEW: f64 = 0.998;
+    /// Maximum half opening angle, as a tangent.
     const WIDEST: f64 = 2.0;
     let finite = || cloud.points.iter().filter(|p| is_finite(p)).map(|p| p.cast::<f64>() - viewpoint);
     let rays: Vec<Vector3<f64>> = finite().filter_map(|ray| ray.try_normalize(1e-9)).collect();
@@ -265,10 +266,10 @@ fn virtual_map(cloud: &Cloud, viewpoint: &Point3<f64>) -> Option<DepthMap> {
     Some(DepthMap::project(cloud, &world_from_camera.inverse(), intrinsics, &world_from_camera))
 }
 
-/// Pinhole camera of an organised cloud in its optical frame: least squares of `u·z = f·x + c·z`
-/// over the pixels.
+/// Estimates the pinhole camera of an organised cloud in its optical frame: least squares of `u·z = f·x + c·z` over the
+/// pixels.
 ///
-/// `None` if there is no grid or the pixels do not tell.
+/// `None` if there is no grid or the pixels do not determine a camera.
 pub fn estimate_intrinsics(cloud: &Cloud) -> Option<Intrinsics> {
     let grid = cloud.grid?;
     let mut x = Matrix3::<f64>::zeros();

@@ -1,18 +1,18 @@
-//! Voxel downsampling: one point per cube, at the centroid of its points.
+//! Voxel downsampling: one point per voxel, the centroid of its points.
 
 use crate::cloud::{Cloud, is_finite};
 use nalgebra::{Point3, Vector3};
 
-/// Voxels that cannot be made.
+/// Reason why points cannot be assigned to voxels.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VoxelError {
-    /// Edge length that is not positive.
+    /// The edge length is not positive.
     #[error("a voxel edge of {edge_m} m: give a positive length, such as 0.01")]
     Edge {
-        /// Value that was given.
+        /// Given edge length, metres.
         edge_m: f32,
     },
-    /// Point beyond the two million voxels that an axis can number.
+    /// A point lies beyond the range of voxel numbers, about a million on each side of the origin.
     #[error(
         "point {index} lies {distance_m} m out, too far for voxels of {edge_m} m (the farthest is {farthest_m} m): \
          are these millimetres (scale by 0.001), or a stray return?"
@@ -20,16 +20,16 @@ pub enum VoxelError {
     TooFar {
         /// Index of the point.
         index: usize,
-        /// The farthest coordinate of the point.
+        /// Greatest absolute coordinate of the point, metres.
         distance_m: f32,
-        /// The voxels' edge.
+        /// Edge length of the voxels, metres.
         edge_m: f32,
-        /// The farthest coordinate that can be counted.
+        /// Greatest coordinate within range, metres.
         farthest_m: f32,
     },
 }
 
-/// Voxels an axis on each side of zero; three axes fill 63 bits.
+/// Number of voxels along an axis on each side of zero; three axes fill 63 bits.
 const HALF_RANGE: i64 = 1 << 20;
 
 /// Floor as an integer; the standard function is slow on the oldest instruction set.
@@ -41,8 +41,8 @@ pub(crate) fn floor(value: f64) -> i64 {
 
 /// Downsamples to one point per voxel of edge `edge_m`, the centroid, in order of first occurrence.
 ///
-/// The grid is fixed to the origin of the frame, so that the same surface gives the same voxels in every cloud. Colours and normals are
-/// averaged, a label is that of the voxel's first point. Points without a return are left out.
+/// The grid is fixed to the origin of the frame, so that the same surface gives the same voxels in every cloud. Colours
+/// and normals are averaged; the label is that of the voxel's first point. Points that are not finite are left out.
 ///
 /// # Errors
 /// If the edge is not positive or a point lies more than a million voxels from the origin.
@@ -80,20 +80,20 @@ pub fn downsample(cloud: &Cloud, edge_m: f32) -> Result<Cloud, VoxelError> {
     Ok(Cloud { points, grid: None, colours, normals, labels })
 }
 
-/// Mark of a point without a voxel.
+/// Voxel number of a point without a voxel.
 pub const NONE: u32 = u32::MAX;
 
-/// The voxel of each point.
+/// Assignment of points to voxels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assigned {
-    /// Voxel number of each point, counted by first occurrence; [`NONE`] for missing returns.
+    /// Voxel number of each point, counted by first occurrence; [`NONE`] for points that are not finite.
     pub voxel: Vec<u32>,
     /// Number of voxels.
     pub voxels: usize,
 }
 
 impl Assigned {
-    /// Points in each voxel.
+    /// Number of points in each voxel.
     pub fn counts(&self) -> Vec<u32> {
         let mut counts = vec![0u32; self.voxels];
         self.voxel.iter().filter(|v| **v != NONE).for_each(|&v| counts[v as usize] += 1);
@@ -145,7 +145,7 @@ pub fn assign(points: &[Point3<f32>], edge_m: f32) -> Result<Assigned, VoxelErro
     Ok(Assigned { voxel, voxels: table.len as usize })
 }
 
-/// Key of the voxel at integer coordinates; `None` beyond the range of an axis.
+/// Unique key of the voxel at integer coordinates; `None` beyond the range of an axis.
 #[inline(always)]
 pub(crate) fn key([x, y, z]: [i64; 3]) -> Option<u64> {
     let axis = |c: i64| c.saturating_add(HALF_RANGE) as u64;
@@ -153,7 +153,7 @@ pub(crate) fn key([x, y, z]: [i64; 3]) -> Option<u64> {
     ((x | y | z) < 2 * HALF_RANGE as u64).then_some(x << 42 | y << 21 | z)
 }
 
-/// Numbers keys in order of first occurrence: open addressing, linear probing.
+/// Hash table that numbers keys in order of first occurrence (open addressing, linear probing).
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     slots: Vec<(u64, u32)>,
@@ -188,7 +188,7 @@ impl Table {
         number
     }
 
-    /// Number that a key has.
+    /// Number of a key; `None` if the key has none.
     pub(crate) fn find(&self, key: u64) -> Option<u32> {
         let mut at = self.home(key);
         loop {

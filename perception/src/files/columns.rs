@@ -1,29 +1,29 @@
-//! Clouds from a table of numbers, by column names or by the columns' values.
+//! Clouds from a table of numbers, whose columns are identified by names or by their values.
 
 use crate::cloud::{Cloud, Grid};
 use nalgebra::{Point3, Vector3};
 
-/// Extent relative to the distance from the origin, below which coordinates are map coordinates.
-/// From: chosen.
+/// Extent of a cloud relative to its distance from the origin, below which coordinates are map coordinates. From:
+/// chosen.
 const NARROW: f64 = 0.01;
 /// Distance from the origin beyond which map coordinates are moved to the origin, metres, because
 /// single precision blurs them. From: chosen.
 const FAR_M: f64 = 1000.0;
-/// Tolerance on the length of a normal. From: chosen.
+/// Maximum deviation of a normal's length from 1. From: chosen.
 const NORMAL: f64 = 0.05;
 
-/// Meaning of the columns of a table.
+/// Meaning of a table's columns, as column indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Columns {
     pub position: [usize; 3],
-    /// Red, green, blue, up to 255.
+    /// Red, green and blue, from 0 to 255.
     pub colour: Option<[usize; 3]>,
     pub normal: Option<[usize; 3]>,
     pub label: Option<usize>,
 }
 
 impl Columns {
-    /// Columns by name; `None` without x, y and z.
+    /// Finds the columns by name; `None` without x, y and z.
     pub(super) fn named(names: &[String]) -> Option<Columns> {
         let find = |name: &str| names.iter().position(|n| n == name);
         let triple = |all: [&str; 3]| Some([find(all[0])?, find(all[1])?, find(all[2])?]);
@@ -36,8 +36,8 @@ impl Columns {
         })
     }
 
-    /// Meaning of unnamed columns by their number: x, y, z, then colours or normals, as the values
-    /// of all rows allow; seven columns have `intensity` in between.
+    /// Columns of a table without names: x, y, z, then colours or normals if the values of all rows allow it. Seven
+    /// columns have an intensity in between.
     pub(super) fn unnamed(values: &[f64], width: usize) -> Columns {
         let mut columns = Columns { position: [0, 1, 2], colour: None, normal: None, label: None };
         let rest = match width {
@@ -56,13 +56,13 @@ impl Columns {
         columns
     }
 
-    /// Number of columns that are used.
+    /// Number of columns with a known meaning.
     pub(super) fn used(&self) -> usize {
         3 + 3 * (usize::from(self.colour.is_some()) + usize::from(self.normal.is_some()))
             + usize::from(self.label.is_some())
     }
 
-    /// The cloud of a table, row by row.
+    /// Cloud of a table with `width` columns, whose `values` are given row by row.
     pub(super) fn cloud(
         &self,
         values: &[f64],
@@ -85,9 +85,9 @@ impl Columns {
     }
 }
 
-/// Moves map coordinates to the origin by whole metres before rounding to single precision; returns
-/// the offset and a note. Positions in another unit are also far from the origin, but as wide as
-/// they are far.
+/// Moves map coordinates to the origin by whole metres before they are rounded to single precision; returns the offset
+/// and a note, or `None` if nothing is moved. Positions in another unit are also far from the origin, but the cloud
+/// then is as wide as it is far.
 pub(super) fn to_origin(positions: &mut [[f64; 3]]) -> Option<([f64; 3], String)> {
     let finite = |p: &&[f64; 3]| p.iter().all(|c| c.is_finite());
     let first = *positions.iter().find(finite)?;

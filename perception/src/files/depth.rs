@@ -2,22 +2,22 @@
 
 use super::error::{FileError, Place};
 
-/// Depths along the optical axis, row by row.
+/// Depth image: depths along the optical axis, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// Depths, metres; NaN for missing returns.
+    /// Depths, metres; NaN where nothing was measured.
     pub depths_m: Vec<f32>,
 }
 
-/// Reads a 16-bit depth image (PNG or PGM); `metres_per_unit`: 0.001 for millimetres. 0 and 65535
-/// are missing returns.
+/// Reads a 16-bit depth image (PNG or PGM); `metres_per_unit`: 0.001 for millimetres. Values 0 and 65535 mean that
+/// nothing was measured.
 ///
 /// # Errors
-/// If it is no such image or has another depth of pixel.
+/// If the file is no PNG or PGM image, or has no single grey channel of 16 bits.
 pub fn read(bytes: &[u8], metres_per_unit: f64) -> Result<DepthImage, FileError> {
     let start = Place::Byte(0);
     let decoded = image::load_from_memory(bytes).map_err(|e| {

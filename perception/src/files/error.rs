@@ -1,11 +1,11 @@
-//! Errors of files, with the place and a mend.
+//! Errors of files, with place and remedy.
 
 /// Place of an error in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// A line of text, counted from 1.
+    /// Line of text, counted from 1.
     Line(usize),
-    /// An offset in bytes from the beginning.
+    /// Offset from the beginning of the file, bytes.
     Byte(usize),
 }
 
@@ -18,17 +18,17 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// Error of an unreadable file: place, expected and found content, and remedy.
+/// Reason why a file cannot be read: place, expected and found content, and remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: expected {expected}, found {found}; {mend}")]
 pub struct FileError {
-    /// Place of the error.
+    /// Place of the error in the file.
     pub place: Place,
-    /// The expected content.
+    /// Content that was expected there.
     pub expected: String,
-    /// The content that was found.
+    /// Content that was found there.
     pub found: String,
-    /// Remedy.
+    /// Suggested remedy.
     pub mend: String,
 }
 

@@ -1,4 +1,4 @@
-//! LAS of laser surveys, versions 1.0 to 1.4: positions and colours.
+//! LAS files of laser surveys, versions 1.0 to 1.4: positions and colours.
 
 use super::columns::to_origin;
 use super::error::{FileError, Place};
@@ -8,14 +8,21 @@ use nalgebra::{Isometry3, Point3};
 
 pub(super) const MAGIC: &[u8] = b"LASF";
 
-/// Offsets of the header's fields that are used, bytes. From: LAS Specification 1.4, table 3.
+/// Offset of the minor version in the header, bytes. From: LAS Specification 1.4, table 3.
 const MINOR_VERSION: usize = 25;
+/// Offset of the field with the offset of the points, bytes. From: LAS Specification 1.4, table 3.
 const DATA: usize = 96;
+/// Offset of the point format, bytes. From: LAS Specification 1.4, table 3.
 const FORMAT: usize = 104;
+/// Offset of the length of a point record, bytes. From: LAS Specification 1.4, table 3.
 const LENGTH: usize = 105;
+/// Offset of the 32-bit number of points, bytes. From: LAS Specification 1.4, table 3.
 const LEGACY_COUNT: usize = 107;
+/// Offset of the three scale factors, bytes. From: LAS Specification 1.4, table 3.
 const SCALES: usize = 131;
+/// Offset of the three coordinate offsets, bytes. From: LAS Specification 1.4, table 3.
 const OFFSETS: usize = 155;
+/// Offset of the 64-bit number of points (version 1.4), bytes. From: LAS Specification 1.4, table 3.
 const COUNT: usize = 247;
 
 /// Offset of the colour within a point record, bytes; `None` without colour. From: LAS
@@ -33,7 +40,7 @@ fn at<const N: usize>(bytes: &[u8], offset: usize) -> Option<[u8; N]> {
     bytes.get(offset..offset.checked_add(N)?)?.try_into().ok()
 }
 
-/// Point records of a file, as declared by its header.
+/// Point records of a file, with the header's description of them.
 struct Points<'a> {
     bytes: &'a [u8],
     length: usize,
@@ -63,10 +70,10 @@ fn points(bytes: &[u8]) -> Option<(Points<'_>, u64, usize)> {
     Some((points, count, data_at))
 }
 
-/// Reads a LAS file; coordinates of a map are moved to the origin.
+/// Reads a LAS file; map coordinates are moved to the origin.
 ///
 /// # Errors
-/// If it is compressed (LAZ), cut, or its header cannot be.
+/// If the file is compressed (LAZ) or cut, or its header is invalid.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let head = || {
         let place = Place::Byte(bytes.len());

@@ -1,4 +1,4 @@
-//! A cloud as read from a file, made sane.
+//! A cloud as read from a file, normalised.
 
 use super::error::{FileError, Place};
 use crate::cloud::{Cloud, CloudError, Grid};
@@ -7,26 +7,25 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// Cloud read from a file, with the file's further information.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// Cloud; contains finite points only, unless it has a grid.
+    /// Points of the file; all finite, unless the cloud has a grid.
     pub cloud: Cloud,
-    /// Sensor pose stated by the file (`VIEWPOINT` of PCD), else identity; points are not
-    /// transformed by it.
+    /// Sensor pose stated by the file (`VIEWPOINT` of PCD), else identity; the points are not transformed by it.
     pub viewpoint: Isometry3<f64>,
-    /// Notes for a person: points left out, suspicious units, attributes ignored.
+    /// Notes for the user: points left out, suspicious units, ignored attributes.
     pub notes: Vec<String>,
 }
 
-/// Maximum padding after the data, bytes: a memory page, to which the Point Cloud Library fills its
-/// files. From: chosen, 64 KiB.
+/// Maximum padding after the data, bytes: the Point Cloud Library fills its files to a memory page. From: chosen, 64
+/// KiB.
 const MOST_PADDING: usize = 1 << 16;
 
-/// True if the remaining bytes are padding: zeros to the end of a page, or a line end.
+/// True if the remaining bytes are padding: few, and only zeros and white space.
 pub(super) fn is_padding(rest: &[u8]) -> bool {
     rest.len() < MOST_PADDING && rest.iter().all(|b| *b == 0 || b.is_ascii_whitespace())
 }
 
-/// Marks pixels at the sensor's own position as missing returns and counts them; skipped if the
-/// file states a sensor position other than the origin.
+/// Marks points at the sensor's own position, the origin, as missing returns (NaN), and returns their number. Nothing
+/// is marked if the file states another sensor position.
 fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
     if viewpoint.translation.vector != Vector3::zeros() {
         return 0;
@@ -39,8 +38,8 @@ fn void_at_sensor(cloud: &mut Cloud, viewpoint: &Isometry3<f64>) -> usize {
     voided
 }
 
-/// Normalises raw points: infinite ones become missing returns, and clouds without a grid drop
-/// missing returns; adds notes.
+/// Normalises a cloud as read: infinite points become missing returns (NaN), and clouds without a grid drop missing
+/// returns; adds notes about this.
 pub(super) fn finish(
     mut cloud: Cloud,
     viewpoint: Isometry3<f64>,

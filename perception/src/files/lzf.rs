@@ -1,11 +1,12 @@
-//! LZF, the compression of `binary_compressed` PCD: literal runs of up to 32 bytes, back references of 3 to 264 bytes within 8 KiB.
+//! LZF, the compression of `binary_compressed` PCD: literal runs of up to 32 bytes, and back references of 3 to 264
+//! bytes within 8 KiB.
 
 const MAX_LITERAL: usize = 32;
 const MAX_OFFSET: usize = 1 << 13;
 const MAX_MATCH: usize = 264;
 const HASH_BITS: u32 = 15;
 
-/// Reason a stream cannot be unpacked.
+/// Reason why a stream cannot be unpacked; `at` is the offset in the compressed stream, bytes.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LzfError {
     #[error("the stream ends inside a run")]
@@ -19,7 +20,7 @@ pub enum LzfError {
 }
 
 impl LzfError {
-    /// Offset in the compressed stream.
+    /// Offset of the error in the compressed stream, bytes.
     pub(super) fn at(&self) -> usize {
         match *self {
             LzfError::Truncated { at }
@@ -72,7 +73,7 @@ pub fn unpack(packed: &[u8], expected: usize) -> Result<Vec<u8>, LzfError> {
     Ok(out)
 }
 
-/// Appends `length` bytes from `from` on; source and copy may overlap, which repeats the bytes between.
+/// Appends `length` bytes of `out` starting at index `from`; if source and copy overlap, the bytes between repeat.
 fn copy_within(out: &mut Vec<u8>, from: usize, length: usize) {
     let mut left = length;
     while left > 0 {
@@ -83,7 +84,7 @@ fn copy_within(out: &mut Vec<u8>, from: usize, length: usize) {
     }
 }
 
-/// Packs `data`; data that do not shrink grow by one byte in 32.
+/// Packs `data`; incompressible data grow by one byte in 32.
 pub fn pack(data: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(data.len() / 2 + 16);
     let mut last_at = vec![usize::MAX; 1 << HASH_BITS];

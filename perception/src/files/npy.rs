@@ -1,4 +1,4 @@
-//! NumPy's NPY: one numeric array, with a row per point, or as an image with a point per pixel.
+//! NPY files of NumPy: one numeric array with a row per point, or an image with a point per pixel.
 
 use super::columns::Columns;
 use super::error::{FileError, Place};
@@ -8,7 +8,7 @@ use nalgebra::Isometry3;
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Number type: width in bytes, and decoder.
+/// Number type: width in bytes, byte order, and decoder from little-endian bytes.
 struct Kind {
     size: usize,
     big: bool,
@@ -40,7 +40,7 @@ impl Kind {
     }
 }
 
-/// Header text and end offset, from the length prefix.
+/// Header text, and the offset of the data behind it; `None` if the file is cut.
 fn header(bytes: &[u8]) -> Option<(&str, usize)> {
     let version = *bytes.get(MAGIC.len())?;
     let (start, length) = match version {
@@ -51,16 +51,16 @@ fn header(bytes: &[u8]) -> Option<(&str, usize)> {
     Some((std::str::from_utf8(bytes.get(start..end)?).ok()?, end))
 }
 
-/// Text after a key of the header.
+/// Text that follows a key of the header; `None` without the key.
 fn entry<'a>(header: &'a str, key: &str) -> Option<&'a str> {
     let (_, rest) = header.split_once(key)?;
     Some(rest.trim_start_matches(['\'', '"', ':', ' ']))
 }
 
-/// Reads an array of shape (points, columns) or (rows, columns, 3 or more).
+/// Reads a cloud from an array of shape (points, columns) or (rows, columns, 3 or more).
 ///
 /// # Errors
-/// If it is of another shape or type, or its data are cut.
+/// If the array has another shape or type, or its data are cut.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let place = Place::Byte(MAGIC.len());
     let bad = |expected: &str, found: &str| {

@@ -1,4 +1,5 @@
-//! PCD 0.5 to 0.7 of the Point Cloud Library: `ascii`, `binary` and `binary_compressed`, any order, type and count of fields.
+//! PCD 0.5 to 0.7 of the Point Cloud Library: `ascii`, `binary` and `binary_compressed`, with fields in any order, type
+//! and count.
 
 mod header;
 
@@ -11,11 +12,11 @@ use header::{Field, Header};
 use nalgebra::{Point3, Vector3};
 use std::borrow::Cow;
 
-/// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`,
-/// `label`; a note lists ignored ones.
+/// Reads a PCD file. Fields used: `x y z`, `rgb` or `rgba` (packed), `normal_x normal_y normal_z`, `label`; a note
+/// lists the ignored ones.
 ///
 /// # Errors
-/// If the header or the data are broken: with the line or byte, what was expected, and what to do.
+/// If the header or the data are damaged, with the line or byte, what was expected, and what to do.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let header = header::parse(bytes)?;
     let data = &bytes[header.data_at..];
@@ -30,10 +31,10 @@ pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     finish(cloud, header.viewpoint, notes, place)
 }
 
-/// Bytes of all points; a field of point `i` begins at `offset + i * step`.
+/// Bytes of all points. A field of point `i` begins at `offset + i * step`.
 struct Table<'a> {
     bytes: Cow<'a, [u8]>,
-    /// Per field: begin and step.
+    /// Offset and step of each field, bytes.
     layout: Vec<(usize, usize)>,
 }
 
@@ -106,7 +107,7 @@ impl<'a> Table<'a> {
         Ok(Table { bytes: bytes.into(), layout })
     }
 
-    /// Four (or fewer) raw bytes of field `field` of point `point`, zero-extended to eight.
+    /// First `size` bytes (at most eight) of a field of a point, extended with zeros to eight.
     fn raw(&self, field: usize, size: usize, point: usize) -> [u8; 8] {
         let (begin, step) = self.layout[field];
         let at = begin + step * point;
@@ -130,7 +131,7 @@ impl<'a> Table<'a> {
         self.column(header, field, move |raw| kind.number(raw))
     }
 
-    /// Four bytes of a four-byte field, for each point.
+    /// First four bytes of a field, for each point.
     fn words(&self, header: &Header, field: usize) -> impl Iterator<Item = [u8; 4]> {
         let (begin, step) = self.layout[field];
         let of_points = self.bytes.get(begin..).unwrap_or_default().chunks(step).take(header.points);
@@ -184,7 +185,7 @@ impl<'a> Table<'a> {
         Ok(Cloud { points, grid, colours, normals, labels })
     }
 
-    /// Three fields of every point, combined.
+    /// Values combined from three fields of each point, in the order of the points.
     fn triples<T>(&self, header: &Header, fields: [usize; 3], make: impl Fn([f32; 3]) -> T) -> Vec<T> {
         let single = |f: usize| header.fields[f].kind == b'F' && header.fields[f].size == 4;
         if fields.into_iter().all(single) {
@@ -206,7 +207,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Appends the binary form of a text line.
+/// Appends the binary form of a text line that holds one point.
 fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> Result<(), FileError> {
     let mut tokens = line.split_ascii_whitespace();
     for field in fields {
@@ -234,8 +235,8 @@ fn parse_row(fields: &[Field], line: &str, place: Place, out: &mut Vec<u8>) -> R
     }
 }
 
-/// Encodes a cloud as PCD 0.7: `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` and
-/// `label` (U 4) if present.
+/// Encodes a cloud as PCD 0.7: fields `x y z` (F 4), then `rgb` (U 4), `normal_x normal_y normal_z` (F 4) and `label`
+/// (U 4) if the cloud has them.
 pub fn write(cloud: &Cloud, encoding: PcdEncoding) -> Vec<u8> {
     let columns = columns(cloud);
     let points = cloud.len();
@@ -277,7 +278,7 @@ pub fn write(cloud: &Cloud, encoding: PcdEncoding) -> Vec<u8> {
     out
 }
 
-/// Column to write: four bytes per point.
+/// Field to write: four bytes per point.
 struct Column<'a> {
     name: &'static str,
     float: bool,

@@ -12,7 +12,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 pub enum PlyEncoding {
     /// Text, one vertex per line.
     Ascii,
-    /// Little endian.
+    /// Binary, little endian.
     Binary,
 }
 
@@ -59,7 +59,7 @@ impl Scalar {
         }
     }
 
-    /// Value of `raw`, little endian, zero-extended.
+    /// Value stored in `raw`, little endian and extended with zeros.
     fn value(self, raw: [u8; 8]) -> f64 {
         let low = u64::from_le_bytes(raw);
         match self {
@@ -77,7 +77,7 @@ impl Scalar {
 struct Property {
     name: String,
     scalar: Scalar,
-    /// Type of the list length; `None` for a scalar property.
+    /// Type of the list's length; `None` for a scalar property.
     list: Option<Scalar>,
 }
 
@@ -90,7 +90,7 @@ struct Element {
 }
 
 impl Element {
-    /// Minimum bytes of a row.
+    /// Minimum number of bytes of a row.
     fn least_bytes(&self, stored: Stored) -> usize {
         match stored {
             Stored::Ascii => 2 * self.properties.len(),
@@ -99,10 +99,11 @@ impl Element {
     }
 }
 
-/// Reads the vertices of a PLY file: `x y z`, `red green blue` (or `diffuse_red` …; whole numbers to 255 or floats to 1), `nx ny nz`, `label`.
+/// Reads the vertices of a PLY file: `x y z`, `red green blue` (or `diffuse_red` …; whole numbers to 255 or floats to
+/// 1), `nx ny nz`, `label`.
 ///
 /// # Errors
-/// If the header or the data are broken: with the line or byte, what was expected, and what to do.
+/// If the header or the data are damaged, with the line or byte, what was expected, and what to do.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let (stored, elements, mut cursor) = header(bytes)?;
     let (mut vertices, mut camera) = (None, None);
@@ -141,7 +142,7 @@ struct Camera {
 }
 
 impl Camera {
-    /// Camera in the first row; `None` for another program's element.
+    /// Camera in the first row of an element; `None` if the element is not of this kind.
     fn of(element: &Element, values: &[f64]) -> Option<Camera> {
         let flat: Vec<&str> =
             element.properties.iter().filter(|p| p.list.is_none()).map(|p| p.name.as_str()).collect();
@@ -165,7 +166,7 @@ impl Camera {
     }
 }
 
-/// The reading position.
+/// Reading position: byte offset and number of the last line read.
 struct Cursor<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -181,7 +182,7 @@ impl<'a> Cursor<'a> {
         Some((self.line, std::str::from_utf8(&rest[..end]).unwrap_or("\u{fffd}")))
     }
 
-    /// Rejects data after the last element, because the header declares too little.
+    /// Rejects data after the last element, as the header then declares too few rows; padding is allowed.
     fn ends_with(&self, stored: Stored, last: &Element) -> Result<(), FileError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();
         let more = match stored {
@@ -200,7 +201,7 @@ impl<'a> Cursor<'a> {
         ))
     }
 
-    /// All scalar values of an element, row by row.
+    /// Reads all scalar values of an element, row by row; lists are skipped.
     fn rows(&mut self, stored: Stored, element: &Element) -> Result<Vec<f64>, FileError> {
         let least = element.least_bytes(stored);
         let left = self.bytes.len() - self.at;
@@ -223,7 +224,7 @@ impl<'a> Cursor<'a> {
         Ok(values)
     }
 
-    /// Next non-empty line.
+    /// Number and text of the next line that is not blank; `None` at the end of the file.
     fn filled_line(&mut self) -> Option<(usize, &'a str)> {
         std::iter::from_fn(|| self.text_line()).find(|(_, text)| !text.trim().is_empty())
     }
@@ -391,7 +392,7 @@ fn property(words: &[&str]) -> Option<Property> {
     }
 }
 
-/// Cloud of the vertices, and the offset subtracted from each.
+/// Cloud of the vertices, and the offset that was subtracted from each, metres.
 fn cloud(element: &Element, values: &[f64], notes: &mut Vec<String>) -> Result<(Cloud, [f64; 3]), FileError> {
     let flat: Vec<&Property> = element.properties.iter().filter(|p| p.list.is_none()).collect();
     let find = |name: &str| flat.iter().position(|p| p.name == name);

@@ -6,16 +6,17 @@ use super::error::{FileError, Place};
 use super::loaded::{Loaded, finish};
 use nalgebra::Isometry3;
 
-/// Maximum length of the first line, bytes. From: chosen.
+/// Maximum number of bytes examined to recognise the format. From: chosen.
 const FIRST_LINE: usize = 1 << 12;
 
-/// Words of a line: separated by commas, semicolons or blanks.
+/// Words of a line, separated by commas, semicolons or blanks; quotes are removed.
 fn words(line: &str) -> impl Iterator<Item = &str> {
     let split = line.split(|c: char| c == ',' || c == ';' || c.is_whitespace());
     split.map(|word| word.trim_matches('"')).filter(|word| !word.is_empty())
 }
 
-/// Lower-case column names in a line that contains `x y z`, after any comment marker.
+/// Lower-case column names of a header line, and their meaning; a comment marker before them is skipped. `None` unless
+/// x, y and z are among them.
 fn names(line: &str) -> Option<(Vec<String>, Columns)> {
     let names: Vec<String> =
         words(line.trim().trim_start_matches(['#', '/'])).map(str::to_ascii_lowercase).collect();
@@ -29,7 +30,7 @@ fn is_comment(line: &str) -> bool {
     line.trim().is_empty() || line.trim_start().starts_with(['#', '/'])
 }
 
-/// True if the first non-comment line has numbers, or column names with x, y and z.
+/// True if the first line that is no comment has only numbers, or column names with x, y and z.
 pub(super) fn is(bytes: &[u8]) -> bool {
     let start = &bytes[..bytes.len().min(FIRST_LINE)];
     let text = String::from_utf8_lossy(start);
@@ -40,10 +41,10 @@ pub(super) fn is(bytes: &[u8]) -> bool {
     })
 }
 
-/// Reads a text of numbers.
+/// Reads a cloud from lines of numbers.
 ///
 /// # Errors
-/// If a line holds something else than numbers, or another count of them than the first.
+/// If a line contains something other than numbers, or not as many numbers as the first.
 pub fn read(bytes: &[u8]) -> Result<Loaded, FileError> {
     let text = std::str::from_utf8(bytes).map_err(|e| {
         FileError::new(

@@ -1,71 +1,70 @@
-//! Ends of a surface in a camera's view, each between neighbouring rays of which one hit the
-//! surface and the other passed.
+//! Ends of a surface in a camera's view, each between two rays of which one hits the surface and the other passes it.
 //!
-//! Noise of depth moves a point along its ray. Where the ray meets the plane of the surface is free of it.
+//! Depth noise moves a point along its ray; the point where the ray meets the plane of the surface is free of this
+//! noise.
 
 use crate::surface::Surface;
 use crate::visibility::{DepthMap, Visibility};
 use nalgebra::{Point3, Vector3};
 
-/// Maximum distance of points on the surface from its plane, metres.
+/// Maximum height above the surface's plane of points on the surface, metres.
 const ON_M: f64 = 0.012;
-/// Depth below the plane from which points belong to a board's side, or are mixed pixels of a depth
-/// edge, metres.
+/// Depth below the plane from which points belong to a board's side, or are mixed pixels at a depth edge, metres.
 const BELOW_M: f64 = 0.004;
-/// Depth below the plane from which points belong to something behind the surface, metres.
+/// Depth below the plane from which points belong to something behind or beneath the surface, metres.
 const PAST_M: f64 = 0.02;
-/// Maximum distance beyond the hull of the seen surface at which the surface may go on.
+/// Maximum distance of an end beyond the hull of the observed surface, metres.
 const HULL_MARGIN_M: f64 = 0.04;
-/// Number of pixels to either side of an end, of which [`CERTAIN`] must agree, as single pixels are
-/// noise.
+/// Number of pixels to either side of an end that are checked.
 const AROUND: usize = 4;
+/// Minimum number of these pixels that must agree, as single pixels are noisy.
 const CERTAIN: usize = 3;
-/// Minimum extent of a surface behind its end, metres; less is an intersection with something
-/// upright.
+/// Minimum extent of a surface before its end, metres; less is an intersection with something upright.
 const DEEP_M: f64 = 0.04;
-/// Minimum number of pixels of an image line that see an edge.
+/// Minimum number of pixels that show a board's side at an end.
 const SIDE: usize = 2;
-/// Maximum number of lost pixels at an end; a longer loss is the shadow of the projector.
+/// Maximum number of pixels without a return that count as the end's own gap; a longer gap is the shadow of the
+/// projector.
 const LOST: usize = 3;
-/// Length of a gap without returns behind the surface's last point that proves empty space, metres.
+/// Minimum length of a gap without returns after the surface's last point that proves empty space, metres.
 const NOTHING_M: f64 = 0.09;
 
-/// End of a surface on a line of pixels.
+/// End of a surface on a row or column of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ending {
     /// Point where the last ray hits the surface, world frame, metres.
     pub on: Point3<f64>,
-    /// Point where the first passing ray crosses the surface's plane.
+    /// Point where the first passing ray crosses the surface's plane, world frame, metres.
     pub past: Point3<f64>,
-    /// Mean of the observed points on a board's side at the end; `None` without.
+    /// Mean of the points observed on a board's side at the end, world frame, metres; `None` if there are too few.
     pub side: Option<Point3<f64>>,
-    /// The camera.
+    /// Position of the camera, world frame, metres.
     pub eye: Point3<f64>,
 }
 
-/// All ends of a surface seen by the cameras, without occlusions and image borders.
+/// Ends of a surface in all views; occlusions and image borders are no ends.
 pub fn endings(visibility: &Visibility, surface: &Surface) -> Vec<Ending> {
     let outline = surface.outline();
     let is_near = |ending: &Ending| outline.covers(&ending.on, HULL_MARGIN_M);
     visibility.maps.iter().flat_map(|map| Rays::of(map, surface).endings()).filter(is_near).collect()
 }
 
-/// The content of a pixel.
+/// Content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
-    /// A pixel without a return.
+    /// No return.
     Nothing,
-    /// The surface.
+    /// Point on the surface.
     On,
-    /// A return just below the surface's plane.
+    /// Point just below the surface's plane.
     Low,
-    /// A return from behind the surface's plane.
+    /// Point farther below the surface's plane.
     Past,
-    /// Other point.
+    /// Any other point.
     Other,
 }
 
-/// The rays of a camera and the plane of a surface, in the optical frame.
+/// Rays of a camera and plane of a surface, in the optical frame.
 struct Rays<'a> {
     map: &'a DepthMap,
     world_from_camera: nalgebra::Isometry3<f64>,
@@ -87,7 +86,7 @@ impl<'a> Rays<'a> {
         rays
     }
 
-    /// Ray of a pixel at unit depth.
+    /// Ray of a pixel, as the point at unit depth.
     fn ray(&self, pixel: usize) -> Vector3<f64> {
         let width = self.map.intrinsics.width;
         self.map.intrinsics.unproject((pixel % width) as f64, (pixel / width) as f64, 1.0).coords
@@ -108,7 +107,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Point where a pixel's ray crosses the plane, world frame; `None` if the ray rises.
+    /// Point where a pixel's ray crosses the surface's plane, world frame, metres; `None` if the ray rises.
     fn through(&self, pixel: usize) -> Option<Point3<f64>> {
         let ray = self.ray(pixel);
         let fall = self.up.dot(&ray);
@@ -134,7 +133,7 @@ impl<'a> Rays<'a> {
         endings
     }
 
-    /// Ends of the surface along a line of pixels.
+    /// Appends the ends of the surface along a line of pixels, in the direction of the line.
     fn along(&self, line: &[usize], endings: &mut Vec<Ending>) {
         let shown = |at: usize| self.shown[line[at]];
         let most = |what: Shown, range: std::ops::Range<usize>| {
@@ -166,7 +165,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// True if the last pixels show the surface for as far as [`DEEP_M`].
+    /// True if most pixels over the last [`DEEP_M`] of a line show the surface.
     fn is_deep(&self, line: &[usize]) -> bool {
         let Some(end) = line.last().and_then(|&pixel| self.through(pixel)) else { return false };
         let is_far = |&&pixel: &&usize| self.through(pixel).is_none_or(|p| (p - end).norm() > DEEP_M);
@@ -176,7 +175,7 @@ impl<'a> Rays<'a> {
         near.is_some_and(|near| AROUND * on(near) >= CERTAIN * near)
     }
 
-    /// True if the pixels after an end have no return, over a long enough gap.
+    /// True if no pixel of a gap has a return, and the gap is long enough.
     fn is_nothing(&self, gap: &[usize]) -> bool {
         let ends =
             || Some((self.through(*gap.first()?)?, gap.iter().rev().find_map(|&pixel| self.through(pixel))?));
@@ -185,7 +184,7 @@ impl<'a> Rays<'a> {
             && ends().is_some_and(|(from, to)| (to - from).norm() > NOTHING_M)
     }
 
-    /// Mean point of some pixels, world.
+    /// Mean point of some pixels, world frame, metres; `None` if they are fewer than [`SIDE`].
     fn side(&self, pixels: impl Iterator<Item = usize>) -> Option<Point3<f64>> {
         let at = |pixel: usize| self.ray(pixel) * f64::from(self.map.depths_m[pixel]);
         let (sum, count) = pixels.fold((Vector3::zeros(), 0), |(sum, n), pixel| (sum + at(pixel), n + 1));

@@ -4,7 +4,7 @@ use super::nearby::Nearby;
 use super::{Bounds, LEAF, Neighbours, Span};
 use crate::pool;
 
-/// Reusable buffers of a tree walk.
+/// Reusable buffers of a tree traversal.
 #[derive(Default)]
 struct Scratch {
     open: Vec<Span>,
@@ -12,10 +12,10 @@ struct Scratch {
     nearby: Nearby,
 }
 
-/// A leaf that may hold neighbours of the leaf at hand.
+/// Leaf that may contain neighbours of the current leaf's points.
 #[derive(Clone, Copy)]
 struct NearLeaf {
-    /// Squared distance between the boxes.
+    /// Squared distance from the box of the current leaf, square metres.
     distance_sq: f32,
     leaf: u32,
     bounds: Bounds,
@@ -25,8 +25,8 @@ struct NearLeaf {
 const SLACK: usize = 64;
 
 impl Neighbours {
-    /// For every finite point, `result` of its slot and its `k` nearest points (itself included,
-    /// unordered); results are in point order, with `default` for non-finite points.
+    /// Computes `result` for every finite point, from its slot and its `k` nearest points (itself included, unordered).
+    /// Results are in point order, with `default` for points that are not finite.
     pub(crate) fn map_all<T: Copy + Send + Sync>(
         &self,
         k: usize,
@@ -52,7 +52,7 @@ impl Neighbours {
         out
     }
 
-    /// Coordinates of a slot.
+    /// Coordinates of the point in a slot.
     #[inline(always)]
     pub(crate) fn at(&self, slot: usize) -> [f32; 3] {
         [self.x[slot], self.y[slot], self.z[slot]]
@@ -110,7 +110,7 @@ impl Neighbours {
         (seed, self.nodes[span.node])
     }
 
-    /// Squared distance of the k-th nearest point of the seed, an upper bound for all.
+    /// Squared distance of the k-th nearest point of the seed, an upper bound for the k-th nearest of all.
     fn bound_from(&self, q: &[f32; 3], seed: Span, k: usize, nearby: &mut Nearby) -> f32 {
         nearby.clear();
         let mut bound = f32::MAX;
@@ -123,9 +123,9 @@ impl Neighbours {
         nearby.keep(k, bound)
     }
 
-    /// Leaves of the seed, and those whose boxes are nearer to `own` than the square root of
-    /// `reach`, nearest first. Boxes at equal distance hold only ties, which coinciding points
-    /// would produce by the million.
+    /// Collects into `leaves` those of the seed, and those whose boxes are nearer to `own` than the square root of
+    /// `reach`, nearest first. Boxes at equal distance contain only ties, which coinciding points would produce by the
+    /// million.
     fn leaves_near(
         &self,
         own: &Bounds,

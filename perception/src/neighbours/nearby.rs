@@ -2,10 +2,10 @@
 
 use super::LEAF;
 
-/// Candidates near a query: squared distances and slots, unordered.
+/// Candidates near a query point: squared distances and slots, unordered.
 #[derive(Default)]
 pub(crate) struct Nearby {
-    /// Both hold room for a leaf beyond `len`.
+    /// Squared distances; this and the next field have room for a leaf beyond `len`.
     distances: Vec<f32>,
     slots: Vec<u32>,
     len: usize,
@@ -14,10 +14,10 @@ pub(crate) struct Nearby {
 
 /// Maximum number of bracketing steps before sorting; many ties admit no narrow bracket.
 const GUESSES: usize = 12;
-/// Candidates around the k-th that are sorted.
+/// Maximum number of candidates around the k-th that are sorted.
 const FEW: usize = 8;
 
-/// Squared distances on both sides of the k-th nearest, with the number of candidates up to each.
+/// Bracket of the k-th nearest: a squared distance on each side, with the number of candidates up to it.
 struct Parting {
     low: f32,
     below: usize,
@@ -25,7 +25,8 @@ struct Parting {
     above: usize,
 }
 
-/// The least of a leaf's distances. Eight at a time: a chain of single comparisons would take longer than the distances themselves.
+/// Least of a leaf's distances. Eight at a time: a chain of single comparisons would take longer than the distances
+/// themselves.
 #[inline(always)]
 pub(crate) fn least(distances: &[f32; LEAF]) -> f32 {
     let (eights, _) = distances.as_chunks::<8>();
@@ -55,7 +56,7 @@ impl Nearby {
         self.len = 0;
     }
 
-    /// Adds the points of a leaf (first slot `first`) within `bound`, a finite squared distance.
+    /// Adds the points of a leaf within `bound`, a finite squared distance; `first`: the leaf's first slot.
     #[inline(always)]
     pub(super) fn add(&mut self, distances: &[f32; LEAF], first: usize, bound: f32) {
         let end = self.len + LEAF;
@@ -79,8 +80,8 @@ impl Nearby {
         self.len += kept;
     }
 
-    /// Keeps the `k` nearest candidates, all within `bound`, and returns the squared distance of
-    /// the farthest; keeps all if there are at most `k`.
+    /// Keeps the `k` nearest candidates and returns the squared distance of the farthest, square metres; with fewer
+    /// than `k`, keeps all and returns `bound`.
     #[inline(always)]
     pub(super) fn keep(&mut self, k: usize, bound: f32) -> f32 {
         if self.len > k {
@@ -106,8 +107,8 @@ impl Nearby {
         lanes.iter().chain(rest).fold(0.0, |a, &b| if b > a { b } else { a })
     }
 
-    /// Squared distances that bracket the k-th nearest candidate with at most `FEW` in between. On
-    /// a surface, the count grows with the squared distance, so interpolation is usually close.
+    /// Bracket of the k-th nearest candidate with at most `FEW` candidates in between; `None` if none is found. On a
+    /// surface, the count grows with the squared distance, so interpolation is usually close.
     #[inline(always)]
     fn part(&self, k: usize) -> Option<Parting> {
         let mut p = Parting { low: -1.0, below: 0, high: self.farthest(), above: self.len };
@@ -130,7 +131,7 @@ impl Nearby {
         None
     }
 
-    /// Keeps the candidates below the bracket and the nearest of those inside; ties by slot.
+    /// Keeps the `k` nearest candidates: those below the bracket and the nearest of those inside it; ties by slot.
     #[inline(always)]
     fn cut(&mut self, k: usize, parting: Parting) {
         let mut between = [(f32::INFINITY, u32::MAX); FEW + 1];
@@ -153,7 +154,7 @@ impl Nearby {
         self.len = kept;
     }
 
-    /// Sorts by distance; equal distances by slot.
+    /// Keeps the `k` nearest candidates by selection, ties by slot.
     #[cold]
     fn sort(&mut self, k: usize) {
         self.order.clear();

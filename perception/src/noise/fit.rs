@@ -1,4 +1,4 @@
-//! Estimates a camera's noise from level faces, on which inverse depth is linear in the pixels.
+//! Estimates a camera's noise from plane surfaces, on which inverse depth is linear in the pixel coordinates.
 
 use super::Sensor;
 use crate::pool;
@@ -8,50 +8,49 @@ use crate::surface::outline::Outline;
 use crate::visibility::DepthMap;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
-/// Side of the blocks whose residuals are used, pixels; and side of the smaller cells whose means
-/// show the error correlation of neighbours. From: chosen.
+/// Side of the blocks of pixels whose residuals are used, pixels. From: chosen.
 const BLOCK_PX: usize = 24;
+/// Side of the smaller cells whose means show the error correlation of neighbouring pixels, pixels. From: chosen.
 pub(crate) const CELL_PX: usize = 8;
-/// Blocks of a view that are enough to go by. From: work.
+/// Maximum number of blocks used of a view. From: work.
 const BLOCKS: usize = 24;
-/// Minimum share of a block's pixels on the face. From: chosen.
+/// Minimum share of a block's pixels on the surface. From: chosen.
 const COVERED: f64 = 0.8;
-/// Maximum distance of a return from its face, as a share of the depth, metres per metre.
-/// From: chosen.
+/// Maximum distance of a return from the surface, as a share of the depth. From: chosen.
 const NEAR_SHARE: f64 = 0.012;
-/// Minimum distance of a block from the face's outline, metres. From: chosen.
+/// Minimum distance of a block's centre from the surface's outline, metres. From: chosen.
 const INSIDE_M: f64 = 0.02;
-/// Residual, in standard deviations of the block, beyond which a pixel is off the face.
-/// From: chosen.
+/// Residual, in standard deviations of the block, beyond which a pixel is an outlier. From: chosen.
 const OUTLIER: f64 = 4.0;
-/// Minimum number of blocks, and weight of the assumed noise, in blocks. From: chosen.
+/// Minimum number of blocks for an estimate. From: chosen.
 const FEWEST: usize = 4;
+/// Weight of the assumed noise in the estimate, in blocks. From: chosen.
 const ASSUMED: f64 = 4.0;
-/// Limits of the estimated noise, as multiples of the assumed noise. From: chosen.
+/// Minimum and maximum of the estimated noise, as multiples of the assumed noise. From: chosen.
 const BETWEEN: (f64, f64) = (0.5, 6.0);
-/// Minimum of either noise term, as a share of its value if both had grown alike. From: chosen.
+/// Minimum of either noise term, as a share of the assumed term scaled to the measured noise. From: chosen.
 const LEAST: f64 = 0.2;
-/// Numbers that a plane takes. From: derived, two slopes and a height.
+/// Number of parameters of a plane. From: derived, two slopes and a height.
 const PLANE: f64 = 3.0;
 
-/// Residuals of views' returns from level faces.
+/// Residuals of several views' returns at plane surfaces.
 #[derive(Clone, Debug, Default)]
 pub struct Residuals {
     blocks: Vec<Block>,
 }
 
-/// Part of a face in one view.
+/// Block of pixels on a surface in one view.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     depth_m: f64,
     /// Standard deviation of a return along its ray, metres.
     sigma_m: f64,
-    /// Independent returns in a cell of 8 by 8.
+    /// Number of independent returns that a cell of 8 by 8 pixels counts for.
     looks: f64,
 }
 
 impl Residuals {
-    /// Adds the residuals of a view at a surface.
+    /// Adds the residuals of a view's returns at a surface.
     pub fn add(&mut self, map: &DepthMap, surface: &Surface) {
         let (width, height) = (map.intrinsics.width, map.intrinsics.height);
         let camera_from_surface = map.camera_from_world * surface.surface_from_world.inverse();
@@ -67,7 +66,7 @@ impl Residuals {
         self.blocks.extend(pool::filter(corners.len(), 1, |n| block(map, corners[n], &normal, offset_m)));
     }
 
-    /// Sensor with the estimated noise; unobserved parameters stay as assumed.
+    /// Estimates the sensor's noise; parameters without evidence stay as assumed.
     pub fn fit(&self, assumed: &Sensor) -> Sensor {
         if self.blocks.len() < FEWEST {
             return *assumed;
@@ -97,7 +96,8 @@ impl Residuals {
     }
 }
 
-/// True if a pixel shows the surface (camera frame).
+/// True if a pixel shows the surface, well inside its outline; `normal`, `offset_m`: the surface's plane in the camera
+/// frame.
 fn is_on(
     map: &DepthMap,
     outline: &Outline,
@@ -112,8 +112,8 @@ fn is_on(
         && outline.covers(&map.camera_from_world.inverse_transform_point(&p), -INSIDE_M)
 }
 
-/// Residuals of inverse depth of a pixel block on the face, where it is linear; `None` if the block
-/// is not on the face.
+/// Noise of a block of pixels, from residuals of inverse depth, which is linear in the pixels; `None` if too few pixels
+/// are on the surface.
 fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, offset_m: f64) -> Option<Block> {
     let mut seen: Vec<(usize, Vector3<f64>, f64)> = Vec::with_capacity(BLOCK_PX * BLOCK_PX);
     let mut depth_m = 0.0;
@@ -146,7 +146,7 @@ fn block(map: &DepthMap, (left, top): (usize, usize), normal: &Vector3<f64>, off
     Some(Block { depth_m, sigma_m: sigma * depth_m * depth_m, looks: looks(&seen, &residuals, &gate, sigma) })
 }
 
-/// Least-squares coefficients of inverse depth, linear in the rows; `None` if singular.
+/// Least-squares coefficients of inverse depth as a linear function of the rows; `None` if singular.
 fn fit_plane(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<f64>> {
     let (normal, right) = rows.fold((Matrix3::zeros(), Vector3::zeros()), |(n, r), (row, q)| {
         (n + row * row.transpose(), r + row * q)
@@ -154,10 +154,9 @@ fn fit_plane(rows: impl Iterator<Item = (Vector3<f64>, f64)>) -> Option<Vector3<
     normal.cholesky().map(|c| c.solve(&right))
 }
 
-/// Number of independent errors among a cell's returns: variance of a return divided by variance of
-/// the cell's mean.
+/// Number of independent errors among a cell's returns: variance of a return divided by variance of the cells' means.
 fn looks(seen: &[(usize, Vector3<f64>, f64)], residuals: &[f64], gate: &[bool], sigma: f64) -> f64 {
-    /// Number of cells in a block. From: derived, its side has so many.
+    /// Number of cells in a block. From: derived, the square of their number per side.
     const CELLS: usize = (BLOCK_PX / CELL_PX) * (BLOCK_PX / CELL_PX);
     let mut sums = [(0.0, 0.0); CELLS];
     for ((cell, ..), (r, _)) in

@@ -5,17 +5,17 @@ use crate::cloud::{Cloud, Grid};
 use crate::pool;
 use nalgebra::{Point3, Vector3};
 
-/// Size of the neighbourhood of a pixel.
+/// Neighbourhood of a pixel that determines its normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrganisedOptions {
-    /// Pixels to each side: 2 looks at 5 x 5.
+    /// Number of pixels to each side: 2 gives a window of 5 x 5.
     pub reach: usize,
-    /// Maximum depth difference of a neighbour on the same surface, as a share of the depth (plus
-    /// `base_m`).
+    /// Maximum depth difference between a pixel and a neighbour on the same surface, as a share of the depth, but at
+    /// least `base_m`.
     pub depth_step_share: f32,
-    /// Minimum depth difference that separates surfaces, metres.
+    /// Least value of this maximum, metres.
     pub base_m: f32,
-    /// Minimum number of neighbours for a normal.
+    /// Minimum number of pixels of the window on the same surface for a normal.
     pub least: usize,
 }
 
@@ -25,7 +25,7 @@ impl Default for OrganisedOptions {
     }
 }
 
-/// Pixels whose windows are summed up together.
+/// Number of pixels whose windows are summed up together.
 const LANES: usize = 16;
 
 /// Normals from the window around each pixel, towards the camera; `None` without a grid that fits
@@ -34,7 +34,7 @@ pub fn organised(cloud: &Cloud, options: &OrganisedOptions) -> Option<Normals> {
     organised_where(cloud, options, |_| true)
 }
 
-/// Normals of the wanted pixels; others may have none.
+/// Normals of the wanted pixels as of [`organised`]; those of others may be missing (NaN).
 pub(crate) fn organised_where(
     cloud: &Cloud,
     options: &OrganisedOptions,
@@ -71,18 +71,18 @@ pub(crate) fn organised_where(
     Some(found)
 }
 
-/// Image coordinates in structure-of-arrays form, with a frame of missing returns.
+/// Image of points with one array per coordinate, and a border of missing returns.
 struct Image {
     planes: [Vec<f32>; 3],
-    /// Pixels from row to row.
+    /// Number of entries from row to row.
     pitch: usize,
     reach: usize,
 }
 
-/// The coordinates of each product: xx xy xz yy yz zz.
+/// Axes of each product: xx xy xz yy yz zz.
 const FACTORS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// Window sums of neighbouring pixels, relative to the pixels themselves.
+/// Window sums of `LANES` adjacent pixels, relative to the pixels themselves.
 struct WindowSums {
     count: [u32; LANES],
     sum: [[f32; LANES]; 3],
@@ -108,7 +108,7 @@ impl Image {
         self.planes.each_ref().map(|plane| plane[at..].first_chunk().copied().unwrap_or([f32::NAN; LANES]))
     }
 
-    /// `LANES` pixels from a column on with their window sums; `None` without returns.
+    /// Coordinates of `LANES` pixels from a column on, with their window sums; `None` if none has a return.
     #[inline(always)]
     fn sums(
         &self,
@@ -132,7 +132,7 @@ impl Image {
 }
 
 impl WindowSums {
-    /// Adds a neighbour of each pixel if its depth is similar; branch-free per lane.
+    /// Adds a neighbour of each pixel where its depth is within `step`; branch-free per lane.
     #[inline(always)]
     fn add(&mut self, p: &[[f32; LANES]; 3], at: &[[f32; LANES]; 3], step: &[f32; LANES]) {
         let mut near = [0_u32; LANES];
@@ -154,14 +154,14 @@ impl WindowSums {
         }
     }
 
-    /// Normals towards the camera, and the share of the spread along each, NaN if undefined.
-    /// Equivalent to [`spread::least`], branch-free per lane.
+    /// Normals towards the camera (three numbers), and the share of the spread along each; NaN if undefined. Equivalent
+    /// to [`spread::least`], branch-free per lane.
     #[inline(always)]
     fn surfaces(&self, at: &[[f32; LANES]; 3], options: &OrganisedOptions) -> [[f32; LANES]; 4] {
-        /// Number of Newton iterations; single precision converges, unless no direction has the
-        /// least variance.
+        /// Number of Newton iterations; enough in single precision, unless two eigenvalues nearly coincide.
         const STEPS: usize = 6;
-        /// Minimum ratio of the spread across a line to that along it; below, it is rounding.
+        /// Minimum sum of products of two eigenvalues, of which all three sum to 1; less is rounding at collinear
+        /// points.
         const COLLINEAR: f32 = 1e-6;
         let least_count = options.least.max(3) as f32;
         let mut all = [[f32::NAN; LANES]; 4];

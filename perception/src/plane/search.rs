@@ -1,5 +1,5 @@
-//! RANSAC (Fischler and Bolles 1981) with preliminary scores on a random subset, then least squares
-//! on the inliers.
+//! Plane search: RANSAC (Fischler and Bolles 1981) with preliminary scores on a random subset, then least squares on
+//! the inliers.
 
 use super::{Plane, PlaneError, PlaneFit, PlaneOptions};
 use crate::cloud::is_finite;
@@ -7,21 +7,20 @@ use crate::draw::Draws;
 use crate::spread::{self, Moments};
 use nalgebra::{Point3, Vector3};
 
-/// Number of points for the preliminary score; only hypotheses that may beat the best are scored on
-/// all points.
+/// Number of points for the preliminary score; only candidates that may beat the best are scored on all points.
 const FIRST: usize = 1024;
-/// Number of points scored between two checks against the best score.
+/// Number of points scored between two comparisons with the best score.
 const BLOCK: usize = 4096;
-/// Standard deviations below the best score within which a hypothesis is still evaluated in full;
-/// one in 30,000 would be lost.
+/// Number of standard deviations below the best preliminary score within which a candidate is still scored in full; one
+/// in 30,000 would be lost.
 const DEVIATIONS: f64 = 4.0;
 /// Maximum number of least-squares refits.
 const REFITS: usize = 3;
 
-/// Plane with most inliers; deterministic for points, options and seed.
+/// Finds the plane with the most inliers; deterministic for points, options and seed.
 ///
 /// # Errors
-/// If there are fewer than three finite points, if they do not span a plane, or if no plane is as asked.
+/// If the tolerance is not positive, fewer than three points are finite, or no sample gives a plane as required.
 pub fn find(points: &[Point3<f32>], options: &PlaneOptions) -> Result<PlaneFit, PlaneError> {
     let _span = tracing::debug_span!("plane", points = points.len()).entered();
     if !(options.tolerance_m > 0.0 && options.tolerance_m.is_finite()) {
@@ -38,7 +37,8 @@ pub fn find(points: &[Point3<f32>], options: &PlaneOptions) -> Result<PlaneFit, 
     Ok(polish(points, best, finite.len(), rounds_used, options))
 }
 
-/// Least-squares plane of the points, towards the origin; `None` if they are degenerate.
+/// Least-squares plane of the finite points, with its normal towards the origin; `None` if they are collinear or
+/// coincident.
 pub fn refit<'a>(points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Plane> {
     let mut points = points.into_iter().filter(|p| is_finite(p)).peekable();
     let mut moments = Moments::about(points.peek()?);
@@ -47,7 +47,7 @@ pub fn refit<'a>(points: impl IntoIterator<Item = &'a Point3<f32>>) -> Option<Pl
     Some(Plane::through(&moments.mean(), Vector3::from(least.normal)).facing(&Point3::origin()))
 }
 
-/// The finite points in random order, by coordinate.
+/// Finite points in random order, with one array per coordinate.
 struct Shuffled {
     x: Vec<f32>,
     y: Vec<f32>,
@@ -61,7 +61,7 @@ impl Shuffled {
         Shuffled { x: column(0), y: column(1), z: column(2) }
     }
 
-    /// Points of `from..to` within the tolerance.
+    /// Number of points among `from..to` within the tolerance of a plane.
     fn count(&self, from: usize, to: usize, plane: &Plane, tolerance_m: f32) -> u32 {
         let n = plane.normal.cast::<f32>();
         let offset = plane.offset_m as f32;
@@ -111,7 +111,7 @@ fn sample(
     (best.map(|(plane, _, _)| plane), used)
 }
 
-/// Plane through three points, unless these are (nearly) collinear.
+/// Plane through three points; `None` if they are (nearly) collinear.
 fn through([a, b, c]: [Point3<f64>; 3]) -> Option<Plane> {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(&ac);
@@ -120,7 +120,7 @@ fn through([a, b, c]: [Point3<f64>; 3]) -> Option<Plane> {
     flat.then(|| Plane::through(&a, normal / length))
 }
 
-/// Plane with the normal as requested; `None` if it violates the options.
+/// Plane with its normal oriented as required; `None` if the plane violates the options.
 fn oriented(plane: Plane, options: &PlaneOptions) -> Option<Plane> {
     let Some((direction, within_rad)) = options.tilt else {
         return Some(plane.facing(&Point3::origin()));
@@ -131,7 +131,7 @@ fn oriented(plane: Plane, options: &PlaneOptions) -> Option<Plane> {
     (upright && placed).then_some(plane)
 }
 
-/// Least squares on the inliers, repeated while the number of inliers does not fall.
+/// Refits the plane to its inliers by least squares, repeatedly while the number of inliers does not fall.
 fn polish(
     points: &[Point3<f32>],
     mut plane: Plane,

@@ -1,26 +1,26 @@
-//! The header of a PCD file.
+//! Header of a PCD file.
 
 use crate::files::error::{FileError, Place};
 use crate::files::loaded::is_padding;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
-/// Encoding of the points: the header's DATA.
+/// Encoding of the points, the header's DATA entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PcdEncoding {
     /// Text, one point a line.
     Ascii,
-    /// Point after point, little endian.
+    /// Binary, point after point, little endian.
     Binary,
-    /// Field after field, LZF.
+    /// Binary, field after field, compressed with LZF.
     BinaryCompressed,
 }
 
-/// Field: `count` values of `size` bytes.
+/// Field of a point: `count` values of `size` bytes each.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Field {
     pub name: String,
     pub size: usize,
-    /// `F`, `I` or `U`.
+    /// Type of the values: `F` (float), `I` (signed) or `U` (unsigned).
     pub kind: u8,
     pub count: usize,
 }
@@ -30,7 +30,7 @@ impl Field {
         self.size * self.count
     }
 
-    /// Value in the first `size` bytes.
+    /// Value stored in the first `size` bytes of `raw`, little endian.
     pub(super) fn number(&self, raw: [u8; 8]) -> f64 {
         let low = u64::from_le_bytes(raw);
         let unused = 64 - 8 * self.size as u32;
@@ -42,8 +42,8 @@ impl Field {
         }
     }
 
-    /// Appends the binary form of a number in text. Colours of kind `F` occur both as packed
-    /// integers and as floats of the same bits.
+    /// Appends the binary form of a number given as text; `None` if the text is no such number. Colours of kind `F`
+    /// occur both as packed integers and as floats of the same bits.
     pub(super) fn encode(&self, token: &str, out: &mut Vec<u8>) -> Option<()> {
         let colour = matches!(self.name.as_str(), "rgb" | "rgba") && self.size == 4;
         let packed = colour.then(|| token.parse::<u32>().ok()).flatten();
@@ -77,18 +77,18 @@ pub(super) struct Header {
     pub encoding: PcdEncoding,
     /// Offset of the first byte of data.
     pub data_at: usize,
-    /// Line of the first byte of data.
+    /// Number of the first line of data.
     pub data_line: usize,
     pub notes: Vec<String>,
 }
 
 impl Header {
-    /// Bytes per point; `parse` bounds the value, so that it cannot overflow.
+    /// Number of bytes per point; the parser limits it, so that it cannot overflow.
     pub(super) fn stride(&self) -> usize {
         self.fields.iter().map(Field::bytes).sum()
     }
 
-    /// The offset of each field within a point, bytes.
+    /// Offset of each field within a point, bytes.
     pub(super) fn offsets(&self) -> impl Iterator<Item = usize> {
         self.fields.iter().scan(0, |at, f| {
             let begin = *at;
@@ -106,8 +106,8 @@ impl Header {
         )
     }
 
-    /// Rejects `data` that continue for a point or more after `needed` bytes, because the header
-    /// declares too few; zeros are padding.
+    /// Rejects `data` that continue for a point or more after `needed` bytes, as the header then declares too few
+    /// points; zeros are padding.
     pub(super) fn ends_with(&self, data: &[u8], needed: usize) -> Result<(), FileError> {
         let rest = data.get(needed..).unwrap_or_default();
         let more = rest.len() / self.stride();
@@ -123,7 +123,7 @@ impl Header {
     }
 }
 
-/// Header entries, each with its line number.
+/// Header entries, each with its line number and its values.
 #[derive(Default)]
 struct Said<'a> {
     fields: Option<(usize, Vec<&'a str>)>,
@@ -136,8 +136,9 @@ struct Said<'a> {
     viewpoint: Option<(usize, Vec<&'a str>)>,
 }
 
-/// Longest header line and most bytes a point that are believed: guards against reading binary rubbish as a header.
+/// Maximum length of a header line, bytes; guards against reading binary data as a header.
 const LONGEST_LINE: usize = 1 << 16;
+/// Maximum number of bytes per point.
 const WIDEST_POINT: usize = 1 << 20;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Header, FileError> {

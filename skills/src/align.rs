@@ -1,15 +1,15 @@
-//! `align`: registers scans of one object. The body does not move.
+//! `align`: registers laser scans of one object. The body does not move.
 
 use async_trait::async_trait;
 use descry_robots::perception::laser::{PosedScan, SolverOptions, align_consistent};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Registers scans of one object into its outline.
+/// Registers laser scans of one object into a model of its outline.
 pub struct Align {
-    /// The scans, with their localised poses.
+    /// Scans of the object, with their localised poses.
     pub scans: Vec<PosedScan>,
-    /// Maximum residual before the scans count as contradictory, metres.
+    /// Maximum error after alignment, metres; above it, scans count as contradictory.
     pub longest_m: f64,
     /// Options of the solver.
     pub options: SolverOptions,

@@ -1,11 +1,11 @@
-//! One request to the body: reads a sense, sweeps the laser, pushes, opens a door.
+//! One request to the body, such as to read a sense, sweep the laser, push, or open a door.
 
 use async_trait::async_trait;
 use descry_robots::{Answer, Request};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Asks the body for one thing, and returns its answer.
+/// Sends a request to the body, and returns the body's answer.
 pub struct Ask(pub Request);
 
 #[async_trait]

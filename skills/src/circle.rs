@@ -5,9 +5,9 @@ use descry_robots::{Driven, Place};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Drives through waypoints; the last is the destination.
+/// Drives through waypoints, all within one time limit; the last is the destination.
 pub struct Circle {
-    /// The waypoints, without the current pose.
+    /// Waypoints in order, without the current pose.
     pub way: Vec<Place>,
 }
 

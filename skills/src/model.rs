@@ -9,15 +9,15 @@ use descry_robots::perception::learning::{Keyframe, LearnOptions, LearnedModel, 
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Learns a model of the object in the first view.
+/// Learns a model of an object that is marked in the first view.
 pub struct Model {
-    /// The views, with their localised poses.
+    /// Views of the object, with their localised poses.
     pub views: Vec<Arc<View>>,
-    /// Mask of the object's pixels in the first view.
+    /// For each pixel of the first view, true if it belongs to the object.
     pub mask: Vec<bool>,
-    /// Upward direction in the map frame; none if unknown.
+    /// Up direction in the map frame; `None` if unknown.
     pub up: Option<Unit<Vector3<f64>>>,
-    /// Maximum range of measurements, metres.
+    /// Maximum range of the measurements used, metres.
     pub range_m: f64,
     /// Options of learning.
     pub options: LearnOptions,
@@ -26,9 +26,9 @@ pub struct Model {
 /// Result of learning a model.
 #[derive(Debug)]
 pub struct Modelled {
-    /// Pose and content of each view; inconsistent views are left out.
+    /// Registered pose of each view; inconsistent views are marked as unused.
     pub keyframes: Vec<Keyframe>,
-    /// The learned model, or the reason that none was learned.
+    /// Learned model, or the reason why none was learned.
     pub model: Result<LearnedModel, String>,
 }
 

@@ -5,9 +5,9 @@ use descry_robots::Place;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Drives to a destination.
+/// Drives to a destination on the map.
 pub struct Move {
-    /// Destination.
+    /// Destination on the map.
     pub to: Place,
 }
 

@@ -5,9 +5,9 @@ use descry_robots::nalgebra::Point3;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Takes a view from the current pose.
+/// Takes a view from the body's current pose.
 pub struct Observe {
-    /// Point for the head to turn to, map frame, metres; none: the head stays.
+    /// Point to turn the head to, map frame, metres; `None` to leave the head as it is.
     pub at: Option<Point3<f64>>,
 }
 

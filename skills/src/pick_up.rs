@@ -5,9 +5,9 @@ use descry_robots::{Failure, Grasp};
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Grasps and lifts an object.
+/// Grasps and lifts an object; fails if the hand is empty afterwards.
 pub struct PickUp {
-    /// The grasp.
+    /// Grasp to carry out.
     pub grasp: Grasp,
 }
 

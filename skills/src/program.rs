@@ -1,4 +1,4 @@
-//! Action carried out by an external program, in any language.
+//! Action executed by an external program, in any language.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use descry_robots::Failure;
 
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Answer of a program: done, with a message; or failed, with the reason and a hint on retrying.
+/// Answer of an external program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Asked {
     /// Success, with the program's message.
@@ -21,8 +21,7 @@ pub enum Asked {
     },
 }
 
-/// Runs an external program. The question blocks until an answer or the time limit; it is asked on a thread
-/// of its own.
+/// Runs an external program on a thread of its own, as it blocks until it answers or its time is over.
 pub struct Program {
     /// Asks the program and waits for its answer.
     pub ask: Arc<dyn Fn() -> Asked + Send + Sync>,

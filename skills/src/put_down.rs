@@ -6,9 +6,9 @@ use descry_robots::{Failure, Placing, Request};
 use crate::ask::Ask;
 use crate::skill::{Context, Outcome, Skill, SkillFailure};
 
-/// Places the held object.
+/// Places the held object; fails if the hand is empty.
 pub struct PutDown {
-    /// The placement.
+    /// Placement to carry out.
     pub placing: Placing,
 }
 

@@ -1,4 +1,4 @@
-//! Trait of all skills: arguments in SI units, cancellation, a time limit.
+//! Trait of all skills: arguments in SI units, cancellation, and a time limit.
 
 use async_trait::async_trait;
 use descry_robots::perception::laser::Alignment;
@@ -13,7 +13,7 @@ use crate::model::Modelled;
 pub struct Call {
     /// Name of the action.
     pub action: String,
-    /// Names of its arguments.
+    /// Arguments of the action, by name.
     pub arguments: Vec<String>,
 }
 
@@ -27,20 +27,20 @@ impl std::fmt::Display for Call {
     }
 }
 
-/// Surroundings of a skill: robot, cancellation, time limit, progress.
+/// Resources and limits of a skill: robot, cancellation, time limit, and progress reports.
 pub struct Context<'a> {
-    /// The body.
+    /// Body that carries out the skill.
     pub robot: &'a dyn Robot,
     /// Token that stops the skill.
     pub cancel: CancellationToken,
     /// Time limit, seconds on the body's clock.
     pub time_limit_s: f64,
-    /// Receives progress reports.
+    /// Function that receives progress reports.
     pub progress: &'a (dyn Fn(&Progress) + Send + Sync),
 }
 
 impl Context<'_> {
-    /// The watch to pass to the body.
+    /// Cancellation, time limit and progress reports in the form that a request to the body takes.
     pub fn watch(&self) -> Watch<'_> {
         Watch { cancel: self.cancel.clone(), time_limit_s: self.time_limit_s, progress: self.progress }
     }
@@ -49,24 +49,24 @@ impl Context<'_> {
 /// Result of a skill.
 #[derive(Debug)]
 pub enum Outcome {
-    /// The body has moved.
+    /// The body has driven.
     Driven(Driven),
     /// A view was taken.
     Seen(Box<Sensed>),
-    /// The body has answered a request.
+    /// The body has answered a single request.
     Answered(Box<Answer>),
     /// Scans were registered.
     Aligned(Box<Alignment>),
-    /// Views of an object were registered, and a model learned.
+    /// Views of an object were registered, and a model was learned if possible.
     Modelled(Box<Modelled>),
-    /// An object was lifted, with the state of the hand.
+    /// An object was lifted; with the state of the hand afterwards.
     Grasped(Grasped, Hand),
     /// An external program succeeded, with its message.
     Told(String),
 }
 
 impl Outcome {
-    /// Answer of the body, where the skill was one request.
+    /// Answer of the body if the skill was a single request; `None` otherwise.
     pub fn answer(&self) -> Option<&Answer> {
         match self {
             Outcome::Answered(answer) => Some(answer),
@@ -75,13 +75,13 @@ impl Outcome {
     }
 }
 
-/// Failure of a skill.
+/// Reason why a skill failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SkillFailure {
-    /// The body failed.
+    /// The body reported a failure.
     #[error(transparent)]
     Body(#[from] Failure),
-    /// An external program failed.
+    /// An external program reported a failure.
     #[error("{because}")]
     Program {
         /// Reason, as the program states it.
@@ -89,13 +89,13 @@ pub enum SkillFailure {
         /// True if a retry may succeed.
         passing: bool,
     },
-    /// The request makes no sense for the body in its current state.
+    /// The skill makes no sense with its arguments.
     #[error("{because}")]
     Meaningless {
         /// Reason.
         because: String,
     },
-    /// The action was carried out, but its execution violates the action as the domain describes it.
+    /// The action was executed, but its execution violated the domain's description of the action.
     #[error("it has ended, but not as the domain says: {because}")]
     Unkept {
         /// Reason: the part of the description that was violated.
@@ -103,7 +103,7 @@ pub enum SkillFailure {
         /// The violated invariant (`over all` condition), in PDDL.
         condition: Option<String>,
     },
-    /// The action was carried out, but an expected effect is missing.
+    /// The action was executed, but an expected effect is missing.
     #[error("it was done, but {condition} does not hold")]
     Unmet {
         /// The missing effect, in PDDL.
@@ -122,7 +122,7 @@ impl SkillFailure {
         }
     }
 
-    /// Name of the failure's kind: that of the body ([`Failure::kind`]), `program`, `meaningless` or `unmet`.
+    /// Kind of the failure: that of the body ([`Failure::kind`]), `program`, `meaningless` or `unmet`.
     pub fn kind(&self) -> &'static str {
         match self {
             SkillFailure::Body(failure) => failure.kind(),

@@ -4,14 +4,16 @@ use descry_planner::{Plan, Step};
 
 use crate::escaped;
 
-/// Widths of the chart and of its name column, and height of a row, pixels.
+/// Width of the chart, pixels.
 const WIDE: f64 = 1000.0;
+/// Width of the column with the steps' names, pixels.
 const NAMES: f64 = 300.0;
+/// Height of a row, pixels.
 const ROW: f64 = 22.0;
-/// Maximum length of a step's label, letters.
+/// Maximum number of letters of a step's label; longer ones are cut.
 const LETTERS: usize = 42;
 
-/// Draws a plan as SVG. Steps of a plan without times last one unit each.
+/// Draws a plan as an SVG image. Steps of a plan without times last one unit each.
 pub fn svg(plan: &Plan) -> String {
     let timed = plan.makespan_s();
     let begins = |n: usize, step: &Step| step.start_s.unwrap_or(n as f64);

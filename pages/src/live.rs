@@ -1,7 +1,7 @@
-//! Live page, served by its own thread to browsers on this machine alone.
+//! Live page, served by a thread of its own to browsers on this machine only.
 //!
-//! The server is read-only. It refuses requests that other sites' pages cause: by the `Host` and `Origin`
-//! headers (DNS rebinding and cross-site requests), and by restrictive response headers.
+//! The server is read-only. It refuses requests caused by pages of other sites, which it recognises by the `Host` and
+//! `Origin` headers (DNS rebinding and cross-site requests); restrictive response headers protect the page.
 
 #[doc(hidden)]
 pub mod answers;
@@ -22,35 +22,35 @@ use connections::Connections;
 use descry_agent::exit::CommandError;
 use news::News;
 
-/// Script of a page that subscribes to updates.
+/// Script by which a page subscribes to updates.
 pub const FOLLOW: &str = include_str!("live/follow.js");
 
 /// Interval between checks for a new revision while a reader is connected.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
-/// Maximum wait for readers to fetch the final state.
+/// Maximum time that the server waits, after the end, for readers to fetch the final state.
 const LINGER: Duration = Duration::from_secs(5);
-/// Maximum number of open connections; a further one evicts another, preferably one that has sent no request.
+/// Maximum number of open connections; a further one closes another, preferably one that has sent no request.
 const MOST_CONNECTIONS: usize = 64;
 /// Time within which a client must have sent its request.
 const ASK_WITHIN: Duration = Duration::from_secs(10);
 
-/// Source of a live page.
+/// Content that a live page shows.
 pub trait Shown: Send + Sync + 'static {
-    /// Revision of the content; changes with every update.
+    /// Revision number of the content; changes with every update.
     fn revision(&self) -> u64;
 
-    /// Content at a path, the page itself at `/`; none if the path does not exist.
+    /// Content at a path of the URL, the page itself at `/`; `None` if there is nothing at the path.
     ///
     /// # Errors
     /// [`CommandError`] if the content is unavailable now; a later call may succeed.
     fn at(&self, path: &str) -> Result<Option<Found>, CommandError>;
 }
 
-/// Content at a path.
+/// Content at a path of the URL.
 pub struct Found {
-    /// Media type.
+    /// Media type (HTTP `Content-Type`).
     pub kind: &'static str,
-    /// Body.
+    /// Body of the response.
     pub text: String,
 }
 
@@ -94,7 +94,7 @@ impl Port {
         format!("http://{}/", self.address)
     }
 
-    /// Starts to serve a page on the port.
+    /// Starts to serve content on the port, in a thread of its own.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if the system cannot start a thread.
@@ -122,7 +122,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Announces the end, and waits briefly for readers to fetch the final state.
+    /// Announces the end to readers, waits briefly for them to fetch the final state, and stops the server.
     pub fn end(self) {
         let _ = self.end.send(true);
         let _ = self.thread.join();

@@ -1,5 +1,5 @@
-//! Self-contained HTML page of a run: map with route and views, plans next to their execution, confidence
-//! after each look, point clouds in 3-D, and the narration, all synchronised by one time slider.
+//! Self-contained HTML page of a run: map with route and views, plans next to their execution, confidence after each
+//! observation, point clouds in 3-D, and the narration, all synchronised by one time slider.
 
 mod live;
 #[doc(hidden)]
@@ -30,7 +30,7 @@ pub fn of_run(record: &Record, report: Option<&Report>) -> Result<String, Comman
     Ok(laid_out(&format!("descry: {}", story.goal), &told))
 }
 
-/// Renders the page around a story in JSON.
+/// Renders the page around a story, given as JSON in `told`.
 pub fn laid_out(title: &str, told: &str) -> String {
     let title = escaped(title);
     let (style, script) = ([COLOURS, STYLE].concat(), [FOLLOW, SCRIPT].concat());

@@ -1,5 +1,5 @@
-//! Picture of a segmented cloud with each object tinted and labelled: the camera image, or a view from above
-//! if the cloud is unorganised.
+//! Picture of a segmented cloud with each object tinted and labelled: the camera image, or a view from above if the
+//! cloud is unorganised.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,18 +11,19 @@ use image::{ImageFormat, Rgb, RgbImage};
 use crate::escaped;
 use descry_agent::exit::CommandError;
 
-/// Size of a pixel in a view from above, metres, and maximum number of pixels along a side.
+/// Minimum size of a pixel in a view from above, metres.
 const PIXEL_M: f64 = 0.002;
+/// Maximum number of pixels along a side of a view from above.
 const MOST_PIXELS: f64 = 1200.0;
 /// Margin drawn around the surface, metres.
 const BESIDE_M: f64 = 0.15;
-/// Minimum probability of an object that a percept of its kind may be, for it to be named.
+/// Minimum probability at which a label mentions an object that the percept may be.
 const LEAST_TOLD: f64 = 0.05;
-/// Colours of the objects, in turn.
+/// Tints of the objects, used in turn.
 const TINTS: [[u8; 3]; 6] =
     [[230, 85, 30], [40, 120, 220], [30, 160, 80], [190, 60, 180], [215, 160, 0], [0, 160, 175]];
 
-/// Renders the picture as SVG: pixels, with labels over them.
+/// Renders the picture as SVG: an image with labels over it.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if the pixels cannot be encoded.
@@ -66,8 +67,8 @@ pub fn svg(cloud: &Cloud, surface: &Surface, percepts: &[Percept]) -> Result<Str
     ))
 }
 
-/// Name of a percept with its probability: the known object, else the kind with the objects that it may be;
-/// `unknown` only where nothing else is as likely.
+/// Label of a percept with its probability: the known object, else the kind with the objects that it may be, else
+/// `unknown`.
 fn named(percept: &Percept) -> String {
     let kind = percept.kinds.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > percept.unknown);
     match (&percept.label, kind) {
@@ -85,8 +86,8 @@ fn named(percept: &Percept) -> String {
     }
 }
 
-/// Size of the picture, and the pixel of each point: its own in an organised cloud, its projection
-/// from above otherwise.
+/// Width and height of the picture, pixels, and the pixel of each point: its own in an organised cloud, its projection
+/// from above otherwise; `None` if the point is not in the picture.
 fn places(cloud: &Cloud, surface: &Surface) -> (u32, u32, Vec<Option<(u32, u32)>>) {
     if let Some(grid) = cloud.grid {
         let at = |n: usize| {
@@ -109,7 +110,7 @@ fn places(cloud: &Cloud, surface: &Surface) -> (u32, u32, Vec<Option<(u32, u32)>
     (width as u32, height as u32, cloud.points.iter().map(at).collect())
 }
 
-/// The colour of each point; in a cloud without colours a grey, lighter for nearer points.
+/// Colour of each point, by index; in a cloud without colours a grey, lighter for nearer points.
 fn shade(cloud: &Cloud) -> impl Fn(usize) -> [u8; 3] + '_ {
     let far = cloud.points.iter().map(|p| p.coords.norm()).filter(|m| m.is_finite()).fold(1e-3, f32::max);
     move |n| match &cloud.colours {

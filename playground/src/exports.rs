@@ -1,4 +1,4 @@
-//! Functions that JavaScript calls. Texts cross byte by byte, so that neither side touches the other's memory.
+//! Functions that JavaScript calls. Texts are passed byte by byte, so that neither side touches the other's memory.
 
 // Exported names and the imported clock are what `unsafe` stands for here; no memory is handled by hand.
 #![allow(unsafe_code)]
@@ -6,30 +6,30 @@
 use std::cell::RefCell;
 
 thread_local! {
-    /// Texts that were pushed, and the answer to the last question.
+    /// Texts received from the page, and the last answer.
     static TEXTS: RefCell<(Vec<Vec<u8>>, Vec<u8>)> = const { RefCell::new((Vec::new(), Vec::new())) };
 }
 
 #[link(wasm_import_module = "page")]
 unsafe extern "C" {
-    /// Milliseconds since any moment.
+    /// Milliseconds since a fixed moment.
     safe fn now_ms() -> f64;
 }
 
-/// Begins a further text.
+/// Begins the next text.
 #[unsafe(no_mangle)]
 extern "C" fn begin() {
     TEXTS.with_borrow_mut(|(texts, _)| texts.push(Vec::new()));
 }
 
-/// Adds a byte to the last text.
+/// Appends a byte to the last text.
 #[unsafe(no_mangle)]
 extern "C" fn push(byte: u8) {
     TEXTS.with_borrow_mut(|(texts, _)| texts.last_mut().into_iter().for_each(|text| text.push(byte)));
 }
 
-/// Answers about the two texts that were pushed: plans for so many milliseconds, or with 0 only checks. Returns the answer's
-/// length.
+/// Answers for the domain and the problem received: plans for at most `limit_ms` milliseconds, or only checks them if
+/// that is 0. Returns the length of the answer, bytes.
 #[unsafe(no_mangle)]
 extern "C" fn answer(limit_ms: f64) -> usize {
     let mut texts = TEXTS.with_borrow_mut(|(texts, _)| std::mem::take(texts)).into_iter();
@@ -46,7 +46,7 @@ extern "C" fn answer(limit_ms: f64) -> usize {
     })
 }
 
-/// Byte of the answer.
+/// Byte of the answer at an index; 0 beyond the end.
 #[unsafe(no_mangle)]
 extern "C" fn byte(at: usize) -> u8 {
     TEXTS.with_borrow(|(_, said)| said.get(at).copied().unwrap_or_default())

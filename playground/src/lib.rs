@@ -1,4 +1,4 @@
-//! The planner and the checker in a browser. `playground/build.py` makes one page of it: `docs/playground/index.html`.
+//! Planner and checker for a browser. `playground/build.py` makes one page of them: `docs/playground/index.html`.
 
 #[cfg(target_arch = "wasm32")]
 mod exports;
@@ -6,18 +6,19 @@ mod exports;
 use descry_planner::{Attachments, Findings, Options, Outcome, Plan, Source, Task, check, plan};
 use serde_json::{Value, json};
 
-/// States that one planning may evaluate; the page also stops it by its clock.
+/// Maximum number of states that one planning run evaluates; the page also limits its time.
 const MOST_EVALUATED: u64 = 2_000_000;
-/// Names of the two texts in findings.
+/// Names of the domain and the problem in findings.
 const NAMES: [&str; 2] = ["domain.pddl", "problem.pddl"];
 
-/// Checks a domain and a problem: findings with their places in bytes, and as a terminal draws them.
+/// Checks a domain and a problem. Returns the findings as JSON, with byte offsets, and as text for a terminal.
 pub fn checked(domain: &str, problem: &str) -> Value {
     let [domain, problem] = [Source::new(NAMES[0], domain), Source::new(NAMES[1], problem)];
     said(&check(&domain, Some(&problem)))
 }
 
-/// Plans until `stop` says so: the findings if the texts are faulty, else the plan, or the reason for which there is none.
+/// Plans until `stop` returns true. Returns as JSON the findings if the texts have errors, else the plan, or the reason
+/// why there is none.
 pub fn planned(domain: &str, problem: &str, stop: &(dyn Fn() -> bool + Sync)) -> Value {
     let task = match Task::read(&Source::new(NAMES[0], domain), &Source::new(NAMES[1], problem)) {
         Ok(task) => task,

@@ -1,4 +1,4 @@
-//! What the page asks, asked natively.
+//! Tests, run natively, of the functions that the page calls.
 
 use descry_playground::{checked, planned};
 

@@ -16,7 +16,7 @@ use super::{Found, Shown};
 
 type Body = BoxBody<Bytes, std::io::Error>;
 
-/// Path of the event stream.
+/// Path at which readers subscribe to updates.
 const NEWS: &str = "/news";
 
 /// Security headers of every response: the page loads nothing from elsewhere, and other sites may neither
@@ -81,8 +81,8 @@ fn said(status: StatusCode, why: &str) -> Response<Body> {
     response
 }
 
-/// Reason to refuse a request: a `Host` other than this machine, or a cross-site origin; none if it
-/// is allowed.
+/// Reason to refuse a request: a `Host` other than this machine, or a cross-site origin; `None` if the request is
+/// allowed. `named`: host in the request's URL, if any.
 pub fn refusal(headers: &HeaderMap, named: Option<&str>, port: u16) -> Option<&'static str> {
     let own = |host: &str| {
         let names = ["127.0.0.1", "localhost"];

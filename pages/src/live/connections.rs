@@ -1,15 +1,15 @@
-//! Bounded set of open connections; silent clients cannot exhaust it.
+//! Open connections, limited in number; silent clients cannot use them all up.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use tokio::sync::Notify;
 
-/// The open connections, the oldest first.
+/// Open connections, the oldest first.
 #[derive(Debug, Default)]
 pub struct Connections(Mutex<Vec<Arc<Connection>>>);
 
-/// An open connection.
+/// Open connection.
 #[derive(Debug, Default)]
 pub struct Connection {
     has_asked: AtomicBool,
@@ -17,8 +17,8 @@ pub struct Connection {
 }
 
 impl Connections {
-    /// Opens a connection. If `most` are open already, evicts the oldest that has sent no request, or else
-    /// the oldest.
+    /// Registers a new connection. If `most` are open already, evicts the oldest that has sent no request, or else the
+    /// oldest.
     pub fn open(&self, most: usize) -> Arc<Connection> {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         while all.len() >= most.max(1) {
@@ -30,7 +30,7 @@ impl Connections {
         connection
     }
 
-    /// Removes a connection.
+    /// Removes a closed connection.
     pub fn close(&self, connection: &Arc<Connection>) {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         all.retain(|one| !Arc::ptr_eq(one, connection));

@@ -1,4 +1,4 @@
-//! Notification of readers about new revisions.
+//! Notification of readers about new revisions of the content.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use tokio::sync::watch;
 
 use super::{LOOK_EVERY, Shown};
 
-/// Progress of the shown content.
+/// State of the shown content.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct News {
-    /// Current revision; changes with every update.
+    /// Current revision number; changes with every update.
     pub revision: u64,
-    /// True if no further update will come.
+    /// True if no further update follows.
     pub ended: bool,
 }
 
-/// Polls for new revisions while a reader is subscribed.
+/// Checks for new revisions periodically while a reader is subscribed, and announces them in `news`; never returns.
 pub async fn watch(shown: Arc<dyn Shown>, news: Arc<watch::Sender<News>>) {
     loop {
         tokio::time::sleep(LOOK_EVERY).await;

@@ -1,4 +1,4 @@
-//! Page of a run under way, rendered from its record; the run itself is not involved.
+//! Page of a run under way, rendered from the run's record alone.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -10,25 +10,25 @@ use super::story::{self, Looks};
 use crate::live::{Found, Shown};
 use descry_agent::exit::CommandError;
 
-/// A run that is under way, or has not begun.
+/// Live content of a run that is under way or has not begun.
 pub struct Running {
     folder: PathBuf,
     told: Mutex<Told>,
 }
 
-/// Content read so far.
+/// Parts of the record read so far.
 #[derive(Default)]
 struct Told {
     record: Option<Record>,
     /// True if the run had ended when the record was opened.
     has_ended: bool,
     looks: Looks,
-    /// The story as JSON, with its revision.
+    /// Story as JSON, with the revision number that it shows.
     story: Option<(u64, String)>,
 }
 
 impl Running {
-    /// The run that writes its record into a folder.
+    /// Creates the content of the run that writes its record into a folder.
     pub fn of(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), told: Mutex::default() }
     }
@@ -48,7 +48,7 @@ impl Running {
         Ok(records.map_err(CommandError::broken)? + u64::from(told.has_ended))
     }
 
-    /// The story without points; readers fetch the points of each look from a path of its own.
+    /// Story as JSON, without points; readers fetch the points of each observation from a path of its own.
     fn story(&self, told: &mut Told) -> Result<String, CommandError> {
         let revision = Self::revision_of(told)?;
         if let Some((_, story)) = told.story.as_ref().filter(|(of, _)| *of == revision) {

@@ -8,18 +8,20 @@ use descry_perception::Cloud;
 use descry_perception::nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 
-/// Maximum number of points of one look, and of all looks together.
+/// Maximum number of points of one observation.
 const MOST_OF_A_LOOK: usize = 50_000;
+/// Maximum number of points of all observations together.
 const MOST_OF_ALL: usize = 1_000_000;
-/// Side of a thinning cell near surfaces, metres, and factor on it elsewhere; each cell keeps one point.
+/// Initial side of a thinning cell near surfaces, metres; each cell keeps one point.
 const CELL_M: f64 = 0.008;
+/// Factor on the side of a cell away from surfaces.
 const COARSER: f64 = 5.0;
-/// Growth factor of the cells, applied until the points are few enough.
+/// Factor by which cells grow until the points are few enough.
 const GROWTH: f64 = 1.3;
 /// Maximum distance of drawn points from the camera, metres.
 const FAR_M: f64 = 6.0;
 
-/// Axis-aligned box with dense points, map frame, metres.
+/// Axis-aligned box in which points are kept densely, map frame, metres.
 pub struct Near {
     /// Minimum corner.
     pub min_m: Point3<f64>,
@@ -27,25 +29,25 @@ pub struct Near {
     pub max_m: Point3<f64>,
 }
 
-/// Packed points with colours.
+/// Points with colours, packed for JSON.
 #[derive(Debug, Serialize)]
 pub struct Packed {
     /// Minimum corner of the bounding box, map frame, metres.
     min_m: [f64; 3],
     /// Size of the bounding box, metres.
     size_m: [f64; 3],
-    /// Three `u16` a point, little-endian, base64: the position as a fraction of the bounding box.
+    /// Positions as fractions of the bounding box: three `u16` per point, little-endian, in base64.
     pub places: String,
-    /// Three bytes a point, base64: red, green, blue.
+    /// Colours: red, green and blue, one byte each per point, in base64.
     pub colours: String,
 }
 
-/// Maximum number of points of each look, for this number of looks.
+/// Maximum number of points of each observation, given the number of observations.
 pub fn most(looks: usize) -> usize {
     MOST_OF_A_LOOK.min(MOST_OF_ALL / looks.max(1))
 }
 
-/// Thins and packs a cloud taken at a camera pose.
+/// Thins a cloud (camera frame) to at most `most` points, denser in the boxes `near`, and packs it in the map frame.
 pub fn pack(cloud: &Cloud, map_from_camera: &Isometry3<f64>, near: &[Near], most: usize) -> Packed {
     let mut cell_m = CELL_M;
     let mut kept = thinned(cloud, map_from_camera, near, cell_m);
@@ -69,8 +71,8 @@ pub fn pack(cloud: &Cloud, map_from_camera: &Isometry3<f64>, near: &[Near], most
     Packed { min_m, size_m, places: STANDARD.encode(places), colours: STANDARD.encode(colours) }
 }
 
-/// Permutes points such that every prefix is spread over the whole: a prefix can be drawn while the view
-/// turns.
+/// Permutes points such that every prefix is spread over the whole: a prefix can be drawn while the user turns the
+/// view.
 pub fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     const STRIDE: usize = 7919;
     let count = points.len();
@@ -81,7 +83,7 @@ pub fn mixed<T: Copy>(points: Vec<T>) -> Vec<T> {
     }
 }
 
-/// First point of each cell.
+/// First point of each cell, in the map frame, with its colour; far points are left out.
 fn thinned(
     cloud: &Cloud,
     map_from_camera: &Isometry3<f64>,

@@ -19,19 +19,21 @@ use descry_agent::written::call_of;
 use descry_domains::saying::Saying;
 use descry_explain::wording::capital;
 
-/// Margins of the dense box of a surface: around its outline, below and above it, metres.
+/// Margin of a surface's dense box around the outline, metres.
 const BESIDE_M: f64 = 0.15;
+/// Margin of the box below the surface, metres.
 const BELOW_M: f64 = 0.05;
+/// Margin of the box above the surface, metres.
 const ABOVE_M: f64 = 0.6;
 
 /// Content of a run's page. Times are seconds since the run began, on the body's clock; positions are in the
 /// map frame, metres.
 #[derive(Debug, Serialize)]
 pub struct Story {
-    /// Goal as the user phrased it.
+    /// Goal in the user's words.
     pub goal: String,
     pddl: String,
-    /// Goal in the domain's wording.
+    /// Goal in the domain's wording; `None` if that is the PDDL text.
     wanted: Option<String>,
     report: Option<Report>,
     begun_unix_s: Option<u64>,
@@ -46,12 +48,12 @@ pub struct Story {
     stands: Vec<Stand>,
     beliefs: Vec<Believed>,
     known: Vec<Known>,
-    /// The numbers in the goal.
+    /// Numbers in the goal, each with its values over time.
     sought: Vec<Sought>,
     lost: Vec<String>,
 }
 
-/// The parts of the body's description that the page draws.
+/// Parts of the body's description that the page draws.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 struct Map {
@@ -69,7 +71,7 @@ struct Area {
     height_m: f64,
 }
 
-/// A message of the narration.
+/// Message of the narration.
 #[derive(Debug, Serialize)]
 struct Moment {
     at_s: f64,
@@ -80,7 +82,7 @@ struct Moment {
     text: String,
 }
 
-/// A plan as it was made.
+/// Plan, with the time and the reason of its making.
 #[derive(Debug, Serialize)]
 struct Planned {
     at_s: f64,
@@ -89,48 +91,48 @@ struct Planned {
     steps: Vec<PlanStep>,
 }
 
-/// A step of a plan.
+/// Step of a plan.
 #[derive(Debug, Serialize)]
 struct PlanStep {
-    /// The step in PDDL.
+    /// Action with its arguments, in PDDL.
     call: String,
-    /// The step in the domain's wording.
+    /// Action in the domain's wording.
     said: String,
     from_s: f64,
     lasts_s: f64,
 }
 
-/// A step that was carried out or attempted.
+/// Step that was executed or attempted.
 #[derive(Debug, Serialize)]
 struct Deed {
     call: String,
-    /// Arguments of the call.
+    /// Arguments of the action.
     arguments: Vec<String>,
     from_s: f64,
     to_s: f64,
     failed: Option<String>,
 }
 
-/// A look: camera pose, and measured points.
+/// Observation: camera pose and measured points.
 #[derive(Debug, Clone, Serialize)]
 struct Look {
-    /// Key of the look; changes with its pose.
+    /// Key of the observation; changes with the camera pose.
     key: String,
     at_s: f64,
     eye_m: [f64; 3],
-    /// Corners of the image at a depth of two metres.
+    /// Corners of the image at a depth of two metres, map frame, metres; empty if the camera is unknown.
     corners_m: Vec<[f64; 3]>,
     on: Value,
     #[serde(skip_serializing_if = "Option::is_none")]
     points: Option<Arc<Packed>>,
 }
 
-/// Cache of a run's looks from one story to the next.
+/// Observations of a run by key, kept from one story to the next.
 #[derive(Debug, Default)]
 pub struct Looks(BTreeMap<String, Look>);
 
 impl Looks {
-    /// Points of a look, by its key.
+    /// Points of an observation, by its key; `None` if the key is unknown.
     pub fn points(&self, key: &str) -> Option<Arc<Packed>> {
         self.0.get(key)?.points.clone()
     }
@@ -145,28 +147,28 @@ struct Stand {
     yaw_rad: f64,
 }
 
-/// Belief after a look.
+/// Belief after an observation.
 #[derive(Debug, Serialize)]
 struct Believed {
     at_s: f64,
     objects: Vec<Object>,
-    /// Highest probability of each known object.
+    /// Highest probability of each known object among all believed objects.
     best: BTreeMap<String, f64>,
 }
 
-/// State of the run after a look: certainty, reasons for doubt, and unseen places.
+/// Knowledge after an observation, as text: certainty, reasons for doubt, and unseen places.
 #[derive(Debug, Serialize)]
 struct Known {
     at_s: f64,
     text: String,
 }
 
-/// History of a number in the goal.
+/// Number in the goal, with its values over time.
 #[derive(Debug, Serialize)]
 struct Sought {
     name: String,
     wanted: f64,
-    /// Pairs of a time, seconds, and the value from then on.
+    /// Pairs of a time, seconds since the run began, and the value from then on.
     values: Vec<(f64, f64)>,
 }
 
@@ -179,7 +181,7 @@ struct Object {
     footprint_m: Vec<[f64; 3]>,
 }
 
-/// Gathers the story of a run.
+/// Gathers the content of a run's page; `looks`: the observations of an earlier call, updated.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -233,8 +235,8 @@ pub fn of(record: &Record, report: Option<&Report>, looks: &mut Looks) -> Result
 }
 
 impl Story {
-    /// The story for readers that fetch the points of each look separately. While the run is still writing,
-    /// unreadable parts of the record are not reported.
+    /// Story for readers that fetch the points of each observation separately. While the run has no report yet,
+    /// unreadable parts of the record are not mentioned.
     pub fn under_way(mut self) -> Self {
         self.looks.iter_mut().for_each(|look| look.points = None);
         if self.report.is_none() {
@@ -244,7 +246,7 @@ impl Story {
     }
 }
 
-/// The record, its lost parts, and the time at which it begins.
+/// Record of the run, descriptions of its unreadable parts, and the stamp of the first document read.
 struct All<'a> {
     record: &'a Record,
     lost: Vec<String>,
@@ -296,14 +298,14 @@ fn told(all: &All<'_>, events: &[Document], saying: &Saying) -> (Vec<Moment>, Ve
     (moments, plans)
 }
 
-/// A step of a plan that was made at `at_s`.
+/// Converts a step of a plan made at `at_s`, seconds since the run began.
 fn planned(step: &Step, at_s: f64, saying: &Saying) -> PlanStep {
     let call = call_of(step).to_string();
     let said = saying.say(&call);
     PlanStep { call, said, from_s: at_s + step.start_s.unwrap_or(0.0), lasts_s: step.duration_s }
 }
 
-/// Steps begun, each with its end: its failure, or the next event about something else.
+/// Steps that were begun, each with its end and, if it failed, the reason. A step ends with the next plan or step.
 fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     let events: Vec<(f64, Event)> =
         events.iter().filter_map(|d| Some((all.s(d.stamp_ns), part(&d.body)?))).collect();
@@ -331,7 +333,7 @@ fn deeds(all: &All<'_>, events: &[Document]) -> Vec<Deed> {
     deeds
 }
 
-/// Pose of each look in the last merge that included it, by the record ID of its cloud.
+/// Camera pose of each observation in the last merge that used it, by the record ID of its cloud.
 fn placed(all: &mut All<'_>) -> Result<BTreeMap<u64, Isometry3<f64>>, CommandError> {
     let mut placed = BTreeMap::new();
     for document in all.find("percepts")? {
@@ -344,7 +346,7 @@ fn placed(all: &mut All<'_>) -> Result<BTreeMap<u64, Isometry3<f64>>, CommandErr
 }
 
 impl Looks {
-    /// Updates the looks from these clouds; those with an unchanged pose are kept.
+    /// Updates the observations from the record's clouds; those with an unchanged pose are kept.
     fn tell(&mut self, all: &mut All<'_>, clouds: &[Document], map: &Map) -> Result<(), CommandError> {
         let placed = placed(all)?;
         let frame = map.description["frames"]["map"].as_str().unwrap_or("map").to_owned();
@@ -377,7 +379,7 @@ impl Looks {
     }
 }
 
-/// Key of a look, from its cloud and its pose.
+/// Key of an observation, from its cloud and its camera pose.
 fn key(document: &Document, map_from_camera: &Isometry3<f64>) -> String {
     let numbers = map_from_camera.to_homogeneous();
     let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
@@ -409,7 +411,7 @@ fn look(
     })
 }
 
-/// The dense box of a surface.
+/// Dense box of a surface.
 fn near(surface: &Area) -> Near {
     let side = |axis: usize, of: fn(f64, f64) -> f64, from: f64| {
         surface.outline_m.iter().map(|p| p[axis]).fold(from, of)
@@ -422,7 +424,7 @@ fn near(surface: &Area) -> Near {
     }
 }
 
-/// Start pose of the body, and its pose at each look.
+/// Pose of the body at each observation.
 fn stands(all: &All<'_>, map: &Map, clouds: &[Document]) -> Vec<Stand> {
     let frames = &map.description["frames"];
     let [world, base] = ["map", "base"].map(|name| frames[name].as_str().unwrap_or(name).to_owned());
@@ -457,7 +459,7 @@ fn believed(at_s: f64, belief: &Belief) -> Believed {
     Believed { at_s, objects: belief.tracks.iter().map(object).collect(), best }
 }
 
-/// The most probable kind of a track with its probability; none if unknown is more probable.
+/// Most probable kind of a believed object, with its probability; `None` if unknown is more probable.
 fn kind_of(track: &descry_memory::belief::Track) -> Option<(&str, f64)> {
     let kind = track.kind()?;
     let (_, probability) = track.kinds.iter().find(|(name, _)| name == kind)?;

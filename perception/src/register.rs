@@ -19,7 +19,7 @@ pub use pairs::{Pair, pairs};
 pub struct Prepared {
     pub(crate) points: Vec<Point3<f32>>,
     pub(crate) normals: Option<Vec<Vector3<f32>>>,
-    /// Normals by tree slot; empty if not requested.
+    /// Normal of the point in each slot of the tree; empty if not requested.
     by_slot: Vec<[f64; 3]>,
     pub(crate) tree: Neighbours,
 }
@@ -35,7 +35,7 @@ impl Prepared {
         Ok(Prepared { points, normals: None, by_slot: Vec::new(), tree })
     }
 
-    /// Makes points ready for every method, with normals by the `k` nearest points.
+    /// Makes points ready for every method, with normals from the `k` nearest points.
     ///
     /// # Errors
     /// As [`Prepared::new`].
@@ -64,10 +64,10 @@ impl Prepared {
     }
 }
 
-/// The quantity that is minimised.
+/// Quantity that a registration minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Distances between partners (Besl and McKay 1992).
+    /// Distances between corresponding points (Besl and McKay 1992).
     PointToPoint,
     /// Distances of the source's points from the target's tangent planes (Chen and Medioni 1992).
     PointToPlane,
@@ -78,22 +78,24 @@ pub enum Method {
 /// The options of a registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegisterOptions {
-    /// The quantity that is minimised.
+    /// Quantity that is minimised.
     pub method: Method,
-    /// The initial pose of the source in the target.
+    /// Initial pose of the source in the target's frame.
     pub start_target_from_source: Isometry3<f64>,
     /// Maximum correspondence distance, metres.
     pub within_m: f32,
-    /// Maximum number of rounds of pairing and moving.
+    /// Maximum number of iterations of matching and moving.
     pub rounds: usize,
-    /// Settled if a round shifts the middle of the matched points by less, metres …
+    /// Shift of the source's centre in one iteration below which the registration has converged, if
+    /// the rotation is below `settle_rad` too, metres.
     pub settle_m: f64,
-    /// … and turns by less, radians.
+    /// Rotation in one iteration below which the registration has converged, if the shift is below
+    /// `settle_m` too, radians.
     pub settle_rad: f64,
     /// Residual length (metres) beyond which the weight falls as `1 / (1 + (r/s)²)` (Cauchy), so
     /// that points without a true partner have little influence; `None`: unit weights.
     pub robust_m: Option<f64>,
-    /// Minimum number of partners to go on with.
+    /// Minimum number of correspondences; with fewer, the registration ends.
     pub least: usize,
 }
 
@@ -117,7 +119,7 @@ impl Default for RegisterOptions {
 pub enum Termination {
     /// Converged: the last iteration moved less than the threshold.
     Settled,
-    /// All rounds were used while the source still moved.
+    /// All iterations were used while the source still moved.
     OutOfRounds,
     /// Too few correspondences: the clouds do not overlap at the initial pose.
     TooFewPartners,
@@ -136,30 +138,30 @@ impl std::fmt::Display for Termination {
 /// Pose of the source, with quality measures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// Pose found.
+    /// Pose of the source in the target's frame.
     pub target_from_source: Isometry3<f64>,
-    /// Points of the source with a partner at that pose.
+    /// Number of source points with a correspondence at that pose.
     pub matched: usize,
-    /// Points of the source.
+    /// Number of source points.
     pub of: usize,
     /// Root mean square of the minimised residuals over the correspondences, metres: point to
     /// point, or point to tangent plane.
     pub residual_m: f64,
-    /// Rounds used.
+    /// Number of iterations.
     pub rounds: usize,
     /// Reason registration ended.
     pub ending: Termination,
-    /// Displacement of the correspondences' centroid from the initial pose, metres.
+    /// Displacement of the source's centroid from the initial pose, metres.
     pub moved_m: f64,
     /// Rotation from the initial pose, radians.
     pub moved_rad: f64,
     /// Number of unconstrained directions of motion (of six): 3 for two planes, 1 for two infinite
     /// cylinders; the source is not moved along them.
     pub free: usize,
-    /// Normal matrix of the last iteration about `centre`, small rotation then shift in the
-    /// target's frame, for weighting this fit among others.
+    /// Normal matrix of the last iteration (small rotation, then shift, about `centre` in the
+    /// target's frame), for weighting this fit among others.
     pub information: Matrix6<f64>,
-    /// The point of the target's frame that the matrix refers to.
+    /// Point of the target's frame about which `information` describes motions.
     pub centre: Point3<f64>,
 }
 
@@ -170,7 +172,7 @@ impl Fit {
     }
 }
 
-/// Clouds that cannot be registered.
+/// Reason clouds cannot be registered.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RegisterError {
     /// A cloud without a finite point.

@@ -12,27 +12,29 @@ use nalgebra::{Point3, Vector4};
 use side::{SidePoints, Sums};
 use std::ops::Range;
 
-/// Radii that are tried, metres. From: chosen.
+/// Minimum and maximum radius of a body, metres. From: chosen.
 const RADII_M: (f64, f64) = (0.012, 0.20);
-/// Circles proposed. From: chosen.
+/// Number of random circles proposed per fit. From: chosen.
 const PROPOSALS: usize = 120;
-/// Points that judge a proposal, at the most. From: chosen.
+/// Maximum number of points that score a proposed circle. From: chosen.
 const JUDGES: usize = 160;
-/// Points that all steps of a fit but the last go by, at the most. From: chosen.
+/// Maximum number of points used in all steps of a fit but the last. From: chosen.
 const SCOUTS: usize = 800;
 /// Minimum number of side points to start a fit, and of points near the side to continue.
 /// From: chosen.
 const FEWEST: (usize, usize) = (20, 12);
-/// Gates of the first steps of a fit, in tolerances. From: chosen.
+/// Maximum distance of used points from the side in the first steps of a fit, in multiples of the
+/// tolerance. From: chosen.
 const FIRST_GATES: [f64; 2] = [3.0, 2.0];
 /// Number of directions around an axis. From: chosen.
 pub const SECTORS: usize = 36;
 /// Shares of the height, at the foot and below the top, excluded from the side. From: chosen.
 pub(crate) const ENDS: (f64, f64) = (0.15, 0.1);
-/// Prior standard deviations of radius, metres, and slope of objects on tables, and the maximum
-/// slope. From: chosen.
+/// Prior standard deviation of the radius of objects on tables, metres. From: chosen.
 pub(crate) const RADIUS_SPREAD_M: f64 = 0.05;
+/// Prior standard deviation of the slope (growth of the radius with height). From: chosen.
 pub(crate) const SLOPE_SPREAD: f64 = 0.1;
+/// Maximum slope (growth of the radius with height). From: chosen.
 pub const STEEPEST: f64 = 0.6;
 /// Share of the side's points that a fitted circle must explain: on any flat face some circle
 /// explains a third. From: chosen, just above a third; on real mugs a circle explains half of the
@@ -44,28 +46,28 @@ pub(crate) const SEED: u64 = 7;
 /// An upright cone frustum in the surface's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
-    /// Axis, metres.
+    /// Position of the axis along x, metres.
     pub x: f64,
-    /// Axis, metres.
+    /// Position of the axis along y, metres.
     pub y: f64,
     /// Radius at the middle height, metres.
     pub radius_m: f64,
-    /// Growth of the radius with height, metres a metre.
+    /// Growth of the radius with height, metres per metre.
     pub slope: f64,
     /// Middle height, metres above the surface.
     pub middle_m: f64,
-    /// Standard deviation of axis position and of radius, metres.
+    /// Standard deviation of the axis position along x or y, metres.
     pub place_sigma_m: f64,
     /// Standard deviation of the radius, metres.
     pub radius_sigma_m: f64,
     /// Standard deviation of the slope.
     pub slope_sigma: f64,
-    /// Root mean square distance of the inliers, metres.
+    /// Root mean square distance of the inliers from the side, metres.
     pub residual_m: f64,
     /// Root mean square distance of all side points that are not inside the body, metres, each at
     /// most `OUTSIDE_M`.
     pub spread_m: f64,
-    /// Share of the points between base and top on the body.
+    /// Share of the side's points that lie on the body.
     pub inliers: f64,
 }
 
@@ -75,7 +77,7 @@ pub struct Round {
 pub(crate) struct Edge {
     /// Horizontal unit vector.
     pub direction: [f64; 2],
-    /// Metres.
+    /// Reach of the side along `direction` from the frame's origin, metres.
     pub reach_m: f64,
     /// Height above the surface, metres.
     pub height_m: f64,
@@ -89,9 +91,11 @@ const EDGE_SIGMA_M: f64 = 0.0025;
 /// From: chosen.
 pub(crate) const MOST_INDEPENDENT: f64 = 25.0;
 
-/// Tolerance factor for points on the side in the last iterations. From: chosen.
+/// Maximum distance of used points from the side in the last steps of a fit, in multiples of the
+/// tolerance. From: chosen.
 const LAST_GATE: f64 = 1.5;
-/// Maximum outside distance that counts, metres; larger distances are clamped. From: chosen.
+/// Limit of a point's distance outside the side in [`Round::spread_m`], metres; larger distances
+/// are clamped. From: chosen.
 const OUTSIDE_M: f64 = 0.02;
 
 impl Round {
@@ -170,7 +174,8 @@ pub fn fit(points: &[Point3<f64>], base_m: f64, top_m: f64, sigma_m: f64, seed: 
     (round.radius_m > RADII_M.0).then_some(round)
 }
 
-/// Refits the body with silhouette constraints on its width, which depth alone measures badly.
+/// Refits the body with silhouette constraints on its width, which depth alone measures badly;
+/// `None` if too few points lie near the side.
 pub(crate) fn refit(
     round: &Round,
     points: &[Point3<f64>],
@@ -191,9 +196,9 @@ pub(crate) fn refit(
 }
 
 impl Round {
-    /// Body shifted along one viewing direction (horizontal, unit, towards the camera) until its
-    /// side is centred in the points. Depth errors lie along the view, so a circle through such
-    /// points is too near and too small.
+    /// Body shifted along a horizontal unit vector towards the camera until its side is centred in
+    /// the points; `None` for too few points. Depth errors lie along the view, so a circle
+    /// through such points is too near and too small.
     pub fn behind(
         &self,
         points: &[Point3<f64>],
@@ -214,7 +219,8 @@ impl Round {
         Some(Round { x: self.x + shift_m * to_x, y: self.y + shift_m * to_y, ..*self })
     }
 
-    /// [`Round::spread_m`] of the side points that count.
+    /// Root mean square distance, metres, of the side points for which `counts` is true, as
+    /// [`Round::spread_m`].
     pub fn spread_of(
         &self,
         points: &[Point3<f64>],
@@ -231,7 +237,7 @@ impl Round {
     }
 }
 
-/// Maximum distance of a measured point of the side from the side, metres.
+/// Maximum distance of a measurement from the side that it is of, metres.
 fn tolerance(sigma_m: f64) -> f64 {
     (2.0 * sigma_m).clamp(EDGE_M, PLACE_M)
 }
@@ -242,8 +248,8 @@ pub(crate) fn side_band(base_m: f64, top_m: f64) -> Range<f64> {
     base_m + ENDS.0 * height..top_m - ENDS.1 * height
 }
 
-/// Circle through three points with the most points on it and the fewest outside, seen from above,
-/// relative to the side's first point.
+/// Best of random circles through three points, with the most points on the circle and the fewest
+/// outside, seen from above: centre, relative to the side's first point, and radius, metres.
 fn propose(side: &SidePoints, tolerance: f64, seed: u64) -> Option<[f64; 3]> {
     let mut rng = Draws::new(seed);
     let judges = side.judges(JUDGES);
@@ -274,7 +280,8 @@ fn circumcircle(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> Option<[f64; 3]> {
     Some([a[0] + ux, a[1] + uy, distance(ux, uy)])
 }
 
-/// Gauss-Newton step on axis, radius and slope over the points within `gate` of the side.
+/// Takes a Gauss-Newton step on axis, radius and slope over the points within `gate` of the side;
+/// `None` if the points are too few or the step is undetermined.
 fn improve(round: &Round, side: &SidePoints, edges: &[Edge], gate: f64, sigma_m: f64) -> Option<Round> {
     let Sums { normal, right, squares, count, outside, spread } = side.sums(round, gate);
     if count < FEWEST.1 as f64 {

@@ -13,14 +13,16 @@ const CHUNK: usize = 1024;
 /// (Segal et al. 2009, section III.B).
 const FLAT: f64 = 1e-3;
 
-/// Minimum size of the point sample in early iterations, where fewer points give the direction as
-/// well.
+/// Minimum number of points in the sample of early iterations, where fewer points give the motion
+/// nearly as well.
 const SAMPLE: usize = 2000;
+/// Maximum stride through the points in early iterations.
 const WIDEST_STRIDE: usize = 16;
-/// Multiple of the convergence threshold below which the sample is replaced by all points: the many
-/// small steps of [`Method::PointToPoint`] are worth taking on the sample, but the few large steps
-/// of the others would end in a local minimum of the sample.
+/// Multiple of the convergence threshold below which all points replace the sample in
+/// [`Method::PointToPoint`], whose many small steps are worth taking on the sample.
 const NEARLY: f64 = 10.0;
+/// Multiple of the convergence threshold below which all points replace the sample in the other
+/// methods, whose few large steps would end in a local minimum of the sample.
 const NEARLY_BY_PLANES: f64 = 100.0;
 
 /// Aligns the source with the target.
@@ -105,9 +107,11 @@ struct Run<'a> {
     source: &'a Prepared,
     /// Stride through the points.
     stride: usize,
-    /// Correspondence of each of these points.
+    /// Correspondence of each sampled point.
     partners: Vec<Partner>,
+    /// Number of correspondences at the last pose.
     matched: usize,
+    /// Sum of the squared residuals at the last pose, square metres.
     square: f64,
 }
 
@@ -134,8 +138,8 @@ impl<'a> Run<'a> {
         self.stride = stride;
     }
 
-    /// Runs at most `most` iterations; ends when the motion is below `ease` times the convergence
-    /// threshold.
+    /// Iterates until `most` iterations in all, fewer than `least` correspondences, or a motion
+    /// below `ease` times the convergence threshold.
     fn rounds(&mut self, at: &mut Progress, most: usize, least: usize, ease: f64) -> Termination {
         let options = self.options;
         let mut first = true;
@@ -165,7 +169,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Pairs at a pose, and sums up.
+    /// Finds the correspondences at a pose, and sums their normal equations about `centre`.
     fn sums(&mut self, pose: &Isometry3<f64>, centre: &Point3<f64>) -> Sums {
         let place = Place::of(pose);
         let centre = [centre.x, centre.y, centre.z];

@@ -5,7 +5,8 @@ use nalgebra::{
     Vector6,
 };
 
-/// Sums over pairs. Motions are small rotations, then shifts, about `centre` in the target's frame.
+/// Sums over correspondences for one step. A motion is a small rotation, then a shift, about a
+/// centre in the target's frame.
 #[derive(Clone, Copy)]
 pub(crate) struct Sums {
     pub matched: usize,
@@ -13,12 +14,15 @@ pub(crate) struct Sums {
     pub square: f64,
     /// Upper triangle of the normal matrix, row by row.
     h: [f64; 21],
+    /// Weighted sum of the derivatives times the residuals.
     g: [f64; 6],
-    /// Sum of weights, for the closed form; further fields: weighted sums of source and target
-    /// points and of their products.
+    /// Sum of weights; this and the following fields serve the closed form of point to point.
     weight: f64,
+    /// Weighted sum of the source points, relative to the centre.
     source: [f64; 3],
+    /// Weighted sum of the target points, relative to the centre.
     target: [f64; 3],
+    /// Weighted sums of products of a target coordinate (row) and a source coordinate (column).
     cross: [[f64; 3]; 3],
     /// Weighted products of source points with themselves: xx xy xz yy yz zz.
     spread: [f64; 6],
@@ -37,7 +41,7 @@ impl Sums {
         spread: [0.0; 6],
     };
 
-    /// A residual `r` whose derivative by the motion is `j`.
+    /// Adds a residual `r` with the derivative `j` by the motion (rotation, then shift).
     #[inline(always)]
     pub(crate) fn add_scalar(&mut self, j: [f64; 6], r: f64, weight: f64) {
         self.matched += 1;
@@ -53,7 +57,8 @@ impl Sums {
         }
     }
 
-    /// Adds two points about the centre, for the closed form of point to point.
+    /// Adds a source point `p` and its target point `t`, relative to the centre, for the closed
+    /// form of point to point.
     #[inline(always)]
     pub(super) fn add_points(&mut self, p: [f64; 3], t: [f64; 3], weight: f64) {
         self.matched += 1;
@@ -135,7 +140,7 @@ impl Sums {
         self
     }
 
-    /// Weighted sum of derivatives by residuals.
+    /// Right-hand side: weighted sum of the derivatives times the residuals.
     pub(crate) fn right(&self) -> Vector6<f64> {
         Vector6::from(self.g)
     }
@@ -163,7 +168,8 @@ impl Sums {
         Motion::about(centre, rotation, Vector3::new(twist[3], twist[4], twist[5]), free, information)
     }
 
-    /// The rotation and shift of least squares between partners (Arun, Huang, Blostein 1987; Umeyama 1991 for the sign).
+    /// Least-squares rotation and shift between corresponding points (Arun, Huang, Blostein 1987;
+    /// Umeyama 1991 for the sign).
     pub(super) fn closed_form(&self, centre: &Point3<f64>) -> Motion {
         let per = 1.0 / self.weight;
         let source = Vector3::from(self.source) * per;
@@ -231,13 +237,17 @@ pub(super) fn held_inverse(information: &Matrix6<f64>) -> (Matrix6<f64>, usize) 
     (scale * inverse * scale, free)
 }
 
-/// A step of the pose.
+/// Change of the pose found in one iteration.
 pub(super) struct Motion {
-    /// The step, to be applied on the left of the present pose.
+    /// Rigid motion, applied on the left of the present pose.
     pub step: Isometry3<f64>,
+    /// Shift of the centre, metres.
     pub shift_m: f64,
+    /// Rotation, radians.
     pub turn_rad: f64,
+    /// Number of unconstrained directions of motion, of six.
     pub free: usize,
+    /// Normal matrix about the centre.
     pub information: Matrix6<f64>,
 }
 

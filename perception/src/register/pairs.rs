@@ -1,14 +1,15 @@
-//! Partners: for each point of the source the nearest of the target.
+//! Correspondences: for each source point the nearest target point.
 //!
-//! A point that has moved by δ since its last search still has the same nearest point `a` if the distance to `a` is no more than the distance that the
-//! second nearest had, less δ. So most searches are spared once the pose settles, and the partners are those that a search would have found.
+//! A point that has moved by δ since its last search still has the same nearest point `a` if `a` is
+//! no farther than the second nearest point was, less δ. So most searches are spared once the pose
+//! settles, with the same correspondences as with a search.
 
 use super::Prepared;
 use crate::neighbours::{LEAF, Neighbours, least};
 use crate::pool;
 use nalgebra::{Isometry3, Point3};
 
-/// Two points that belong together.
+/// A source point and its corresponding target point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair {
     /// Index in the source's points.
@@ -36,7 +37,7 @@ pub fn pairs(
     pool::filter(source.points.len(), 1, search)
 }
 
-/// A pose ready to be applied to many points.
+/// Pose as matrix rows, for fast transformation of many points.
 pub(super) struct Place {
     rows: [[f64; 4]; 3],
 }
@@ -69,9 +70,10 @@ pub(crate) struct Partner {
     searched_at: [f32; 3],
     /// Slot of the nearest point in the target's tree; `NONE` if none is near.
     slot: u32,
-    /// Minimum distance of all other target points at the last search, metres.
+    /// Lower bound of the distance to all other target points at the last search, metres.
     others_m: f32,
-    /// Current squared distance to the partner; infinite if none is near enough.
+    /// Current squared distance to the corresponding target point, square metres; infinite if none
+    /// is near enough.
     pub(super) distance_sq: f32,
 }
 
@@ -90,13 +92,13 @@ impl Partner {
         Partner { slot: self.slot, ..Partner::UNKNOWN }
     }
 
-    /// True before the first search.
+    /// True if no search has been made yet.
     pub(crate) fn is_unknown(&self) -> bool {
         self.others_m == f32::NEG_INFINITY
     }
 
-    /// Updates the correspondence for the point at `at`; returns its slot if within `within_m`.
-    /// Others may be nearer by up to `slack_m`.
+    /// Updates the correspondence for the point at `at`; returns its tree slot if within
+    /// `within_m`. Another target point may be nearer by up to `slack_m`.
     #[inline(always)]
     pub(crate) fn update(
         &mut self,
@@ -135,7 +137,7 @@ fn distance_sq(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     x * x + y * y + z * z
 }
 
-/// Two nearest points so far.
+/// Nearest point (slot) found so far, with the squared distances of the two nearest points.
 struct Two {
     slot: u32,
     first_sq: f32,

@@ -14,10 +14,11 @@ const SCOUTS: usize = 300;
 /// A round body about an axis along the surface.
 #[derive(Clone, Copy)]
 pub struct LyingRound {
-    /// Transform from the surface's frame to one with z along the axis and y away from the surface.
+    /// Transform from the surface's frame to the body's: z along the axis, y away from the surface.
     pub turned: Isometry3<f64>,
-    /// Body and the positions of its ends.
+    /// Body about an axis along z, body frame.
     pub round: Round,
+    /// Positions of the body's two ends along z, metres.
     pub ends_m: [f64; 2],
 }
 
@@ -31,18 +32,21 @@ impl LyingRound {
     }
 }
 
-/// Found body, the points in its frame, and the direction of its axis.
+/// Lying round body fitted to points.
 pub(crate) struct Found {
     pub body: LyingRound,
+    /// Points in the body's frame, metres.
     pub points: Vec<Point3<f64>>,
+    /// Direction of the axis along the surface, radians from x.
     angle: f64,
     /// Mean squared distance of the points from the side, each clamped, square metres.
     miss_m2: f64,
 }
 
-/// Best round body about an axis along the surface.
+/// Fits a round body about an axis along the surface; `None` if none rests there.
 ///
-/// Bounds of the points seen from above, the height that they rest on, and the spread of one measurement, metres.
+/// `bounds`: rectangle around the points seen from above; `base_m`: height of the support;
+/// `sigma_m`: standard deviation of a measurement, metres.
 pub(crate) fn fit(points: &[Point3<f64>], bounds: &Rectangle, base_m: f64, sigma_m: f64) -> Option<Found> {
     let few: Vec<Point3<f64>> =
         points.iter().step_by(points.len().div_ceil(SCOUTS).max(1)).copied().collect();

@@ -3,19 +3,20 @@
 use super::{OUTSIDE_M, Round, side_band};
 use nalgebra::{Matrix4, Point3, Vector4};
 
-/// Points that are summed up side by side. From: work.
+/// Number of points processed together (SIMD lanes). From: work.
 const LANES: usize = 4;
 
 type Lanes = [f32; LANES];
 
-/// Points that judge circles, seen from above, as of [`SidePoints`].
+/// Sample of the side points that scores circles, seen from above, with the origin of
+/// [`SidePoints`].
 pub struct Judges {
     x: Vec<f32>,
     y: Vec<f32>,
 }
 
-/// Points relative to the first one, in single precision to a tenth of a micrometre; padded with
-/// NaN, which is on no side.
+/// Side points relative to the first one, metres, in single precision (a tenth of a micrometre);
+/// padded with NaN, which is on no side.
 pub struct SidePoints {
     /// Origin in the surface's frame, metres.
     pub origin: [f64; 3],
@@ -25,19 +26,20 @@ pub struct SidePoints {
     len: usize,
 }
 
-/// The sums over the points near the side of a body that a step of a fit needs.
+/// Sums over the points near the side of a body, for one step of a fit.
 pub struct Sums {
-    /// Sum of the products of the derivatives of a point's distance from the side by axis, radius and slope,
-    /// with the sign reversed.
+    /// Sum of products of the derivatives of a point's distance from the side by axis x, axis y,
+    /// radius and slope (normal matrix).
     pub normal: Matrix4<f64>,
-    /// Sum of the derivatives times the distances (right-hand side).
+    /// Sum of the same derivatives, with reversed sign, times the distances (right-hand side).
     pub right: Vector4<f64>,
     /// Sum of the squared distances.
     pub squares: f64,
+    /// Number of points near the side.
     pub count: f64,
     /// Sum of the squared distances of all points not inside, each limited to [`OUTSIDE_M`].
     pub spread: f64,
-    /// Number of points outside the side.
+    /// Number of points that are not inside the body.
     pub outside: f64,
 }
 
@@ -94,7 +96,7 @@ impl SidePoints {
 
     /// Sums over the points within `gate` of the side of a body.
     pub fn sums(&self, round: &Round, gate: f64) -> Sums {
-        /// Lanes of points whose sums keep enough digits in single precision. From: rounding.
+        /// Maximum number of lane groups summed in single precision. From: rounding.
         const BLOCK: usize = 64;
         let body = Seen::of(round, gate, self.origin);
         let mut all = [0.0; 17];
@@ -123,11 +125,12 @@ impl SidePoints {
 }
 
 impl Judges {
-    /// Score of a circle for the points, seen from above; `None` if not better than `best`.
+    /// Score of a circle (centre and radius, metres) for the points seen from above; `None` if not
+    /// better than `best`.
     pub fn score(&self, circle: [f64; 3], tolerance: f64, best: f32) -> Option<f32> {
         /// Penalty of a point inside the circle; less than the half for one outside. From: chosen.
         const INSIDE: f32 = 0.15;
-        /// Points after which a circle may be left. From: work.
+        /// Number of points scored between tests whether the circle can still win. From: work.
         const BLOCK: usize = 16;
         /// Score difference within the rounding error. From: rounding.
         const ROUNDING: f32 = 1e-3;
@@ -160,7 +163,7 @@ fn lanes(of: impl Fn(usize) -> f32) -> Lanes {
     std::array::from_fn(of)
 }
 
-/// A body as seen from the first of the points.
+/// Round body relative to the first side point, metres, in single precision.
 struct Seen {
     x: f32,
     y: f32,

@@ -3,7 +3,8 @@
 use crate::polygon::{convex_hull, holds};
 use nalgebra::Point3;
 
-/// Maximum share, as a fraction, of places outside an enclosing outline. From: chosen.
+/// Maximum share of points outside an outline that counts as enclosing them: numerator and
+/// denominator. From: chosen.
 pub const OUTSIDE: (usize, usize) = (3, 10);
 
 #[doc(hidden)]
@@ -13,7 +14,7 @@ pub fn middle(points: &[Point3<f64>]) -> [f64; 2] {
     [x / n, y / n]
 }
 
-/// Lowest and highest corner of the box around points.
+/// Lowest and highest corner of the bounding box of points.
 pub fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
     let first = points.first().copied().unwrap_or_else(Point3::origin);
     let (mut low, mut high) = (first, first);
@@ -26,7 +27,7 @@ pub fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
     (low, high)
 }
 
-/// The convex outline of points.
+/// Corners of the convex hull of points seen from above.
 pub fn hull_from_above(points: &[Point3<f64>]) -> Vec<[f64; 2]> {
     convex_hull(points.iter().map(|p| [p.x, p.y]).collect())
 }

@@ -12,19 +12,19 @@ use std::collections::BTreeMap;
 /// Maximum number of visible upright faces of a box. From: derived, one of two that are across from
 /// each other is turned away.
 const FACES: usize = 2;
-/// Minimum cosine between the normals of one upright face, and between those of two ends of one
-/// (15°). From: chosen.
+/// Minimum cosine between the normals of one upright face, and between the normals of two ends of
+/// one face (15°). From: chosen.
 const FLAT: f64 = 0.966;
 /// Maximum width of a hidden part of a face, metres. From: chosen.
 const WIDEST_M: f64 = 0.25;
-/// Step along a gap at which visibility is tested, metres, and at which shares of its height.
-/// From: work.
+/// Step along a gap at which visibility is tested, metres. From: work.
 const STEP_M: f64 = 0.01;
+/// Heights at which the visibility of a gap is tested, as shares of the face's height. From: work.
 const SHARES: [f64; 3] = [0.3, 0.5, 0.7];
 
 /// Upright face of a part, surface frame.
 struct Face {
-    /// Unit, horizontal.
+    /// Horizontal unit normal.
     normal: Vector2<f64>,
     /// Distance of the face's plane from the origin along the normal, metres.
     offset_m: f64,
@@ -32,8 +32,9 @@ struct Face {
     span_m: (f64, f64),
 }
 
-/// Part with its faces.
+/// Part of the segmentation with its upright faces.
 struct Body {
+    /// Name of the part: one of its voxels.
     name: u32,
     top_m: f64,
     faces: Vec<Face>,
@@ -62,7 +63,8 @@ impl Body {
         Body { name, top_m: quantile(&mut heights, VOXEL_ENDS.1), faces: faces(voxels, of) }
     }
 
-    /// True if both bodies have coplanar, equally high faces, and the gap between these is hidden.
+    /// True if both bodies have coplanar, equally high faces, and the gap between two such faces is
+    /// hidden.
     fn goes_on_in(&self, other: &Body, seen: &Visibility, surface: &Surface) -> bool {
         (self.top_m - other.top_m).abs() < PLACE_M
             && self.faces.iter().any(|a| {
@@ -80,7 +82,7 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
         .filter(|&&v| is_upright(&voxels.normals[v]))
         .map(|&v| (voxels.centres[v], voxels.normals[v].xy().normalize()))
         .collect();
-    /// Directions that are tried. From: work.
+    /// Approximate number of directions that are tried. From: work.
     const TRIED: usize = 25;
     let mut faces = Vec::new();
     while side.len() >= SIDE_VOXELS && faces.len() < FACES {
@@ -96,7 +98,7 @@ fn faces(voxels: &Voxels, of: &[usize]) -> Vec<Face> {
 }
 
 impl Face {
-    /// The face of the points; none if too few of them face one way or lie in no plane.
+    /// Face through points with normals; `None` if too few of the points lie in one plane.
     fn through(of: &[(Point3<f64>, Vector2<f64>)]) -> Option<Face> {
         let normal = of.iter().map(|(_, n)| n).sum::<Vector2<f64>>().try_normalize(0.0)?;
         let mut offsets: Vec<f64> = of.iter().map(|(p, _)| normal.dot(&p.xy().coords)).collect();
@@ -115,13 +117,13 @@ impl Face {
         })
     }
 
-    /// Point of the face's plane at a distance along it and a height.
+    /// Point of the face's plane at a distance along the face and a height, metres.
     fn at(&self, along_m: f64, height_m: f64) -> Point3<f64> {
         let flat = self.normal * self.offset_m + Vector2::new(-self.normal.y, self.normal.x) * along_m;
         Point3::new(flat.x, flat.y, height_m)
     }
 
-    /// Gap between this face and another that may be the same face.
+    /// Gap between this face and `other` if they may be ends of one face; `None` otherwise.
     fn gap_to<'a>(&'a self, other: &'a Face) -> Option<Gap<'a>> {
         if self.normal.dot(&other.normal) < FLAT {
             return None;

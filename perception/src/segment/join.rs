@@ -19,6 +19,7 @@ const SMOOTH_RAD: f64 = 0.35;
 
 /// Sets of voxels within which parts are sought.
 pub(super) struct Sets {
+    /// True for each voxel with far fewer points than its neighbours.
     thin: Vec<bool>,
     /// Connected sets of voxels, without thin ones.
     sets: Vec<Vec<usize>>,
@@ -40,7 +41,8 @@ impl Sets {
     }
 }
 
-/// Part number of each voxel; deterministic, as it is a voxel's index.
+/// Part number of each voxel: the index of one of the part's voxels, so that the numbers are
+/// deterministic.
 pub(super) fn parts(voxels: &Voxels, Sets { thin, sets, place }: &Sets, options: &SceneOptions) -> Vec<u32> {
     let name = |set: &Vec<usize>| match options.part_touching {
         true => Piece::of(voxels, set, place).parts(),
@@ -61,11 +63,12 @@ pub(super) struct Piece<'a> {
     pub of: &'a [usize],
     /// Start of each voxel's neighbours in `near`, and the total.
     starts: Vec<u32>,
+    /// Neighbours of all voxels in a row, as indices within the piece.
     near: Vec<u32>,
 }
 
 impl<'a> Piece<'a> {
-    /// Piece of the given voxels; `place`: index in its piece by voxel, [`NONE`] outside.
+    /// Piece of the voxels `of`; `place`: index of each voxel in its set, [`NONE`] for thin ones.
     fn of(voxels: &'a Voxels, of: &'a [usize], place: &[u32]) -> Piece<'a> {
         let count = of.iter().map(|&voxel| voxels.neighbours(voxel).len()).sum();
         let (mut starts, mut near) = (Vec::with_capacity(of.len() + 1), Vec::with_capacity(count));
@@ -81,7 +84,7 @@ impl<'a> Piece<'a> {
         Piece { voxels, of, starts, near }
     }
 
-    /// Neighbours of a voxel.
+    /// Neighbours of a voxel within the piece.
     fn near(&self, voxel: usize) -> impl Iterator<Item = u32> {
         self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize].iter().copied()
     }
@@ -131,7 +134,8 @@ fn adopt(voxels: &Voxels, thin: &[bool], parts: &mut [u32]) {
     adopted.into_iter().for_each(|(i, j)| parts[i] = parts[j]);
 }
 
-/// Patches: voxels around a flat seed with like normals. Flattest seeds first.
+/// Grows patches of neighbouring voxels with similar normals from seeds, the flattest first;
+/// returns the patch number of each voxel.
 fn grow_patches(piece: &Piece) -> Vec<u32> {
     let Piece { voxels, of, .. } = *piece;
     // Curvatures are not negative: their bits are in the order of their values.
@@ -177,7 +181,7 @@ fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
     /// Factor by which a sphere's curvature is scaled to one; normals on a sphere give no axis.
     /// From: derived, equal moments along three axes.
     const PER_BALL: f64 = 3.0;
-    /// Normals that add up to less cancel out. From: rounding.
+    /// Minimum length of the sum of a patch's normals; below it, they cancel out. From: rounding.
     const CANCELLED: f64 = 1e-9;
     let count = patch_of.iter().max().map_or(0, |&m| m as usize + 1);
     let mut patches: Vec<Patch> = (0..count)
@@ -200,11 +204,11 @@ fn describe(Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Patch> {
 /// Two neighbouring patches, the lower number first.
 pub(super) struct Border {
     pub patches: (u32, u32),
-    /// Number of voxel pairs along the border.
+    /// Number of neighbouring voxel pairs across the border.
     pub length: u32,
 }
 
-/// The borders of all patches, in order of the patches.
+/// Borders between all neighbouring patches, in order of the patches.
 fn borders(piece: &Piece, patch_of: &[u32]) -> Vec<Border> {
     let of = |range: Range<usize>| {
         let mut lengths: FxHashMap<(u32, u32), u32> = FxHashMap::default();
@@ -261,7 +265,7 @@ fn meets_convexly(a: &Patch, b: &Patch, border: &Border) -> bool {
     smooth || along < ALONG
 }
 
-/// A voxel of each root patch, to name parts by.
+/// First voxel of each root patch, after which the part is named.
 fn first_voxels(patch_of: &[u32], joined: &mut Union, patches: usize) -> Vec<u32> {
     let mut first = vec![u32::MAX; patches];
     for (i, &p) in patch_of.iter().enumerate() {

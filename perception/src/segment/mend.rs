@@ -11,17 +11,19 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::OnceLock;
 
-/// Size relative to a neighbour below which a part is no object of its own. From: chosen.
+/// Number of points relative to a neighbour below which a part is no object of its own.
+/// From: chosen.
 const CRUMB_SHARE: f64 = 0.12;
 /// Minimum number of voxels of an object of its own. From: chosen.
 const CRUMB_VOXELS: usize = 40;
-/// Relative size below which a part without contact to the surface belongs to the body it is
-/// attached to (a handle, a spout). From: chosen.
+/// Number of points relative to a body below which a part without contact to the surface belongs to
+/// that body (a handle, a spout). From: chosen.
 const HANGING_SHARE: f64 = 0.25;
 
-/// Joins parts separated wrongly by creases: insides of vessels, handles, crumbs.
+/// Joins parts separated wrongly by creases: insides of vessels, handles, small fragments.
 ///
-/// The smallest part that belongs to a neighbour goes first; then what touches the joined part is looked at anew.
+/// The smallest part that belongs to a neighbour is joined first; then the neighbours of the joined
+/// part are tested again.
 pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_of: &[u32]) {
     let mut parts = gather(joined, piece, patch_of);
     link(&mut parts, joined, borders);
@@ -58,15 +60,18 @@ pub(super) fn mend(joined: &mut Union, borders: &[Border], piece: &Piece, patch_
     }
 }
 
-/// Part that belongs to a neighbour, in joining order: few points first, then long borders.
+/// Part that belongs to a neighbour, ordered by joining: few points first, then long borders.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Belonging {
+    /// Number of points of the smaller part.
     points: u32,
+    /// Root of the smaller part.
     small: u32,
-    /// The border's length below the greatest number.
+    /// Greatest number minus the border's length, so that long borders come first.
     shortness: u32,
+    /// Root of the larger part.
     large: u32,
-    /// The numbers of joins after which each of the two was made.
+    /// Number of joins before each of the two parts was made, to notice later changes.
     made: [u32; 2],
 }
 
@@ -79,14 +84,14 @@ impl Belonging {
         own.then_some(Belonging { points: s.points, small, shortness: u32::MAX - length, large, made })
     }
 
-    /// True if neither part has been joined since.
+    /// True if neither part has been joined since this was found.
     fn is_current(&self, parts: &[Option<Part>]) -> bool {
         let is_same = |part: u32, made| parts[part as usize].as_ref().is_some_and(|p| p.made == made);
         is_same(self.small, self.made[0]) && is_same(self.large, self.made[1])
     }
 }
 
-/// Border with another part.
+/// Border with another part: its root, and the number of voxel pairs along the border.
 #[derive(Clone, Copy)]
 struct Link {
     other: u32,
@@ -95,10 +100,11 @@ struct Link {
 
 struct Part {
     points: u32,
-    /// Heights of the part's voxels, ascending, metres.
+    /// Heights of the part's voxels above the surface, ascending, metres.
     heights_m: Vec<f64>,
+    /// Voxel centres seen from above, metres.
     places: Vec<[f64; 2]>,
-    /// Points that span the part's hull.
+    /// Points that span the part's hull, seen from above, metres.
     outer: Vec<[f64; 2]>,
     hull: OnceLock<Vec<[f64; 2]>>,
     /// Links to other parts, one each, unordered.
@@ -161,7 +167,7 @@ fn merged(long: &[f64], short: &[f64]) -> Vec<f64> {
     both
 }
 
-/// Parts by root, without links.
+/// Part of each root patch, without links; `None` for the other patches.
 fn gather(joined: &mut Union, Piece { voxels, of, .. }: &Piece, patch_of: &[u32]) -> Vec<Option<Part>> {
     let patches = patch_of.iter().max().map_or(0, |&p| p as usize + 1);
     let mut parts: Vec<Option<Part>> = (0..patches).map(|_| None).collect();

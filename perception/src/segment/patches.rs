@@ -16,18 +16,21 @@ pub(super) struct Voxels {
     pub centres: Vec<Point3<f64>>,
     /// Unit normal, towards the nearest viewpoint; zero if unknown.
     pub normals: Vec<Vector3<f64>>,
-    /// The flatness of each neighbourhood: 0 for a plane, 1/3 for a ball.
+    /// Curvature of each neighbourhood: 0 for a plane, 1/3 for a ball, 1 if unknown.
     pub curvatures: Vec<f64>,
-    /// Number of points.
+    /// Number of points of each voxel.
     pub counts: Vec<u32>,
     /// Start of each voxel's neighbours in `near`, and the total.
     starts: Vec<u32>,
+    /// Neighbours of all voxels in a row.
     near: Vec<u32>,
     /// Start of each run of consecutive points in one voxel, and the total.
     run_starts: Vec<u32>,
+    /// Voxel of each run.
     of_run: Vec<u32>,
-    /// Point runs grouped by voxel, and the end of each voxel's group.
+    /// First and end point of each run, grouped by voxel.
     runs: Vec<(u32, u32)>,
+    /// End of each voxel's group in `runs`.
     run_ends: Vec<u32>,
 }
 
@@ -41,7 +44,7 @@ impl Voxels {
         &self.near[self.starts[voxel] as usize..self.starts[voxel + 1] as usize]
     }
 
-    /// Some voxels in sets that hang together, each ascending.
+    /// Splits some voxels into connected sets, each ascending.
     pub fn together(&self, of: &[usize]) -> Vec<Vec<usize>> {
         let mut open = vec![false; self.len()];
         of.iter().for_each(|&v| open[v] = true);
@@ -68,7 +71,8 @@ impl Voxels {
         self.of_run.len()
     }
 
-    /// Some runs of consecutive points in one voxel, in point order: point range and voxel.
+    /// Some of the runs of consecutive points in one voxel, in point order: range of points, and
+    /// voxel.
     pub fn runs(&self, of: Range<usize>) -> impl Iterator<Item = (Range<usize>, usize)> {
         let ends =
             self.run_starts[of.start..=of.end].windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
@@ -95,7 +99,7 @@ impl Voxels {
 struct Moments {
     count: f64,
     sum: Vector3<f64>,
-    /// xx xy xz yy yz zz.
+    /// Sums of products of coordinates: xx, xy, xz, yy, yz, zz; square metres.
     products: [f64; 6],
 }
 
@@ -211,7 +215,7 @@ fn runs(lattice: &Lattice, points: &[Point3<f64>]) -> (Vec<(u64, u32)>, Vec<u32>
     (all.iter().zip(0..).map(|((key, _), run)| (*key, run)).collect(), starts)
 }
 
-/// The start of each voxel's neighbours, and the neighbours of all voxels in a row.
+/// Start of each voxel's neighbours in the second list, and the neighbours of all voxels in a row.
 fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     /// Maximum number of chunks for the neighbour search. From: work.
     const SHARES: usize = 8;
@@ -241,7 +245,8 @@ fn neighbours(lattice: &Lattice, keys: &[u64]) -> (Vec<u32>, Vec<u32>) {
     (starts, near)
 }
 
-/// Normals and curvatures of consecutive voxels, from their own and neighbouring points.
+/// Normals and curvatures of consecutive voxels from their own and neighbouring points; `None` with
+/// too few points.
 fn surfaces(
     voxels: &Voxels,
     moments: &[Moments],
@@ -286,7 +291,7 @@ pub(super) fn members(part_of_voxel: &[u32]) -> Vec<(u32, Vec<usize>)> {
     members
 }
 
-/// True of the normal of something upright.
+/// True if a surface with this normal is upright within 30°.
 pub(super) fn is_upright(normal: &Vector3<f64>) -> bool {
     normal.z.abs() < 0.5 && normal.xy().norm() > 0.5
 }

@@ -1,8 +1,9 @@
 //! Extraction of upright round bodies from larger parts: a cup beside a box, where no crease
 //! separates them.
 //!
-//! The normals of a round body's side point away from its axis. Each voxel of a side votes for the axes that it may belong to; where many
-//! agree, a body is fitted, and parted off if what is left is more than a handle.
+//! The normals of a round body's side point away from its axis. Each voxel of a side votes for the
+//! axes that it may belong to; where many votes agree, a body is fitted, and separated if the
+//! remainder is more than a handle.
 
 use super::patches::{SIDE_VOXELS, Voxels, is_upright, members, take_away};
 use super::vessels::round_body;
@@ -31,11 +32,11 @@ const BESIDE_M: f64 = 0.035;
 const FACING: f64 = 0.9;
 /// Minimum share of the voxels at the radius with radial normals. From: chosen.
 const ROUND_SHARE: f64 = 0.75;
-/// Minimum number of directions around an axis that must show the side: a third. From: chosen.
+/// Minimum number of directions (of 36) around an axis that must show the side. From: chosen.
 const LEAST_SECTORS: usize = 12;
 /// Cosine of the greatest slope of a level face. From: chosen.
 const LEVEL: f64 = 0.8;
-/// Minimum concentration of a box's normals at right angles (1: all). From: chosen.
+/// Minimum concentration of the normals of a box's sides at right angles (1: all). From: chosen.
 const SQUARE: f64 = 0.55;
 
 /// Separates round bodies from parts, and joins their pieces split by creases. A part is named by
@@ -159,7 +160,7 @@ fn is_round(voxels: &Voxels, body: &[usize], points: &[Point3<f64>], viewpoints:
     round_body(&points, heights.0, heights.1, viewpoints).is_some()
 }
 
-/// Hough votes of a part's side.
+/// Hough votes of some voxels' sides for the axes of round bodies.
 fn votes_of(voxels: &Voxels, of: &[usize]) -> Votes {
     let (low, high) = bounds(of.iter().map(|&v| voxels.centres[v].xy()));
     let low = [low.x, low.y].map(|c| cell_of(c - RADII_M.1) - 1);
@@ -191,7 +192,7 @@ fn cell_of(m: f64) -> i32 {
     floor(m * (1.0 / STEP_M) + 0.5)
 }
 
-/// An upright axis that the side of a body may have.
+/// An upright axis and a radius that a round body may have.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     x: f64,
@@ -200,9 +201,9 @@ struct Axis {
 }
 
 impl Axis {
-    /// The axes that most votes are for, best first.
+    /// Axes with the most votes, best first.
     fn sought(votes: &Votes) -> Vec<Axis> {
-        /// Axes that are tried. From: chosen.
+        /// Maximum number of axes that are tried. From: chosen.
         const MOST: usize = 8;
         /// Minimum number of own votes of a position and radius, exclusive. From: chosen.
         const FEW: u16 = 3;
@@ -232,8 +233,8 @@ impl Axis {
         distance(p.x - self.x, p.y - self.y)
     }
 
-    /// Voxels (ascending) of the body about an axis: its side, seen from enough directions, and its
-    /// inside.
+    /// Voxels (ascending) of the body about an axis: its side and its inside; `None` if the side is
+    /// not seen from enough directions.
     fn body(&self, voxels: &Voxels, of: &[usize]) -> Option<Vec<usize>> {
         let near = |v: &usize| {
             is_upright(&voxels.normals[*v])

@@ -1,4 +1,4 @@
-//! A surface with the objects on it, and the options of parting them.
+//! A surface with the objects on it, and the options of segmentation.
 
 use crate::quantile::{POINT_ENDS, end};
 use crate::surface::{Surface, SurfaceOptions, TALLEST_M};
@@ -51,7 +51,7 @@ pub struct Segment {
     /// Height of the object's support above the surface, metres: 0 on the surface itself, more on
     /// another object.
     pub base_m: f64,
-    /// Standard deviation of that height, metres; large for an object inside another, whose foot is
+    /// Standard deviation of `base_m`, metres; large for an object inside another, whose foot is
     /// invisible.
     #[serde(default)]
     pub base_sigma_m: f64,

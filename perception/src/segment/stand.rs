@@ -18,13 +18,15 @@ pub const BOTTOM_M: (f64, f64) = (0.004, 0.003);
 /// Maximum distance between an object's lower edge and the measured top of its support, metres.
 /// From: chosen.
 const MEETS_M: f64 = 0.03;
-/// Minimum number of directions with an enclosing object around a point; the next constant is that
-/// for a supporting one. From: chosen.
+/// Minimum number of directions (of 36) around an object's centre in which an enclosing object must
+/// be seen. From: chosen.
 const AROUND: usize = 27;
+/// Minimum number of directions (of 36) around an object's centre in which a supporting object must
+/// be seen. From: chosen.
 const BEARS: usize = 15;
 
 /// Determines the support of each segment: the surface, another segment around its foot, or the
-/// bottom of one that encloses it. Returns all tops.
+/// bottom of one that encloses it. Returns the height of each segment's top, metres.
 pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     let of = |part: &Segment| (top_m(part), bounds(&part.points));
     let (tops, boxes): (Vec<f64>, Vec<_>) = pool::map(parts, 1, of).into_iter().unzip();
@@ -65,8 +67,8 @@ pub fn on(parts: &mut [Segment]) -> Vec<f64> {
     tops
 }
 
-/// Height at which another object supports a part, metres: that object's top around the part's
-/// foot, or its side below; `None` without support.
+/// Height at which another object supports a part, metres: that of the object's points around the
+/// part's foot; `None` if they are seen in too few directions.
 fn borne_at_m(outline: &Outline, (place, low): ([f64; 2], f64), other: &[Point3<f64>]) -> Option<f64> {
     /// Quantile of the supporting points that defines the top. From: chosen.
     const TOP: f64 = 0.8;
@@ -90,7 +92,7 @@ fn is_wider((low, high): &(Point3<f64>, Point3<f64>), (from, to): &(Point3<f64>,
     (0..2).all(|k| high[k] - low[k] > to[k] - from[k])
 }
 
-/// Number of directions from a point in which other points lie.
+/// Number of directions (of 36) from a point in which other points lie.
 fn directions<'a>(points: impl Iterator<Item = &'a Point3<f64>>, [x, y]: [f64; 2]) -> usize {
     let mut seen = [false; SECTORS];
     points.for_each(|p| seen[sector(p.x - x, p.y - y)] = true);

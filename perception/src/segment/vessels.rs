@@ -13,12 +13,12 @@ use crate::surface::nearest_sigma_m;
 use nalgebra::Point3;
 use std::sync::OnceLock;
 
-/// Widest vessel, metres of radius. From: chosen.
+/// Maximum radius of a vessel, metres. From: chosen.
 const WIDEST_M: f64 = 0.14;
 /// Minimum share of both parts' points on the common round body. From: chosen.
 const ON_BODY: f64 = 0.85;
 /// Minimum share of the side of each of two parts on its own round body for both to be images of
-/// one, and of a rim on its circle; handles are off. From: chosen, more than half.
+/// one body, and of a rim on its circle; handles lie off. From: chosen, more than half.
 const ON_MOST: f64 = 0.55;
 /// Maximum distance between the axes of one body, as a share of the smaller radius. From: chosen,
 /// two bodies cannot stand so near to each other.
@@ -28,15 +28,17 @@ const OF_BOX: f64 = 0.6;
 
 /// Part with cached values for pairwise tests.
 pub struct Candidate {
-    /// Index among all parts; `None` if joined.
+    /// Index among all parts; `None` for parts that were joined.
     number: Option<usize>,
     segment: Segment,
     low: Point3<f64>,
     high: Point3<f64>,
     top_m: f64,
-    /// Seen from above.
+    /// Convex hull of the points seen from above, computed on demand.
     hull: OnceLock<Vec<[f64; 2]>>,
+    /// Best-fitting upright round body, computed on demand; `None` if none fits.
     fitted: OnceLock<Option<Fitted>>,
+    /// Lying round body, computed on demand; `None` if none fits.
     lying: OnceLock<Option<LyingRound>>,
 }
 
@@ -62,7 +64,7 @@ impl Candidate {
             .as_ref()
     }
 
-    /// Lying round body of the part, if rounder than a box.
+    /// Lying round body of the part; `None` if it is no rounder than a box.
     fn lying(&self, viewpoints: &[Point3<f64>]) -> Option<&LyingRound> {
         let fit = || {
             let points = &self.segment.points;
@@ -110,7 +112,7 @@ pub fn whole(mut parts: Vec<Segment>, viewpoints: &[Point3<f64>]) -> Vec<Segment
 }
 
 fn one_vessel(large: &Candidate, small: &Candidate, viewpoints: &[Point3<f64>]) -> bool {
-    /// Number of points of both parts used for fitting a body. From: work.
+    /// Approximate number of points of both parts used for fitting a body. From: work.
     const ENOUGH: usize = 2000;
     if !near(large, small) {
         return is_level(large, small) && is_in_reach(large, small) && one_rim([large, small], viewpoints);
@@ -182,7 +184,8 @@ fn is_level(large: &Candidate, small: &Candidate) -> bool {
     (large.top_m - small.top_m).abs() <= APART_M
 }
 
-/// Round body with nearly all side points on it, if rounder than a box.
+/// Round body with nearly all side points on it; `None` if none fits or it is no rounder than a
+/// box.
 pub(super) fn round_body(
     points: &[Point3<f64>],
     low_m: f64,
@@ -192,7 +195,7 @@ pub(super) fn round_body(
     Fitted::to(points, low_m, top_m, viewpoints).filter(|f| f.is_tight(points)).map(|f| f.body)
 }
 
-/// The round body that comes nearest to points, however badly.
+/// Round body fitted to points, however badly.
 struct Fitted {
     body: Round,
     /// Standard deviation of one measurement, metres.
@@ -214,7 +217,8 @@ impl Fitted {
         !outline::fits(points, self.body.residual_m / share)
     }
 
-    /// True if the spread of the inliers is small; a handle is excluded.
+    /// True if nearly all points lie on the body within the measurement error; a handle may lie
+    /// off.
     fn is_tight(&self, points: &[Point3<f64>]) -> bool {
         self.is_near(points, ON_BODY)
     }
@@ -274,7 +278,7 @@ pub fn near(a: &Candidate, b: &Candidate) -> bool {
     (0..3).all(|k| a.low[k] - APART_M < b.high[k] && b.low[k] - APART_M < a.high[k])
 }
 
-/// True if the widest vessel could reach both.
+/// True if two parts are near enough for a vessel of maximum radius to reach both.
 fn is_in_reach(a: &Candidate, b: &Candidate) -> bool {
     let across_m = 2.0 * (WIDEST_M + STEEPEST * APART_M + APART_M);
     (0..2).all(|k| a.low[k] - across_m < b.high[k] && b.low[k] - across_m < a.high[k])

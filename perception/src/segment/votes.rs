@@ -7,12 +7,13 @@ const TILE: usize = 16;
 
 /// Hough accumulator in tiles, allocated on demand.
 pub struct Votes {
-    /// The lowest cell.
+    /// Lowest cell: x, y.
     low: [i32; 2],
-    /// Tiles along y.
+    /// Number of tiles along y.
     deep: usize,
-    /// Index plus one of each allocated tile.
+    /// Index plus one of each allocated tile; 0 for the others.
     tiles: Vec<u32>,
+    /// Votes of each cell by radius, tile by tile.
     counts: Vec<[u16; RADII]>,
 }
 
@@ -36,7 +37,7 @@ impl Votes {
         self.change(cells, |count| count.saturating_add(1));
     }
 
-    /// Takes votes back.
+    /// Removes one vote per radius in the given cells.
     pub fn take_back(&mut self, cells: &[[i32; 2]; RADII]) {
         self.change(cells, |count| count.saturating_sub(1));
     }
@@ -76,8 +77,8 @@ impl Votes {
         self.counts.get(laid * TILE * TILE + place)
     }
 
-    /// Cells with more than `few` votes of their own and at least `most` with their neighbours:
-    /// count, and x, y and radius.
+    /// Cells and radii with more than `few` votes of their own and at least `most` with their
+    /// neighbours: votes with neighbours, and x, y and radius index.
     pub fn peaks(&self, few: u16, most: u32) -> Vec<(u32, [i32; 3])> {
         let mut peaks = Vec::new();
         for (tile, laid) in self.tiles.iter().enumerate().filter(|(_, laid)| **laid > 0) {

@@ -1,6 +1,6 @@
-//! The continual loop (paper 004, sections III to V): estimate, monitor, replan only if the plan is
-//! broken, execute, record, perceive, believe. The loop knows no word of a domain; the [`World`]
-//! holds their meanings.
+//! The agent's loop (paper 004, sections III to V): estimate the state, monitor the plan, replan
+//! only if the plan is broken, execute, record, perceive, update the belief. It knows no predicate
+//! of a domain; their meanings are held by the [`World`].
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -24,52 +24,53 @@ use crate::report::Event;
 use crate::stop::Stop;
 use crate::{standing, weigh, written};
 
-/// Agent pursuing one goal.
+/// Agent that pursues one goal.
 pub struct Agent<'a> {
     robot: Arc<dyn Robot>,
     record: &'a Record,
     stop: Stop,
     tell: &'a mut dyn FnMut(&Event),
     plan: Option<Plan>,
-    /// Failed call after which no plan was found.
+    /// Failed call because of which there is no plan at present.
     failed: Option<Call>,
     totals: Totals,
-    /// Goal in PDDL for the comparison of plans; `None` if the domain has attachments, as the
-    /// comparison would call programs.
+    /// Goal in PDDL, by which plans are compared with alternatives; `None` if the domain has
+    /// attachments, since comparing would run their programs.
     weighed_by: Option<String>,
 }
 
-/// Totals of a run so far.
+/// Totals of a run until now.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Totals {
     /// Number of views taken.
     pub views: usize,
-    /// Plans made.
+    /// Number of plans made.
     pub plans: usize,
     /// Distance driven, metres.
     pub distance_m: f64,
-    /// Longest planning call on the wall clock, without the time of attachments, seconds.
+    /// Longest planning call in real time, without the time spent in attachments, seconds.
     pub planning_s: f64,
-    /// Longest time in attachments during one planning call, seconds.
+    /// Longest time spent in attachments during one planning call, seconds.
     pub geometry_s: f64,
 }
 
-/// Result of asking the world model to choose the next steps.
+/// Outcome of asking the world model to choose the next steps.
 enum Taken {
-    /// The world's choice is the plan now.
+    /// The world model chose steps, which are the plan now.
     Up,
-    /// Nothing is left to choose, with the reason.
+    /// The world model has no steps left to choose; the text says why.
     Nothing(String),
-    /// The choice is the planner's.
+    /// The world model leaves the choice to the planner.
     LeftToPlanner,
 }
 
-/// Result of a call: number of the last started part, and how that part ended.
+/// Result of a call: the index of the part that failed with its failure, or the number of parts and
+/// success.
 type Performed = (usize, Result<(), SkillFailure>);
 
 impl<'a> Agent<'a> {
-    /// Agent with a body and a record; `tell` receives every event, `stop` ends the run, the body
-    /// first.
+    /// Creates an agent for a body and a record. `tell` receives every event; `stop` stops the body
+    /// first and then the run.
     pub fn new(
         robot: Arc<dyn Robot>,
         record: &'a Record,
@@ -113,7 +114,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// One iteration of the loop; returns the reason if the run ends here.
+    /// Runs one iteration of the loop; returns how the run ended, or `None` if it continues.
     async fn step(&mut self, world: &mut World<'_>, round: &Round) -> Result<Option<Ended>, CommandError> {
         if reached(round) {
             if let Some(late_s) = round.situation.time_left_s.map(|left_s| -left_s).filter(|s| *s > 0.0) {
@@ -145,8 +146,8 @@ impl<'a> Agent<'a> {
         Ok(None)
     }
 
-    /// Checks that the rest of the plan, applied to the current state, still reaches the goal;
-    /// otherwise returns the violated condition.
+    /// Checks that the remaining plan, from the current state, still reaches the goal; otherwise
+    /// returns why a new plan is needed.
     fn monitor(&self, world: &World<'_>, round: &Round) -> Result<(), Trigger> {
         if world.takes_steps_unasked() && !self.rest().steps.is_empty() {
             return Ok(());
@@ -162,7 +163,7 @@ impl<'a> Agent<'a> {
         })
     }
 
-    /// Makes a new plan; returns how the run ends if there is none.
+    /// Makes a new plan; returns how the run ends if there is none, else `None`.
     fn replan(
         &mut self,
         world: &mut World<'_>,
@@ -215,7 +216,7 @@ impl<'a> Agent<'a> {
         Ok(None)
     }
 
-    /// Adopts the world's choice of steps.
+    /// Adopts steps that the world model chooses by the rule `choose`.
     fn take_up<'w>(
         &mut self,
         world: &mut World<'w>,
@@ -243,8 +244,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Calls the planner, with more viewpoints as long as no plan is found, and records the
-    /// planning time.
+    /// Calls the planner, with more and more candidate viewpoints until a plan is found.
     fn plan(&mut self, world: &World<'_>, task: &Task, round: &Round) -> Result<Planned, CommandError> {
         let mut statistics = Statistics::default();
         for stage in 0.. {
@@ -286,7 +286,7 @@ impl<'a> Agent<'a> {
         self.intend(round, plan, reason, asked_of(statistics))
     }
 
-    /// Adopts a plan and reports it.
+    /// Adopts a plan, and reports and records it.
     fn intend(
         &mut self,
         round: &Round,
@@ -320,14 +320,15 @@ impl<'a> Agent<'a> {
         self.say_with(&event, vec![standing::blob(round)?]).map(|_| ())
     }
 
-    /// Steps of the plan that are still to be done.
+    /// Steps of the plan that are not executed yet.
     fn rest(&self) -> Plan {
         self.plan.clone().unwrap_or_default()
     }
 
-    /// Removes the next steps from the plan: the first, and those that start before any of these
-    /// ends (at least one, as an empty plan means that the goal holds). Times become relative to
-    /// the first step's start; those of the remainder, to its own first step.
+    /// Removes from the plan the steps to execute next: the first, and all that start before any of
+    /// these ends. Their times become relative to the first one's start; times of the remaining
+    /// plan, to the start of its own first step. An empty plan stays empty (it means that the goal
+    /// holds).
     fn next_steps(&mut self) -> Vec<Step> {
         let plan = self.plan.get_or_insert_with(Plan::default);
         let first_s = plan.steps.first().and_then(|s| s.start_s).unwrap_or(0.0);
@@ -352,7 +353,7 @@ impl<'a> Agent<'a> {
         steps
     }
 
-    /// Executes steps, concurrently if several, and learns from each outcome.
+    /// Executes steps (several at the same time), and updates the world model from each outcome.
     async fn act(
         &mut self,
         world: &mut World<'_>,
@@ -387,7 +388,7 @@ impl<'a> Agent<'a> {
         Ok(())
     }
 
-    /// Executes the parts of a call in order, and learns from the outcome of each.
+    /// Executes the parts of a call in order, and updates the world model from each outcome.
     async fn perform(&mut self, world: &mut World<'_>, call: &Call) -> Result<Performed, CommandError> {
         for part in 0.. {
             let Some(job) = world.ground(call, part)? else { return Ok((part, Ok(()))) };
@@ -399,8 +400,8 @@ impl<'a> Agent<'a> {
         Ok((0, Ok(())))
     }
 
-    /// Executes several calls concurrently, one part of each at a time; outcomes are processed in
-    /// plan order, so that a run is reproducible.
+    /// Executes several calls at the same time, one part of each at a time. Outcomes are processed
+    /// in plan order, so that a run is reproducible.
     async fn perform_together(
         &mut self,
         world: &mut World<'_>,
@@ -443,7 +444,7 @@ impl<'a> Agent<'a> {
         job.skill?.perform(&context).await
     }
 
-    /// Updates the world model from the outcome of one part of a call, and reports what it learned.
+    /// Updates the world model from the outcome of one part of a call; reports what was learned.
     fn learn(
         &mut self,
         world: &mut World<'_>,
@@ -462,7 +463,7 @@ impl<'a> Agent<'a> {
         Ok(())
     }
 
-    /// Updates the world model from a failure; the pose is read from the body again.
+    /// Updates the world model from the failure of a step, after reading the body's pose again.
     async fn learn_from_failure(
         &mut self,
         world: &mut World<'_>,
@@ -495,7 +496,8 @@ impl<'a> Agent<'a> {
         self.say(&Event::Failed { call, because, unkept, therefore, lesson: Some(lesson) }).map(|_| ())
     }
 
-    /// Ends the run if a stop was requested; the body is idle by now and gets no more requests.
+    /// Returns an error if a stop was requested; the body is idle by then and gets no more
+    /// requests.
     fn check_stopped(&self) -> Result<(), CommandError> {
         match self.stop.is_asked() {
             true => Err(CommandError::Stopped { said: "stopped".into(), signal: self.stop.signal() }),
@@ -503,7 +505,7 @@ impl<'a> Agent<'a> {
         }
     }
 
-    /// Records the belief on which the end of a run rests.
+    /// Records why the run ended, and the doubts that remain.
     fn rest_on(&mut self, round: &Round, ended: &Ended) -> Result<(), CommandError> {
         let body = serde_json::to_value(standing::rests(round, ended))
             .map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -517,7 +519,7 @@ impl<'a> Agent<'a> {
         self.say_with(event, Vec::new())
     }
 
-    /// Reports an event and records it with further blobs.
+    /// Reports an event and records it, with further data blobs.
     fn say_with(&mut self, event: &Event, more: Vec<Blob<'static>>) -> Result<RecordId, CommandError> {
         (self.tell)(event);
         let body = serde_json::to_value(event).map_err(|e| CommandError::Bug(e.to_string()))?;
@@ -533,7 +535,8 @@ impl<'a> Agent<'a> {
     }
 }
 
-/// True if a plan takes longer than is left until the deadline.
+/// True if a plan takes longer than the time left until the deadline (`left_s`, seconds; `None`: no
+/// deadline).
 fn ends_late(plan: &Plan, left_s: Option<f64>) -> bool {
     left_s.is_some_and(|left_s| plan.makespan_s().unwrap_or(0.0) > left_s)
 }
@@ -543,12 +546,12 @@ fn too_long(plan: &Plan, left_s: Option<f64>) -> String {
     format!("the plan that was found takes {takes_s:.1} s, and {left_s:.1} s are left until the deadline")
 }
 
-/// True if the goal holds now and no step is left.
+/// True if the goal holds now.
 fn reached(round: &Round) -> bool {
     descry_planner::monitor(&round.task, &round.attachments, &Plan::default()).is_ok()
 }
 
-/// Number of queries of each attachment, by name.
+/// Number of calls of each attachment, by name.
 fn asked_of(statistics: &Statistics) -> Vec<(String, u64)> {
     statistics.attachments.iter().map(|(name, c)| (name.clone(), c.calls + c.relaxed)).collect()
 }

@@ -16,16 +16,16 @@ pub mod program;
 mod recorded;
 pub mod tape;
 
-/// A body that was opened.
+/// Opened body.
 pub struct Body {
-    /// Robot, as the agent sees it.
+    /// Robot that the agent controls.
     pub robot: Arc<dyn Robot>,
-    /// Name and text of the scene that the body was made from, if any.
+    /// Name and text of the simulated scene; `None` without one.
     pub scene: Option<(String, String)>,
     truth: Option<Told>,
 }
 
-/// Source of the true positions of objects.
+/// Source of the ground truth about objects.
 enum Told {
     Simulator(Arc<SimRobot>),
     Program(program::TruthFile),
@@ -34,29 +34,30 @@ enum Told {
 /// True position of an object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TruePlace {
-    /// Centre of the object's body, in the map, metres.
+    /// Centre of the object, in the map frame, metres.
     pub position_m: [f64; 3],
-    /// Surface that the object stands on; `None` in the hand.
+    /// Surface that the object stands on; `None` if it is in the hand.
     pub on: Option<String>,
-    /// Room that this is in.
+    /// Room that the object is in; `None` if unknown.
     pub room: Option<String>,
 }
 
 impl Body {
-    /// Wraps any body; the example `own_body` shows a complete one.
+    /// Wraps any robot as a body, without ground truth; the example `own_body` shows a complete
+    /// one.
     pub fn new(robot: Arc<dyn Robot>) -> Self {
         Self { robot, scene: None, truth: None }
     }
 
-    /// A simulated body, whose truth a report may show.
+    /// Wraps a simulated robot as a body with ground truth.
     pub fn simulated(robot: Arc<SimRobot>) -> Self {
         Self { truth: Some(Told::Simulator(Arc::clone(&robot))), ..Self::new(robot) }
     }
 
-    /// Ground truth of the scene now, for reports; `None` without a simulator that states it.
+    /// Ground truth of the scene at present, for reports; `None` if the body has none.
     ///
     /// # Errors
-    /// If what a program wrote of it cannot be read.
+    /// Message, if the file that a program wrote it to cannot be read.
     pub fn truth(&self) -> Result<Option<Truth>, String> {
         match &self.truth {
             None => Ok(None),
@@ -65,8 +66,9 @@ impl Body {
         }
     }
 
-    /// True place of an object of that name or kind, the nearest to the believed place; `None`
-    /// without a simulation, or if the object is absent.
+    /// True place of an object of this name or kind, the nearest to the believed position (map
+    /// frame, metres) if there are several; `None` without ground truth, or if the object is
+    /// absent.
     pub fn true_place(&self, name: &str, believed_m: Option<[f64; 3]>) -> Option<TruePlace> {
         let truth = self.truth().ok().flatten()?;
         let distance = |at: &[f64; 3]| {
@@ -86,11 +88,14 @@ impl Body {
     }
 }
 
-/// Opens the body of `--robot`: `sim`, `recorded:DIR` with a folder of frames or the record of a run, `program:COMMAND`,
-/// or `socket:HOST:PORT` or `socket:PATH`.
+/// Opens the body that `robot` names: `sim`, `recorded:DIR` with a folder of frames or the record of a
+/// run, `program:COMMAND`, `socket:HOST:PORT` or `socket:PATH`.
+///
+/// `scene` is for `sim` alone, and `seed` for `sim` and `program`.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] names the place and what was expected; [`CommandError::Broken`] if a program says no hello.
+/// [`CommandError::BadInput`], which names the place and what was expected; [`CommandError::Broken`] if
+/// a program does not complete the handshake.
 pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Result<Body, CommandError> {
     match robot.split_once(':') {
         None if robot == "sim" => {
@@ -141,7 +146,8 @@ pub fn open(robot: &str, scene: Option<&str>, seed: u64, domain: &Domain) -> Res
     }
 }
 
-/// Simulated body in one arrangement of a scene; the scene's own faults come before the given ones.
+/// Creates a simulated body in one random arrangement of a scene. Faults of the scene come before
+/// `faults`.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the scene cannot be arranged.
@@ -151,7 +157,7 @@ pub fn simulate(spec: &SceneSpec, seed: u64, faults: FaultPlan) -> Result<Body, 
     Ok(Body::simulated(Arc::new(SimRobot::new(scene, options))))
 }
 
-/// Scene of the domain by name, or any scene from a file.
+/// Scene of the domain by name, or a scene from a file; `None` means the domain's default scene.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] names the scenes that there are, or the mistake in the file.
@@ -165,7 +171,7 @@ fn parse(name: &str, text: &str, domain: &Domain) -> Result<SceneSpec, CommandEr
     SceneSpec::parse(&shown, text).map_err(CommandError::bad_input)
 }
 
-/// Name and text of a scene.
+/// Name and text of a scene of the domain or of a file.
 fn scene_text(scene: Option<&str>, domain: &Domain) -> Result<(String, String), CommandError> {
     let name = scene.unwrap_or(&domain.config.scene);
     if let Some(text) = domain.scenes.get(name) {

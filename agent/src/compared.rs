@@ -1,21 +1,21 @@
-//! Numeric comparison in a PDDL condition.
+//! Numeric comparisons in the text of a PDDL condition.
 
-/// A number that is compared: `(>= (presence a-ring ?s) 0.8)`.
+/// Comparison of a function with a number, such as `(>= (presence a-ring ?s) 0.8)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compared<'c> {
-    /// Word.
+    /// Name of the function.
     pub word: &'c str,
-    /// Function and its arguments; variables begin with `?`.
+    /// Arguments of the function; variables begin with `?`.
     pub of: Vec<&'c str>,
-    /// Right-hand side, if it is a number.
+    /// Right-hand side; `None` if it is not a number.
     pub wanted: Option<f64>,
-    /// True if smaller values are wanted.
+    /// True for `<` and `<=`.
     pub less: bool,
-    /// True if the comparison must hold for all values of its variables.
+    /// True if a variable of the comparison is bound by `forall`.
     pub of_all: bool,
 }
 
-/// All numeric comparisons in a condition, as written.
+/// All comparisons in a condition whose left side is a function, in text order.
 pub fn all(condition: &str) -> impl Iterator<Item = Compared<'_>> {
     const SIGNS: [&str; 5] = ["(>= (", "(<= (", "(> (", "(< (", "(= ("];
     condition.match_indices('(').filter_map(move |(at, _)| {
@@ -29,18 +29,19 @@ pub fn all(condition: &str) -> impl Iterator<Item = Compared<'_>> {
     })
 }
 
-/// Bound of a goal on a number, if the goal compares the number with a constant.
+/// Bound that a goal sets on a number; `None` if the goal does not compare this number with a
+/// constant.
 pub fn wanted(goal: &str, number: &str) -> Option<f64> {
     all(goal).filter(|compared| compared.fits(number)).find_map(|compared| compared.wanted)
 }
 
-/// Words of a number as written in PDDL.
+/// Names in a number as written in PDDL: the function, then its arguments.
 pub fn words(number: &str) -> impl Iterator<Item = &str> {
     number.trim_matches(['(', ')']).split_whitespace()
 }
 
 impl Compared<'_> {
-    /// True if the comparison is about the given number; a variable matches any object.
+    /// True if the comparison is about this number (written in PDDL); variables match any object.
     pub fn fits(&self, number: &str) -> bool {
         let mut own = words(number);
         let is_word = own.next() == Some(self.word);

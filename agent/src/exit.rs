@@ -1,15 +1,15 @@
-//! Exit codes, on which scripts depend, and the conversion of errors to text.
+//! Exit codes of commands, on which scripts depend, and errors as text.
 
 use std::process::ExitCode;
 
 use descry_domains::error::WorldError;
 
-/// Exit of a command.
+/// Exit code of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
     /// Success: achieved, plan found, valid, no findings.
     Done = 0,
-    /// Truthful negative: not found after every useful view, plan invalid, findings.
+    /// Valid negative result: not found after every useful view, plan invalid, or findings.
     No = 1,
     /// Bad input or usage.
     BadInput = 2,
@@ -19,18 +19,18 @@ pub enum Exit {
     OutOfTime = 4,
     /// The robot or a store failed for good.
     Broken = 5,
-    /// Terminal is gone.
+    /// The terminal is gone (SIGHUP).
     HungUp = 129,
-    /// Stopped by Ctrl-C.
+    /// Stopped by Ctrl-C (SIGINT).
     Interrupted = 130,
-    /// Terminated by a signal.
+    /// Stopped by SIGTERM.
     Terminated = 143,
-    /// A bug of descry.
+    /// An error in descry itself.
     Bug = 70,
 }
 
 impl Exit {
-    /// Exit of a command that a signal stopped.
+    /// Exit code of a command that a signal stopped.
     pub fn of_signal(signal: u8) -> Self {
         match signal {
             1 => Self::HungUp,
@@ -46,7 +46,7 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Error of a command, ready to be shown.
+/// Error of a command, with its text for the user.
 #[derive(Debug, thiserror::Error)]
 pub enum CommandError {
     /// Unusable input; the text points at the place and suggests a remedy.
@@ -55,12 +55,12 @@ pub enum CommandError {
     /// The robot or a store failed for good.
     #[error("{0}")]
     Broken(String),
-    /// The run was stopped; the text tells how to resume it.
+    /// The run was stopped.
     #[error("{said}")]
     Stopped {
-        /// Message about kept results, and how to resume.
+        /// Text that says where results are kept and how to resume.
         said: String,
-        /// Signal that stopped the run.
+        /// Number of the signal that stopped the run.
         signal: u8,
     },
     /// Internal error of descry.
@@ -69,17 +69,17 @@ pub enum CommandError {
 }
 
 impl CommandError {
-    /// Error of unusable input.
+    /// Wraps an error as unusable input.
     pub fn bad_input(error: impl std::fmt::Display) -> Self {
         Self::BadInput(error.to_string())
     }
 
-    /// Error of a robot or store that failed for good.
+    /// Wraps an error as a final failure of the robot or a store.
     pub fn broken(error: impl std::fmt::Display) -> Self {
         Self::Broken(error.to_string())
     }
 
-    /// Exit code for this error.
+    /// Exit code of the error.
     pub fn exit(&self) -> Exit {
         match self {
             Self::BadInput(_) => Exit::BadInput,

@@ -1,4 +1,4 @@
-//! Storage of a run's record.
+//! Options for storing the record of a run, and opening of records.
 
 #[doc(hidden)]
 pub mod remote;
@@ -11,30 +11,31 @@ use serde::{Deserialize, Serialize};
 
 use crate::exit::CommandError;
 
-/// Storage options of a record: part of the settings of a run.
+/// Options for storing the record of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Keeping {
-    /// Address of the record, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; `None`: the run's folder.
+    /// Address of the store, `mongodb://HOST[:PORT]/DATABASE[#RUN]`; `None`: the run's folder.
     pub memory: Option<String>,
-    /// Durability of the record; `None`: data counts as recorded once on the disk.
+    /// Durability of the record; `None`: [`Kept::Disk`].
     pub durability: Option<Kept>,
-    /// Maximum size of the record, bytes; the oldest excess is pruned, unless a belief or a plan
-    /// rests on it.
+    /// Maximum size of the record, bytes; beyond, the oldest data are pruned, except what a belief
+    /// or plan is based on. `None`: unlimited.
     pub max_bytes: Option<u64>,
-    /// Maximum age of recorded data, seconds on the body's clock.
+    /// Maximum age of recorded data, seconds on the body's clock; `None`: unlimited.
     pub max_age: Option<f64>,
-    /// Minimum room to be left on the disk, bytes.
+    /// Minimum free space to leave on the disk, bytes; `None`: no minimum.
     pub min_free: Option<u64>,
 }
 
-/// Durability: the point at which data counts as recorded.
+/// Point at which data count as recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
-    /// Data is on the disk.
+    /// Data have reached the disk.
     Disk,
-    /// The operating system has the data.
+    /// Data have reached the operating system, and survive a crash of the process but not of the
+    /// machine.
     Process,
 }
 
@@ -54,7 +55,7 @@ impl Keeping {
         }
     }
 
-    /// True if recorded data may have been pruned.
+    /// True if a limit is set, so that recorded data may have been pruned.
     pub fn prunes(&self) -> bool {
         self.options().retention != Retention::default()
     }
@@ -63,11 +64,12 @@ impl Keeping {
         self.memory.as_deref().map(Address::read).transpose()
     }
 
-    /// Options with the name of a new run in its store, where that name must be free.
+    /// Options for a new run: completed with the run's name in the store, which must not exist
+    /// there yet.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] for an address that cannot be used, or where less room is left already than is to be left;
-    /// [`CommandError::Broken`] if no server answers there.
+    /// [`CommandError::BadInput`] for an unusable address, a name that exists, or a disk with less
+    /// free space than [`Keeping::min_free`]; [`CommandError::Broken`] if no server answers.
     pub fn of_new_run(&self, run: &Path) -> Result<Self, CommandError> {
         let Some(address) = self.address()? else {
             self.check_room(run)?;
@@ -91,10 +93,10 @@ impl Keeping {
         }
     }
 
-    /// A new record for a run.
+    /// Creates the record of a new run.
     ///
     /// # Errors
-    /// [`CommandError::Broken`] if it cannot be made.
+    /// [`CommandError::Broken`] if the record cannot be created.
     pub fn create(&self, run: &Path) -> Result<Record, CommandError> {
         match self.address()? {
             Some(address) => address.write(self.options()),
@@ -102,11 +104,12 @@ impl Keeping {
         }
     }
 
-    /// Opens the record of a run to be resumed; creates one if the run was cut off before it had
-    /// one.
+    /// Opens the record of an interrupted run for writing; creates one if the run was interrupted
+    /// before it had a record.
     ///
     /// # Errors
-    /// [`CommandError::Broken`] if it cannot be opened, or is being written.
+    /// [`CommandError::Broken`] if the record cannot be opened, or if another process is writing
+    /// it.
     pub fn resume(&self, run: &Path) -> Result<Record, CommandError> {
         if let Some(address) = self.address()? {
             return address.write(self.options())?.retracing().map_err(CommandError::broken);
@@ -122,7 +125,8 @@ impl Keeping {
     }
 }
 
-/// Opens a record for reading: that of a run, a bare record folder, or one at an address.
+/// Opens a record for reading: the record of a run, a bare record folder, or a record at an
+/// address.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if there is none; [`CommandError::Broken`] if it cannot be opened.
@@ -134,8 +138,7 @@ pub fn open(place: &Path) -> Result<Record, CommandError> {
     Ok(record)
 }
 
-/// Opens the record of a running run for reading; later writes become visible, as the index exists
-/// from the first record on.
+/// Opens the record of a run in progress for reading; data written later become visible.
 ///
 /// # Errors
 /// As [`open`], also if the run has not written anything yet.
@@ -162,7 +165,8 @@ fn found(place: &Path) -> Result<Record, CommandError> {
     })
 }
 
-/// Opens a record for reading; fails if a loss is visible without reading all data.
+/// Opens a record for reading; fails if data are missing as far as that shows without reading
+/// everything.
 ///
 /// # Errors
 /// As [`open`], or [`CommandError::Broken`] that says what is lost.
@@ -174,5 +178,5 @@ pub fn open_whole(place: &Path) -> Result<Record, CommandError> {
     }
 }
 
-/// Name of the record's folder inside its run's folder.
+/// Name of the record's folder in the folder of its run.
 pub const RECORD: &str = "record";

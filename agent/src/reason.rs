@@ -1,5 +1,5 @@
-//! Reasons of plans and failures, with the values that decide them. Records keep the values;
-//! sentences are made for readers.
+//! Reasons why plans are made, with the values that decide them. Records hold the values; sentences
+//! are made from these for readers.
 
 use std::fmt;
 
@@ -13,21 +13,21 @@ use serde::{Deserialize, Serialize};
 use crate::numbers::{is_share, number, share_of};
 use crate::written;
 
-/// Reason a plan was made.
+/// Reason why a plan was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Reason {
-    /// The event that made the plan necessary.
+    /// Event that made a new plan necessary.
     pub trigger: Trigger,
-    /// Number of states after which the search was cut off without a proof; `None`: it ended by
-    /// itself.
+    /// Number of states at which the planner's search was ended without a proof; `None` if the
+    /// search ended by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search_ended_after: Option<u64>,
-    /// True if no plan reaches the goal in the remaining time.
+    /// True if no plan reaches the goal in the time left.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_late: bool,
 }
 
-/// An event that makes a new plan necessary.
+/// Event that makes a new plan necessary.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "because")]
 pub enum Trigger {
@@ -35,36 +35,37 @@ pub enum Trigger {
     Begin,
     /// A step failed.
     Failed {
-        /// The step.
+        /// The failed step.
         #[serde(with = "written::call")]
         call: Call,
     },
-    /// The rest of the plan no longer reaches the goal.
+    /// The remaining plan no longer reaches the goal.
     Broken(Break),
-    /// The goal holds, but on too few observations to rely on absence.
+    /// The goal denies that something is there and holds, but on too few observations.
     NotDenied,
 }
 
-/// The obstacle that keeps steps from reaching the goal.
+/// First obstacle in a sequence of steps towards the goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Break {
-    /// Step whose condition fails; `None`: the goal is missed.
+    /// Step that cannot be executed; `None` if all can and the goal is missed.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "written::maybe")]
     pub step: Option<Call>,
-    /// True if other steps precede; the values are then those expected after these steps.
+    /// True if other steps come before the obstacle; the values in `cause` are then those expected
+    /// after these steps.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_expected: bool,
-    /// Cause with the deciding values.
+    /// Unmet condition, missed goal or changed duration, with the values that decide it.
     pub cause: Cause,
 }
 
 impl Reason {
-    /// A reason without a limit of time or search.
+    /// Reason with this trigger, for a plan limited neither in time nor in search.
     pub fn of(trigger: Trigger) -> Self {
         Reason { trigger, search_ended_after: None, is_late: false }
     }
 
-    /// Reason in a sentence.
+    /// The reason as a sentence; `saying` words the domain.
     pub fn told(&self, saying: &Saying) -> String {
         let mut said = match &self.trigger {
             Trigger::Begin => "there is no plan yet".to_string(),
@@ -83,7 +84,7 @@ impl Reason {
 }
 
 impl Break {
-    /// Converts a finding of the planner's monitor in `steps`.
+    /// Converts an obstacle that the planner's monitor found in `steps`.
     pub fn of(broken: &Broken, steps: &Plan) -> Self {
         let step = broken.step.and_then(|at| steps.steps.get(at));
         Break {
@@ -93,7 +94,8 @@ impl Break {
         }
     }
 
-    /// Step whose duration has changed, with its planned and its present duration, seconds.
+    /// Step whose duration has changed, with the planned and the present duration, seconds; `None`
+    /// if the obstacle is another.
     pub fn reckoned(&self) -> Option<(&Call, f64, f64)> {
         match (&self.step, &self.cause) {
             (Some(call), Cause::Duration { planned_s, asked_s }) => Some((call, *planned_s, *asked_s)),
@@ -101,7 +103,7 @@ impl Break {
         }
     }
 
-    /// Goal, or part of the goal, that is missed.
+    /// Part of the goal that is missed; `None` if the obstacle is another.
     pub fn missed_goal(&self) -> Option<&Unmet> {
         match &self.cause {
             Cause::Goal(unmet) => Some(unmet),
@@ -109,23 +111,24 @@ impl Break {
         }
     }
 
-    /// True if a number is too small for the remaining steps.
+    /// True if a number is smaller than a condition or the goal requires (`>=`).
     pub(crate) fn is_of_too_little(&self) -> bool {
         let (Cause::Goal(unmet) | Cause::Condition { unmet, .. }) = &self.cause else { return false };
         unmet.compared.as_ref().is_some_and(|compared| compared.comparison == Comparison::GreaterOrEqual)
     }
 
-    /// The break in a sentence.
+    /// The obstacle as a sentence.
     pub fn told(&self, saying: &Saying) -> String {
         self.sentence(if self.is_expected { "would be only" } else { "is" }, saying)
     }
 
-    /// Sentence about a break of hypothetical steps.
+    /// The obstacle as a sentence, for steps that were only considered.
     pub fn would_be(&self, saying: &Saying) -> String {
         self.sentence("would be", saying)
     }
 
-    /// Sentence about the break; `is` stands between a number and its value.
+    /// The obstacle as a sentence; `is` is the verb between a number and its value ("is", "would
+    /// be").
     fn sentence(&self, is: &str, saying: &Saying) -> String {
         let call = self.step.as_ref().map(|call| saying.say(&call.to_string()));
         match (&self.cause, call) {
@@ -151,7 +154,7 @@ impl fmt::Display for Break {
     }
 }
 
-/// Sentence about a missed goal, with the number that is too small or too large.
+/// Sentence about a missed goal, with the number that is too small or too large if there is one.
 fn missed(unmet: &Unmet, is: &str, saying: &Saying) -> String {
     match &unmet.compared {
         Some(compared) => {
@@ -177,7 +180,7 @@ fn needs(call: &str, when: Moment, unmet: &Unmet, is: &str, saying: &Saying) -> 
     }
 }
 
-/// Number of a comparison in words, and its value, worded to differ from the bound.
+/// Number of a comparison in words, and its value as text that differs from the bound's.
 fn found(compared: &Compared, saying: &Saying) -> (String, String) {
     let value = match (compared.left_value, compared.right_value) {
         (None, _) => "unknown".to_string(),
@@ -187,7 +190,7 @@ fn found(compared: &Compared, saying: &Saying) -> (String, String) {
     (saying.say(&compared.left), value)
 }
 
-/// Bound of a comparison in words: `at least 0.80`.
+/// Bound of a comparison in words, such as `at least 0.80`.
 fn wanted(compared: &Compared, saying: &Saying) -> String {
     let sign = match compared.comparison {
         Comparison::Less => "less than ",

@@ -1,4 +1,4 @@
-//! Replay of a run from its record, and comparison of the results.
+//! Replay of a run from its record, and comparison of the results with the recorded ones.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -18,25 +18,26 @@ use descry_domains::abilities::searching::policies;
 
 /// Kinds of documents that a replay must reproduce byte for byte.
 const COMPARED: [&str; 5] = ["percepts", "belief", "problem", "skill", "event"];
-/// Keys of a report that differ from run to run, or come from a simulator.
+/// Fields of a report that differ from run to run, or come from a simulator; these are not
+/// compared.
 const OWN: [&str; 7] = ["wall_s", "planning_s", "geometry_s", "run", "true_position_m", "true_on", "true_in"];
 
-/// The outcome of a replay.
+/// Outcome of a replay.
 #[derive(Debug, Default, Serialize)]
 pub struct Replayed {
     /// The run's folder.
     pub run: String,
-    /// Damage of the record; a damaged record is not replayed.
+    /// Damage found in the record; a damaged record is not replayed.
     pub damage: Vec<Fault>,
-    /// True if everything recorded was reproduced.
+    /// True if all that was compared is equal.
     pub same: bool,
-    /// Number of equal documents, by kind.
+    /// Number of equal documents at the beginning, by kind.
     pub compared: Vec<(&'static str, usize)>,
-    /// Recorded verdict, if the run reached one.
+    /// Verdict that the replay reached; `None` if the run was interrupted.
     pub verdict: Option<Value>,
-    /// Place at which the run was interrupted.
+    /// Reason why the record does not continue, for an interrupted run.
     pub cut_off: Option<String>,
-    /// Differences, one per line.
+    /// Differences from the record, one text each.
     pub differences: Vec<String>,
 }
 
@@ -45,16 +46,17 @@ pub struct Replayed {
 pub struct Replay<'a> {
     /// The run's folder.
     pub run: &'a Path,
-    /// Replay speed, seconds of the body's clock per second; `None`: unlimited.
+    /// Seconds of the body's clock per second of real time; `None`: as fast as possible.
     pub speed: Option<f64>,
-    /// Folder for the replayed run, if it is to be kept.
+    /// Folder in which the replayed run is kept; `None`: it is discarded.
     pub out: Option<&'a Path>,
 }
 
 /// Replays a run from its record, unless the record is damaged.
 ///
 /// # Errors
-/// [`CommandError`] if there is no run, if its record does not say what it began with, or if living through it fails.
+/// [`CommandError`] if there is no run, if its record does not hold how the run began, or if the
+/// replay fails.
 pub async fn replay(asked: Replay<'_>, watcher: Watcher<'_>) -> Result<Replayed, CommandError> {
     run::header(asked.run)?;
     let source = Arc::new(keeping::open(asked.run)?);
@@ -66,7 +68,7 @@ pub async fn replay(asked: Replay<'_>, watcher: Watcher<'_>) -> Result<Replayed,
     Ok(Replayed { run: asked.run.display().to_string(), ..replayed })
 }
 
-/// Lives through a run whose record is whole.
+/// Replays a run whose record is undamaged.
 async fn live_through(
     asked: Replay<'_>,
     source: &Arc<Record>,
@@ -110,7 +112,7 @@ async fn live_through(
     Ok(replayed)
 }
 
-/// Body of the run as recorded.
+/// Body that answers as recorded.
 fn robot(source: &Arc<Record>, into: &Arc<Record>, asked: Replay<'_>) -> Result<TapedRobot, CommandError> {
     let Some(known) = tape::known(source)? else {
         let text = format!(
@@ -124,7 +126,8 @@ fn robot(source: &Arc<Record>, into: &Arc<Record>, asked: Replay<'_>) -> Result<
     Ok(TapedRobot::replay(known, tape, entries, asked.speed))
 }
 
-/// Compares the replayed events with the recorded ones, as far as these are kept and complete.
+/// Compares replayed documents with the recorded ones, as far as these were kept and the run was
+/// not interrupted (`ended`: why).
 fn compare(
     source: &Record,
     again: &Record,
@@ -161,7 +164,7 @@ fn compare(
     Ok(replayed)
 }
 
-/// First difference between two texts, with some context.
+/// Description of the first difference between two texts, with some context.
 fn difference(kind: &str, number: usize, recorded: &str, found: &str) -> String {
     const SHOWN: usize = 60;
     let common = recorded.chars().zip(found.chars()).take_while(|(a, b)| a == b).count();
@@ -185,7 +188,7 @@ fn compare_reports(recorded: Option<&Report>, found: Option<&Report>) -> Vec<Str
         .collect()
 }
 
-/// Folder of the replay's own record: the requested one, or a temporary one.
+/// Folder of the replayed run: the requested one, or a temporary one that is removed on drop.
 struct Scratch {
     folder: PathBuf,
     goes: bool,

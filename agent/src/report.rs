@@ -1,4 +1,4 @@
-//! Reports of a run: events as they happen, for people and for the record, and the final result.
+//! Reports of a run: events while it runs, for people and for the record, and the final result.
 
 use std::fmt;
 
@@ -16,83 +16,82 @@ use crate::numbers::count;
 use crate::reason::Reason;
 use crate::written;
 
-/// Event of a run, with its reason.
+/// Event of a run, with the reason for it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "event")]
 pub enum Event {
     /// The goal was understood.
     Goal {
-        /// Words as given.
+        /// Goal in words, as given.
         said: String,
         /// Goal in PDDL.
         pddl: String,
         /// Start place of the body.
         start: String,
-        /// Number of viewpoints in the candidate set.
+        /// Number of candidate viewpoints.
         candidates: usize,
     },
     /// A new plan was made.
     Planned {
         /// Number of the planning round, from 1.
         round: usize,
-        /// Reason why the previous plan is no longer valid, in a sentence.
+        /// Reason why the plan was made, in a sentence.
         because: String,
-        /// Reason with its values; absent in records of earlier versions.
+        /// Reason why the plan was made, with its values; `None` in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         reason: Option<Reason>,
-        /// The steps.
+        /// Steps of the plan.
         #[serde(with = "written::steps")]
         steps: Vec<Step>,
-        /// Duration of the plan.
+        /// Makespan of the plan, seconds.
         makespan_s: f64,
-        /// Calls of attachments that planning made, by name.
+        /// Number of calls of each attachment during planning, by name.
         calls: Vec<(String, u64)>,
     },
     /// The rest of the plan still reaches the goal.
     Kept {
-        /// Steps that are left.
+        /// Number of steps left.
         left: usize,
     },
     /// A step begins.
     Acting {
-        /// The call.
+        /// Action with its arguments.
         #[serde(with = "written::call")]
         call: Call,
         /// Cost and expected gain of the step, in a sentence.
         because: String,
     },
-    /// A step ended well.
+    /// A part of a step has succeeded.
     Acted {
-        /// The call.
+        /// Action with its arguments.
         #[serde(with = "written::call")]
         call: Call,
-        /// The outcome, in a sentence.
+        /// Outcome, in a sentence.
         outcome: String,
     },
     /// A step failed.
     Failed {
-        /// The call.
+        /// Action with its arguments.
         #[serde(with = "written::call")]
         call: Call,
-        /// The error that the body reported.
+        /// Failure as reported, in a sentence.
         because: String,
-        /// Violated invariant in PDDL, if that is the failure.
+        /// Violated invariant in PDDL; `None` if the failure is another.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         unkept: Option<String>,
-        /// The conclusion drawn from the failure, in a sentence.
+        /// Conclusion drawn from the failure, in a sentence.
         therefore: String,
-        /// The lesson as a value; absent in records of earlier versions.
+        /// Conclusion as a value; `None` in records of earlier versions.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         lesson: Option<Lesson>,
     },
-    /// The world has learned something.
+    /// The world model noted something: a perception, a change of belief or the like.
     #[serde(untagged)]
     Noted(Note),
 }
 
 impl Event {
-    /// Heading word of the event, and its text in lines, with conditions and steps in the domain's
-    /// wording.
+    /// Heading of the event and its text (lines), worded with `saying`.
     pub fn parts(&self, saying: &Saying) -> (String, String) {
         let said = |call: &Call| saying.say(&call.to_string());
         match self {
@@ -127,7 +126,7 @@ impl Event {
         }
     }
 
-    /// Event in lines, after a column with its heading word.
+    /// Event as lines of text, with the heading in a column on the left.
     pub fn told(&self, saying: &Saying) -> String {
         let (head, text) = self.parts(saying);
         let line =
@@ -142,7 +141,7 @@ impl fmt::Display for Event {
     }
 }
 
-/// Step of a plan: start, wording, duration.
+/// Step of a plan as text: start time, action, and duration.
 pub fn timed(step: &Step, saying: &Saying) -> String {
     let call = saying.say(&written::call_of(step).to_string());
     match step.start_s {
@@ -151,7 +150,7 @@ pub fn timed(step: &Step, saying: &Saying) -> String {
     }
 }
 
-/// Reason a step failed, in a sentence.
+/// Reason why a step failed, in a sentence. `unkept`: violated invariant in PDDL.
 pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
     match unkept {
         Some(condition) => {
@@ -161,70 +160,71 @@ pub fn failed(because: &str, unkept: Option<&str>, saying: &Saying) -> String {
     }
 }
 
-/// Result of a run, as printed by `--json`.
+/// Result of a run, printed with `--json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
-    /// Words as given.
+    /// Goal in words, as given.
     pub goal: String,
     /// Goal in PDDL.
     pub pddl_goal: String,
     /// Verdict of the run.
     pub verdict: Verdict,
-    /// "yes", "no" or "cannot tell", for a question.
+    /// "yes", "no" or "cannot tell"; `None` if the goal is not a question.
     pub answer: Option<String>,
     /// Reason for the verdict, in a sentence.
     pub why: String,
-    /// The requested object, if the goal is about a single one.
+    /// Requested object; `None` if the goal is not about a single one.
     pub object: Option<String>,
     /// Confidence that was reached, 0 to 1.
     pub confidence: f64,
     /// Confidence that was required, 0 to 1.
     pub threshold: f64,
-    /// Probability that the sought object is there after all.
+    /// Probability that the requested object is there although it was not found; `None` if not
+    /// applicable.
     pub remaining: Option<f64>,
-    /// Believed position of the requested object: centre of its body in the map frame; `None` in
-    /// the hand.
+    /// Believed position of the requested object's centre, map frame, metres; `None` if it is in
+    /// the hand or unknown.
     pub position_m: Option<[f64; 3]>,
-    /// Standard deviation of the position in its least certain direction.
+    /// Standard deviation of that position in its least certain direction, metres.
     #[serde(default)]
     pub position_sigma_m: Option<f64>,
-    /// True position of the requested object; simulation only.
+    /// True position of the requested object's centre, map frame, metres; only with ground truth.
     pub true_position_m: Option<[f64; 3]>,
     /// Spoken name of the surface that the object is believed to stand on.
     pub on: Option<String>,
-    /// True surface of the object; simulation only.
+    /// True surface that the object stands on; only with ground truth.
     pub true_on: Option<String>,
     /// Room that the object is believed to be in.
     #[serde(rename = "in")]
     pub room: Option<String>,
-    /// True room of the object; simulation only.
+    /// True room of the object; only with ground truth.
     #[serde(rename = "true_in")]
     pub true_room: Option<String>,
-    /// Everything that was seen on the surface.
+    /// All objects that are believed to exist.
     pub objects: Vec<Believed>,
     /// Number of views taken.
     pub views: usize,
-    /// Plans after the first.
+    /// Number of plans after the first.
     pub replans: usize,
     /// Distance driven, metres.
     pub distance_m: f64,
-    /// Duration of the run on the clock of the body, seconds.
+    /// Duration of the run on the body's clock, seconds.
     pub sim_time_s: f64,
-    /// Duration of the run on the wall clock, seconds.
+    /// Duration of the run in real time, seconds.
     pub wall_s: f64,
-    /// Longest planning call on the wall clock, without attachments, seconds; 0 if nothing was
-    /// planned or the time is unknown.
+    /// Longest planning call in real time, without attachments, seconds; 0 if nothing was planned
+    /// or the time is unknown.
     #[serde(default)]
     pub planning_s: f64,
     /// Longest time in attachments during one planning call, seconds.
     #[serde(default)]
     pub geometry_s: f64,
-    /// The run's folder.
+    /// Folder of the run.
     pub run: String,
 }
 
 impl Report {
-    /// Report without values that differ between repetitions, and without ground truth.
+    /// Copy of the report without values that differ between repetitions, and without ground truth.
     pub(crate) fn as_recorded(&self) -> Self {
         Self {
             true_position_m: None,
@@ -238,7 +238,7 @@ impl Report {
         }
     }
 
-    /// A report of a run that has only begun.
+    /// Report of a run that has just begun.
     pub fn begin(goal: &Goal, run: String) -> Self {
         Self {
             goal: goal.said.clone(),
@@ -270,7 +270,7 @@ impl Report {
     }
 }
 
-/// Short duration as text, in milliseconds below a second.
+/// Duration as text, in milliseconds below a second.
 pub fn brief(time_s: f64) -> String {
     match time_s {
         s if s >= 1.0 => format!("{s:.1} s"),

@@ -1,4 +1,4 @@
-//! A run from beginning to end: folder, record, report.
+//! A run from beginning to end: its folder, record and report.
 
 mod beginning;
 pub(crate) mod files;
@@ -40,27 +40,27 @@ use crate::report::{Event, Report};
 use crate::shell;
 use crate::stop::Stop;
 
-/// Task of a run.
+/// Task of a run: domain, goal and remembered belief.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
-    /// Domain: vocabulary and actions.
+    /// Domain: predicates, actions and settings.
     pub domain: &'a Domain,
     /// Goal that is pursued.
     pub goal: &'a Goal,
-    /// Persistent belief from earlier runs.
+    /// Belief remembered from earlier runs; `None` without one.
     pub past: Option<&'a Past>,
 }
 
 /// Observer of a run.
 pub struct Watcher<'a> {
-    /// Stop signal; ends the body first.
+    /// Stop signal; stops the body first.
     pub stop: &'a Stop,
-    /// Hears of everything that happens.
+    /// Receives every event of the run.
     pub tell: &'a mut dyn FnMut(&Event),
 }
 
-/// Pursues a goal and reports. Planning and perception block the awaiting thread: use a thread of
-/// its own, as with a current-thread runtime.
+/// Pursues a goal in a new run and reports. Planning and perception block the awaiting thread, so
+/// this should run on a thread of its own.
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
@@ -100,10 +100,11 @@ pub async fn pursue(
     Ok(report)
 }
 
-/// Parses a goal with the words of a domain, the places of a body, and remembered names.
+/// Parses a goal in words, with the names of the domain, of the body's places, and of remembered
+/// objects.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] that says what could have been said.
+/// [`CommandError::BadInput`], which says what would be understood.
 pub fn understood(
     said: &str,
     domain: &Domain,
@@ -126,7 +127,7 @@ fn now_unix_s() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64())
 }
 
-/// Writes the persistent belief of a finished run, if its settings name a store.
+/// Writes what a finished run leaves to be remembered, if the settings name a store.
 fn remember(
     settings: &Settings,
     past: Option<&Past>,
@@ -174,7 +175,8 @@ pub async fn go_on(
     Ok(report)
 }
 
-/// Runs the agent with a body on tape, into a record.
+/// Runs the agent with a body that records its answers or replays them, and writes into `record`.
+/// `folder` is named in the report.
 ///
 /// # Errors
 /// [`CommandError`] if the body or the record fails for good, or the domain cannot be used.
@@ -205,8 +207,8 @@ pub async fn live_through(
     Ok((report, remembered))
 }
 
-/// Adds to the error of a stopped or failed run how to resume it. A record at its size limit cannot
-/// be resumed, as the limit is fixed at the start of the run.
+/// Adds to the error of a stopped or failed run how to resume it. `is_at_bound`: the record is
+/// full, and the run cannot be resumed, because the size limit is fixed at the start.
 pub fn how_to_go_on(error: CommandError, folder: &Path, is_at_bound: bool) -> CommandError {
     let folder = folder.display().to_string();
     let resume = format!("descry do --resume {}", shell::word(&folder));
@@ -222,7 +224,7 @@ pub fn how_to_go_on(error: CommandError, folder: &Path, is_at_bound: bool) -> Co
     }
 }
 
-/// Fills in the true position of the requested object; simulation only.
+/// Fills in the true place of the requested object, if the body has ground truth.
 fn show_true_position(report: &mut Report, body: &Body) {
     let object = report.object.as_deref();
     let true_place = object.and_then(|name| body.true_place(name, report.position_m));
@@ -240,7 +242,7 @@ fn answer(verdict: Verdict) -> &'static str {
     }
 }
 
-/// Completes a report; returns the belief to remember.
+/// Completes a report from the conclusion; returns the belief to be remembered.
 fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<Remembered> {
     report.verdict = conclusion.verdict;
     report.why = conclusion.why;
@@ -260,7 +262,7 @@ fn fill(report: &mut Report, conclusion: Conclusion, totals: Totals) -> Option<R
     conclusion.remembered
 }
 
-/// Events of a run in order, from its record, with the losses.
+/// Bodies of the event documents of a run, in order, and the damage found in its record.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.

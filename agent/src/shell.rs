@@ -1,4 +1,4 @@
-//! Shell command lines, for display and for execution.
+//! Words of shell command lines.
 
 /// Text as a shell word, quoted if needed.
 pub fn word(text: &str) -> String {

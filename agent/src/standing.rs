@@ -1,6 +1,6 @@
-//! Belief report of a run: confidence in the requested objects, coverage of their possible places,
-//! and open probability. Recorded with every plan, made or kept, so that the gain of each look can
-//! be explained later.
+//! Remaining doubts of a run: confidence about what was asked for, coverage of the places where it
+//! may be, and undecided probability. Recorded with every plan, new or kept, so that the gain of
+//! each observation can be explained later.
 
 pub use descry_domains::abilities::searching::FirstLook;
 use descry_domains::belief::doubt::Doubt;
@@ -15,88 +15,88 @@ use serde_json::Value;
 
 use crate::exit::CommandError;
 
-/// Name of the blob with the doubts, attached to a plan's event.
+/// Name of the blob with the doubts, attached to an event of a plan.
 pub const BLOB: &str = "in-doubt";
-/// Record kind of the facts on which the end of a run rests.
+/// Record kind of the facts that explain the end of a run.
 pub const RESTS: &str = "rests-on";
 
-/// Doubtful object, kind or surface.
+/// Doubt about an object, all objects of a kind, or all objects on a surface.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct InDoubt {
-    /// Spoken name of the doubtful object, kind or surface.
+    /// Spoken name of the object, kind or surface.
     pub about: String,
-    /// The type of the doubt.
+    /// Type of the doubt.
     pub of: Of,
-    /// For a kind: rooms that restrict the question, as in " in the kitchen"; empty: no
-    /// restriction.
+    /// Rooms to which the question about a kind is restricted, such as " in the kitchen"; empty
+    /// without restriction.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub within: String,
-    /// Confidence reached so far, 0 to 1; absent in records of earlier versions.
+    /// Confidence reached, 0 to 1; `None` in records of earlier versions.
     pub sure: Option<f64>,
     /// Confidence that is required, 0 to 1.
     pub wanted: f64,
-    /// Probability that is still unsettled, 0 to 1.
+    /// Probability that is still undecided, 0 to 1.
     pub left: f64,
-    /// Part of the open probability at unseen places.
+    /// Probability that the object (or a further one) is where nothing was seen yet, 0 to 1.
     pub hidden: f64,
-    /// Part of the open probability of having been lost out of the hand, where no look at a surface
-    /// shows it.
+    /// Part of `hidden`: probability that the object was lost out of the hand, to where no view of
+    /// a surface shows it.
     pub lost: f64,
-    /// Coverage of each place where the object may be.
+    /// Coverage of each surface where the object may be.
     pub seen: Vec<Seen>,
 }
 
-/// The type of a doubt.
+/// Type of a doubt.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
-    /// Doubt about the place of one object.
+    /// Place of one object.
     #[default]
     Thing,
-    /// Doubt about the set of objects of one kind.
+    /// Set of the objects of one kind.
     Kind,
-    /// Doubt about the objects on one surface.
+    /// Objects on one surface.
     Surface,
 }
 
-/// Coverage of one place.
+/// Coverage of one surface.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
-    /// Spoken name of the place.
+    /// Spoken name of the surface.
     pub on: String,
-    /// Share of the place where nothing can be hidden, 0 to 1; `None` for an unknown place.
+    /// Share of the surface on which nothing can stand unseen, 0 to 1; `None` if unknown.
     pub share: Option<f64>,
-    /// Number of viewpoints of the place's valid views.
+    /// Number of viewpoints whose views of the surface are valid.
     pub places: usize,
-    /// Probability that the object is in an unseen part of this place, 0 to 1; absent in records of
-    /// earlier versions.
+    /// Probability that the object stands unseen on this surface, 0 to 1; 0 in records of earlier
+    /// versions.
     #[serde(default)]
     pub hidden: f64,
-    /// Part of the hidden probability at unexplained measurements.
+    /// Part of `hidden` at places where measurements are explained by no object.
     #[serde(default)]
     pub measured: f64,
-    /// Data of a first look at this place, if looks in vain are penalised; absent in records of
-    /// earlier versions.
+    /// Success probability and duration of a first observation of this surface, if the metric
+    /// penalises observations in vain; `None` otherwise and in records of earlier versions.
     #[serde(default)]
     pub first: Option<FirstLook>,
 }
 
-/// Facts on which the end of a run rests.
+/// Facts that explain the end of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Rests {
-    /// Reason the run ended.
+    /// Reason why the run ended.
     pub ended: End,
-    /// Message of the limit or failure; empty without one.
+    /// Message about the limit, failure or undecided search; empty without one.
     pub said: String,
-    /// Reasons for no plan.
+    /// Reasons why there is no plan.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub no_plan: Vec<NoPlan>,
-    /// Remaining doubts at the end.
+    /// Doubts that remain at the end.
     pub in_doubt: Vec<InDoubt>,
 }
 
-/// Reason a run ended.
+/// Reason why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum End {
     /// The goal held.
@@ -105,10 +105,10 @@ pub enum End {
     /// No plan reaches the goal.
     #[serde(rename = "no plan")]
     NoPlan,
-    /// Planning was cut off.
+    /// Planning ended without a plan and without a proof that there is none.
     #[serde(rename = "undecided")]
     Undecided,
-    /// A limit of looks, plans or time was reached.
+    /// A limit on views, plans or time was reached.
     #[serde(rename = "limit")]
     Limit,
     /// A step failed for good.
@@ -116,7 +116,7 @@ pub enum End {
     Failed,
 }
 
-/// Collects the facts on which the end of a run rests, for the record.
+/// Collects the facts that explain the end of a run, for the record.
 pub fn rests(round: &Round, of: &Ended) -> Rests {
     let (ended, said) = match of {
         Ended::Reached => (End::Reached, String::new()),
@@ -129,7 +129,7 @@ pub fn rests(round: &Round, of: &Ended) -> Rests {
     Rests { ended, said, no_plan, in_doubt: in_doubt(round) }
 }
 
-/// Doubts of a round as a blob for an event.
+/// Doubts of a round as a data blob for an event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.
@@ -138,7 +138,7 @@ pub fn blob(round: &Round) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// Remaining doubts of a round about the requested objects.
+/// Remaining doubts about what was asked for.
 fn in_doubt(round: &Round) -> Vec<InDoubt> {
     let s = &round.situation;
     let places = |on: usize| s.spaces[on].seen_from().len();

@@ -1,4 +1,4 @@
-//! A small domain that runs, written into a folder, to be changed.
+//! Template of a small working domain, to be written to a folder and changed there.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
-//! Comparison of a plan with its alternatives: the same steps with other objects, each with
-//! duration and gain by the plan's own attachment answers. Recorded with the plan, so that the
+//! Comparison of a plan with its alternatives: the same steps with other objects, each with its
+//! duration and gain as the plan's own task predicts them. Recorded with the plan, so that the
 //! choice can be explained later.
 
 #[doc(hidden)]
@@ -25,87 +25,93 @@ use crate::written::{self, call_of};
 
 /// Name of the blob with the comparison, attached to a plan's event.
 pub const BLOB: &str = "weighed";
-/// The maximum number of combinations of objects that are tried.
+/// Maximum number of combinations of objects that are tried.
 const MOST_TRIED: usize = 600;
-/// The maximum number of alternatives that are kept.
+/// Number of alternatives kept for their gain per second; a few more are kept for other reasons.
 pub const MOST_KEPT: usize = 12;
-/// The maximum number of steps until the first gain in plans that are compared.
+/// Maximum number of steps before a plan's first gain; plans that gain later are not compared.
 pub const MOST_STEPS: usize = 6;
 /// Durations that differ by less than this count as equal, seconds.
 const SHORTER_S: f64 = 0.05;
-/// Maximum duration of a detour, in multiples of the step it replaces.
+/// Maximum duration of a detour, as a multiple of the step that it replaces.
 const FAR: f64 = 2.0;
-/// Minimum gain; smaller ones count as none.
+/// Minimum improvement of a number; smaller ones count as none.
 const GAINED: f64 = 1e-6;
 
 /// Comparison of a plan with its alternatives.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Weighed {
-    /// Numeric fluents in the goal: value before the plan, and expected value at its end (or best
-    /// moment, if the plan consumes them).
+    /// Numbers that the goal (or else the steps' conditions) compares and the plan improves, with
+    /// the value at the plan's end, or at its best moment if the plan consumes them.
     pub numbers: Vec<Expected>,
-    /// Plan up to its first gain.
+    /// Steps of the plan up to the first that improves a number; `None` if none of the first steps
+    /// does.
     pub chosen: Option<Way>,
-    /// Alternatives, by decreasing gain per second.
+    /// Alternatives to `chosen`: those with the highest gain per second, in that order, then
+    /// further notable ones.
     pub others: Vec<Way>,
-    /// Number of feasible alternatives, including the chosen plan and those not in `others`.
+    /// Number of alternatives that can be executed, the chosen plan and those not in `others`
+    /// included.
     pub open: usize,
-    /// Plan up to its first gain, with consecutive steps merged where possible.
+    /// The chosen steps with consecutive ones merged, if that is quicker and gains no less.
     pub shorter: Option<Way>,
-    /// Quickest plan with one more step that shortens another one, such as opening a door on the
-    /// route.
+    /// The chosen steps with one more step that makes a later one shorter, such as opening a door
+    /// on the route; the quickest such change.
     pub through: Option<Way>,
-    /// Remaining steps of the previous plan, if different from the new one.
+    /// Remaining steps of the previous plan; `None` if the new plan has the same.
     pub left: Option<Way>,
-    /// Expected values of the numbers after the rest of the previous plan.
+    /// Numbers that the remaining previous plan would improve.
     pub left_numbers: Vec<Expected>,
 }
 
-/// A number of the domain.
+/// Number of the domain with its predicted change.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
-    /// Name in PDDL.
+    /// Function with arguments, in PDDL.
     pub name: String,
-    /// Value now.
+    /// Present value.
     pub now: f64,
-    /// Value after the plan, if all goes as expected.
+    /// Value after the plan, if all goes as predicted.
     pub then: f64,
 }
 
-/// Steps with their duration and gain.
+/// Sequence of steps with its duration and gain.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Way {
-    /// The calls.
+    /// Steps, as calls.
     #[serde(with = "written::calls")]
     pub steps: Vec<Call>,
-    /// Duration of each step, seconds; absent in records of earlier versions.
+    /// Duration of each step, seconds; empty in records of earlier versions.
     #[serde(default)]
     pub each_s: Vec<f64>,
-    /// Total duration of the steps in sequence, seconds.
+    /// Duration of all steps one after the other, seconds.
     pub takes_s: f64,
-    /// Total gain: approach of the numbers to their bounds.
+    /// Sum of the improvements of the compared numbers.
     pub gains: f64,
-    /// True if the goal is expected to hold after the steps; absent in records of earlier versions.
+    /// True if the goal is predicted to hold after the steps; `None` if undecided, or in records of
+    /// earlier versions.
     #[serde(default)]
     pub reaches: Option<bool>,
-    /// Totals with the rest of the plan appended; `None` if infeasible, or in records of earlier
-    /// versions.
+    /// Totals if the rest of the plan follows; `None` if that is impossible, or in records of
+    /// earlier versions.
     #[serde(default)]
     pub whole: Option<Whole>,
-    /// Obstacle to the rest of the plan, if any; absent in records of earlier versions.
+    /// Obstacle to the rest of the plan; `None` if there is none, or in records of earlier
+    /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocked: Option<Break>,
 }
 
-/// Totals of a plan to its end.
+/// Totals of a whole plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Whole {
-    /// Cost of the steps in sequence by the plan metric, seconds.
+    /// Increase of the plan metric, in seconds; without a metric value, the duration of the steps
+    /// one after the other.
     pub takes_s: f64,
     /// Number of steps.
     pub steps: usize,
-    /// True if the goal is expected to hold after the steps.
+    /// True if the goal is predicted to hold at the end.
     pub reaches: bool,
 }
 
@@ -115,13 +121,14 @@ impl Way {
         self.gains / self.takes_s.max(1e-9)
     }
 
-    /// Last argument of the last step: the object that the alternative is about.
+    /// Last argument of the last step, which is the object that the steps are about; `None` without
+    /// one.
     pub fn about(&self) -> Option<&str> {
         self.steps.last()?.arguments.last().map(String::as_str)
     }
 }
 
-/// Comparison as a blob for an event.
+/// Comparison as a data blob for an event.
 ///
 /// # Errors
 /// [`CommandError::Bug`] if it cannot be written as JSON.
@@ -130,8 +137,8 @@ pub fn blob(weighed: &Weighed) -> Result<Blob<'static>, CommandError> {
     Ok(Blob { name: BLOB.into(), form: Form::Bytes, layout: Value::Null, data: data.into() })
 }
 
-/// Compares a plan with alternatives and with the remainder of the previous plan; `goal` selects
-/// the numbers.
+/// Compares a plan with alternatives and with the remaining previous plan `left`. `goal`, in PDDL,
+/// names the numbers by which they are compared.
 pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
     let Some(scale) = Scale::new(round, plan, goal) else { return Weighed::default() };
     let weighed = scale.weigh(plan).unwrap_or_default();
@@ -140,21 +147,23 @@ pub fn weigh(round: &Round, plan: &Plan, left: &Plan, goal: &str) -> Weighed {
     Weighed { left: left_way, left_numbers, ..weighed }
 }
 
-/// Numbers relevant in a round, with their current values.
+/// Prediction of steps from the present state, and the numbers by which plans are compared.
 struct Scale<'r> {
     semantics: Semantics<'r>,
     state: State,
-    /// Numeric functions that matter to the goal, each with true if less is better.
+    /// Numeric functions by which plans are compared, each with true if smaller values are better.
     counting: Vec<(FunctionId, bool)>,
-    /// Text that compares these numbers: the goal, or else the steps' conditions.
+    /// Text in PDDL that compares these numbers: the goal, or else the conditions of the plan's
+    /// steps.
     asked: String,
-    /// Objects of the goal that the steps with conditions on these numbers affect; `None` if the
+    /// Objects in the goal that are affected by steps with conditions on the numbers; `None` if the
     /// goal itself names the numbers.
     aims: Option<Vec<String>>,
 }
 
 impl<'r> Scale<'r> {
-    /// Scale of the numbers in the goal, or else in the steps' conditions.
+    /// Scale by the numbers in the goal, or else in the conditions of the plan's steps; `None` if
+    /// the initial state cannot be evaluated.
     fn new(round: &'r Round, plan: &Plan, goal: &str) -> Option<Self> {
         let semantics = Semantics::new(&round.task, &round.attachments);
         let state = semantics.initial().ok()?;
@@ -183,7 +192,8 @@ impl<'r> Scale<'r> {
         Some(Scale { semantics, state, counting, asked: by, aims })
     }
 
-    /// Values of the numbers that matter in a state, by name, each with true if less is better.
+    /// Values of the compared numbers in a state, by name in PDDL, each with true if smaller values
+    /// are better.
     fn numbers(&self, state: &State) -> BTreeMap<String, (f64, bool)> {
         let task = self.semantics.task;
         let of = |&(id, less): &(FunctionId, bool)| {
@@ -205,7 +215,7 @@ impl<'r> Scale<'r> {
         self.counting.iter().flat_map(of).collect()
     }
 
-    /// Object names of a number with those that may vary between plans replaced by variables.
+    /// Arguments of a number, with `?` for those that may differ between plans.
     fn any<'o>(&self, of: Vec<&'o str>) -> Vec<&'o str> {
         let Some(aims) = &self.aims else { return of };
         let is_aim = |object: &&str| aims.iter().any(|aim| aim == object);
@@ -213,19 +223,21 @@ impl<'r> Scale<'r> {
         of.into_iter().map(|object| if !any_is || is_aim(&object) { object } else { "?" }).collect()
     }
 
-    /// Gain of a number: approach to its bound.
+    /// Improvement of a number from `now` to `then`; 0 if it gets worse. `less`: smaller values are
+    /// better.
     fn gain(now: f64, then: f64, less: bool) -> f64 {
         (if less { now - then } else { then - now }).max(0.0)
     }
 
-    /// Durations of consecutive steps, seconds, and the resulting state; `None` if inapplicable.
+    /// Duration of each of some consecutive steps, seconds, and the state after all; `None` if a
+    /// step is inapplicable.
     fn after(&self, steps: &[Step]) -> Option<(Vec<f64>, State)> {
         let mut state = self.state.clone();
         let each = steps.iter().map(|step| self.apply(&mut state, step)).collect::<Option<_>>()?;
         Some((each, state))
     }
 
-    /// Duration of a step in a state, seconds.
+    /// Duration of a step in a state, seconds; `None` if it has no fixed duration.
     fn takes_s(&self, state: &State, step: &Step) -> Option<f64> {
         let (id, binding) = self.semantics.bind(step).ok()?;
         let Some(bounds) = &self.semantics.task.action(id).duration else { return Some(0.0) };
@@ -233,7 +245,8 @@ impl<'r> Scale<'r> {
         self.semantics.number(state, &bound.value, &binding).ok()?.filter(|s| s.is_finite())
     }
 
-    /// Applies a step; returns its duration, seconds.
+    /// Applies a step to a state; returns its duration, seconds, or `None` if the step is
+    /// inapplicable.
     fn apply(&self, state: &mut State, step: &Step) -> Option<f64> {
         let semantics = &self.semantics;
         let (id, mut binding) = semantics.bind(step).ok()?;
@@ -252,7 +265,8 @@ impl<'r> Scale<'r> {
         Some(takes_s)
     }
 
-    /// Applies changes; `None` if they contradict each other.
+    /// Applies simultaneous effects to a state; `None` if these contradict each other or are
+    /// undefined.
     fn change(
         &self,
         state: &mut State,
@@ -278,13 +292,13 @@ impl<'r> Scale<'r> {
         Some(Way { steps, each_s, takes_s, gains, reaches, ..Way::default() })
     }
 
-    /// True if the goal holds in a state; `None` if undefined.
+    /// True if the goal holds in a state; `None` if that cannot be evaluated.
     fn reaches(&self, state: &State) -> Option<bool> {
         let goal = &self.semantics.task.goal;
         self.semantics.holds(state, &goal.body, &mut Binding::new(goal.slots)).ok()
     }
 
-    /// Totals of steps done in sequence.
+    /// Totals of steps executed one after the other; `None` if a step is inapplicable.
     fn whole(&self, steps: &[Step]) -> Option<Whole> {
         let (each_s, state) = self.after(steps)?;
         let takes_s = each_s.iter().sum();
@@ -294,8 +308,9 @@ impl<'r> Scale<'r> {
         Some(Whole { takes_s: counted.unwrap_or(takes_s), steps: steps.len(), reaches })
     }
 
-    /// Totals of alternative steps followed by the needed rest of a plan: with objects exchanged,
-    /// or after one connecting step. If infeasible, the obstacle.
+    /// Totals of an alternative followed by as much of the rest of the plan as the goal needs,
+    /// tried with exchanged objects and with one connecting step. If that is impossible, the
+    /// obstacle instead.
     fn led_on(&self, other: &Other, rest: &[Step]) -> (Option<Whole>, Option<Break>) {
         let ends = self.ends(other, rest);
         let all = ends.iter().map(|end| [&other.steps, end.as_slice()].concat());
@@ -319,7 +334,7 @@ impl<'r> Scale<'r> {
         }
     }
 
-    /// Candidate continuations that connect alternative steps with the rest of a plan.
+    /// Continuations to be tried after an alternative, made from the rest of the plan.
     fn ends(&self, other: &Other, rest: &[Step]) -> Vec<Vec<Step>> {
         let exchanged: Vec<Step> = rest.iter().map(|step| other.instead.exchanged(step)).collect();
         let put: Vec<Step> = rest.iter().map(|step| other.instead.in_step(step)).collect();
@@ -353,15 +368,15 @@ impl<'r> Scale<'r> {
         ends
     }
 
-    /// Applicable steps that lead from an object of one step to one of another.
+    /// Applicable steps that lead from an object of step `from` to an object of step `to`.
     fn led(&self, there: &State, from: &Step, to: &Step, about: &Step) -> Vec<Step> {
         let pairs = from.arguments.iter().flat_map(|from| to.arguments.iter().map(move |to| (from, to)));
         let bridges = pairs.flat_map(|(from, to)| self.bridges(from, to, about));
         bridges.filter(|bridge| self.apply(&mut there.clone(), bridge).is_some()).collect()
     }
 
-    /// Obstacle to the rest of a plan after alternative steps: a number too small for all remaining
-    /// steps other than looks, or else the first obstacle.
+    /// Obstacle to the rest of a plan after an alternative: a number too small for the steps after
+    /// the last observation, or else the first obstacle of any kind.
     fn short_of(&self, other: &Other, rest: &[Step]) -> Option<Break> {
         let is_look = |step: &Step| other.steps.last().is_some_and(|last| last.action == step.action);
         let looked = rest.iter().rposition(is_look);
@@ -380,7 +395,8 @@ impl<'r> Scale<'r> {
         !self.semantics.task.init.timed.is_empty()
     }
 
-    /// First obstacle that the monitor finds in steps done in sequence.
+    /// First obstacle that the monitor finds in steps executed one after the other; `None` if the
+    /// goal is reached.
     fn stuck(&self, steps: &[Step]) -> Option<Break> {
         let (mut state, mut begins_s, mut timed) = (self.state.clone(), 0.0, Vec::new());
         for step in steps {
@@ -396,7 +412,7 @@ impl<'r> Scale<'r> {
         monitor(task, attachments, &plan).err().map(|broken| Break::of(&broken, &plan))
     }
 
-    /// Numbers that steps bring nearer to their bounds.
+    /// Numbers that steps improve, with their predicted values.
     fn expected(&self, steps: &[Step]) -> Vec<Expected> {
         let then = self.after(steps).map(|(_, state)| self.numbers(&state)).unwrap_or_default();
         let expected = |(name, (now, less)): (String, (f64, bool))| {
@@ -406,7 +422,8 @@ impl<'r> Scale<'r> {
         self.numbers(&self.state).into_iter().filter_map(expected).collect()
     }
 
-    /// Expected numbers at a plan's end, or at its best moment if the plan consumes them.
+    /// Numbers that steps improve until their end; or, if none, until the moment of the greatest
+    /// improvement (the steps may consume them later).
     fn at_most(&self, steps: &[Step]) -> Vec<Expected> {
         let whole = self.expected(steps);
         if !whole.is_empty() {
@@ -441,7 +458,8 @@ impl<'r> Scale<'r> {
         Some(Weighed { numbers, chosen: Some(chosen), others, open, shorter, through, ..Weighed::default() })
     }
 
-    /// Remaining steps of the previous plan, with totals or the obstacle.
+    /// Remaining steps of the previous plan with its totals, or else the obstacle; `None` if the
+    /// new plan has the same steps, or if none remain.
     fn left(&self, plan: &Plan, left: &Plan) -> Option<Way> {
         let steps: Vec<Call> = left.steps.iter().map(call_of).collect();
         if steps.is_empty() || plan.steps.iter().map(call_of).eq(steps.iter().cloned()) {
@@ -452,8 +470,8 @@ impl<'r> Scale<'r> {
         Some(Way { steps, whole, blocked, ..Way::default() })
     }
 
-    /// Quickest insertion of one more step into a plan that shortens a later step between two
-    /// objects.
+    /// The steps with one more inserted that makes a step between two objects shorter; the quickest
+    /// such change, `None` if there is none.
     fn through(&self, steps: &[Step]) -> Option<Vec<Step>> {
         let task = self.semantics.task;
         let step = |action: &str, arguments: [&str; 2]| Step {
@@ -501,8 +519,8 @@ impl<'r> Scale<'r> {
         best.map(|(_, steps)| steps)
     }
 
-    /// Alternatives: the plan's last step that has a choice, with other objects and necessary
-    /// preceding steps.
+    /// Alternatives to a plan: its last step that has a choice of objects is executed with other
+    /// objects, after the steps that this needs.
     fn others(&self, steps: &[Step], chosen: &Way) -> Vec<Other> {
         let task = self.semantics.task;
         let choices = |step: &Step| -> Option<Vec<Arc<[ObjectId]>>> {
@@ -534,8 +552,8 @@ impl<'r> Scale<'r> {
         ways.filter(|other| other.way.gains > GAINED && other.way.steps != chosen.steps).collect()
     }
 
-    /// Plan with one step replaced: directly, where the plan leads there, or after one connecting
-    /// step.
+    /// Alternative with step `at` of a plan replaced by `other`: alone, after the same steps with
+    /// other objects, or after one connecting step; `None` if none is applicable.
     fn in_place(&self, steps: &[Step], at: usize, other: &Step) -> Option<Other> {
         let instead = Instead::of(&steps[at], other);
         let mut all: Vec<Step> = steps.iter().map(|step| instead.in_step(step)).collect();
@@ -547,7 +565,7 @@ impl<'r> Scale<'r> {
         Some(Other { steps, instead, way })
     }
 
-    /// Steps that may lead from one object to another, for the purpose of a step.
+    /// Steps that may lead from one object to another; a third argument is taken from `step`.
     fn bridges(&self, from: &str, to: &str, step: &Step) -> Vec<Step> {
         let bridge = |action: &Action, more: &[&String]| {
             let arguments = [from, to].into_iter().chain(more.iter().map(|m| m.as_str()));
@@ -565,15 +583,15 @@ impl<'r> Scale<'r> {
     }
 }
 
-/// Alternative to a plan's steps.
+/// Alternative to a plan's steps, with the objects that differ from the plan's.
 struct Other {
     steps: Vec<Step>,
     instead: Instead,
     way: Way,
 }
 
-/// Alternatives to keep: those with the highest gain per second, and of the others the quickest,
-/// the one with the highest gain, and the best about each object.
+/// Selects the alternatives to keep: the [`MOST_KEPT`] with the highest gain per second; of the
+/// others, the quickest, the one with the greatest gain, and the best about each further object.
 fn kept(mut all: Vec<Other>) -> Vec<Other> {
     let rate = |a: &Other, b: &Other| b.way.rate().total_cmp(&a.way.rate());
     all.sort_by(|a, b| rate(a, b).then_with(|| a.way.steps.cmp(&b.way.steps)));

@@ -1,5 +1,5 @@
-//! Contrastive explanation for an action that is not in the plan: missing conditions, existence and
-//! cost of a plan with it.
+//! Contrastive explanation why an action is not in a plan: its unmet conditions, and whether plans
+//! with it exist and at what cost.
 
 use descry_planner::task::{Atom, Change, Condition, Effect, Predicate, PredicateId, Task, Term, Timed};
 use descry_planner::{Attachments, Options, Outcome, Plan, PlanError, Semantics, Source, Span, Step};
@@ -7,34 +7,34 @@ use serde::Serialize;
 
 use crate::exit::CommandError;
 
-/// Answer about an action.
+/// Explanation about one action.
 #[derive(Debug, Serialize)]
 pub struct Answer {
-    /// Action as written in plans.
+    /// Action with its arguments, as written in plans.
     pub action: String,
-    /// True if the found plan contains the action.
+    /// True if the plan that was found contains the action.
     pub in_plan: bool,
-    /// Parts of the action's condition that do not hold initially.
+    /// Parts of the action's condition that do not hold in the initial state.
     pub unmet: Vec<String>,
-    /// Plan that contains the action, without the goal.
+    /// Result of planning for the action alone, without the goal.
     pub leads_to_it: Tried,
-    /// Plan that contains the action and reaches the goal.
+    /// Result of planning for the goal with the action as part of the plan.
     pub with_it: Tried,
 }
 
-/// Result of planning with the action.
+/// Result of planning with the action as a goal.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tried {
     /// A plan was found.
     Found(Plan),
-    /// None exists, with the reason.
+    /// No plan exists; the text says why.
     None(String),
-    /// The search was inconclusive.
+    /// The search ended without a plan and without a proof, or was not made.
     Open,
 }
 
-/// Answers about an action, besides the plan that was found for the task.
+/// Explains why an action is not in the plan `found`; `asked` is the action as written in plans.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if there is no such action.
@@ -88,7 +88,7 @@ pub fn answer(
     Ok(Answer { action: call(&step), in_plan, unmet, leads_to_it, with_it })
 }
 
-/// The step that somebody means.
+/// Step that a text names.
 fn step(asked: &str) -> Result<Step, CommandError> {
     let plan = Plan::read(&Source::new("--why-not", asked))
         .map_err(|f| refused(asked, f.list[0].message.as_str()))?;
@@ -109,8 +109,8 @@ fn conjuncts<'t>(condition: &'t Condition, parts: &mut Vec<&'t Condition>) {
     }
 }
 
-/// Adds a marker effect to an action for these arguments; returns the condition that the marker is
-/// set.
+/// Makes an action with these arguments set a new marker fact; returns the condition that the
+/// marker is set.
 fn mark(task: &mut Task, action: usize, arguments: &[descry_planner::task::ObjectId]) -> Condition {
     let predicate = PredicateId(task.predicates.len() as u32);
     let name = "taken".to_string();
@@ -153,7 +153,7 @@ fn call(step: &Step) -> String {
     format!("({}{arguments})", step.action)
 }
 
-/// Size of a plan, in words.
+/// Size of a plan in words: steps, cost and makespan.
 fn size(plan: &Plan) -> String {
     let cost = plan.cost.map_or(String::new(), |c| format!(", cost {c}"));
     let makespan = plan.makespan_s().map_or(String::new(), |s| format!(", makespan {s:.3}"));
@@ -162,7 +162,7 @@ fn size(plan: &Plan) -> String {
 }
 
 impl Answer {
-    /// Answer in sentences, next to the found plan.
+    /// Explanation in sentences, in comparison with the plan that was found.
     pub fn said(&self, found: Option<&Plan>) -> String {
         let action = &self.action;
         let mut lines = Vec::new();

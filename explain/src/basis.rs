@@ -1,5 +1,5 @@
-//! Evidence behind the verdict of a finished run, by record ID: the end of the run, the last belief, and the
-//! views behind it.
+//! Evidence for the verdict of a finished run, by record ID: the end of the run, the last belief,
+//! and the views that the belief is based on.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -11,36 +11,36 @@ use crate::wording::{count, share};
 use descry_agent::exit::CommandError;
 use descry_agent::standing::{self, End, InDoubt, Of, Rests};
 
-/// Evidence behind a verdict.
+/// Evidence for a verdict.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Basis {
-    /// Record of the run's end, with its content.
+    /// Record that says how the run ended, with the reason; `None` if missing.
     pub ended: Option<(RecordId, End)>,
-    /// Open doubts at the end.
+    /// Doubts that remained at the end.
     pub in_doubt: Vec<InDoubt>,
-    /// Record of the last belief.
+    /// Record of the last belief; `None` if missing.
     pub belief: Option<RecordId>,
-    /// Last percepts of each surface.
+    /// Last recognised objects (percepts) of each surface.
     pub surfaces: Vec<Perceived>,
     /// Damaged or missing parts of the record, one message each.
     pub lost: Vec<String>,
 }
 
-/// Last percepts of a surface.
+/// Last percepts of one surface.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Perceived {
-    /// The surface's symbol.
+    /// Symbol of the surface.
     pub on: String,
-    /// Record of what was recognised there.
+    /// Record of the percepts.
     pub record: RecordId,
-    /// Records of the views that were merged for it.
+    /// Records of the views that were merged to obtain the percepts.
     pub looks: Vec<RecordId>,
 }
 
-/// Kinds of the records that are evidence.
+/// Kinds of the records that count as evidence.
 const KINDS: [&str; 4] = [standing::RESTS, "belief", "percepts", "cloud"];
 
-/// Reads the evidence from a record, as far as the record holds it.
+/// Reads the evidence from the record of a run, as far as the record has it.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -57,7 +57,7 @@ pub fn of(record: &Record) -> Result<Basis, CommandError> {
 }
 
 impl Basis {
-    /// Evidence among the whole documents of a record, oldest first.
+    /// Evidence among undamaged documents of a record, oldest first.
     pub fn among(documents: &[Document]) -> Self {
         let mut lost = Vec::new();
         let [ends, beliefs, percepts, clouds] =
@@ -95,7 +95,7 @@ impl Basis {
     }
 }
 
-/// The surface, record ID and used views of a percepts document; none if it is malformed.
+/// Surface, record ID and used views of a percepts document; `None` if the document is malformed.
 fn perceived(document: &Document) -> Option<Perceived> {
     let body = &document.body;
     let views: Vec<RecordId> = serde_json::from_value(body["views"].clone()).ok()?;
@@ -137,7 +137,8 @@ impl fmt::Display for Basis {
     }
 }
 
-/// One line of text: the certainty reached, the share seen of each place, and the remaining probability.
+/// One line about a doubt: the confidence reached, the share seen of each surface, and the
+/// probability that is left.
 fn chances(doubt: &InDoubt) -> String {
     let about = match doubt.of {
         Of::Thing => doubt.about.clone(),

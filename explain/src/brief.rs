@@ -1,4 +1,5 @@
-//! Short justification of a plan: its total in the planner's metric, and the totals of its alternatives.
+//! Short justification of a plan: its total by the planner's metric, and the totals of its
+//! alternatives.
 
 use descry_planner::Unmet;
 
@@ -11,8 +12,8 @@ use descry_agent::reason::Break;
 use descry_agent::standing::{Of, Seen};
 use descry_agent::weigh::{Way, Weighed};
 
-/// Sentences that justify a plan over its alternatives, as far as the record allows; with all figures where
-/// the search was cut short.
+/// Sentences that justify a plan against its alternatives, as far as the record allows; those of
+/// [`rivals::why`] where the totals are not known.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     if chapter.is_late() {
         return vec![rivals::IN_TIME.into()];
@@ -53,13 +54,13 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     said
 }
 
-/// True if the planner's metric exceeds the makespan of the plan by more than [`LONGER_S`].
+/// True if the metric value of a plan exceeds its makespan by more than [`LONGER_S`].
 pub fn counts_more(chapter: &Chapter) -> bool {
     let chosen = chapter.weighed.as_ref().and_then(|weighed| weighed.chosen.as_ref());
     chosen.and_then(whole_s).is_some_and(|whole_s| whole_s > chapter.makespan_s + LONGER_S)
 }
 
-/// One sentence with the total of each notable alternative; none without alternatives.
+/// Sentence with the total of each notable alternative; `None` without alternatives.
 fn instead(
     chapter: &Chapter,
     (weighed, chosen): (&Weighed, &Way),
@@ -76,7 +77,7 @@ fn instead(
     (!all.is_empty()).then(|| format!("begun otherwise: {}.", all.join("; ")))
 }
 
-/// Label of an alternative: its last step, or all its steps where another alternative has the same last step.
+/// Name of an alternative: its last step, or all its steps if another one ends with the same step.
 fn called(way: &Way, chosen: &Way, rivals: &[&Way], asked: &Asked<'_>) -> String {
     let alike = rivals.iter().copied().chain([chosen]).filter(|other| other.steps.last() == way.steps.last());
     match way.steps.last() {
@@ -85,8 +86,8 @@ fn called(way: &Way, chosen: &Way, rivals: &[&Way], asked: &Asked<'_>) -> String
     }
 }
 
-/// Total of an alternative with the rest of the plan behind it, relative to the chosen plan. `is_more` is
-/// true if the metric counts more than the time that passes.
+/// Clause that compares the total of an alternative, with the rest of the plan after it, to that of
+/// the chosen plan: (metric value, true if the metric counts more than time).
 fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> String {
     let take = if is_more { "count" } else { "take" };
     match way.whole {
@@ -104,7 +105,7 @@ fn comes_to(way: &Way, (whole_s, is_more): (f64, bool), asked: &Asked<'_>) -> St
     }
 }
 
-/// The obstacle that keeps the rest of the plan from following an alternative.
+/// Clause on the obstacle to the rest of the plan after an alternative.
 fn blocked_by(way: &Way, blocked: &Break, asked: &Asked<'_>) -> String {
     let why = rivals::would_be(blocked, asked);
     match (blocked.missed_goal(), &blocked.step) {
@@ -123,7 +124,7 @@ fn blocked_by(way: &Way, blocked: &Break, asked: &Asked<'_>) -> String {
     }
 }
 
-/// Clause for an alternative that would miss the goal, with its expected gain.
+/// Clause on an alternative that would miss the goal, with the gain that it promises.
 fn not_enough(way: &Way) -> String {
     match way.gains > 0.0 {
         true => format!("would not be enough (+{} is hoped for)", share(way.gains)),
@@ -131,8 +132,8 @@ fn not_enough(way: &Way) -> String {
     }
 }
 
-/// Prior probability of each place for the requested object; first plan only, since later plans are explained
-/// by the views.
+/// Sentence with the probability of each place of the requested object before anything was seen;
+/// `None` for later plans, which are explained by views.
 fn unseen(chapter: &Chapter) -> Option<String> {
     let before = chapter.before.as_ref().filter(|_| chapter.round == 1)?;
     let doubt = before.doubts.iter().find(|doubt| doubt.of == Of::Thing && doubt.seen.len() > 1)?;

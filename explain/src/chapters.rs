@@ -1,4 +1,4 @@
-//! The record of a run, plan by plan.
+//! Record of a run, divided by its plans.
 
 use descry_agent::written::call_of;
 use descry_domains::lesson::Lesson;
@@ -18,55 +18,57 @@ use descry_agent::report::{Event, failed};
 use descry_agent::run::Resumed;
 use descry_agent::weigh::{self, Weighed};
 
-/// A plan and its outcome.
+/// Plan with the events until the next one.
 #[derive(Debug, Default)]
 pub struct Chapter {
     /// Number of the plan, from 1.
     pub round: usize,
-    /// Seconds since the run began.
+    /// Time at which the plan was made, seconds since the run began.
     pub at_s: f64,
-    /// Reason for replanning; none in records of earlier versions, which hold only a sentence.
+    /// Reason why the plan was made; `None` in records of earlier versions, which hold only a
+    /// sentence.
     pub reason: Option<Reason>,
-    /// Reason for replanning, as a sentence.
+    /// Reason why the plan was made, as a sentence.
     pub because: String,
-    /// The greatest of the numbers of an unmet existential condition, with its name.
+    /// Greatest of the numbers of which the goal requires at least one to be large enough, with its
+    /// name first; `None` if the previous plan did not end because all are too small.
     pub most: Option<(String, f64)>,
-    /// Steps.
+    /// Steps of the plan.
     pub steps: Vec<Step>,
-    /// The calls of its steps.
+    /// Calls of the steps.
     pub calls: Vec<Call>,
-    /// Makespan, seconds.
+    /// Makespan of the plan, seconds.
     pub makespan_s: f64,
-    /// State of the run when the plan was made; none if the record does not hold it.
+    /// State of the run when the plan was made; `None` if it is not in the record.
     pub before: Option<Standing>,
-    /// Alternatives that the plan was compared with; none if the record does not hold them.
+    /// Comparison of the plan with alternatives; `None` if it is not in the record.
     pub weighed: Option<Weighed>,
-    /// Events from this plan until the next.
+    /// Events from this plan until the next one, in order.
     pub deeds: Vec<Deed>,
 }
 
-/// An event of execution.
+/// Event while a plan is executed.
 #[derive(Debug)]
 pub enum Deed {
     /// A step began.
     Began(Call),
-    /// State of the run after a step.
+    /// State of the run after a step, or at the next plan or the end.
     Stands(Standing),
-    /// The outcome of a step, as a sentence.
+    /// A step had an outcome, given as a sentence.
     Ended(Call, String),
     /// A step failed.
     Failed {
-        /// The call.
+        /// Call of the step.
         call: Call,
         /// Reason for the failure, as a sentence.
         because: String,
-        /// The violated invariant (`over all` condition) in PDDL, if a violation is the failure.
+        /// Violated invariant (`over all` condition) in PDDL; `None` if the failure is another.
         unkept: Option<String>,
         /// Conclusion from the failure, as a sentence.
         therefore: String,
-        /// Conclusion from the failure; none in records of earlier versions.
+        /// Conclusion as a value; `None` in records of earlier versions.
         lesson: Option<Lesson>,
-        /// Difference in facts and numbers after the failure; none if the record does not hold it.
+        /// Facts and numbers that changed with the failure; `None` if they are not in the record.
         changed: Option<Difference>,
     },
     /// The run was interrupted and resumed.
@@ -75,7 +77,8 @@ pub enum Deed {
     Noted(Note),
 }
 
-/// Reads the plans of a run, with a message for each lost part. `resumed` lists its resumptions.
+/// Reads the plans of a run with their events, and a message for each lost part. `resumed` lists
+/// the interruptions.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -147,7 +150,7 @@ pub fn of(
 }
 
 impl Chapter {
-    /// The calls of completed steps, and those of all other steps.
+    /// Calls of the steps that began and did not fail, and calls of the plan's other steps.
     pub fn steps_done(&self) -> (Vec<&Call>, Vec<&Call>) {
         let mut done: Vec<&Call> = Vec::new();
         for deed in &self.deeds {
@@ -169,17 +172,17 @@ impl Chapter {
         (done, open)
     }
 
-    /// True if a step of this action has a longer duration in the plan than `takes_s`.
+    /// True if the plan has a step of this action with a duration above `takes_s`, seconds.
     pub fn counts_more(&self, action: &str, takes_s: f64) -> bool {
         self.steps.iter().any(|step| step.action == action && step.duration_s > takes_s + 0.05)
     }
 
-    /// State of the run after each step.
+    /// States of the run after the steps of this plan.
     pub fn stood(&self) -> impl Iterator<Item = &Standing> {
         self.deeds.iter().filter_map(|deed| if let Deed::Stands(now) = deed { Some(now) } else { None })
     }
 
-    /// The failed steps, each with the reason as a sentence.
+    /// Failed steps, each with the reason as a sentence.
     pub fn failures(&self, saying: &Saying) -> Vec<(&Call, String)> {
         let mut all = Vec::new();
         for deed in &self.deeds {
@@ -190,7 +193,7 @@ impl Chapter {
         all
     }
 
-    /// The violation that ended the previous plan, if one did.
+    /// Obstacle that ended the previous plan; `None` if it ended for another reason.
     pub fn broken(&self) -> Option<&Break> {
         match &self.reason.as_ref()?.trigger {
             Trigger::Broken(broken) => Some(broken),
@@ -198,23 +201,25 @@ impl Chapter {
         }
     }
 
-    /// True if the previous plan stayed valid but its metric changed.
+    /// True if the plan was made only because a step's duration had changed.
     pub fn is_reckoned(&self) -> bool {
         self.broken().is_some_and(|broken| broken.reckoned().is_some())
     }
 
-    /// Number of states at which the planner's search was cut short without a proof, as text.
+    /// Number of states at which the planner's search was ended without a proof, as text; `None` if
+    /// it ended by itself.
     pub fn cut(&self) -> Option<String> {
         self.reason.as_ref()?.search_ended_after.map(|states| format!("{states} states"))
     }
 
-    /// True if no plan could reach the goal in the remaining time.
+    /// True if no plan reaches the goal in the time left.
     pub fn is_late(&self) -> bool {
         self.reason.as_ref().is_some_and(|reason| reason.is_late)
     }
 }
 
-/// Common prefix of the numbers under an existential comparison: `(f a ` of `(exists (?x) (>= (f a ?x) …`.
+/// Beginning that all numbers under an existential comparison share: `(f a ` for `(exists (?x) (>=
+/// (f a ?x) …`. `None` if the condition has no such comparison.
 fn one_of(condition: &str) -> Option<String> {
     let is_open = |compared: &Compared<'_>| {
         let last = compared.of.last();
@@ -224,7 +229,8 @@ fn one_of(condition: &str) -> Option<String> {
     Some(format!("({} ", [&[word], &of[..of.len() - 1]].concat().join(" ")))
 }
 
-/// The alternatives of a plan, if its document holds them; failures to read are added to `lost`.
+/// Comparison of a plan with alternatives from the plan's document; `None` if it has none. Failures
+/// to read it are added to `lost`.
 fn weighed(record: &Record, document: &Document, lost: &mut Vec<String>) -> Option<Weighed> {
     document.blobs.iter().find(|blob| blob.name == weigh::BLOB)?;
     let read = record.store().blob(document.id, weigh::BLOB).map_err(|e| e.to_string());

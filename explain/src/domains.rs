@@ -1,4 +1,5 @@
-//! Explanations of a domain's actions, calls and numbers, as far as the explanation of a run mentions them.
+//! Explanations of a domain's actions, attachment calls and numbers, as far as a run's explanation
+//! mentions them.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +13,7 @@ use descry_planner::task::{Action, CallTerm, Change, Expression};
 use super::chapters::Chapter;
 use super::wording::listed;
 
-/// Domain of a run, its wording, and the run's plans.
+/// Domain of a run, with its wording and the run's plans.
 pub struct Words<'a> {
     pub domain: &'a Domain,
     pub saying: &'a Saying,
@@ -20,13 +21,13 @@ pub struct Words<'a> {
 }
 
 impl Words<'_> {
-    /// Description of a call that is answered by descry itself; none for others.
+    /// Description of an attachment call that descry itself answers; `None` for other calls.
     pub fn meaning(&self, call: &str) -> Option<String> {
         abilities::meaning(&self.domain.config, call)
     }
 
-    /// List of the calls in an action's duration, each description passed through `told`; none without a
-    /// known call.
+    /// List of the attachment calls in an action's duration, each description passed through
+    /// `told`; `None` if no call is known.
     pub fn counts(&self, action: &str, told: impl Fn(String) -> String) -> Option<String> {
         let bounds = self.action(action)?.duration.as_ref()?;
         let all = self.asked(bounds.iter().flat_map(|bound| bound.value.calls()));
@@ -34,7 +35,8 @@ impl Words<'_> {
         (!all.is_empty()).then(|| listed(&all, all.len()))
     }
 
-    /// Sentence on the metric of the domain beyond total time; none if the metric is total time alone.
+    /// Sentence about a metric that adds numbers to the total time; `None` if it is the total time
+    /// alone.
     pub fn besides_time(&self) -> Option<String> {
         let minimise = &self.domain.config.minimise;
         let task = &self.domain.vocabulary.task;
@@ -52,8 +54,8 @@ impl Words<'_> {
         })
     }
 
-    /// Sentence on the actions of this run whose duration in the plan exceeds the time that they take; none
-    /// without one.
+    /// Sentence about actions of this run whose planned duration exceeds the time that they take;
+    /// `None` if there are none.
     pub fn seconds(&self) -> Option<String> {
         let one = |action: &Action| {
             let takes_s = fixed_s(action)?;
@@ -73,7 +75,7 @@ impl Words<'_> {
         })
     }
 
-    /// True if an action of one of the plans makes this call.
+    /// True if an action in one of the plans makes this attachment call.
     pub fn is_used(&self, call: &str) -> bool {
         let steps = self.chapters.iter().flat_map(|chapter| &chapter.steps);
         let actions: BTreeSet<&str> = steps.map(|step| step.action.as_str()).collect();
@@ -81,7 +83,8 @@ impl Words<'_> {
         asked.into_iter().any(|asked| self.name(asked) == call)
     }
 
-    /// Sentence on the naming of viewpoints; none if they are named otherwise.
+    /// Sentences about the names of viewpoints and the notation of places; `None` if the domain
+    /// does not use the ability "searching".
     pub fn poses(&self, robot: &str) -> Option<String> {
         let text = match robot.starts_with("recorded:") {
             true => {
@@ -97,7 +100,8 @@ impl Words<'_> {
         is_searching.then(|| format!("{text} Places are x, y and height in the map, in metres."))
     }
 
-    /// Sentence on the meaning of the numbers that plans are to change; none if none is known.
+    /// Sentences about the meaning of the numbers that plans are to improve; `None` if no meaning
+    /// is known.
     pub fn numbers(&self) -> Option<String> {
         let Words { domain, saying, chapters } = self;
         let expected = || chapters.iter().filter_map(|c| c.weighed.as_ref()).flat_map(|w| &w.numbers);
@@ -126,7 +130,7 @@ impl Words<'_> {
         &self.domain.vocabulary.task.module(call.module).name
     }
 
-    /// Descriptions of known calls, without adjacent duplicates.
+    /// Descriptions of the known ones among some calls, without adjacent duplicates.
     fn asked<'c>(&self, calls: impl IntoIterator<Item = &'c CallTerm>) -> Vec<String> {
         let mut all: Vec<String> =
             calls.into_iter().filter_map(|call| self.meaning(self.name(call))).collect();
@@ -134,7 +138,7 @@ impl Words<'_> {
         all
     }
 
-    /// The calls by which actions change a number.
+    /// Attachment calls by which actions change a number.
     fn grows_by(&self, number: &str) -> Vec<&CallTerm> {
         let task = &self.domain.vocabulary.task;
         let effects =
@@ -147,7 +151,8 @@ impl Words<'_> {
     }
 }
 
-/// The constant term of an action's duration, if the duration is a sum, seconds.
+/// Constant term of an action's duration, seconds; `None` if the duration is no sum with a
+/// constant.
 fn fixed_s(action: &Action) -> Option<f64> {
     let [bound] = action.duration.as_deref()? else { return None };
     let Expression::Add(parts) = &bound.value else { return None };

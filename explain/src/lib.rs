@@ -1,5 +1,6 @@
-//! Explanation of a run from its record alone, in plain sentences: the reason and justification of each plan,
-//! its outcome, and the evidence behind the verdict. Facts missing from the record are reported as unknown.
+//! Explanation of a run from its record alone, in plain sentences: why each plan was made and
+//! chosen, what came of it, and the evidence for the verdict. Facts that are not in the record are
+//! reported as unknown.
 
 pub mod basis;
 #[doc(hidden)]
@@ -44,18 +45,18 @@ use domains::Words;
 use states::States;
 use wording::wrapped;
 
-/// Explanation of a run.
+/// Explanation of a run; each text is one or a few sentences.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Explanation {
-    /// Summary in a few sentences: the goal, the answer, its evidence, and the worst failure.
+    /// Summary: the goal, the answer, the evidence for it, and the worst trouble.
     pub summary: Vec<String>,
-    /// The goal, and notes on reading the text below.
+    /// Goal, and notes that help to read what follows.
     pub asked: Vec<String>,
-    /// Notes on reading the figures.
+    /// Notes that help to read the figures.
     pub reading: Vec<String>,
-    /// The plans, one after the other.
+    /// Explanations of the plans, in order.
     pub plans: Vec<Told>,
-    /// Evidence behind the verdict.
+    /// Evidence for the verdict.
     pub verdict: Vec<String>,
     /// Lost parts of the record, one message each.
     pub lost: Vec<String>,
@@ -66,23 +67,24 @@ pub struct Explanation {
 pub struct Told {
     /// Number of the plan, from 1.
     pub round: usize,
-    /// Time of planning, seconds since the run began, on the body's clock.
+    /// Time at which the plan was made, seconds since the run began, on the body's clock.
     pub at_s: f64,
-    /// Trigger of the plan.
+    /// Event that made the plan necessary.
     pub cause: String,
-    /// Purpose of the plan.
+    /// Steps of the plan, and the improvements that it is to bring, one sentence each.
     pub intent: Vec<String>,
-    /// Justification of the plan over its alternatives.
+    /// Reasons for choosing this plan over its alternatives, in short, one sentence each.
     pub why: Vec<String>,
-    /// Justification with all figures: duration and gain of each alternative.
+    /// Reasons for choosing this plan, with the duration and gain of each alternative, one sentence
+    /// each.
     pub figures: Vec<String>,
-    /// Outcome of the plan.
+    /// Outcomes of the plan, one text per event or observation.
     pub outcome: Vec<String>,
-    /// Steps carried out, and the reason for leaving out the others.
+    /// Number of steps executed, and why others were left out.
     pub done: String,
 }
 
-/// Explains a run from its record, its header, and its report if it has one.
+/// Explains a run from its record, its settings, and its report if it has one.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -139,7 +141,7 @@ pub fn of(record: &Record, header: &Header, report: Option<&Report>) -> Result<E
     Ok(Explanation { summary, asked: said, reading, plans, verdict, lost })
 }
 
-/// Records of a run that cannot be read, and parts missing from the basis of its verdict, one message each.
+/// Messages about records of a run that cannot be read, and about missing evidence for its verdict.
 fn missing(record: &Record, report: Option<&Report>) -> Result<Vec<String>, CommandError> {
     let (documents, faults) = record.find_whole(&Query::default()).map_err(CommandError::broken)?;
     let mut lost: Vec<String> = faults.iter().map(ToString::to_string).collect();
@@ -147,8 +149,8 @@ fn missing(record: &Record, report: Option<&Report>) -> Result<Vec<String>, Comm
     Ok(lost)
 }
 
-/// State of the run after each look, with its time on the body's clock in nanoseconds; empty if the record
-/// does not hold any. `goal` is in PDDL.
+/// State of the run after each observation, as a sentence, with its time on the body's clock,
+/// nanoseconds; empty if the record holds none. `goal` is in PDDL.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -158,18 +160,18 @@ pub fn after_looks(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<(
     Ok(all.filter_map(|outcome| Some((outcome.stood_ns?, outcome.said))).collect())
 }
 
-/// History of a number in the goal.
+/// History of a number that the goal compares.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sought {
-    /// The number, in the domain's wording.
+    /// Number, in the domain's wording.
     pub name: String,
-    /// Threshold that the goal sets.
+    /// Bound that the goal sets.
     pub wanted: f64,
     /// Values with their times on the body's clock, nanoseconds.
     pub values: Vec<(i64, f64)>,
 }
 
-/// History of each number in the goal, at every plan and look. `goal` is in PDDL.
+/// History of each number that the goal compares, at every plan and observation. `goal` is in PDDL.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -190,55 +192,58 @@ pub fn sought(record: &Record, goal: &str, saying: &Saying) -> Result<Vec<Sought
     Ok(all)
 }
 
-/// Wording of a run's domain; the default wording, PDDL as written, if this version cannot read the domain.
+/// Wording of a run's domain; the default wording (PDDL as written) if this version cannot read the
+/// domain.
 pub fn saying_of(beginning: &Beginning) -> Saying {
     let Ok(domain) = beginning.domain() else { return Saying::default() };
     let scene = beginning.scene.as_ref().and_then(|(name, text)| SceneSpec::parse(name, text).ok());
     Saying::of(&domain, &scene.as_ref().map(Places::of_spec).unwrap_or_default())
 }
 
-/// Note on the figures of an alternative.
+/// Note that explains the figures of an alternative.
 const WAYS: &str = "A way to get further is a sequence of steps up to the first that may bring the numbers nearer to what is \
                     wanted. In brackets behind it: the sum of all improvements, the seconds until then, and the \
                     improvement a second; behind each step its seconds. Numbers that are hoped for assume that what is \
                     looked for is there: a look may show more, or less.";
 
-/// Note on the reading of alternatives.
+/// Note that explains what alternatives assume.
 const OTHERWISE: &str = "What is hoped for assumes that what is looked for is there. The time of a plan that begins otherwise \
                          includes the rest of the plan behind it, as far as that can follow and is needed.";
-/// Note on a metric that counts more seconds than pass.
+/// Note about a metric that counts more seconds than pass.
 const COUNTED: &str = "Beside the time that a plan takes, the planner counts for the first look of each plan at a surface, also where \
                        earlier plans have looked, what it costs on average to look there in vain: the more, the less likely it finds \
                        something and the farther it is, so that what is likely and near comes first (--figures says how).";
 
-/// The question behind a run, as far as its plans depend on it.
+/// Context on which the explanation of plans depends.
 pub struct Asked<'a> {
     /// Goal in PDDL.
     pub goal: String,
-    /// The policy that chose the next look; none if the planner chose.
+    /// Policy that chose the next observation; `None` if the planner chose.
     pub policy: Option<String>,
-    /// Describes the computed part of an action's duration; none if the duration is constant.
+    /// Describes what the duration of an action (by name) is computed from; `None` if unknown or
+    /// constant.
     pub counts: &'a dyn Fn(&str) -> Option<String>,
     /// Wording of the domain.
     pub saying: &'a Saying,
     /// True if the run has a verdict.
     pub has_ended: bool,
-    /// True if the metric counts the expected cost of fruitless looks.
+    /// True if the metric counts the expected cost of observations that find nothing.
     pub counts_in_vain: bool,
 }
 
 impl Asked<'_> {
-    /// Wording of a step.
+    /// Call in the domain's wording.
     fn say(&self, call: &Call) -> String {
         self.saying.say(&call.to_string())
     }
 
-    /// Wording of several steps, joined by `then`.
+    /// Calls in the domain's wording, joined by `then`.
     fn say_all(&self, calls: &[Call], then: &str) -> String {
         calls.iter().map(|call| self.say(call)).collect::<Vec<_>>().join(then)
     }
 
-    /// The threshold that the goal sets for a number; none if the goal does not name this number.
+    /// Bound that the goal sets on a number; `None` if the goal does not compare the number with a
+    /// constant.
     fn wanted(&self, number: &str) -> Option<f64> {
         compared::wanted(&self.goal, number)
     }
@@ -266,7 +271,7 @@ fn said(header: &Header, asked: &Asked<'_>, given_s: Option<f64>, saying: &Sayin
 }
 
 impl Explanation {
-    /// Renders the explanation as text of 80 columns, with all figures or in short.
+    /// Explanation as text of 80 columns, with all figures or in short.
     pub fn text(&self, has_figures: bool) -> String {
         const WIDTH: usize = 80;
         let all = |lines: &[String], first: &str| -> String {

@@ -1,5 +1,5 @@
-//! Outcome of a look: the certainty reached, the reasons for remaining doubt, and the share seen of each
-//! place.
+//! Outcome of an observation: the confidence reached, the reasons for remaining doubt, and the
+//! share seen of each surface.
 
 use descry_agent::standing::{InDoubt, Of, Seen};
 use descry_agent::weigh::Expected;
@@ -13,32 +13,34 @@ use super::numbers::{self, Sure};
 use super::standings::Standing;
 use super::wording::{by_share, listed, place, share, share_of};
 
-/// Probabilities up to this are not mentioned.
+/// Probability up to which nothing is mentioned.
 pub const HARDLY: f64 = 0.005;
-/// Minimum probability at which a detected object counts as a candidate for the requested one.
+/// Minimum probability at which an object counts as a candidate for the requested one.
 const MAY_BE: f64 = 0.05;
-/// Maximum distance between two objects for one to be taken for the other, metres: half the width of a mug.
+/// Maximum distance at which one object may have been mistaken for the other, metres: half the
+/// width of a mug.
 const BESIDE_M: f64 = 0.06;
-/// Minimum probability at which an object is identified as the requested one.
+/// Minimum probability at which an object counts as identified.
 const TAKEN: f64 = 0.5;
-/// Minimum probability at which a place is certain and gets no mention.
+/// Probability from which something counts as certain and is not mentioned.
 const SURELY: f64 = 0.99;
 /// Maximum number of doubts described one by one.
 const MOST_DOUBTS: usize = 3;
 /// Maximum number of places listed by name; the rest are counted.
 const MOST_PLACES: usize = 4;
 
-/// The goal, and the expectations of the plan.
+/// Goal, and what the plan was expected to improve.
 pub struct Hopes<'a> {
     /// Goal in PDDL.
     pub goal: &'a str,
-    /// The numbers that the plan was expected to improve.
+    /// Numbers that the plan was expected to improve.
     pub hoped: &'a [Expected],
     /// Wording of the domain.
     pub saying: &'a Saying,
 }
 
-/// Sentences on each doubt after some looks.
+/// Sentences about each doubt after some observations (`looks`). `before` and `after` are the
+/// states of the run.
 pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked: &Hopes<'_>) -> Vec<String> {
     let told = |doubt: &InDoubt| {
         let was = before.and_then(|before| before.same(doubt));
@@ -54,8 +56,8 @@ pub fn told(before: Option<&Standing>, after: &Standing, looks: &[&Note], asked:
     after.doubts.iter().take(MOST_DOUBTS).filter_map(told).collect()
 }
 
-/// Certainty as a clause: `the certainty of where it stands is now 0.27 (0.00 before, 0.80 is wanted)`. Of
-/// several numbers, the first and those below their thresholds.
+/// Clause about confidence, such as `the certainty of where it stands is now 0.27 (0.00 before,
+/// 0.80 is wanted)`; of several numbers, the first and those below their bounds.
 fn sureness(all: &[Sure], saying: &Saying) -> String {
     let one = |sure: &Sure| {
         let told = |value| share_of(value, sure.wanted);
@@ -71,7 +73,8 @@ fn sureness(all: &[Sure], saying: &Saying) -> String {
     listed(&said, said.len())
 }
 
-/// Share seen of each place where the object may be, and the places without any view.
+/// Sentences about the share seen of each surface where the object may be, as far as it changed
+/// since `was`, and about surfaces without any view.
 pub fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     let before = |seen: &Seen| was.and_then(|was| was.seen.iter().find(|s| s.on == seen.on));
     let percent = |share: f64| format!("{:.0} %", (share * 100.0).floor());
@@ -104,7 +107,7 @@ pub fn seen(doubt: &InDoubt, was: Option<&InDoubt>) -> String {
     }
 }
 
-/// Reasons for the remaining doubt; none if the record gives none.
+/// Reasons why doubt remains, as a clause; `None` if the record gives none.
 fn why_no_surer(
     doubt: &InDoubt,
     before: Option<&Standing>,
@@ -136,7 +139,8 @@ fn why_no_surer(
     (!why.is_empty()).then(|| why.join("; "))
 }
 
-/// Reason for which a look had no effect; none if it had one.
+/// Clause about an observation that showed nothing usable, or that made earlier views invalid;
+/// `None` for others.
 fn in_vain(note: &Note) -> Option<String> {
     match note {
         Note::Nothing { .. } => Some("the look showed no surface".into()),
@@ -150,8 +154,8 @@ fn in_vain(note: &Note) -> Option<String> {
     }
 }
 
-/// Best candidate before a look, if the look ruled it out: its former probability, and a clause on
-/// the change.
+/// Best candidate before some observations, if these ruled it out: its earlier probability, and a
+/// clause about what it is now. `None` if it is still a candidate.
 pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, String)> {
     let (track, was) = before.best(thing).filter(|(_, was)| *was >= MAY_BE)?;
     let now = after.belief.tracks.iter().find(|now| now.id == track.id);
@@ -184,7 +188,7 @@ pub fn lost(thing: &str, before: &Standing, after: &Standing) -> Option<(f64, St
     Some((was, format!("what {taken} {is}")))
 }
 
-/// True if fewer places of the object's surface are counted as seen than before.
+/// True if fewer viewpoints count for the object's surface than before.
 fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
     let places = |standing: &Standing| -> usize {
         let seen = standing.doubts.iter().flat_map(|doubt| &doubt.seen);
@@ -193,15 +197,15 @@ fn counts_less(track: &Track, before: &Standing, after: &Standing) -> bool {
     places(after) < places(before)
 }
 
-/// Object now at or beside the position of a former one; none if the nearest is farther than
-/// `BESIDE_M`.
+/// Object that is now nearest to the position of an earlier one; `None` if it is [`BESIDE_M`] or
+/// more away.
 pub fn there<'a>(track: &Track, after: &'a Standing) -> Option<&'a Track> {
     let apart_m = |other: &Track| (other.position_m - track.position_m).norm();
     let nearest = after.belief.tracks.iter().min_by(|a, b| apart_m(a).total_cmp(&apart_m(b)))?;
     (apart_m(nearest) < BESIDE_M).then_some(nearest)
 }
 
-/// Clause on the best candidate for the requested object; none without a candidate.
+/// Clause about the best candidate for the requested object; `None` without a candidate.
 pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
     let thing = &doubt.about;
     let (track, p) = best_seen(doubt, after).filter(|(_, p)| *p >= MAY_BE)?;
@@ -221,19 +225,19 @@ pub fn may_be(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Stri
     })
 }
 
-/// Objects with their probabilities of being the requested one; without the object in the hand if
-/// it may have been dropped.
+/// Objects, each with the probability that it is the requested one; without the object in the hand
+/// if it may have been lost.
 fn seen_objects<'s>(doubt: &'s InDoubt, after: &'s Standing) -> impl Iterator<Item = (&'s Track, f64)> {
     let seen = after.belief.tracks.iter().filter(|track| !track.on.is_empty() || doubt.lost <= HARDLY);
     seen.map(|track| (track, track.probability_of(&doubt.about)))
 }
 
-/// Object with the highest probability of being the requested one.
+/// Object that is most probably the requested one, with that probability; `None` without objects.
 pub fn best_seen<'s>(doubt: &'s InDoubt, after: &'s Standing) -> Option<(&'s Track, f64)> {
     seen_objects(doubt, after).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Clause for the case without any candidate.
+/// Clause for the case that there is no candidate.
 pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
     let p = best_seen(doubt, after).map(|(_, p)| p).filter(|p| *p > HARDLY);
     match (after.belief.tracks.len(), p.map(share)) {
@@ -245,8 +249,8 @@ pub fn none_may_be(doubt: &InDoubt, after: &Standing) -> String {
     }
 }
 
-/// Clause on the objects of uncertain kind, for a request for all of a kind: the overall certainty, and the
-/// least certain object.
+/// Clause about objects of uncertain kind, when all objects of a kind are requested: the joint
+/// certainty, and the least certain object. `None` if they are certain enough.
 fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<String> {
     let p = |track: &Track| track.probability_of(&doubt.about);
     let open = |track: &Track| p(track).min(1.0 - p(track));
@@ -271,7 +275,7 @@ fn unsure_of(doubt: &InDoubt, after: &Standing, saying: &Saying) -> Option<Strin
     })
 }
 
-/// Clause on the least certainly identified object of a surface.
+/// Clause about the least certainly identified object on a surface; `None` if all are certain.
 fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     let on = symbol(&doubt.about);
     let there = after.belief.tracks.iter().filter(|track| track.on == on);
@@ -294,8 +298,8 @@ fn untold(doubt: &InDoubt, after: &Standing) -> Option<String> {
     ))
 }
 
-/// Clause on the probability of unseen places and of absence. `seen` is the total probability of the seen
-/// objects.
+/// Clause about the probability that the object stands unseen, or is absent; `None` if it hardly
+/// can. `seen` is the total probability of the objects seen.
 pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     (doubt.hidden > HARDLY).then_some(())?;
     let lost = match doubt.lost > HARDLY {
@@ -320,8 +324,8 @@ pub fn hidden(doubt: &InDoubt, seen: f64) -> Option<String> {
     })
 }
 
-/// Surfaces behind that probability, most probable first, with a mention of unexplained
-/// measurements.
+/// Surfaces on which the object may stand unseen, most probable first, as text in brackets;
+/// mentions unexplained measurements. Empty if there is nothing to distinguish.
 fn hidden_places(doubt: &InDoubt) -> String {
     let mut places: Vec<&Seen> = doubt.seen.iter().filter(|seen| seen.hidden > HARDLY).collect();
     places.sort_by(|a, b| b.hidden.total_cmp(&a.hidden));
@@ -340,7 +344,7 @@ fn hidden_places(doubt: &InDoubt) -> String {
     format!(" ({named})")
 }
 
-/// The most probable identity of an object besides one, with its probability.
+/// Most probable identity of an object other than `besides`, with its probability.
 fn likeliest(track: &Track, besides: &str) -> (String, f64) {
     let names = track.probabilities.iter().filter(|(name, _)| name != besides);
     let best = names.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, p)| *p > track.unknown);

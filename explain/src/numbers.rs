@@ -1,5 +1,5 @@
-//! Numbers of a domain that express certainty of the answer: those that the goal compares, under the names
-//! used by the plans.
+//! Numbers of a domain that express confidence in the answer: those that the goal compares, under
+//! the names that plans use.
 
 use descry_agent::compared::{self, words};
 use descry_agent::standing::InDoubt;
@@ -8,24 +8,25 @@ use descry_domains::symbol::symbol;
 
 use super::standings::{Standing, certainty};
 
-/// Values below this carry no information about the position of an object.
+/// Value below which a number says nothing about an object's position.
 const NEXT_TO_NOTHING: f64 = 0.05;
 
-/// A number that expresses certainty.
+/// Number that expresses confidence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sure {
-    /// Its name in PDDL, or its wording.
+    /// Name of the number in PDDL, or a description in words.
     pub name: String,
-    /// Previous value; none if unknown.
+    /// Earlier value; `None` if unknown.
     pub was: Option<f64>,
-    /// Current value.
+    /// Present value.
     pub now: f64,
-    /// Threshold.
+    /// Required value.
     pub wanted: f64,
 }
 
-/// The numbers that express the certainty about a doubt: those that the goal compares; else those that the
-/// plan expects to improve; else the recorded certainty. Empty if the record holds none.
+/// Numbers that express the confidence about a doubt: those that the goal compares; otherwise those
+/// that the plan is expected to improve; otherwise the recorded confidence. Empty if the record has
+/// none.
 pub fn of(
     doubt: &InDoubt,
     before: Option<&Standing>,

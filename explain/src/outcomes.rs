@@ -1,4 +1,4 @@
-//! Outcomes of a plan's steps, and the state of the run after each look.
+//! Outcomes of a plan's steps, and the state of the run after each observation.
 
 use descry_agent::report::failed;
 use descry_domains::note::{BeliefChange, Note, OnTheFloor};
@@ -11,16 +11,17 @@ use super::standings::Standing;
 use super::wording::count;
 use descry_agent::weigh::Expected;
 
-/// Sentences on an outcome, or on the state of the run after a look.
+/// Sentences about an outcome, or about the state of the run after an observation.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Time of that state on the body's clock, nanoseconds; none for the outcome of a step.
+    /// Time of the state on the body's clock, nanoseconds; `None` for the outcome of a step.
     pub stood_ns: Option<i64>,
     /// The sentences.
     pub said: String,
 }
 
-/// Outcomes of a plan's steps in their order, with the state of the run after each look. `goal` is in PDDL.
+/// Outcomes of a plan's steps in order, with the state of the run after each observation. `goal` is
+/// in PDDL.
 pub fn of(chapter: &Chapter, goal: &str, saying: &Saying) -> Vec<Outcome> {
     let hoped: &[Expected] = chapter.weighed.as_ref().map_or(&[], |weighed| &weighed.numbers);
     let asked = looks::Hopes { goal, hoped, saying };
@@ -57,9 +58,9 @@ pub fn of(chapter: &Chapter, goal: &str, saying: &Saying) -> Vec<Outcome> {
     said
 }
 
-/// Sentence on an event; none if it adds nothing. `doing` is the step under way if it is the only one.
-/// `has_standings` is true if the record holds the state after each look, which then replaces the certainty
-/// here.
+/// Sentence about an event; `None` if it adds nothing. `doing`: the step that is being executed, if
+/// it is the only one. `has_standings`: the record has the state after each observation, so that
+/// changes of confidence need not be told here.
 fn outcome(deed: &Deed, doing: Option<&Call>, has_standings: bool, saying: &Saying) -> Option<String> {
     let say = |call: &Call| saying.say(&call.to_string());
     let by = doing.map(|call| format!("{}: ", say(call))).unwrap_or_default();
@@ -104,7 +105,7 @@ fn shown(objects: usize) -> String {
     if objects == 0 { "no object".into() } else { count(objects, "object") }
 }
 
-/// Clause on the objects in a laser sweep; distant ones are only counted.
+/// Clause about the objects found by a laser sweep; distant ones are only counted.
 pub fn swept(things: &[OnTheFloor]) -> String {
     let is_far = |thing: &&OnTheFloor| matches!(thing, OnTheFloor::Thing { is_far: true, .. });
     let (far, near): (Vec<&OnTheFloor>, Vec<&OnTheFloor>) = things.iter().partition(is_far);

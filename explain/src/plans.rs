@@ -1,4 +1,4 @@
-//! Reason, purpose and outcome of each plan.
+//! Explanation of each plan: why it was made, what for, and what came of it.
 
 use descry_agent::reason::{Break, Reason, Trigger};
 use descry_domains::lesson::Lesson;
@@ -13,7 +13,7 @@ use descry_agent::weigh::Expected;
 
 /// Maximum number of numbers listed by name; the rest are counted.
 const MOST_NAMED: usize = 3;
-/// Maximum number of skipped steps listed by name; the rest are counted.
+/// Maximum number of steps left out that are listed by name; the rest are counted.
 const MOST_LEFT_OUT: usize = 4;
 
 /// Explanations of all plans of a run.
@@ -39,7 +39,8 @@ pub fn tell(chapter: &Chapter, before: Option<&Chapter>, after: Option<&Chapter>
     }
 }
 
-/// Sentence on the steps carried out, those left out, and the reason.
+/// Sentence about the steps executed, and the steps left out with the reason. `after` is the next
+/// plan.
 fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let (_, open) = chapter.steps_done();
     let all = chapter.steps.len();
@@ -72,8 +73,8 @@ fn done(chapter: &Chapter, after: Option<&Chapter>, asked: &Asked<'_>) -> String
     format!("{done} of its {all} steps. Left out: {left_out}, because {because}.")
 }
 
-/// Trigger of a plan: the failure or the new knowledge that ended the previous plan, or its completion
-/// without reaching the goal.
+/// Sentence about the event that made a plan necessary: a failure, new knowledge that invalidated
+/// the previous plan, or its completion without reaching the goal.
 fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> String {
     let Some(before) = before else { return "the run began, and there was no plan.".into() };
     let last = before.deeds.iter().rev().find(|deed| !matches!(deed, Deed::Resumed | Deed::Stands(_)));
@@ -144,8 +145,8 @@ fn cause(chapter: &Chapter, before: Option<&Chapter>, asked: &Asked<'_>) -> Stri
     format!("{}{done}{}", moved.unwrap_or_default(), most.unwrap_or_default())
 }
 
-/// The name, current and expected value of the best number among those that differ from `number` only in the
-/// last argument, as expected from the rest of the previous plan.
+/// Name, present value and expected value of the best number that differs from `number` only in its
+/// last argument, as expected of the remaining previous plan; `None` if there is none.
 fn hoped_of_left<'c>(chapter: &'c Chapter, number: &str) -> Option<(&'c str, f64, f64)> {
     let (begins, _) = number.rsplit_once(' ')?;
     let all = chapter.weighed.iter().flat_map(|weighed| &weighed.left_numbers);
@@ -154,7 +155,7 @@ fn hoped_of_left<'c>(chapter: &'c Chapter, number: &str) -> Option<(&'c str, f64
     Some((&most.name, most.now, most.then))
 }
 
-/// Clause on the reason for which the previous plan became invalid.
+/// Clause about why the previous plan became invalid.
 fn missed(chapter: &Chapter, asked: &Asked<'_>) -> String {
     match &chapter.reason {
         Some(Reason { trigger: Trigger::Broken(broken), .. }) => broken.told(asked.saying),
@@ -163,7 +164,7 @@ fn missed(chapter: &Chapter, asked: &Asked<'_>) -> String {
     }
 }
 
-/// Clause on the conclusion from a failure.
+/// Clause about the conclusion drawn from a failure.
 fn follows(call: &Call, therefore: &str, lesson: Option<&Lesson>, asked: &Asked<'_>) -> String {
     match lesson {
         Some(Lesson::Retry { tries, most }) => {
@@ -177,13 +178,14 @@ fn follows(call: &Call, therefore: &str, lesson: Option<&Lesson>, asked: &Asked<
     }
 }
 
-/// True if the previous plan already carried out a step with the same action and the same last argument.
+/// True if the previous plan has executed a step with the same action and the same last argument.
 fn is_first_now(step: &Call, before: &Chapter) -> bool {
     let is_like = |done: &&Call| done.action == step.action && done.arguments.last() == step.arguments.last();
     before.steps_done().0.iter().any(is_like)
 }
 
-/// Sentences on the objects whose position became certain enough since the previous plan.
+/// Sentences about the objects whose position became certain enough since the previous plan; empty
+/// if there are none.
 fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
     let (Some(now), Some(then)) = (&chapter.before, &before.before) else { return String::new() };
     let is_new = |doubt: &&InDoubt| {
@@ -198,7 +200,8 @@ fn enough_now(chapter: &Chapter, before: &Chapter) -> String {
     told.collect()
 }
 
-/// Sentence on the surfaces of which less counts as seen than after the last look of the previous plan.
+/// Sentence about surfaces of which less counts as seen than after the last step of the previous
+/// plan; empty if there are none.
 fn seen_less(chapter: &Chapter, before: &Chapter) -> String {
     let Some(now) = &chapter.before else { return String::new() };
     // How things stood before what made them so as they are now.

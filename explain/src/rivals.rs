@@ -1,5 +1,5 @@
-//! Comparison of a plan with its alternatives: gain of each, its total time to the goal, or the obstacle that
-//! keeps the rest of the plan from following it.
+//! Comparison of a plan with its alternatives: the gain of each, its total to the goal, or the
+//! obstacle that keeps the rest of the plan from following.
 
 use descry_agent::reason::Break;
 use descry_agent::standing::{FirstLook, Seen};
@@ -11,14 +11,15 @@ use super::Asked;
 use super::chapters::Chapter;
 use super::wording::{listed, share};
 
-/// Relative difference below which two rates of gain are equal.
+/// Relative difference up to which two gains or rates of gain count as equal.
 const ALIKE: f64 = 0.02;
-/// Difference below which two durations are equal, seconds.
+/// Difference up to which two durations count as equal, seconds.
 pub const LONGER_S: f64 = 0.05;
-/// Number of alternatives kept in the order of their rates.
+/// Number of alternatives that a record holds in the order of their gain per second.
 const MOST_KEPT: usize = descry_agent::weigh::MOST_KEPT;
 
-/// Sentences that justify a plan over its alternatives, as far as the record allows.
+/// Sentences that justify a plan against its alternatives with all figures, as far as the record
+/// allows.
 pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     let Some(weighed) = &chapter.weighed else {
         return vec!["what else could have been done, and at what cost, is not in the record.".into()];
@@ -52,7 +53,7 @@ pub fn why(chapter: &Chapter, asked: &Asked<'_>) -> Vec<String> {
     late.into_iter().chain(said).chain(left).chain(longer).chain(through).chain(first).collect()
 }
 
-/// Sentence for a search that was cut short before it had a plan.
+/// Sentence for a search that was ended (after `cut`) before it had a plan.
 pub fn cut_short(cut: &str) -> String {
     format!(
         "the planner's search was ended after {cut}, without a plan that it expected to reach the goal: what settles most a \
@@ -60,11 +61,12 @@ pub fn cut_short(cut: &str) -> String {
     )
 }
 
-/// Sentence for the case that no plan ends in time.
+/// Sentence for the case that no plan reaches the goal in time.
 pub const IN_TIME: &str = "No plan would bring it about in the time that is left: the look that settles most a second, of those \
                            that end in time, is taken all the same.";
 
-/// Sentence on a shorter equivalent that the planner missed by not merging steps.
+/// Sentence about the same steps, some merged, that would be quicker; `None` if there is no such
+/// sequence.
 pub fn longer(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let way = weighed.shorter.as_ref()?;
     let (steps, takes_s, chosen_s) = (steps(way, asked), way.takes_s, chosen.takes_s);
@@ -73,8 +75,8 @@ pub fn longer(weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Stri
     ))
 }
 
-/// Justification of a plan that the planner evaluated to the goal, with the totals of its alternatives; none
-/// if that total is unknown.
+/// Justification of a plan by its total to the goal, with the totals of its alternatives; `None` if
+/// its total is unknown.
 fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<Vec<String>> {
     let whole_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
     let rule = match &chapter.cut() {
@@ -95,7 +97,7 @@ fn by_the_end(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<
     Some(std::iter::once(first).chain(rivals).collect())
 }
 
-/// The notable alternatives, each with the criteria by which it is notable.
+/// Notable alternatives, each with the reasons why it is notable as clauses.
 pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<(&'w Way, Vec<String>)> {
     let others = || weighed.others.iter();
     let likeliest = likeliest_besides(chapter, chosen);
@@ -139,7 +141,8 @@ pub fn rivals<'w>(chapter: &Chapter, weighed: &'w Weighed, chosen: &Way) -> Vec<
     rivals
 }
 
-/// The most probable unseen place other than the one that `chosen` looks at.
+/// Symbol of the surface on which something most probably stands unseen, other than the one that
+/// `chosen` is about; `None` if there is none.
 fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
     let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
     let seen = doubts.flat_map(|doubt| &doubt.seen).filter(|seen| seen.hidden > 0.0);
@@ -148,7 +151,8 @@ fn likeliest_besides(chapter: &Chapter, chosen: &Way) -> Option<String> {
     besides.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(on, _)| on)
 }
 
-/// Sentence on the rest of the previous plan, where only its metric had changed.
+/// Sentence about the remaining previous plan, if the new plan was made only because a duration had
+/// changed; `None` otherwise.
 pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let left = weighed.left.as_ref().filter(|_| chapter.is_reckoned())?;
     let what = format!("what was left of plan {}", chapter.round - 1);
@@ -163,7 +167,7 @@ pub fn left(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_
     Some(format!("{what} would do, and takes {whole_s:.1} s{}.", more_than(whole_s, chosen_s)))
 }
 
-/// Clause on the obstacle to steps that were not taken.
+/// Clause about the obstacle to steps that were not executed.
 pub fn would_be(blocked: &Break, asked: &Asked<'_>) -> String {
     let said = blocked.would_be(asked.saying);
     let counted = blocked.reckoned().and_then(|(call, ..)| (asked.counts)(&call.action));
@@ -173,7 +177,7 @@ pub fn would_be(blocked: &Break, asked: &Asked<'_>) -> String {
     }
 }
 
-/// Clause on the difference between a total and that of the chosen plan, in rounded seconds.
+/// Clause about the difference of a total from that of the chosen plan, seconds rounded to tenths.
 fn more_than(whole_s: f64, chosen_s: f64) -> String {
     let tenths = |s: f64| (s * 10.0).round() / 10.0;
     let more_s = tenths(whole_s) - tenths(chosen_s);
@@ -184,7 +188,8 @@ fn more_than(whole_s: f64, chosen_s: f64) -> String {
     }
 }
 
-/// Probability that a first look at each surface finds something, where the metric counts fruitless looks.
+/// Sentence with the probability that a first observation of each surface finds something, if the
+/// metric counts observations in vain; `None` otherwise.
 fn first_looks(chapter: &Chapter) -> Option<String> {
     let doubts = chapter.before.iter().flat_map(|standing| &standing.doubts);
     let looks = doubts.flat_map(|doubt| &doubt.seen).filter_map(|seen| Some((seen, seen.first?)));
@@ -207,7 +212,7 @@ fn first_looks(chapter: &Chapter) -> Option<String> {
     (!said.is_empty()).then(|| format!("p is {}.", listed(&said, said.len())))
 }
 
-/// Justification by gain per second, for plans whose alternatives were not evaluated to the goal.
+/// Justification of a plan by its gain per second, if totals to the goal are unknown.
 fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Asked<'_>) -> Vec<String> {
     let mut named = Named::default();
     let mut said = vec![compared(chapter, weighed, chosen, asked, &mut named)];
@@ -227,8 +232,8 @@ fn by_the_second(chapter: &Chapter, weighed: &Weighed, chosen: &Way, asked: &Ask
     said
 }
 
-/// Clause that compares an alternative, with the rest of the plan behind it, to the chosen plan; none if the
-/// total of the chosen plan is unknown.
+/// Clause that compares an alternative, with the rest of the plan after it, to the chosen plan;
+/// `None` if the total of the chosen plan is unknown.
 fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     let chosen_s = whole_s(chosen).filter(|_| asked.policy.is_none())?;
     let Some(whole) = other.whole else {
@@ -249,17 +254,18 @@ fn against(other: &Way, chosen: &Way, asked: &Asked<'_>) -> Option<String> {
     Some(format!("{alone} {:.1} s{}", whole.takes_s, more_than(whole.takes_s, chosen_s)))
 }
 
-/// Total of an alternative with the rest of the plan behind it, if it is expected to reach the goal, seconds.
+/// Metric value of steps with the rest of the plan after them, seconds; `None` if they are not
+/// expected to reach the goal.
 pub fn whole_s(way: &Way) -> Option<f64> {
     way.whole.filter(|whole| whole.reaches).map(|whole| whole.takes_s)
 }
 
-/// Alternatives whose figures have been given.
+/// Alternatives whose figures were given already.
 #[derive(Default)]
 struct Named(Vec<Vec<Call>>);
 
 impl Named {
-    /// An alternative, with figures at its first mention only.
+    /// Alternative as text, with its figures at the first mention only.
     fn once(&mut self, way: &Way, asked: &Asked<'_>) -> String {
         if self.0.contains(&way.steps) {
             return asked.say_all(&way.steps, ", ");
@@ -269,14 +275,14 @@ impl Named {
     }
 }
 
-/// An alternative with its figures.
+/// Alternative as text with its figures: gain, duration and gain per second.
 fn figures(way: &Way, asked: &Asked<'_>) -> String {
     let gains = if way.gains < 0.01 { share(way.gains) } else { format!("{:.2}", way.gains) };
     format!("{} [+{gains} in {:.1} s, {} a second]", steps(way, asked), way.takes_s, rate(way.rate()))
 }
 
-/// Steps of an alternative; where there are several, each with its seconds if the record holds
-/// them.
+/// Steps of an alternative as text; if there are several, each with its duration, as far as
+/// recorded.
 fn steps(way: &Way, asked: &Asked<'_>) -> String {
     if way.each_s.len() != way.steps.len() || way.steps.len() < 2 {
         return asked.say_all(&way.steps, ", ");
@@ -285,13 +291,13 @@ fn steps(way: &Way, asked: &Asked<'_>) -> String {
     each.map(|(step, takes_s)| format!("{} ({takes_s:.1} s)", asked.say(step))).collect::<Vec<_>>().join(", ")
 }
 
-/// Formats a rate with three significant digits.
+/// Rate as text, with three significant digits.
 fn rate(rate: f64) -> String {
     let digits = if rate > 0.0 { (2.0 - rate.log10().floor()).clamp(1.0, 8.0) as usize } else { 1 };
     format!("{rate:.digits$}")
 }
 
-/// Rank of the chosen alternative by gain per second.
+/// Sentences about the rank of the chosen steps among all alternatives by gain per second.
 fn compared(
     chapter: &Chapter,
     weighed: &Weighed,
@@ -352,8 +358,7 @@ fn compared(
     format!("{mine} is one of {all} ways to get further; {many} {first}. {rule}")
 }
 
-/// True if an alternative alone is expected to reach the goal; none if unknown, as for one that is only part
-/// of the work.
+/// True if an alternative alone is expected to reach the goal; `None` if unknown.
 fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) -> Option<bool> {
     // That a part is not the whole says nothing of it: it is held against plans that end with such a step.
     let last = |steps: &[Call]| steps.last().map(|step| step.action.clone());
@@ -368,7 +373,8 @@ fn enough(chapter: &Chapter, weighed: &Weighed, way: &Way, asked: &Asked<'_>) ->
     Some(if only.then >= only.now { only.now + way.gains >= wanted } else { only.now - way.gains <= wanted })
 }
 
-/// Sentence on the quickest alternative, if it is not the chosen one, and on the reason against it.
+/// Sentence about the quickest alternative and what speaks against it; `None` if the chosen steps
+/// are as quick or it was explained before.
 fn quickest(
     chapter: &Chapter,
     weighed: &Weighed,

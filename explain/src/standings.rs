@@ -1,4 +1,4 @@
-//! State of a run at each plan and look: open doubts, and the belief over objects.
+//! State of a run at each plan and observation: remaining doubts, and the belief about objects.
 
 use std::collections::BTreeMap;
 
@@ -16,21 +16,21 @@ use super::states::States;
 pub struct Standing {
     /// Time of the state on the body's clock, nanoseconds.
     pub stamp_ns: i64,
-    /// Open doubts about the goal.
+    /// Remaining doubts about the goal.
     pub doubts: Vec<InDoubt>,
-    /// Belief over objects.
+    /// Belief about objects.
     pub belief: Belief,
-    /// Numbers of the domain, by their PDDL text.
+    /// Numbers of the domain, by name in PDDL.
     pub numbers: BTreeMap<String, f64>,
 }
 
 impl Standing {
-    /// The doubt with the same subject as `other`.
+    /// Doubt with the same subject as `other`; `None` if it is gone.
     pub fn same(&self, other: &InDoubt) -> Option<&InDoubt> {
         self.doubts.iter().find(|doubt| doubt.of == other.of && doubt.about == other.about)
     }
 
-    /// Objects in the area of a doubt.
+    /// Objects in the rooms that a doubt is about.
     pub fn asked_about<'a>(&'a self, doubt: &'a InDoubt) -> impl Iterator<Item = &'a Track> {
         let is_there = |track: &Track| {
             let mut asked = doubt.seen.iter().filter(|seen| seen.share.is_some());
@@ -39,14 +39,15 @@ impl Standing {
         self.belief.tracks.iter().filter(move |track| is_there(track))
     }
 
-    /// Object with the highest probability of a name or kind, with that probability.
+    /// Object that most probably has this name or kind, with the probability; `None` without
+    /// objects.
     pub fn best(&self, name: &str) -> Option<(&Track, f64)> {
         let all = self.belief.tracks.iter().map(|track| (track, track.probability_of(name)));
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-/// States of a run, read on demand.
+/// States of a run, read from its record when needed.
 pub struct Standings<'a> {
     record: &'a Record,
     states: &'a States,
@@ -54,7 +55,7 @@ pub struct Standings<'a> {
 }
 
 impl<'a> Standings<'a> {
-    /// Opens the states of a run, as far as the record holds them.
+    /// Prepares reading the states of a run, as far as the record has them.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if the record cannot be read.
@@ -64,15 +65,15 @@ impl<'a> Standings<'a> {
         Ok(Standings { record, states, beliefs: found.iter().filter_map(belief).collect() })
     }
 
-    /// State of the run at an event; none if the record holds none, as for earlier versions, or if
-    /// it is damaged.
+    /// State of the run at an event; `None` if the record has none (earlier versions) or if it is
+    /// damaged.
     pub fn at(&self, event: &Document) -> Option<Standing> {
         event.blobs.iter().find(|blob| blob.name == standing::BLOB)?;
         let data = self.record.store().blob(event.id, standing::BLOB).ok()?;
         Some(self.with(event, serde_json::from_slice(&data).ok()?))
     }
 
-    /// State at the end of the run; none if the record does not hold it.
+    /// State at the end of the run; `None` if the record has none.
     pub fn last(&self) -> Option<Standing> {
         let rests = self.record.newest(standing::RESTS).ok()??;
         let said: standing::Rests = serde_json::from_value(rests.body.clone()).ok()?;
@@ -91,7 +92,8 @@ impl<'a> Standings<'a> {
     }
 }
 
-/// Noun phrase for the certainty that a doubt is about.
+/// Description of what a doubt's confidence is about, such as `the certainty of where cup A
+/// stands`.
 pub fn certainty(doubt: &InDoubt) -> String {
     match doubt.of {
         Of::Thing => format!("the certainty of where {} stands", doubt.about),

@@ -1,4 +1,4 @@
-//! Initial states of the planning rounds of a run, and their differences.
+//! Initial states of a run's planning problems, and differences between them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,20 +13,20 @@ const MOST_NAMED: usize = 4;
 /// Maximum number of changed facts listed by name; the rest are counted. A changed surface has one fact for
 /// each view of it.
 const MOST_FACTS: usize = 8;
-/// Difference below which two numbers are equal.
+/// Difference up to which two numbers count as equal.
 const SAME: f64 = 5e-3;
 
-/// Initial state of a planning round.
+/// Initial state of a planning problem.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct State {
     pub facts: BTreeSet<String>,
     numbers: BTreeMap<String, f64>,
-    /// Delay of the first timed initial literal, seconds.
+    /// Time until the first timed initial literal, seconds; `None` without one.
     pub comes_s: Option<f64>,
 }
 
 impl State {
-    /// Parses the `:init` section of a problem in PDDL.
+    /// Parses the `:init` section of a PDDL problem.
     pub fn read(pddl: &str) -> Self {
         let mut state = State::default();
         let Some((_, init)) = pddl.split_once("(:init") else { return state };
@@ -63,7 +63,8 @@ impl State {
     }
 }
 
-/// Difference between two states.
+/// Difference between two states: facts that became true or false, and numbers with their earlier
+/// and later value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Difference {
     came: Vec<String>,
@@ -83,12 +84,12 @@ impl Difference {
         Difference { came: only(after, before), went: only(before, after), numbers }
     }
 
-    /// True if the states are equal.
+    /// True if there is no difference.
     pub fn is_empty(&self) -> bool {
         self.came.is_empty() && self.went.is_empty() && self.numbers.is_empty()
     }
 
-    /// The difference as a clause.
+    /// Difference as a clause.
     pub fn told(&self, saying: &Saying) -> String {
         let facts =
             |all: &[String]| listed(&all.iter().map(|fact| saying.say(fact)).collect::<Vec<_>>(), MOST_FACTS);
@@ -104,12 +105,12 @@ impl Difference {
     }
 }
 
-/// Initial states of a run's rounds in their order.
+/// Initial states of a run's planning problems in order, with their record IDs.
 #[derive(Debug)]
 pub struct States(Vec<(RecordId, State)>);
 
 impl States {
-    /// Reads the states, as far as the record holds them.
+    /// Reads the states from a record, as far as it has them.
     ///
     /// # Errors
     /// [`CommandError::Broken`] if the record cannot be read.
@@ -119,37 +120,41 @@ impl States {
         Ok(States(problems.iter().filter_map(of).collect()))
     }
 
-    /// The numbers in the last round before a document.
+    /// Numbers in the last planning problem recorded before a document; `None` if there is none.
     pub fn numbers(&self, id: RecordId) -> Option<&BTreeMap<String, f64>> {
         self.0.iter().rev().find(|(round, _)| *round < id).map(|(_, state)| &state.numbers)
     }
 
-    /// Time in the first round until its first timed initial literal, seconds.
+    /// Time until the first timed initial literal, such as a deadline, in the first planning
+    /// problem, seconds; `None` without one.
     pub fn given_s(&self) -> Option<f64> {
         self.0.first()?.1.comes_s
     }
 
-    /// Time in the last round until its first timed initial literal, such as a deadline, seconds; 0 after it,
-    /// none if the run has none.
+    /// Time until the first timed initial literal, such as a deadline, in the last planning
+    /// problem, seconds; 0 once it has passed, `None` if the run has none.
     pub fn left_s(&self) -> Option<f64> {
         let was_to_come = self.0.iter().any(|(_, state)| state.comes_s.is_some());
         was_to_come.then(|| self.0.last().and_then(|(_, state)| state.comes_s).unwrap_or(0.0))
     }
 
-    /// The greatest number with the prefix `begins` in the last round before a document.
+    /// Greatest number whose name begins with `begins`, in the last planning problem before a
+    /// document; `None` if there is none.
     pub fn most(&self, id: RecordId, begins: &str) -> Option<(String, f64)> {
         let numbers = self.numbers(id)?.iter().filter(|(name, _)| name.starts_with(begins));
         let most = numbers.max_by(|a, b| a.1.total_cmp(b.1))?;
         Some((most.0.clone(), *most.1))
     }
 
-    /// Difference between the rounds before and after a document.
+    /// Difference between the planning problems before and after a document; `None` if one of them
+    /// is missing.
     pub fn across(&self, id: RecordId) -> Option<Difference> {
         let next = self.0.iter().position(|(round, _)| *round > id)?;
         Some(Difference::between(&self.0[next.checked_sub(1)?].1, &self.0[next].1))
     }
 
-    /// Difference between the first round after a document and the last round.
+    /// Difference between the first planning problem after a document and the last one; `None` if
+    /// there is none after it.
     pub fn since(&self, id: RecordId) -> Option<Difference> {
         let next = self.0.iter().find(|(round, _)| *round > id)?;
         Some(Difference::between(&next.1, &self.0.last()?.1))

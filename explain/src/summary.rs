@@ -1,4 +1,5 @@
-//! Summary of a run in a few sentences: the goal, the answer, its evidence, and the worst failure.
+//! Summary of a run in a few sentences: the goal, the answer, the evidence for it, and the worst
+//! trouble.
 
 use descry_agent::report::{self, Report};
 use descry_agent::run::Header;
@@ -13,10 +14,11 @@ use super::looks;
 use super::standings::Standing;
 use super::wording::{count, listed, place};
 
-/// Maximum number of failures listed by name; the rest are counted.
+/// Maximum number of failed steps listed by name; the rest are counted.
 const MOST_FAILURES: usize = 4;
 
-/// The summary, a sentence each. `left_s` is the time left until the deadline; none without a deadline.
+/// Sentences of the summary. `left_s`: time left until the deadline, seconds; `None` without a
+/// deadline.
 pub fn of(
     header: &Header,
     report: Option<&Report>,
@@ -61,7 +63,8 @@ fn answer(report: Option<&Report>, plans: usize) -> String {
     )
 }
 
-/// Evidence behind the answer, for the first thing asked for.
+/// Sentence about the evidence for the answer, for the first of the requested things; `None` if it
+/// is not in the record.
 fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
     let doubt = last.doubts.first()?;
     let seen = seen(doubt);
@@ -114,7 +117,7 @@ fn rests(report: &Report, last: &Standing, saying: &Saying) -> Option<String> {
     Some(format!("It rests on this: {by}; {seen}{left}."))
 }
 
-/// Share seen of each surface.
+/// Share seen of each surface, as text; empty if nothing was seen.
 fn seen(doubt: &InDoubt) -> String {
     let looked_at = doubt.seen.iter().filter(|seen| seen.places > 0);
     let one = |seen: &descry_agent::standing::Seen| {
@@ -130,7 +133,9 @@ fn seen(doubt: &InDoubt) -> String {
     listed(&all, all.len()) + &open
 }
 
-/// The failures on the way, worst first. `short_s` is the remaining time if it was too short.
+/// Sentence about what went wrong, worst first. `short_s`: time left, seconds, if it was too short;
+/// `is_absent`: the object was found to be absent, so observations in vain are no trouble. `None`
+/// if there is nothing to tell.
 fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool, saying: &Saying) -> Option<String> {
     let deeds = || chapters.iter().flat_map(|chapter| &chapter.deeds);
     let notes = || deeds().filter_map(|deed| if let Deed::Noted(note) = deed { Some(note) } else { None });
@@ -186,15 +191,15 @@ fn trouble(chapters: &[Chapter], short_s: Option<f64>, is_absent: bool, saying: 
     })
 }
 
-/// Joins parts that contain commas of their own.
+/// Joins texts that contain commas with semicolons: the first `most`; the rest are counted.
 fn listed_apart(all: &[String], most: usize) -> String {
     let more = all.len().saturating_sub(most);
     let more = if more > 0 { format!("; and {more} more") } else { String::new() };
     all[..all.len() - all.len().saturating_sub(most)].join("; ") + &more
 }
 
-/// Sentence on the plans that were completed without the expected gain, and on the most misleading object;
-/// none without such plans.
+/// Clause about plans that were completed and left a doubt, and about the most misleading object;
+/// `None` without such plans.
 fn in_vain(chapters: &[Chapter]) -> Option<String> {
     let is_short = |chapter: &&Chapter| {
         let hoped = chapter.weighed.as_ref().is_some_and(|weighed| !weighed.numbers.is_empty());
@@ -213,7 +218,8 @@ fn in_vain(chapters: &[Chapter]) -> Option<String> {
         .then(|| format!("{plans} came to {their} end without the certainty that was hoped for{misled}"))
 }
 
-/// Objects mistaken for the requested one during a plan, each with its highest probability.
+/// Objects that were candidates for the requested one during a plan and were then ruled out:
+/// earlier probability, and a clause about what each is.
 fn misled(chapter: &Chapter) -> Vec<(f64, String)> {
     let all: Vec<&Standing> = chapter.before.iter().chain(chapter.stood()).collect();
     let lost = |pair: &[&Standing]| {

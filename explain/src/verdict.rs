@@ -1,5 +1,5 @@
-//! Evidence behind the verdict of a run: the belief about the requested object and the number of its views,
-//! the share seen of each place, and the remaining probability.
+//! Evidence for the verdict of a run: the belief about the requested object and its views, the
+//! share seen of each surface, and the probability that is left.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,23 +22,23 @@ use super::wording::{count, listed, place, share};
 /// Maximum number of objects described one by one; the rest are counted.
 const MOST_NAMED: usize = 12;
 
-/// Wording of a run's domain.
+/// Wording of a run's domain, and what else the evidence depends on.
 pub struct Wording<'a> {
-    /// Descriptions of calls.
+    /// Description of an attachment call, by name.
     pub meanings: no_plan::Meanings<'a>,
-    /// True for a call that an action of the run's plans makes.
+    /// True for an attachment call that an action of the run's plans makes.
     pub is_used: &'a dyn Fn(&str) -> bool,
     /// Wording of the domain.
     pub saying: &'a Saying,
-    /// State of the run after each step.
+    /// States of the run after its steps.
     pub stood: &'a [&'a Standing],
-    /// Probability below which the object is reported as absent.
+    /// Probability below which the object is reported to be absent; `None` if unknown.
     pub not_there: Option<f64>,
-    /// Probability below which a further look is not worthwhile.
+    /// Probability below which a further observation is not worthwhile; `None` if unknown.
     pub negligible: Option<f64>,
 }
 
-/// Sentences on the evidence.
+/// Sentences about the evidence. Messages about damaged records are added to `lost`.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -96,7 +96,7 @@ pub fn rests_on(
     Ok(said)
 }
 
-/// The looks of a run: viewpoint, and the surfaces shown, by symbol.
+/// Observations of a run: viewpoint, and the symbols of the surfaces that were seen.
 struct Looks(Vec<(String, Vec<String>)>);
 
 impl Looks {
@@ -109,7 +109,7 @@ impl Looks {
         Ok(Looks(clouds.iter().filter_map(part).collect()))
     }
 
-    /// Number of viewpoints that showed a surface.
+    /// Number of viewpoints from which a surface was seen.
     fn places(&self, on: &str) -> usize {
         let on = symbol(on);
         let from = self.0.iter().filter(|(_, shown)| shown.contains(&on)).map(|(from, _)| from);
@@ -117,8 +117,8 @@ impl Looks {
     }
 }
 
-/// Belief about the requested object; about every object, least certain first, if the request was not for one
-/// object.
+/// Sentences about the requested object; if the request was not for one object, about every object,
+/// least certain first.
 fn believed(belief: &Belief, report: &Report, words: &Wording<'_>) -> Vec<String> {
     let mut tracks: Vec<&Track> = belief.tracks.iter().collect();
     let Some(name) = &report.object else {
@@ -152,7 +152,7 @@ fn believed(belief: &Belief, report: &Report, words: &Wording<'_>) -> Vec<String
     said
 }
 
-/// Sentence on known objects found in several places, since objects are recognised by appearance alone.
+/// Sentence about known objects that were recognised in several places; `None` if there are none.
 fn several(tracks: &[&Track]) -> Option<String> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let taken = tracks.iter().flat_map(|track| track.probabilities.iter().filter(|(_, p)| *p > 0.5));
@@ -167,7 +167,8 @@ fn several(tracks: &[&Track]) -> Option<String> {
     })
 }
 
-/// Count of the objects that are certainly unknown, by surface.
+/// Sentence with the number of objects that are certainly none of the known ones, by surface;
+/// `None` without such objects.
 fn surely_none(strange: &[&Track], words: &Wording<'_>) -> Option<String> {
     let mut on: BTreeMap<&str, usize> = BTreeMap::new();
     strange.iter().for_each(|track| *on.entry(&track.on).or_default() += 1);
@@ -180,7 +181,8 @@ fn surely_none(strange: &[&Track], words: &Wording<'_>) -> Option<String> {
     (!all.is_empty()).then(|| format!("{} {are} surely none of the known objects.", listed(&all, all.len())))
 }
 
-/// Description of an object: its probable identities, and the evidence for them.
+/// Sentence about an object: its probable identities (the requested one `asked` first), its place,
+/// and the share seen of it.
 fn object(track: &Track, asked: Option<&str>, words: &Wording<'_>) -> String {
     let mut names: Vec<(&str, f64)> = track.probabilities.iter().map(|(n, p)| (n.as_str(), *p)).collect();
     names.push(("none of the known objects", track.unknown));
@@ -206,7 +208,8 @@ fn object(track: &Track, asked: Option<&str>, words: &Wording<'_>) -> String {
     format!("what {on} at {at} is {} with a probability of {}{others}{seen}.", first.0, share(first.1))
 }
 
-/// Reason for which the run ended, and the remaining probability.
+/// Sentences about the probability that is left and about why the run ended. `left_s`: time left
+/// until the deadline, seconds; `None` without one.
 fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Wording<'_>) -> Vec<String> {
     let mut said = Vec::new();
     if let Some(left) = report.remaining.filter(|_| report.verdict != Verdict::Achieved) {
@@ -254,8 +257,8 @@ fn left(rests: &Rests, report: &Report, left_s: Option<f64>, words: &Wording<'_>
     said
 }
 
-/// Reason for which there is no plan. Refusals of calls that no plan uses are left out if there are
-/// others.
+/// Clause about why there is no plan; refusals by attachments that no plan calls are left out if
+/// there are others.
 fn why_no_plan(rests: &Rests, words: &Wording<'_>) -> String {
     if rests.no_plan.is_empty() {
         return rests.said.clone();
@@ -270,7 +273,7 @@ fn why_no_plan(rests: &Rests, words: &Wording<'_>) -> String {
     no_plan::told(&counting, words.meanings)
 }
 
-/// Share seen of each place where the object may be.
+/// Sentence about the share seen of each surface where the object may be.
 fn seen(doubt: &InDoubt, stood: &[&Standing], looks: &Looks) -> String {
     let percent = |part: f64| (part * 100.0).floor();
     let was = |seen: &Seen| {

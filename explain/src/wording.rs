@@ -1,11 +1,11 @@
-//! Text for people: numbers, lists and wrapped lines.
+//! Text for people: numbers, lists and line wrapping.
 
 use descry_domains::english;
 use descry_memory::belief::Track;
 
 pub use descry_agent::numbers::{count, share, share_of};
 
-/// Joins the first `most` texts as a list; the rest are counted.
+/// Joins the first `most` texts to a list; the rest are counted.
 pub fn listed(all: &[String], most: usize) -> String {
     let named = all[..all.len().min(most)].join(", ");
     match (all, all.len().saturating_sub(most)) {
@@ -15,7 +15,8 @@ pub fn listed(all: &[String], most: usize) -> String {
     }
 }
 
-/// Joins texts by probability; those with the same rounded probability share one figure.
+/// Joins texts with their probabilities to a list; neighbours whose probabilities look equal share
+/// one figure.
 pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
     let mut alike: Vec<(String, Vec<String>)> = Vec::new();
     for (value, of) in all {
@@ -32,7 +33,7 @@ pub fn by_share(all: impl IntoIterator<Item = (f64, String)>) -> String {
     alike.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Capitalises the first letter.
+/// Text with its first letter in upper case.
 pub fn capital(text: &str) -> String {
     let mut signs = text.chars();
     signs.next().map(|first| first.to_uppercase().chain(signs).collect()).unwrap_or_default()
@@ -43,7 +44,8 @@ pub fn place(track: &Track) -> String {
     english::position(track.position_m.coords.into())
 }
 
-/// Wraps a text at `most` letters; the first line starts with `first`, the others are indented by its width.
+/// Wraps a text at `most` characters per line. The first line begins with `first`; the others are
+/// indented by its width.
 pub fn wrapped(text: &str, first: &str, most: usize) -> String {
     let indent = " ".repeat(first.chars().count());
     let mut lines: Vec<String> = Vec::new();
@@ -64,7 +66,8 @@ pub fn wrapped(text: &str, first: &str, most: usize) -> String {
     lines.join("\n")
 }
 
-/// Words of a text for wrapping; a short call or figure in brackets, and a number with `%`, stay whole.
+/// Units that line wrapping keeps together: words, short bracketed calls or figures, and numbers
+/// with their `%`.
 fn words(text: &str) -> Vec<String> {
     let mut words: Vec<String> = Vec::new();
     let mut open: Vec<&str> = Vec::new();
@@ -82,8 +85,8 @@ fn words(text: &str) -> Vec<String> {
     words
 }
 
-/// Adds a bracketed group, or a single word, to the words of a text. A group with a comma is prose and may be
-/// broken.
+/// Adds a bracketed group, or a single word, to the units of a text. A long group, or one in
+/// parentheses with a comma (prose), may be broken.
 fn take(words: &mut Vec<String>, open: &[&str]) {
     const LONGEST_CALL: usize = 60;
     let whole = open.join(" ");

@@ -1,4 +1,4 @@
-//! Program as a body: placeholders of the command line are filled at the start.
+//! Program as a body; placeholders in its command line are filled in when it starts.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,15 +10,17 @@ use super::{Body, Told};
 use crate::exit::CommandError;
 use crate::shell;
 
-/// Placeholder in a command line for the seed.
+/// Placeholder in a command line that stands for the seed.
 pub const SEED: &str = "{seed}";
-/// Placeholder in a command line for a file to which the program writes ground truth.
+/// Placeholder in a command line that stands for the path of a file to which the program writes
+/// ground truth.
 pub const TRUTH: &str = "{truth}";
-/// Placeholder in a command line for the absent kinds of objects, comma-separated, as one shell
-/// word.
+/// Placeholder in a command line that stands for the kinds of objects to leave out,
+/// comma-separated, as one shell word.
 pub const WITHOUT: &str = "{without}";
 
-/// Temporary file to which a program writes ground truth for reports; removed with the body.
+/// Path of a temporary file to which a program writes ground truth for reports; the file is removed
+/// on drop.
 pub struct TruthFile(PathBuf);
 
 impl TruthFile {
@@ -28,7 +30,7 @@ impl TruthFile {
         Self(std::env::temp_dir().join(format!("descry-truth-{}-{number}.json", std::process::id())))
     }
 
-    /// Path of the file once written.
+    /// Path of the file; the program creates it.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -40,10 +42,10 @@ impl Drop for TruthFile {
     }
 }
 
-/// Starts a command line of the shell as a body, with [`SEED`], [`TRUTH`] and [`WITHOUT`] filled in.
+/// Starts a shell command line as a body, with [`SEED`], [`TRUTH`] and [`WITHOUT`] filled in.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if the program says no hello.
+/// [`CommandError::Broken`] if the program does not complete the handshake.
 pub fn open(command: &str, seed: u64, without: &[String]) -> Result<Body, CommandError> {
     let truth = command.contains(TRUTH).then(TruthFile::new);
     let file = truth.as_ref().map(|t| t.path().display().to_string()).unwrap_or_default();
@@ -55,10 +57,10 @@ pub fn open(command: &str, seed: u64, without: &[String]) -> Result<Body, Comman
     Ok(Body { truth: truth.map(Told::Program), ..Body::new(Arc::new(robot)) })
 }
 
-/// A robot that runs already, at `HOST:PORT` or the path of a Unix socket.
+/// Connects to a body that is running already, at `HOST:PORT` or the path of a Unix socket.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if nobody answers there, or says no hello.
+/// [`CommandError::Broken`] if nothing answers there, or the handshake fails.
 pub fn connect(address: &str) -> Result<Body, CommandError> {
     ProgramRobot::connect(address, Limits::default())
         .map(|r| Body::new(Arc::new(r)))

@@ -1,4 +1,5 @@
-//! Record of a run as a body: it can stand where a cloud was taken, and looking returns that cloud.
+//! Record of a run as a body: it can move to every pose from which a cloud was taken, and its
+//! camera returns that cloud.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -11,7 +12,7 @@ use descry_robots::{Base, Camera, Description, Footprint, Frames, Pixels, Speeds
 use super::tape;
 use crate::exit::CommandError;
 
-/// Clouds of a record, one per station.
+/// Clouds of a record, one per station (pose from which a cloud was taken).
 struct Clouds {
     record: Record,
     documents: Vec<Document>,
@@ -23,11 +24,12 @@ impl Footage for Clouds {
     }
 }
 
-/// Opens a record as a body. Clouds with another camera than the first one's, and those without a
-/// known pose, are not stations.
+/// Opens a record as a body. Clouds of a camera other than the first one's, and clouds without a
+/// known pose, are left out.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] if no cloud has a place; [`CommandError::Broken`] if the record cannot be read.
+/// [`CommandError::BadInput`] if no cloud has a camera and a pose; [`CommandError::Broken`] if the
+/// record cannot be read.
 pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> {
     let known = tape::known(&record)?;
     let frames = known.as_ref().map(|k| k.description.frames.clone()).unwrap_or_default();
@@ -67,13 +69,13 @@ pub fn open(record: Record, place: &str) -> Result<RecordedRobot, CommandError> 
     Ok(RecordedRobot::of(known, 0, Box::new(Clouds { record, documents })))
 }
 
-/// True if a folder is that of a run, or holds a record.
+/// True if a folder is that of a run, or contains a record.
 pub fn is_record(folder: &Path) -> bool {
     crate::run::files::header(folder).is_ok()
         || [folder.to_owned(), folder.join("record")].iter().any(|f| f.join("segments").is_dir())
 }
 
-/// Name of a station: the pose of the look, numbered if there were several looks.
+/// Name of a station: the viewpoint of the cloud, numbered if several clouds were taken there.
 fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
     let from = document.body.get("from").and_then(|v| v.as_str()).unwrap_or("view");
     let numbered = (2..).map(|n| format!("{from}-{n}"));
@@ -83,7 +85,7 @@ fn name(document: &Document, taken: &mut BTreeSet<String>) -> String {
     name
 }
 
-/// Description of the body that made a record, or a default.
+/// Description of the body that made the record, or a default one with this camera if unknown.
 fn description(known: Option<&Known>, camera: Intrinsics, sensing: &Sensing, place: &str) -> Description {
     let usual = Settings::default();
     let unknown = || Description {

@@ -1,4 +1,4 @@
-//! Tape of a body, stored in the record of its run.
+//! Answers and description of a body, stored in the record of its run.
 
 use std::sync::Arc;
 
@@ -15,14 +15,14 @@ use crate::exit::CommandError;
 pub const ANSWER: &str = "answer";
 /// Record kind of a body's description.
 pub const BODY: &str = "body";
-/// The blob that holds the map of the room.
+/// Name of the blob with the map.
 const MAP: &str = "map";
 
-/// Tape that records a body's answers and returns the frames of recorded ones.
+/// Storage for a body's answers, from which the pixels of earlier frames are read again.
 pub struct RecordTape {
-    /// Record that new answers go to.
+    /// Record to which new answers are written.
     pub into: Arc<Record>,
-    /// Record that holds the frames of earlier answers.
+    /// Record from which earlier frames are read.
     pub from: Arc<Record>,
 }
 
@@ -51,10 +51,11 @@ impl Tape for RecordTape {
     }
 }
 
-/// Pixels of a recorded cloud's camera, with the colours of the same time.
+/// Points of a recorded cloud as camera pixels, with the colour image of the same time if there is
+/// one.
 ///
 /// # Errors
-/// Why it cannot be read.
+/// Message, if the cloud cannot be read.
 pub fn pixels(record: &Record, cloud: &descry_memory::Document) -> Result<Pixels, String> {
     let (points, _) = record.cloud(cloud).map_err(|e| e.to_string())?;
     let at = Query {
@@ -69,7 +70,7 @@ pub fn pixels(record: &Record, cloud: &descry_memory::Document) -> Result<Pixels
     Ok(Pixels { cloud: points, colour })
 }
 
-/// Colour image recorded with a view; `None` for other images.
+/// Colour image in a document; `None` if it holds none.
 fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<Colour>, String> {
     let Some(info) = document.blobs.iter().find(|b| b.form == Form::RawImage) else { return Ok(None) };
     let number = |key: &str| info.layout.get(key).and_then(Value::as_u64).and_then(|n| u32::try_from(n).ok());
@@ -82,7 +83,7 @@ fn colour(record: &Record, document: &descry_memory::Document) -> Result<Option<
 /// Records the description of a body.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it cannot be kept.
+/// [`CommandError::Broken`] if the record cannot be written.
 pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     let text = |e: serde_json::Error| CommandError::Bug(e.to_string());
     let map = known.map.as_ref().map(serde_json::to_vec).transpose().map_err(text)?;
@@ -101,10 +102,10 @@ pub fn put_known(record: &Record, known: &Known) -> Result<(), CommandError> {
     record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
 
-/// Recorded description of a body, if any.
+/// Description of the body in a record; `None` if there is none.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it cannot be read.
+/// [`CommandError::Broken`] if the record cannot be read.
 pub fn known(record: &Record) -> Result<Option<Known>, CommandError> {
     let document =
         record.find(&Query { limit: Some(1), ..record.own(BODY) }).map_err(CommandError::broken)?.pop();
@@ -118,10 +119,10 @@ pub fn known(record: &Record) -> Result<Option<Known>, CommandError> {
     Ok(Some(known))
 }
 
-/// Recorded answers in order, without a last frame whose pixels did not reach the disk.
+/// Recorded answers in order, up to the first frame whose pixels are not in the record.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if they cannot be read.
+/// [`CommandError::Broken`] if the record cannot be read.
 pub fn entries(record: &Record) -> Result<Vec<Entry>, CommandError> {
     let last_ns = record.newest(kind::CLOUD).map_err(CommandError::broken)?.map(|d| d.stamp_ns);
     let mut entries = Vec::new();

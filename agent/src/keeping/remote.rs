@@ -1,26 +1,26 @@
-//! Records in MongoDB, if built with the feature `mongodb`; otherwise an error that names the
+//! Records in MongoDB. Without the feature `mongodb`, everything returns an error that names the
 //! feature.
 
 use std::path::Path;
 
 use crate::exit::CommandError;
 
-/// Scheme of addresses in MongoDB.
+/// Scheme of MongoDB addresses.
 const SCHEME: &str = "mongodb://";
-/// The environment variable that holds name and password for a server, as `NAME:PASSWORD`.
+/// Environment variable with user name and password for the server, as `NAME:PASSWORD`.
 const LOGIN: &str = "DESCRY_MONGODB_LOGIN";
 
-/// Address of a MongoDB store and of the records meant in it.
+/// Address of a MongoDB store, and of one run or all runs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Address {
     /// Address of the server in the driver's form.
     server: String,
-    /// Name of the run in the store; `None` for all runs.
+    /// Name of the run in the store; `None`: all runs.
     pub run: Option<String>,
 }
 
 impl Address {
-    /// Reads `mongodb://HOST[:PORT][/DATABASE][?OPTIONS][#RUN]`.
+    /// Parses `mongodb://HOST[:PORT][/DATABASE][?OPTIONS][#RUN]`.
     ///
     /// # Errors
     /// [`CommandError::BadInput`] for anything else, and for an address with a password.
@@ -38,7 +38,7 @@ impl Address {
         Ok(Address { server: server.into(), run: run.filter(|run| !run.is_empty()).map(str::to_owned) })
     }
 
-    /// Address with a run's name: the stated one, or that of the run's folder.
+    /// Address with a run's name: the one in the address, or else the name of the run's folder.
     pub fn of_run(self, folder: &Path) -> Self {
         let whole = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let name = whole.file_name().map(|n| n.to_string_lossy().into_owned());
@@ -53,7 +53,7 @@ impl std::fmt::Display for Address {
     }
 }
 
-/// True for an address of a store, false for a folder.
+/// True for an address of a store, false for a path.
 pub fn is_address(place: &Path) -> bool {
     place.to_str().is_some_and(|text| text.starts_with("mongodb:") || text.starts_with("mongodb+srv:"))
 }
@@ -75,7 +75,8 @@ mod driver {
         /// Opens the record of a run for writing.
         ///
         /// # Errors
-        /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] for a limit that it cannot keep.
+        /// [`CommandError::Broken`] if no server answers; [`CommandError::BadInput`] for a limit
+        /// that the store does not support.
         pub fn write(&self, mut options: Options) -> Result<Record, CommandError> {
             options.robot = self.run.clone().unwrap_or_default();
             let store = MongoStore::open(&self.server, &self.options(&options)).map_err(refused)?;
@@ -154,22 +155,22 @@ mod driver {
     use crate::exit::CommandError;
 
     impl Address {
-        /// Error: built without the driver.
+        /// Returns an error: built without MongoDB.
         pub fn write(&self, _options: Options) -> Result<Record, CommandError> {
             self.read_only()
         }
 
-        /// Error: built without the driver.
+        /// Returns an error: built without MongoDB.
         pub fn check_free(&self, _options: Options) -> Result<(), CommandError> {
             self.read_only().map(|_| ())
         }
 
-        /// Error: built without the driver.
+        /// Returns an error: built without MongoDB.
         pub fn runs(&self) -> Result<Vec<String>, CommandError> {
             self.read_only().map(|_| Vec::new())
         }
 
-        /// Error: built without the driver.
+        /// Returns an error: built without MongoDB.
         pub fn read_only(&self) -> Result<Record, CommandError> {
             let text = format!(
                 "{self}: this descry was built without MongoDB\n  build it with: cargo build --release --features mongodb"

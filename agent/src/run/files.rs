@@ -1,4 +1,4 @@
-//! Files beside the record of a run: settings and report.
+//! Files in a run's folder beside its record: settings and report.
 
 use std::path::Path;
 
@@ -14,16 +14,16 @@ use crate::exit::CommandError;
 use crate::keeping::{self, RECORD};
 use crate::report::Report;
 
-/// Settings of a run, in its folder.
+/// Name of the file with the settings of a run.
 pub(super) const HEADER: &str = "run.json";
-/// Report of a run, in its folder.
+/// Name of the file with the report of a run.
 const REPORT: &str = "report.json";
 /// Record kind of a run's report.
 const REPORTED: &str = "report";
-/// Key of the checksum over the rest of a file.
+/// Key of the checksum over the other content of a file.
 const CHECKSUM: &str = "crc32";
 
-/// Settings of a run from its folder, or from its record if the file is missing or damaged.
+/// Settings of a run from its folder; from its record if the file is missing or damaged.
 ///
 /// # Errors
 /// [`CommandError::BadInput`] if the folder holds no run; [`CommandError::Broken`] if neither the file nor the
@@ -51,17 +51,17 @@ pub fn header(folder: &Path) -> Result<Header, CommandError> {
     })
 }
 
-/// Record in a run's folder, if readable.
+/// Record in a run's folder; `None` if it cannot be opened.
 fn recorded(folder: &Path) -> Option<Record> {
     Record::open_shared(&folder.join(RECORD)).ok()
 }
 
-/// Settings of a run, from its record.
+/// Settings of a run from its record; `None` if there are none.
 fn begun(record: &Record) -> Option<Header> {
     Beginning::of(record).ok().flatten().map(|beginning| beginning.header)
 }
 
-/// Settings of a run from its folder, unless its record has others.
+/// Settings of a run from its folder; an error if they differ from those in the record (`begun`).
 fn own_header(folder: &Path, begun: Option<&Header>) -> Result<Header, String> {
     let path = folder.join(HEADER);
     let header: Header = read_json(&path)?;
@@ -86,13 +86,13 @@ pub(super) fn is_run(folder: &Path) -> bool {
     [HEADER, RECORD].iter().any(|name| folder.join(name).exists())
 }
 
-/// Message about a missing or damaged settings file, if the record has the rest.
+/// Message about a missing or damaged settings file; `None` if the file is intact.
 pub fn lost_of_header(folder: &Path) -> Option<String> {
     let why = own_header(folder, recorded(folder).as_ref().and_then(begun).as_ref()).err()?;
     Some(format!("whether the run was cut off and gone on with: {why}"))
 }
 
-/// Loss of all records of a started run; `None` for a record outside a run's folder.
+/// Damage report for a started run whose record is empty; `None` otherwise.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the record cannot be read.
@@ -114,11 +114,11 @@ pub fn keep_header(folder: &Path, header: &Header) -> Result<(), CommandError> {
     write_json(&folder.join(HEADER), header)
 }
 
-/// Report of a run, from its folder or, if missing or damaged, from its record; `None` for an
-/// unfinished run.
+/// Report of a run from its folder; from its record if the file is missing or damaged. `None` for
+/// an unfinished run.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it is damaged, and the record has none.
+/// [`CommandError::Broken`] if the file is damaged and the record has no report.
 pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     let path = folder.join(REPORT);
     let record = recorded(folder);
@@ -142,15 +142,15 @@ pub fn report(folder: &Path) -> Result<Option<Report>, CommandError> {
     })
 }
 
-/// True if a run has ended and its folder holds the report.
+/// True if the run's folder holds a report.
 pub fn has_ended(folder: &Path) -> bool {
     folder.join(REPORT).exists()
 }
 
-/// Records the end of a run, with the reproducible values only.
+/// Records the report of a run, without values that differ between repetitions.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if it cannot be kept.
+/// [`CommandError::Broken`] if the record cannot be written.
 pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Result<(), CommandError> {
     let report = report.as_recorded();
     let mut draft = Draft { kept: true, ..Draft::new(REPORTED, now_ns.max(0)) };
@@ -158,7 +158,7 @@ pub(super) fn put_report(record: &Record, now_ns: i64, report: &Report) -> Resul
     record.put(draft).map(|_| ()).map_err(CommandError::broken)
 }
 
-/// Writes the report beside the record.
+/// Writes the report to the run's folder.
 ///
 /// # Errors
 /// [`CommandError::Broken`] if the folder cannot be written.
@@ -166,7 +166,7 @@ pub fn finish(folder: &Path, report: &Report) -> Result<(), CommandError> {
     write_json(&folder.join(REPORT), report)
 }
 
-/// Writes a file atomically.
+/// Writes a value with its checksum as a JSON file, atomically.
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     let bug = |e: serde_json::Error| CommandError::Bug(e.to_string());
     let mut value = serde_json::to_value(value).map_err(bug)?;
@@ -177,10 +177,10 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     written.map_err(|e| CommandError::broken(format!("{}: {e}", path.display())))
 }
 
-/// Maximum size of a run's file, bytes. From: chosen.
+/// Maximum size of a file in a run's folder, bytes. From: chosen.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Reads a JSON file of a run and verifies its checksum.
+/// Reads a JSON file of a run's folder and verifies its checksum.
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, String> {
     let shown = path.display();
     let bytes = read_bytes(path, MOST_BYTES).map_err(|e| format!("{shown}: {e}"))?;

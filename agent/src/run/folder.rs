@@ -1,4 +1,4 @@
-//! Folder of a run: created by one process, and locked while that process writes.
+//! Folder of a run, locked while a process writes there.
 
 use std::fs::{File, TryLockError, create_dir, create_dir_all};
 use std::io::ErrorKind;
@@ -10,20 +10,21 @@ use descry_domains::symbol::symbol;
 use super::files::is_run;
 use crate::exit::CommandError;
 
-/// Folder of a run, locked by this process.
+/// Folder of a run, locked by this process until dropped.
 pub struct Folder {
     path: PathBuf,
     _lock: File,
 }
 
-/// Lock file of a run.
+/// Name of the lock file.
 const LOCK: &str = "run.lock";
 
 impl Folder {
-    /// Folder of a new run: the requested one, or a numbered one under `runs/`.
+    /// Creates the folder of a new run: the requested one, or a new numbered one under `runs/`.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] if it holds a run already, if another process makes one there, or if it cannot be made.
+    /// [`CommandError::BadInput`] if the folder holds a run already, if another process is creating
+    /// one there, or if it cannot be created.
     pub fn of_new_run(asked: Option<&Path>, goal: &Goal) -> Result<Self, CommandError> {
         match asked {
             Some(folder) => Self::made(folder),
@@ -31,7 +32,7 @@ impl Folder {
         }
     }
 
-    /// Creates a new run's folder of this name.
+    /// Creates the folder of a new run at this path.
     ///
     /// # Errors
     /// As [`Folder::of_new_run`].
@@ -53,10 +54,11 @@ impl Folder {
         Ok(claimed)
     }
 
-    /// Folder of a run to be resumed, locked.
+    /// Locks the folder of a run that is to be resumed.
     ///
     /// # Errors
-    /// [`CommandError::BadInput`] if another process writes there, or if it cannot be written.
+    /// [`CommandError::BadInput`] if another process writes there, or if the folder cannot be
+    /// written.
     pub fn locked(folder: &Path) -> Result<Self, CommandError> {
         let lock = File::options().create(true).truncate(false).write(true).open(folder.join(LOCK));
         let lock = lock.map_err(|e| refused(folder, e))?;
@@ -70,7 +72,8 @@ impl Folder {
         }
     }
 
-    /// First free numbered folder; safe against concurrent creation.
+    /// Creates the first numbered folder that does not exist yet; safe if several processes do so
+    /// at the same time.
     fn numbered(stem: &Path) -> Result<Self, CommandError> {
         let parent = stem.parent().unwrap_or(Path::new("."));
         create_dir_all(parent).map_err(|e| {

@@ -1,34 +1,34 @@
-//! Settings of a run, in its folder and its record.
+//! Settings of a run, kept in its folder and its record.
 
 use serde::{Deserialize, Serialize};
 
 use crate::keeping::Keeping;
 
-/// Settings of a run, sufficient to start it again.
+/// Settings with which a run can be started again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// The body, as on the command line.
+    /// Body, as on the command line.
     pub robot: String,
-    /// The scene, if one was named.
+    /// Scene, if one was named.
     pub scene: Option<String>,
-    /// The seed.
+    /// Seed of all random choices.
     pub seed: u64,
-    /// The domain, as on the command line.
+    /// Domain, as on the command line.
     pub domain: String,
-    /// Name of the policy that chooses where to look next.
+    /// Name of the policy that chooses viewpoints.
     pub policy: String,
     /// Storage options of the record.
     #[serde(default)]
     pub keeping: Keeping,
-    /// Store of the persistent belief; `None`: nothing is remembered.
+    /// Store of the belief that persists between runs; `None`: nothing is remembered.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remember: Option<String>,
 }
 
-/// `run.json` in a run's folder.
+/// Content of `run.json` in a run's folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// Version of descry.
+    /// Version of descry that started the run.
     pub version: String,
     /// Goal in words.
     pub goal: String,
@@ -36,20 +36,20 @@ pub struct Header {
     pub pddl_goal: String,
     /// Start time, seconds since 1970.
     pub started_unix_s: u64,
-    /// The interruptions after which the run was resumed, in order.
+    /// Interruptions after which the run was resumed, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub resumed: Vec<Resumed>,
-    /// Settings that it was started with.
+    /// Settings with which the run was started.
     #[serde(flatten)]
     pub settings: Settings,
 }
 
-/// Note that a run was interrupted and resumed. It is kept outside the record, which equals that of
+/// Note that a run was interrupted and resumed. It is not part of the record, which equals that of
 /// an uninterrupted run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Resumed {
-    /// When, seconds since 1970.
+    /// Time of resumption, seconds since 1970.
     pub unix_s: u64,
-    /// Number of the last event before the interruption; `None` without events.
+    /// Record number of the last event before the interruption; `None` if there was none.
     pub after: Option<u64>,
 }

@@ -1,4 +1,4 @@
-//! Answers of a domain's programs, in the record of the run.
+//! Answers of a domain's programs, kept in the record of the run.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,27 +23,27 @@ struct Exchange {
     answered: Value,
 }
 
-/// Source and destination of programs' answers.
+/// Recording and replay of programs' answers.
 struct Programs {
     into: Arc<Record>,
     robot: Arc<TapedRobot>,
     played: Mutex<VecDeque<Exchange>>,
-    /// True if programs are run for questions without a recorded answer.
+    /// True if programs are run for questions that have no recorded answer.
     run: bool,
-    /// Reason why a replay could not continue.
+    /// Reason why a replay could not continue; `None` otherwise.
     ended: Mutex<Option<String>>,
 }
 
-/// A domain whose programs' answers are on record.
+/// Domain whose programs' answers are recorded and replayed.
 pub struct OnRecord {
-    /// The domain.
+    /// Domain, with its programs routed through the record.
     pub domain: Domain,
     programs: Option<Arc<Programs>>,
 }
 
 impl OnRecord {
-    /// Reason why a replay cannot continue: a program's question has no recorded answer; `None`
-    /// otherwise.
+    /// Reason why a replay could not continue, because a program's question has no recorded answer;
+    /// `None` otherwise.
     pub fn ended(&self) -> Option<String> {
         self.programs.as_ref()?.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -88,11 +88,12 @@ impl Tape for Programs {
     }
 }
 
-/// Domain whose programs' answers are recorded in `into`, and replayed `from` the record of an
-/// earlier session; programs are run for further questions only if `run`.
+/// Routes the programs of a domain through the record: answers are read `from` an earlier record as
+/// long as the questions are the same, and all answers are written to `into`. Further questions run
+/// the programs if `run`, and end the replay otherwise.
 ///
 /// # Errors
-/// [`CommandError::Broken`] if earlier answers cannot be read.
+/// [`CommandError::Broken`] if the earlier answers cannot be read.
 pub fn on_record(
     domain: &Domain,
     into: &Arc<Record>,
@@ -122,10 +123,11 @@ pub fn on_record(
     Ok(OnRecord { domain, programs: Some(programs) })
 }
 
-/// Checks that the programs named by a record may be run here.
+/// Checks that the programs which a record names may be run on this machine.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] names them, unless it is `allowed` or there are none.
+/// [`CommandError::BadInput`] naming the programs, unless running them is `allowed` or there are
+/// none.
 pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -> Result<(), CommandError> {
     let one = |(name, command): &(&str, &[String])| format!("\n    {name}: {}", command.join(" "));
     let elsewhere = robot.split_once(':').filter(|(kind, _)| ["program", "socket"].contains(kind));
@@ -140,7 +142,7 @@ pub fn check_allowed(domain: &Domain, robot: &str, place: &str, allowed: bool) -
     Err(CommandError::BadInput(text))
 }
 
-/// Programs of a domain that no function replaces.
+/// Programs of a domain, by name, that no function of the caller replaces.
 fn unbound(domain: &Domain) -> Vec<(&str, &[String])> {
     let config = &domain.config;
     let calls = config.attachments.iter().map(|(name, p)| ("attachments", name, Some(&p.program)));

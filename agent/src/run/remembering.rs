@@ -1,4 +1,5 @@
-//! Persistent belief: read from its store at the beginning of a run, written back at the end.
+//! Belief that persists between runs: read from a store at the beginning of a run, written back at
+//! the end.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,15 +13,16 @@ use crate::exit::CommandError;
 use crate::keeping::{Address, is_address};
 use crate::run::files::is_run;
 
-/// Maximum wait for another process that writes to the store.
+/// Maximum time to wait for another process that writes to the store.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 /// Interval between checks for the other process.
 const WAIT: Duration = Duration::from_millis(50);
 
-/// Memory of earlier runs in a store; empty for a new store.
+/// Belief remembered in a store; empty for a new store.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] if it is no store; [`CommandError::Broken`] if it cannot be read.
+/// [`CommandError::BadInput`] if the place is not a store; [`CommandError::Broken`] if it cannot be
+/// read.
 pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
     let is_new = !is_address(Path::new(store)) && !Path::new(store).exists();
     let remembered = if is_new { Ok(Remembered::default()) } else { Remembered::recall(&open(store)?) };
@@ -28,10 +30,11 @@ pub fn recall(store: &str, now_unix_s: f64) -> Result<Past, CommandError> {
     Ok(Past { remembered: Arc::new(remembered), now_unix_s })
 }
 
-/// Checks before a run that its store is writable and distinct from the run's own folder.
+/// Checks before a run that the store can be written and is not the run's own folder.
 ///
 /// # Errors
-/// [`CommandError::BadInput`] if that is no place for a store, or none that can be written; else as [`recall`].
+/// [`CommandError::BadInput`] if the place cannot be used as a store; otherwise those of
+/// [`recall`].
 pub fn check(store: &str, run: &Path) -> Result<(), CommandError> {
     let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     if !is_address(Path::new(store)) && whole(Path::new(store)) == whole(run) {
@@ -40,7 +43,8 @@ pub fn check(store: &str, run: &Path) -> Result<(), CommandError> {
     open(store).map(|_| ())
 }
 
-/// Writes what a run learned into a store, merged with what other runs wrote since `began`.
+/// Writes what a run leaves to a store, merged with what other runs have written since this one
+/// began.
 ///
 /// # Errors
 /// As [`recall`].
@@ -51,7 +55,7 @@ pub fn keep(store: &str, began: &Past, left: Remembered, now_unix_s: f64) -> Res
     joined.keep(&store, now_unix_s).map_err(CommandError::broken)
 }
 
-/// Opens or creates the store in a folder or at an address; waits for another process that writes
+/// Opens or creates the store in a folder or at an address; waits if another process is writing
 /// there.
 fn open(store: &str) -> Result<Record, CommandError> {
     let folder = Path::new(store);

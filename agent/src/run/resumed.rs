@@ -1,4 +1,4 @@
-//! Going on with a run that was cut off.
+//! Resuming an interrupted run.
 
 use std::path::Path;
 use std::time::Instant;
@@ -14,29 +14,29 @@ use crate::body;
 use crate::exit::CommandError;
 use crate::report::Report;
 
-/// Prepares a domain from a record for use.
+/// Function that prepares a domain read from a record, for example by binding functions.
 pub type Prepare<'a> = dyn Fn(&mut Domain) -> Result<(), CommandError> + Sync + 'a;
 
-/// Options for going on with a run.
+/// Options for resuming a run.
 pub struct GoingOn<'a> {
     /// The run's folder.
     pub folder: &'a Path,
-    /// Expected goal, if the caller states one.
+    /// Expected goal in words; `None`: any.
     pub said: Option<&'a str>,
-    /// Current address of the body, if changed since the beginning.
+    /// Body to use, as on the command line; `None`: the recorded one.
     pub robot: Option<&'a str>,
-    /// True if the programs named by the record may be run.
+    /// True if the programs that the record names may be run.
     pub allow_programs: bool,
-    /// Binds functions in place of programs.
+    /// Prepares the domain, for example by binding functions in place of programs.
     pub prepare: &'a Prepare<'a>,
 }
 
-/// Resumes a run from its record to its end, with the recorded goal and settings; `began` is called
-/// once the run is claimed.
+/// Resumes an interrupted run to its end, with the recorded goal and settings. `begun` is called
+/// once the run's folder is locked and its record open.
 ///
 /// # Errors
-/// [`CommandError`] as for [`super::pursue`]; if the run has another goal, if another process writes it, if its record is damaged, or
-/// if it names programs that are not allowed.
+/// [`CommandError`] as for [`super::pursue`]; also if the run has another goal, if another process
+/// writes it, if its record is damaged, or if it names programs that are not allowed.
 pub async fn resume(
     asked: &GoingOn<'_>,
     begun: &mut dyn FnMut() -> Result<(), CommandError>,

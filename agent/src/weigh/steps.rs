@@ -1,24 +1,24 @@
-//! Steps with exchanged objects, and steps that can be merged.
+//! Steps with other objects, and merging of consecutive steps.
 
 use descry_planner::task::{Change, Term};
 use descry_planner::{Semantics, Step};
 
-/// Substitution of objects.
+/// Substitution of objects: pairs of an old and a new name.
 pub struct Instead(pub Vec<(String, String)>);
 
 impl Instead {
-    /// Substitution of one step's objects by another's.
+    /// Substitution that turns the arguments of `old` into those of `new`.
     pub fn of(old: &Step, new: &Step) -> Self {
         let pairs = old.arguments.iter().zip(&new.arguments).filter(|(old, new)| old != new);
         Instead(pairs.map(|(old, new)| (old.clone(), new.clone())).collect())
     }
 
-    /// Step with the substitution applied.
+    /// Copy of a step with old names replaced by new ones.
     pub fn in_step(&self, step: &Step) -> Step {
         self.put(step, |name| self.0.iter().find(|(old, _)| old == name).map(|(_, new)| new))
     }
 
-    /// Step with the substitution applied in both directions, for exchanged order.
+    /// Copy of a step with old and new names exchanged in both directions.
     pub fn exchanged(&self, step: &Step) -> Step {
         let back = |name: &str| self.0.iter().find(|(_, new)| new == name).map(|(old, _)| old);
         self.put(step, |name| {
@@ -32,8 +32,8 @@ impl Instead {
     }
 }
 
-/// Merges consecutive steps of one action that lead from object to object (a to b, b to c) into
-/// one; `None` if none can be merged.
+/// Merges consecutive steps of one action that lead from object to object (a to b, then b to c)
+/// into one; `None` if there are none.
 pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     let mut all: Vec<Step> = Vec::new();
     for step in steps {
@@ -50,12 +50,12 @@ pub fn joined(steps: &[Step]) -> Option<Vec<Step>> {
     (all.len() < steps.len()).then_some(all)
 }
 
-/// True unless a step has exactly two arguments and they are equal, as it then leads nowhere.
+/// False if a step leads nowhere: it has two arguments, and these are equal.
 pub fn leads(step: &Step) -> bool {
     !matches!(step.arguments.as_slice(), [from, to] if from == to)
 }
 
-/// Objects in the atoms that a step adds.
+/// Objects in the atoms that a step adds; empty if the step does not fit the task.
 pub fn brought(semantics: &Semantics<'_>, step: &Step) -> Vec<String> {
     let Ok((action, _)) = semantics.bind(step) else { return Vec::new() };
     let effects = &semantics.task.action(action).effects;
@@ -71,7 +71,7 @@ pub fn brought(semantics: &Semantics<'_>, step: &Step) -> Vec<String> {
     added.flatten().filter_map(object).collect()
 }
 
-/// The words of a text in PDDL.
+/// Words of a PDDL text, without parentheses.
 pub fn words(text: &str) -> Vec<&str> {
     text.split(|c: char| c.is_whitespace() || "()".contains(c)).filter(|w| !w.is_empty()).collect()
 }
